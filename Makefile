@@ -1,0 +1,54 @@
+# navapp: two commands for a stranger, `make run` and `make test`.
+
+PYTHON ?= python3
+UV     ?= $(shell command -v uv 2>/dev/null)
+VENV   := .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
+
+SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 libx11-6 tmux
+
+.PHONY: run test check setup bench system-deps clean help
+
+help:           ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
+
+run: setup      ## the application on the simulated rig
+	@$(BIN)/navapp run
+
+test: setup check  ## the whole test suite
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck \
+	    $(BIN)/python -m pytest -q -k kernels tests
+
+check: setup    ## style, types, import rules
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+setup: $(STAMP)  ## .venv with pinned packages, kernels compiled
+
+$(STAMP): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "navapp needs Python 3.11 or newer; set PYTHON=..."; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || \
+	    { echo "a system package is missing; run: make system-deps"; exit 1; }
+	@test -x $(BIN)/python && $(BIN)/python -m pip --version >/dev/null 2>&1 || \
+	    { rm -rf $(VENV); $(PYTHON) -m venv $(VENV); }
+	@echo "installing the pinned packages into $(VENV) (once, some minutes)"
+ifneq ($(UV),)
+	@$(UV) pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[test]'
+else
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+endif
+	@echo "compiling the kernels (once)"
+	@$(BIN)/navapp --quiet run --headless --frames 8 || true
+	@rm -f $(VENV)/.stamp-* && touch $@
+
+system-deps:    ## Debian packages for everything beyond the simulated session
+	apt-get update -qq
+	apt-get install -y --no-install-recommends $(SYSTEM_DEPS)
+
+clean:          ## remove what was installed and built here
+	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache

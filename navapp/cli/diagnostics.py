@@ -1,0 +1,87 @@
+"""What the command line says on stderr, and its results as JSON."""
+
+import json
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from navapp import __version__
+from navapp.errors import InputError
+from navapp.geometry.ply import write_whole
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostics:
+    """How much is said."""
+
+    is_verbose: bool = False
+    is_quiet: bool = False
+    is_debugging: bool = False
+
+    def say(self, text: str) -> None:
+        """A result for people, on stdout."""
+        if not self.is_quiet:
+            sys.stdout.write(text + "\n")
+
+    def warn(self, text: str) -> None:
+        """Something that the user should know, on stderr."""
+        if not self.is_quiet:
+            sys.stderr.write(f"navapp: warning: {text}\n")
+
+    def progress(self, what: str, share: float) -> None:
+        """A bar on stderr, when that is a terminal."""
+        if self.is_quiet or not sys.stderr.isatty():
+            return
+        n = round(30 * min(max(share, 0.0), 1.0))
+        end = "\n" if share >= 1.0 else ""
+        sys.stderr.write(f"\r{what} [{'#' * n}{'.' * (30 - n)}] {100 * share:3.0f} %{end}")
+        sys.stderr.flush()
+
+
+def report(text: str) -> None:
+    """One error sentence on stderr."""
+    sys.stderr.write(f"navapp: error: {text}\n")
+
+
+def check_writable(path: str | None) -> None:
+    """Refuse a JSON target that cannot be written before the work begins."""
+    if path in (None, "-"):
+        return
+    parent = Path(str(path)).resolve().parent
+    if not parent.is_dir():
+        raise InputError(
+            f"folder {parent} for {path} does not exist",
+            subject=str(path),
+            remedy="make it, or choose another place",
+        )
+
+
+def write_json(path: str | None, command: str, content: Mapping[str, Any]) -> None:
+    """The result for programs: one object, never NaN."""
+    if path is None:
+        return
+    whole = {
+        "navapp": __version__,
+        "command": command,
+        "units": {"length": "mm", "angle": "deg"},
+        **content,
+    }
+    text = json.dumps(finite(whole), indent=1, allow_nan=False) + "\n"
+    if path == "-":
+        sys.stdout.write(text)
+    else:
+        write_whole(path, text.encode("utf-8"))
+
+
+def finite(value: Any) -> Any:
+    """The value with None for every number that JSON does not have."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return value

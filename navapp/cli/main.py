@@ -1,0 +1,64 @@
+"""The parser, and the one place where an error becomes an exit code."""
+
+import argparse
+import importlib
+from collections.abc import Sequence
+
+from navapp import __version__
+from navapp.cli.diagnostics import Diagnostics, report
+from navapp.errors import NavappError
+
+# Verb -> module with `add_parser(subparsers)` and `run(arguments, diagnostics) -> int`.
+_VERBS = ("run", "replay", "plan", "doctor", "config")
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Parse, do, and answer with the exit code of cli.md's table."""
+    parser = _parser()
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit as leaving:
+        # argparse leaves with 0 for --help and 2 for wrong usage, as we do.
+        return int(leaving.code or 0)
+    diagnostics = Diagnostics(
+        is_verbose=options.verbose, is_quiet=options.quiet, is_debugging=options.debug
+    )
+    module = importlib.import_module(f"navapp.cli.{options.verb}")
+    try:
+        return int(module.run(options, diagnostics))
+    except KeyboardInterrupt:
+        report("interrupted")
+        return 130
+    except NavappError as error:
+        if options.debug:
+            raise
+        report(str(error))
+        return error.exit_code
+    except BrokenPipeError:
+        return 0
+    except Exception as error:
+        if options.debug:
+            raise
+        report(
+            f"unexpected {type(error).__name__}: {error}; run again with --debug before the verb"
+        )
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="navapp",
+        description="Markerless navigation for knee replacement. Research software, not for "
+        "clinical use.",
+        epilog="example: navapp run        (the application on the simulated rig)",
+    )
+    parser.add_argument("--config", metavar="FILE", help="configuration file (TOML)")
+    parser.add_argument("--verbose", action="store_true", help="say more")
+    parser.add_argument("--quiet", action="store_true", help="say only errors")
+    parser.add_argument("--debug", action="store_true", help="show tracebacks")
+    parser.add_argument("--no-color", action="store_true", help="no colours in the output")
+    parser.add_argument("--version", action="version", version=f"navapp {__version__}")
+    subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
+    for verb in _VERBS:
+        importlib.import_module(f"navapp.cli.{verb}").add_parser(subparsers)
+    return parser

@@ -1,0 +1,293 @@
+"""The TOML configuration: frozen models that refuse unknown keys and name the nearest known one."""
+
+import difflib
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from navapp.errors import ConfigurationError
+
+FILE_NAME = "navapp.toml"
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Section(BaseModel):
+    """One table of the file."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True
+    )
+
+
+class SimulationSection(Section):
+    """The simulated patient and rig."""
+
+    seed: int = 1
+    """Of the anatomy, the textures, the placement and the motion."""
+    side: Literal["left", "right"] = "right"
+    """Of the knee."""
+    sex: Literal["female", "male"] = "female"
+    """Of the patient."""
+    age_group: Literal["young", "middle", "old"] = "middle"
+    """Of the patient."""
+    cartilage_mm: Annotated[float, Field(ge=0.0, le=3.0)] = 0.0
+    """Mean thickness of the cartilage that the camera sees and the plan does not; 0: bare bone."""
+    motion: Literal["still", "breathing", "patient", "jump"] = "breathing"
+    """Of the leg."""
+    instrument: Literal["none", "sweep"] = "none"
+    """What passes in front of the bone."""
+    scale: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    """Size of the pictures: 1.0 is 1280 x 720."""
+    stepped: bool | None = None
+    """Whether frames wait to be read; by default in headless sessions only."""
+    skew_ms: float = 0.0
+    """The right camera exposes later by this."""
+    grey: bool = False
+    """Grey pictures, like those of an OAK camera."""
+    faults: tuple[dict[str, Any], ...] = ()
+    """Scripted faults: tables with kind, start_s, duration_s."""
+
+
+class CameraSection(BaseModel):
+    """Where the pictures come from."""
+
+    # Tables of third-party devices, [camera.NAME], are passed through unchecked.
+    model_config = ConfigDict(
+        frozen=True, extra="allow", strict=True, use_attribute_docstrings=True
+    )
+
+    backend: str = "simulated"
+    """simulated, replay, or the name of an installed device."""
+    rig: str | None = None
+    """Rig file (OpenCV YAML); simulated cameras bring their own."""
+    rate_hz: Positive = 15.0
+    """Pairs per second asked for, or assumed where a recording has no times."""
+    depth_mm: tuple[Positive, Positive] = (300.0, 700.0)
+    """Nearest and farthest surface that is searched without a prediction."""
+    simulated: SimulationSection = SimulationSection()
+    """The simulated patient and rig."""
+
+
+class DisplaySection(Section):
+    """Where the overlay is shown."""
+
+    backend: Literal["simulated"] = "simulated"
+    """simulated."""
+    valid_ms: Positive = 250.0
+    """A picture without a newer one turns black after this."""
+
+
+class ProjectorSection(Section):
+    """The projector's control line."""
+
+    backend: Literal["none"] = "none"
+    """none."""
+
+
+class MirrorSection(Section):
+    """The mount of the half-silvered mirror."""
+
+    backend: Literal["fixed"] = "fixed"
+    """fixed."""
+    calibrated_deg: float = 45.0
+    """Angle at which the display was calibrated."""
+
+
+class PlanSection(Section):
+    """The pre-operative plan."""
+
+    path: str | None = None
+    """Plan folder; the simulated rig brings its own."""
+    prior: str | None = None
+    """JSON file with the rough start pose."""
+
+
+class TrackingSection(Section):
+    """The line."""
+
+    method: Literal["bimcc", "icp"] = "bimcc"
+    """icp is the paper's baseline."""
+
+
+class StagesSection(Section):
+    """The surgical stages."""
+
+    first: str = "opening"
+    """Name or number of the stage that a session starts in."""
+
+
+class RecordingSection(Section):
+    """Session folders."""
+
+    folder: str | None = None
+    """Record every session into this new folder."""
+    pictures: bool = True
+    """Keep the raw pairs (lossless PNG), so that the session can be replayed."""
+
+
+class EmptySection(Section):
+    """A table without keys."""
+
+
+class Configuration(Section):
+    """The whole file."""
+
+    camera: CameraSection = CameraSection()
+    display: DisplaySection = DisplaySection()
+    projector: ProjectorSection = ProjectorSection()
+    mirror: MirrorSection = MirrorSection()
+    plan: PlanSection = PlanSection()
+    stereo: EmptySection = EmptySection()
+    registration: EmptySection = EmptySection()
+    tracking: TrackingSection = TrackingSection()
+    calibration: EmptySection = EmptySection()
+    overlay: EmptySection = EmptySection()
+    stages: StagesSection = StagesSection()
+    recording: RecordingSection = RecordingSection()
+    link: EmptySection = EmptySection()
+    ui: EmptySection = EmptySection()
+
+
+def find_file(given: str | Path | None) -> Path | None:
+    """The file to read: the one given, ./navapp.toml, or the user's; None when there is none.
+
+    Raises:
+        ConfigurationError: the file given does not exist.
+    """
+    if given is not None:
+        if not Path(given).is_file():
+            raise ConfigurationError(
+                f"configuration file {given} does not exist",
+                subject=str(given),
+                remedy="write one with `navapp config init`",
+            )
+        return Path(given)
+    import platformdirs
+
+    for candidate in (
+        Path(FILE_NAME),
+        Path(platformdirs.user_config_dir("navapp", appauthor=False)) / FILE_NAME,
+    ):
+        if candidate.is_file() and os.access(candidate, os.R_OK):
+            return candidate
+    return None
+
+
+def load(path: Path | None) -> Configuration:
+    """Read a file; defaults when there is none.
+
+    Raises:
+        ConfigurationError: broken TOML, unknown key, wrong type, out of bounds.
+    """
+    if path is None:
+        return Configuration()
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            f"configuration file {path} cannot be read", subject=str(path), remedy=str(error)
+        ) from error
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError(
+            f"configuration file {path} is not valid TOML",
+            subject=str(path),
+            remedy=f"mend it: {error}",
+        ) from error
+    return parse(content, str(path))
+
+
+def parse(content: Mapping[str, Any], name: str) -> Configuration:
+    """Check the content of a file."""
+    try:
+        configuration = Configuration.model_validate(_tuples(content))
+    except ValidationError as error:
+        raise _one_sentence(error, name) from error
+    for key, value in (configuration.camera.model_extra or {}).items():
+        if not isinstance(value, Mapping):
+            raise _unknown_key(["camera", key], name)
+    return configuration
+
+
+def _tuples(value: Any) -> Any:
+    """Lists as tuples: TOML has the former, the frozen models the latter."""
+    if isinstance(value, Mapping):
+        return {key: _tuples(item) for key, item in value.items()}
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+def _one_sentence(error: ValidationError, name: str) -> ConfigurationError:
+    """The first problem, with the key's path and, for a typing error, the nearest known key."""
+    problem = error.errors()[0]
+    path = [str(part) for part in problem["loc"]]
+    key = ".".join(path)
+    if problem["type"] != "extra_forbidden":
+        return ConfigurationError(
+            f"{name}: {key}: {problem['msg'].lower()}", subject=key, remedy="correct the value"
+        )
+    return _unknown_key(path, name)
+
+
+def _unknown_key(path: list[str], name: str) -> ConfigurationError:
+    key = ".".join(path)
+    known = _known_keys(path[:-1])
+    near = difflib.get_close_matches(path[-1], known, 1)
+    remedy = (
+        f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known) or 'nothing'}"
+    )
+    return ConfigurationError(f"{name}: unknown key '{key}'", subject=key, remedy=remedy)
+
+
+def _known_keys(path: list[str]) -> list[str]:
+    model: type[BaseModel] = Configuration
+    for part in path:
+        annotation = model.model_fields[part].annotation if part in model.model_fields else None
+        if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+            return []
+        model = annotation
+    return list(model.model_fields)
+
+
+def as_toml(configuration: Configuration, with_comments: bool) -> str:
+    """The configuration as a TOML file; with comments it is a file to start from."""
+    lines = ["# navapp configuration: research software, not for clinical use", ""]
+    for name in Configuration.model_fields:
+        section = getattr(configuration, name)
+        lines += _table(name, type(section), section, with_comments)
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _table(name: str, model: type[BaseModel], values: BaseModel, with_comments: bool) -> list[str]:
+    lines = [f"[{name}]"]
+    inner: list[str] = []
+    for key, field in model.model_fields.items():
+        value = getattr(values, key)
+        if isinstance(value, BaseModel):
+            inner += _table(f"{name}.{key}", type(value), value, with_comments)
+            continue
+        if with_comments and field.description:
+            lines.append(f"# {field.description}")
+        # A key without a value is shown, but commented out: TOML has no null.
+        lines.append(f"# {key} =" if value is None else f"{key} = {_literal(value)}")
+    for key, value in (values.model_extra or {}).items():
+        if isinstance(value, Mapping):
+            inner += [f"[{name}.{key}]", *(f"{k} = {_literal(v)}" for k, v in value.items()), ""]
+    return [*lines, "", *inner]
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{k} = {_literal(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_literal(item) for item in value) + "]"
+    return repr(value)

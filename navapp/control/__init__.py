@@ -1,0 +1,1 @@
+"""Session controller, states, stages, interlocks, events and the recorder."""

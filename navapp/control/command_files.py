@@ -1,0 +1,64 @@
+"""Commands as JSON, for a session's event file."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from navapp.control.states import (
+    Accept,
+    Blank,
+    Cancel,
+    Command,
+    EnterStage,
+    Propose,
+    Quit,
+    Reconnect,
+    Register,
+    Reject,
+    Show,
+)
+from navapp.errors import SequenceError
+from navapp.geometry.transform import RigidTransform
+
+_PLAIN: dict[str, type] = {
+    "register": Register,
+    "cancel": Cancel,
+    "accept": Accept,
+    "reject": Reject,
+    "blank": Blank,
+    "show": Show,
+    "reconnect": Reconnect,
+    "quit": Quit,
+}
+_NAMES = {kind: name for name, kind in _PLAIN.items()}
+
+
+def command_to_json(command: Command) -> dict[str, Any]:
+    """A command as a JSON object."""
+    if isinstance(command, EnterStage):
+        return {"command": "stage", "number": command.number}
+    if isinstance(command, Propose):
+        pose = command.left_from_bone
+        return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
+    return {"command": _NAMES[type(command)]}
+
+
+def command_from_json(value: Mapping[str, Any]) -> Command:
+    """The command of such an object.
+
+    Raises:
+        SequenceError: it is none.
+    """
+    name = value.get("command")
+    try:
+        if name == "stage":
+            return EnterStage(int(value["number"]))
+        if name == "propose":
+            matrix = value["camera_from_model"]
+            return Propose(RigidTransform("left", str(value["bone"]), matrix))
+        command: Command = _PLAIN[str(name)]()
+        return command
+    except (KeyError, ValueError, TypeError) as error:
+        raise SequenceError(
+            f"the session's events hold an unknown command '{name}'",
+            remedy="replay it with the version that recorded it",
+        ) from error

@@ -1,0 +1,42 @@
+"""The one answer to «may guides be shown?»: display, overlay, log and screen all use it."""
+
+from navapp.control.states import SessionState, Snapshot
+from navapp.values import Reason, Status
+
+# A pose older than this shows where the bone was, not where it is.
+MAX_POSE_AGE_MS = 500.0
+
+
+def navigable(snapshot: Snapshot) -> tuple[Reason, ...]:
+    """Why guides must not be shown, the most urgent first; empty means they may.
+
+    A pure function of the snapshot, whose own `reasons` are not looked at.
+    """
+    reasons: list[Reason] = []
+    if snapshot.is_blanked:
+        reasons.append(Reason.BLANKED)
+    if snapshot.state is SessionState.FAULT:
+        reasons.append(Reason.DEVICE_FAULT)
+    if snapshot.is_camera_silent:
+        reasons.append(Reason.CAMERA_SILENT)
+    if not snapshot.is_bone_planned:
+        reasons.append(Reason.STAGE_WITHOUT_BONE)
+    if snapshot.state is SessionState.SUSPENDED:
+        reasons.append(Reason.BONE_LOST)
+    elif snapshot.state is not SessionState.NAVIGATING:
+        reasons.append(Reason.NOT_NAVIGATING)
+    if snapshot.state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
+        reasons += _of_pose(snapshot)
+    return tuple(reasons)
+
+
+def _of_pose(snapshot: Snapshot) -> list[Reason]:
+    verdict = snapshot.verdict
+    if verdict is None or snapshot.left_from_bone is None:
+        return [Reason.BONE_LOST] if snapshot.state is SessionState.NAVIGATING else []
+    reasons: list[Reason] = []
+    if verdict.status is not Status.OK:
+        reasons += verdict.reasons or (Reason.BONE_LOST,)
+    if snapshot.pose_age_ms is None or snapshot.pose_age_ms > MAX_POSE_AGE_MS:
+        reasons.append(Reason.POSE_TOO_OLD)
+    return reasons

@@ -1,0 +1,221 @@
+"""Operators that are not people: a script, a recording, and the plain one of a replay.
+
+An operator sees snapshots, as a person does, and answers with commands.
+"""
+
+import json
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from navapp.control.command_files import command_from_json
+from navapp.control.stages import stage_by_name
+from navapp.control.states import (
+    Accept,
+    Blank,
+    Command,
+    EnterStage,
+    Propose,
+    Register,
+    Reject,
+    SessionState,
+    Show,
+    Snapshot,
+)
+from navapp.errors import ConfigurationError, SequenceError
+from navapp.values import Status
+
+_MAX_ATTEMPTS = 8
+
+
+class Operator(Protocol):
+    """Decides."""
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """What to do now."""
+        ...
+
+
+class ReplayOperator:
+    """Registers, accepts what the judge does not call lost, and registers again when asked to."""
+
+    def __init__(self, *, each_frame: bool = False) -> None:
+        self._each_frame = each_frame
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """Register when nothing is known, accept what is under review."""
+        if snapshot.state in (SessionState.STARTING, SessionState.READY):
+            return [Register()]
+        if self._each_frame and snapshot.state is SessionState.REVIEW:
+            return [Register()]
+        if snapshot.state is SessionState.REVIEW:
+            is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
+            return [Reject() if is_lost else Accept()]
+        return []
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptStep:
+    """One line of an operator's script.
+
+    Attributes:
+        do: `register`; `propose` (offer the found pose, turned, to see the judge refuse it);
+            `stage`, `blank`, `show`.
+        turn_deg: of a proposed pose.
+        stage: of a `stage` step.
+        at_frame: not before this frame.
+    """
+
+    do: Literal["register", "propose", "stage", "blank", "show"]
+    turn_deg: float = 15.0
+    stage: str = ""
+    at_frame: int = 0
+
+
+# Offers a wrong pose first: a judge that takes it is worth nothing.
+DEFAULT_SCRIPT = (ScriptStep("propose"), ScriptStep("register"))
+
+
+class ScriptedOperator:
+    """Follows a script; accepts a candidate only when the judge says OK, rejects all others."""
+
+    def __init__(self, steps: tuple[ScriptStep, ...] = DEFAULT_SCRIPT) -> None:
+        self._steps = deque(steps)
+        self._n_attempts = 0
+        self._phase: Literal["idle", "registering", "proposed"] = "idle"
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """The next action of the script, when its time has come."""
+        if snapshot.state is SessionState.REVIEW:
+            return self._decide(snapshot)
+        if not self._steps or snapshot.sequence < self._steps[0].at_frame:
+            return []
+        step = self._steps[0]
+        if step.do in ("register", "propose"):
+            return self._begin(snapshot)
+        self._steps.popleft()
+        if step.do == "stage":
+            return [EnterStage(stage_by_name(step.stage).number)]
+        return [Blank() if step.do == "blank" else Show()]
+
+    def _begin(self, snapshot: Snapshot) -> list[Command]:
+        if snapshot.state not in (SessionState.READY, SessionState.SUSPENDED):
+            return []
+        self._n_attempts += 1
+        if self._n_attempts > _MAX_ATTEMPTS:
+            self._steps.clear()
+            return []
+        self._phase = "registering"
+        return [Register()]
+
+    def _decide(self, snapshot: Snapshot) -> list[Command]:
+        """On a candidate: turn it, accept it or reject it."""
+        if snapshot.verdict is None or snapshot.left_from_bone is None:
+            return []
+        step = self._steps[0] if self._steps else ScriptStep("register")
+        if step.do == "propose" and self._phase == "registering":
+            self._phase = "proposed"
+            turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
+            pose = snapshot.left_from_bone
+            # About a point of the bone: where the model's origin is, in the camera.
+            return [Reject(), Propose(pose.moved(turn, pose.translation_mm))]
+        if snapshot.verdict.status is not Status.OK:
+            if self._phase == "proposed":
+                self._next_step()
+            return [Reject()]
+        self._next_step()
+        return [Accept()]
+
+    def _next_step(self) -> None:
+        self._phase = "idle"
+        self._n_attempts = 0
+        if self._steps:
+            self._steps.popleft()
+
+
+class RecordedOperator:
+    """Gives the commands of a recorded session after the same frames."""
+
+    def __init__(self, commands: list[tuple[int, Command]]) -> None:
+        self._commands = deque(commands)
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """Those that were given by now."""
+        due: list[Command] = []
+        while self._commands and self._commands[0][0] <= snapshot.sequence:
+            due.append(self._commands.popleft()[1])
+        return due
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedEvents:
+    """What `events.jsonl` of a session says.
+
+    Attributes:
+        commands: (after which frame, command).
+        take_overs: before which frames a registration's result was used.
+    """
+
+    commands: list[tuple[int, Command]]
+    take_overs: list[int]
+
+
+def read_events(path: str | Path) -> RecordedEvents:
+    """Read a session's events.
+
+    Raises:
+        SequenceError: damaged or cut short.
+    """
+    commands: list[tuple[int, Command]] = []
+    take_overs: list[int] = []
+    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), start=1):
+        try:
+            value: dict[str, Any] = json.loads(line)
+            sequence = int(value["sequence"])
+        except (ValueError, KeyError, TypeError) as error:
+            raise SequenceError(
+                f"line {number} of {path} is damaged",
+                subject=str(path),
+                remedy="the session was not recorded to its end; delete that line to use the rest",
+            ) from error
+        if value.get("type") == "command":
+            commands.append((sequence, command_from_json(value)))
+        elif value.get("type") == "take_over":
+            take_overs.append(sequence)
+    return RecordedEvents(commands, take_overs)
+
+
+def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]:
+    """Steps of an operator's script: `[[step]]` tables with do, turn_deg, stage, at_frame.
+
+    Raises:
+        ConfigurationError: an unknown key, action or stage.
+    """
+    steps = []
+    for number, entry in enumerate(content.get("step", []), start=1):
+        try:
+            step = ScriptStep(**entry)
+        except TypeError as error:
+            raise ConfigurationError(
+                f"{name}: step {number} has an unknown key",
+                subject=name,
+                remedy="known are do, turn_deg, stage, at_frame",
+            ) from error
+        if step.do not in ("register", "propose", "stage", "blank", "show"):
+            raise ConfigurationError(
+                f"{name}: step {number} does '{step.do}', which is unknown",
+                subject=name,
+                remedy="known are register, propose, stage, blank, show",
+            )
+        if step.do == "stage":
+            stage_by_name(step.stage)
+        steps.append(step)
+    if not steps or set(content) - {"step"}:
+        raise ConfigurationError(
+            f"{name} is no operator's script", subject=name, remedy="it holds [[step]] tables only"
+        )
+    return tuple(steps)

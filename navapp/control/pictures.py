@@ -1,0 +1,64 @@
+"""The picture for the display, from what the session knows."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.control.states import SessionState, Snapshot
+from navapp.geometry.rig import StereoRig
+from navapp.overlay import compose_video
+from navapp.overlay.layers import Scene
+from navapp.values import Plan
+
+Image = NDArray[np.uint8]
+
+
+def compose(left: Image, snapshot: Snapshot, rig: StereoRig, plan: Plan, mark: str) -> Image:
+    """The left picture with guides, a marked candidate, or the reason why there are none.
+
+    Args:
+        left: picture of the frame that the snapshot's pose belongs to.
+        snapshot: its `reasons` decide; nothing else does.
+        rig: whose left camera took the picture.
+        plan: what to draw.
+        mark: words for the corner.
+    """
+    return compose_video(left, _scene(snapshot, rig, plan), banner(snapshot), mark)
+
+
+def banner(snapshot: Snapshot) -> str:
+    """One line: what the picture is."""
+    stage = f"{snapshot.stage.number} {snapshot.stage.name}"
+    if snapshot.is_navigable and snapshot.verdict is not None:
+        bound_mm = snapshot.verdict.predicted_tre_mm
+        error = "" if bound_mm is None else f" - error <= {bound_mm:.2f} mm"
+        return f"{stage} - NAVIGATING{error}"
+    if snapshot.is_candidate:
+        return f"{stage} - CANDIDATE, not accepted"
+    why = snapshot.reasons[0].value if snapshot.reasons else ""
+    return f"{stage} - NO GUIDES: {why}"
+
+
+def _scene(snapshot: Snapshot, rig: StereoRig, plan: Plan) -> Scene | None:
+    """What may be drawn; None for no guides."""
+    is_candidate = snapshot.state is SessionState.REVIEW and not snapshot.is_blanked
+    bone = plan.bones.get(snapshot.stage.bone)
+    if bone is None or snapshot.left_from_bone is None:
+        return None
+    if not (snapshot.is_navigable or is_candidate):
+        return None
+    return Scene(plan, snapshot.stage, bone.mesh, snapshot.left_from_bone, rig.left, is_candidate)
+
+
+def fitted(image: Image, width: int, height: int) -> Image:
+    """The picture at a display's size: scaled as a whole, black at two sides when it must be."""
+    import cv2
+
+    if image.shape[:2] == (height, width):
+        return image
+    factor = min(width / image.shape[1], height / image.shape[0])
+    size = (max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor)))
+    scaled = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    out = np.zeros((height, width, 3), dtype=np.uint8)
+    x, y = (width - size[0]) // 2, (height - size[1]) // 2
+    out[y : y + size[1], x : x + size[0]] = scaled
+    return out

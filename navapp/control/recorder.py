@@ -1,0 +1,91 @@
+"""A session's folder: pictures and times by a frame sink, everything else here.
+
+session.json   version, plan, options       rig.yml, prior.json, plan/
+frames.csv     one line a frame              left_*.png, right_*.png
+events.jsonl   commands, events and when a registration was taken over
+poses.jsonl    pose and verdict of every frame
+"""
+
+import json
+from pathlib import Path
+from typing import Any, Protocol, TextIO
+
+from drivers.frames import StereoFrame
+from navapp.control.command_files import command_to_json
+from navapp.control.results import FrameResult
+from navapp.control.states import Command, Event
+
+
+class FrameSink(Protocol):
+    """Keeps frames."""
+
+    def add(self, frame: StereoFrame, with_pictures: bool) -> None:
+        """Keep one."""
+        ...
+
+    def close(self) -> None:
+        """No more will come."""
+        ...
+
+
+class SessionRecorder:
+    """Listens to a controller and writes the session folder; every line is flushed."""
+
+    def __init__(self, folder: Path, frames: FrameSink, *, with_pictures: bool = True) -> None:
+        self._frames = frames
+        self._with_pictures = with_pictures
+        self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
+        self._poses: TextIO = (folder / "poses.jsonl").open("w", encoding="utf-8")
+
+    def on_frame(self, result: FrameResult) -> None:
+        """A frame was handled."""
+        self._frames.add(result.frame, self._with_pictures)
+        tracked = result.tracked
+        pose = None if tracked is None else tracked.left_from_bone
+        verdict = None if tracked is None else tracked.verdict
+        _write(
+            self._poses,
+            {
+                "sequence": result.frame.sequence,
+                "bone": result.stage.bone,
+                "state": result.state.value,
+                "status": None if verdict is None else verdict.status.value,
+                "camera_from_model": None if pose is None else pose.to_list(),
+            },
+        )
+
+    def on_command(self, command: Command, after_sequence: int) -> None:
+        """A command is about to be handled."""
+        _write(
+            self._events,
+            {"type": "command", "sequence": after_sequence, **command_to_json(command)},
+        )
+
+    def on_take_over(self, before_sequence: int) -> None:
+        """A registration's result is used from that frame on."""
+        _write(self._events, {"type": "take_over", "sequence": before_sequence})
+
+    def on_event(self, event: Event) -> None:
+        """Something happened."""
+        _write(
+            self._events,
+            {
+                "type": "event",
+                "sequence": event.sequence,
+                "time_ns": event.time_ns,
+                "kind": event.kind,
+                "level": event.level.value,
+                "text": event.text,
+            },
+        )
+
+    def close(self) -> None:
+        """End the files."""
+        self._frames.close()
+        self._events.close()
+        self._poses.close()
+
+
+def _write(stream: TextIO, value: dict[str, Any]) -> None:
+    stream.write(json.dumps(value) + "\n")
+    stream.flush()

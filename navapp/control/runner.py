@@ -1,0 +1,65 @@
+"""Who turns the controller's crank: a loop for headless sessions, a thread for the screen."""
+
+import threading
+from collections.abc import Callable
+
+from navapp.control.controller import SessionController
+from navapp.control.operators import Operator
+from navapp.control.states import Command, Snapshot
+
+
+def run_headless(
+    controller: SessionController,
+    operator: Operator,
+    is_done: Callable[[], bool] = lambda: False,
+) -> Snapshot:
+    """Step until the source ends or `is_done`; the operator answers every snapshot."""
+    snapshot = controller.snapshot
+    while not (snapshot.is_over or is_done()):
+        commands = operator.commands(snapshot)
+        for command in commands:
+            controller.submit(command)
+        for _ in commands:
+            snapshot = controller.step()
+        # A frame between two looks of the operator, as for a person.
+        snapshot = controller.step()
+    return snapshot
+
+
+class SessionRunner:
+    """Steps a controller in a thread of its own; what a screen needs of it never blocks."""
+
+    def __init__(self, controller: SessionController) -> None:
+        self._controller = controller
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
+        self.error: Exception | None = None
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def snapshot(self) -> Snapshot:
+        """The newest one."""
+        return self._controller.snapshot
+
+    def submit(self, command: Command) -> None:
+        """Hand a command over."""
+        self._controller.submit(command)
+
+    def stop(self) -> None:
+        """End the loop and close the devices; safe to call twice."""
+        self._stopping.set()
+        if self._thread.ident is not None:
+            self._thread.join(10.0)
+        else:
+            self._controller.close()
+
+    def _run(self) -> None:
+        try:
+            while not self._stopping.is_set() and not self._controller.snapshot.is_over:
+                self._controller.step()
+        except Exception as error:  # noqa: BLE001 (kept for the caller; the display must go dark)
+            self.error = error
+        finally:
+            self._controller.close()

@@ -1,0 +1,91 @@
+"""The five surgical stages: one declarative table.
+
+Tolerances are those of the plan's targets at that stage. Layers (`navapp.overlay.layers`) are drawn
+in the order given. Gates are what the operator confirms by entering the next stage.
+Source: the paper, section 4 (opening, drilling, implant, patella, spacer).
+"""
+
+from navapp.errors import UsageError
+from navapp.values import StageSpec
+
+STAGES: tuple[StageSpec, ...] = (
+    StageSpec(
+        number=1,
+        name="opening",
+        bone="femur",
+        tolerance_mm=2.0,
+        tolerance_deg=2.0,
+        targets=("femur/medial_condyle", "femur/lateral_condyle", "femur/notch"),
+        layers=("bone", "curves", "targets"),
+        gates=("bone exposed", "registration accepted"),
+    ),
+    StageSpec(
+        number=2,
+        name="drilling",
+        bone="femur",
+        tolerance_mm=1.0,
+        tolerance_deg=1.0,
+        targets=("femur/notch",),
+        layers=("bone", "curves", "targets"),
+        gates=("entry point checked with the tip",),
+        measurements=("drill angle", "drill offset", "drill depth"),
+    ),
+    StageSpec(
+        number=3,
+        name="implant",
+        bone="femur",
+        tolerance_mm=1.0,
+        tolerance_deg=1.0,
+        targets=("femur/medial_condyle", "femur/lateral_condyle"),
+        layers=("bone", "targets"),
+        gates=("cuts checked", "component size confirmed"),
+        measurements=("varus or valgus", "flexion", "rotation", "resection"),
+    ),
+    StageSpec(
+        number=4,
+        name="patella",
+        bone="patella",
+        tolerance_mm=1.0,
+        tolerance_deg=2.0,
+        targets=("patella/centre",),
+        layers=("bone", "targets"),
+        gates=("thickness measured",),
+        measurements=("thickness", "tilt"),
+    ),
+    StageSpec(
+        number=5,
+        name="spacer",
+        bone="tibia",
+        tolerance_mm=1.0,
+        tolerance_deg=1.0,
+        targets=("tibia/medial_plateau", "tibia/lateral_plateau"),
+        layers=("bone", "targets"),
+        gates=("gaps measured",),
+        measurements=("medial gap", "lateral gap", "slope"),
+    ),
+)
+
+
+def stage_by_number(number: int) -> StageSpec:
+    """The stage with that number.
+
+    Raises:
+        UsageError: there is none.
+    """
+    for stage in STAGES:
+        if stage.number == number:
+            return stage
+    raise UsageError(f"there is no stage {number}", remedy=f"choose 1 to {len(STAGES)}")
+
+
+def stage_by_name(name: str) -> StageSpec:
+    """The stage with that name, or with that number as text.
+
+    Raises:
+        UsageError: there is none.
+    """
+    for stage in STAGES:
+        if name.lower() in (stage.name, str(stage.number)):
+            return stage
+    names = ", ".join(stage.name for stage in STAGES)
+    raise UsageError(f"there is no stage '{name}'", remedy=f"choose one of {names}")

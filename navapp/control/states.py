@@ -1,0 +1,214 @@
+"""States of a session, an operator's commands, and the snapshot that all clients read."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import RigidTransform
+from navapp.values import Reason, StageSpec, Status, Verdict
+
+
+class SessionState(Enum):
+    """OFFLINE -> STARTING -> READY -> REGISTERING -> REVIEW -> NAVIGATING <-> SUSPENDED; FAULT."""
+
+    OFFLINE = "offline"
+    STARTING = "starting"
+    READY = "ready"
+    REGISTERING = "registering"
+    REVIEW = "review"
+    NAVIGATING = "navigating"
+    SUSPENDED = "suspended"
+    FAULT = "fault"
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """Start the first registration (again) from the session's prior."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """Stop the registration that is running."""
+
+
+@dataclass(frozen=True, slots=True)
+class Propose:
+    """Offer a pose by hand as the candidate; it is judged as it stands, not refined."""
+
+    left_from_bone: RigidTransform
+
+
+@dataclass(frozen=True, slots=True)
+class Accept:
+    """Take the candidate under review."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reject:
+    """Refuse the candidate under review."""
+
+
+@dataclass(frozen=True, slots=True)
+class Blank:
+    """Make the display black until `Show`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Show:
+    """Leave blank."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnterStage:
+    """Go to a stage by its number, 1 to 5."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reconnect:
+    """Try to open lost devices again, now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quit:
+    """End the session."""
+
+
+Command = (
+    Register | Cancel | Propose | Accept | Reject | Blank | Show | EnterStage | Reconnect | Quit
+)
+
+
+class EventLevel(Enum):
+    """How loud an event is; ALARM rings the terminal's bell once."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ALARM = "alarm"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened.
+
+    Attributes:
+        time_ns: on the session's clock.
+        kind: short name for programs, for example `state`, `stage`, `accept`, `device`.
+        text: one line for people.
+        sequence: the frame after which it happened, -1 before the first.
+    """
+
+    time_ns: int
+    kind: str
+    text: str
+    level: EventLevel = EventLevel.INFO
+    sequence: int = -1
+
+
+class DeviceHealth(Enum):
+    """As shown in the devices panel."""
+
+    OK = "ok"
+    ABSENT = "absent"
+    TROUBLE = "trouble"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLine:
+    """One device in the devices panel."""
+
+    kind: str
+    name: str
+    health: DeviceHealth
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """How the line runs; None before there is a figure.
+
+    Attributes:
+        frames_per_s: over the last seconds.
+        latency_ms: capture to result of the newest frame.
+        fps_history, latency_history_ms: the last values, oldest first, for sparklines.
+        n_frames: handled so far.
+        n_dropped: replaced by newer ones before the line took them.
+        skew_ms: between the two cameras, newest frame.
+    """
+
+    frames_per_s: float | None = None
+    latency_ms: float | None = None
+    fps_history: tuple[float, ...] = ()
+    latency_history_ms: tuple[float, ...] = ()
+    n_frames: int = 0
+    n_dropped: int = 0
+    skew_ms: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Long work that is running."""
+
+    what: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """All that a client may show, immutable; the newest wins.
+
+    Attributes:
+        state: of the session.
+        stage: in force.
+        stages: all five, in order.
+        reasons: why guides are not shown; empty means navigable.
+        verdict: on the newest pose, None before there is one.
+        left_from_bone: the newest pose, None when there is none.
+        is_candidate: the pose waits for the operator's decision.
+        pose_age_ms: of that pose, now.
+        preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
+            the first frame.
+        is_bone_planned: the plan has a model of the stage's bone.
+        is_camera_silent: no picture has come for longer than the camera's period explains.
+        events: the newest, oldest first.
+        headline: identity of the rig, side and plan, for the title line.
+    """
+
+    time_ns: int
+    state: SessionState
+    stage: StageSpec
+    stages: tuple[StageSpec, ...]
+    reasons: tuple[Reason, ...]
+    is_blanked: bool = False
+    verdict: Verdict | None = None
+    left_from_bone: RigidTransform | None = None
+    is_candidate: bool = False
+    pose_age_ms: float | None = None
+    preview: NDArray[np.uint8] | None = None
+    rates: Rates = field(default_factory=Rates)
+    devices: tuple[DeviceLine, ...] = ()
+    events: tuple[Event, ...] = ()
+    progress: Progress | None = None
+    rig_name: str = ""
+    plan_name: str = ""
+    plan_digest: str = ""
+    side: str = ""
+    sequence: int = -1
+    is_bone_planned: bool = True
+    is_camera_silent: bool = False
+    is_recording: bool = False
+    is_over: bool = False
+
+    @property
+    def is_navigable(self) -> bool:
+        """Guides may be shown."""
+        return not self.reasons
+
+    @property
+    def is_ok(self) -> bool:
+        """The judge says OK."""
+        return self.verdict is not None and self.verdict.status is Status.OK

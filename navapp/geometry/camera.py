@@ -1,0 +1,110 @@
+"""A calibrated camera: pinhole with OpenCV's polynomial distortion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from navapp.geometry.transform import FloatArray, read_only
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics of one camera, OpenCV axes (x right, y down, z forward).
+
+    Pixel (0, 0) is the centre of the top-left pixel.
+
+    Attributes:
+        matrix: (3, 3) K, px.
+        distortion: (n,) OpenCV coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1..s4 [tx ty]]]]; n may
+            be 0, 4, 5, 8, 12 or 14.
+        width, height: of the picture, px.
+
+    Raises:
+        ValueError: a shape or a value that no camera has.
+    """
+
+    matrix: FloatArray
+    distortion: FloatArray
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        matrix = read_only(self.matrix)
+        distortion = read_only(np.asarray(self.distortion, dtype=np.float64).reshape(-1))
+        if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+            raise ValueError("a camera matrix is a finite 3x3 matrix")
+        if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
+            raise ValueError("focal lengths must be positive")
+        if distortion.size not in (0, 4, 5, 8, 12, 14) or not np.isfinite(distortion).all():
+            raise ValueError("distortion needs 0, 4, 5, 8, 12 or 14 finite coefficients")
+        if self.width <= 0 or self.height <= 0:
+            raise ValueError("width and height must be positive")
+        object.__setattr__(self, "matrix", matrix)
+        object.__setattr__(self, "distortion", distortion)
+
+    @property
+    def focal_px(self) -> float:
+        """Mean focal length in px."""
+        return float(0.5 * (self.matrix[0, 0] + self.matrix[1, 1]))
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether straight lines bend."""
+        return bool(np.any(self.distortion != 0.0))
+
+    def project(self, points_mm: ArrayLike) -> FloatArray:
+        """(N, 2) px of points (N, 3) mm in this camera's frame; NaN at or behind the camera."""
+        points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 3)
+        pixels = np.full((len(points), 2), np.nan)
+        front = points[:, 2] > 1e-6
+        if not front.any():
+            return pixels
+        x = points[front, 0] / points[front, 2]
+        y = points[front, 1] / points[front, 2]
+        if self.is_distorted:
+            x, y = distort(x, y, self.distortion)
+        pixels[front, 0] = self.matrix[0, 0] * x + self.matrix[0, 1] * y + self.matrix[0, 2]
+        pixels[front, 1] = self.matrix[1, 1] * y + self.matrix[1, 2]
+        return pixels
+
+    def rays(self, pixels: ArrayLike) -> FloatArray:
+        """(N, 3) directions with z = 1 through pixels (N, 2), distortion removed."""
+        import cv2
+
+        points = np.array(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-12)
+        flat = cv2.undistortPoints(
+            points, np.array(self.matrix), np.array(self.distortion), criteria=criteria
+        )
+        flat = flat.reshape(-1, 2)
+        return np.column_stack([flat, np.ones(len(flat))])
+
+    def scaled(self, factor: float) -> "Camera":
+        """The same camera with its picture resized: u' = s (u + 0.5) - 0.5."""
+        matrix = np.array(self.matrix)
+        matrix[:2, 2] += 0.5
+        matrix[:2] *= factor
+        matrix[:2, 2] -= 0.5
+        return Camera(
+            matrix,
+            self.distortion,
+            max(1, round(self.width * factor)),
+            max(1, round(self.height * factor)),
+        )
+
+
+def distort(x: FloatArray, y: FloatArray, distortion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distorted normalised coordinates of undistorted ones (OpenCV's model up to thin prism)."""
+    k = np.zeros(14)
+    k[: distortion.size] = distortion
+    if k[12] != 0.0 or k[13] != 0.0:
+        raise ValueError("a tilted sensor (tx, ty) is not supported")
+    r2 = x * x + y * y
+    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (
+        1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
+    )
+    xy2 = 2.0 * x * y
+    x_distorted = x * radial + k[2] * xy2 + k[3] * (r2 + 2.0 * x * x) + k[8] * r2 + k[9] * r2 * r2
+    y_distorted = y * radial + k[2] * (r2 + 2.0 * y * y) + k[3] * xy2 + k[10] * r2 + k[11] * r2 * r2
+    return x_distorted, y_distorted

@@ -1,0 +1,109 @@
+"""Triangle meshes: the surface of a bone, an instrument, a drape."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray, RigidTransform, read_only
+
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TriangleMesh:
+    """Vertices in mm and triangles seen counter-clockwise from outside.
+
+    Attributes:
+        vertices_mm: (V, 3) float64.
+        faces: (F, 3) int32 indices into the vertices.
+        normals: (V, 3) float64 unit vertex normals, area weighted; computed when not given.
+
+    Raises:
+        ValueError: wrong shapes, an index out of range, a value that is not finite.
+    """
+
+    vertices_mm: FloatArray
+    faces: IntArray
+    normals: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+
+    def __post_init__(self) -> None:
+        vertices = read_only(self.vertices_mm)
+        faces = read_only(self.faces, np.int32)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
+            raise ValueError("vertices must be finite and of shape (V, 3)")
+        if faces.ndim != 2 or faces.shape[1] != 3:
+            raise ValueError("faces must be of shape (F, 3)")
+        if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
+            raise ValueError("a face names a vertex that does not exist")
+        normals = self.normals
+        if len(normals) == 0:
+            normals = vertex_normals(vertices, faces)
+        if normals.shape != vertices.shape:
+            raise ValueError("there must be one normal per vertex")
+        object.__setattr__(self, "vertices_mm", vertices)
+        object.__setattr__(self, "faces", faces)
+        object.__setattr__(self, "normals", read_only(normals))
+
+    @property
+    def centroid_mm(self) -> FloatArray:
+        """(3,) mean of the vertices."""
+        centroid: FloatArray = self.vertices_mm.mean(axis=0)
+        return centroid
+
+    @property
+    def size_mm(self) -> FloatArray:
+        """(3,) extent along the axes."""
+        extent: FloatArray = np.ptp(self.vertices_mm, axis=0)
+        return extent
+
+    def volume_mm3(self) -> float:
+        """Signed volume (positive when the normals point outwards), from signed tetrahedra."""
+        corners = (self.vertices_mm - self.centroid_mm)[self.faces]
+        return float(
+            np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+        )
+
+    def transformed(self, target_from_source: RigidTransform) -> "TriangleMesh":
+        """The mesh in the target frame."""
+        return TriangleMesh(
+            target_from_source.apply(self.vertices_mm),
+            self.faces,
+            target_from_source.rotate(self.normals),
+        )
+
+    def flipped(self) -> "TriangleMesh":
+        """The same surface with the other side outside."""
+        return TriangleMesh(self.vertices_mm, self.faces[:, ::-1], -self.normals)
+
+    def largest_component(self) -> "TriangleMesh":
+        """The connected piece with the most triangles, without unused vertices."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.vertices_mm)
+        rows = np.concatenate([self.faces[:, 0], self.faces[:, 1]])
+        columns = np.concatenate([self.faces[:, 1], self.faces[:, 2]])
+        graph = coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
+        _, label_of_vertex = connected_components(graph, directed=False)
+        label_of_face = label_of_vertex[self.faces[:, 0]]
+        largest = int(np.bincount(label_of_face).argmax())
+        kept = self.faces[label_of_face == largest]
+        used = np.unique(kept)
+        new_index = np.full(n, -1, dtype=np.int32)
+        new_index[used] = np.arange(len(used), dtype=np.int32)
+        return TriangleMesh(self.vertices_mm[used], new_index[kept])
+
+
+def vertex_normals(vertices_mm: FloatArray, faces: IntArray) -> FloatArray:
+    """(V, 3) unit normals: the mean of the adjacent faces' normals, weighted by their area."""
+    corners = vertices_mm[faces]
+    face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(vertices_mm)
+    for column in range(3):
+        index = faces[:, column]
+        for axis in range(3):
+            normals[:, axis] += np.bincount(index, face_normals[:, axis], len(vertices_mm))
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit: FloatArray = normals / np.where(length > 0.0, length, 1.0)
+    return unit

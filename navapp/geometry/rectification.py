@@ -1,0 +1,216 @@
+"""Rectification: rows of both pictures become the same epipolar line."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray, RigidTransform
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle of pixels: columns x .. x + width - 1, rows y .. y + height - 1."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    def grown(self, margin_px: int) -> "Box":
+        """Larger by a margin on every side."""
+        return Box(
+            self.x - margin_px,
+            self.y - margin_px,
+            self.width + 2 * margin_px,
+            self.height + 2 * margin_px,
+        )
+
+    def clipped(self, width: int, height: int) -> "Box":
+        """The part inside a picture; its width or height may be 0."""
+        x0, y0 = min(max(self.x, 0), width), min(max(self.y, 0), height)
+        x1 = min(max(self.x + self.width, x0), width)
+        y1 = min(max(self.y + self.height, y0), height)
+        return Box(x0, y0, x1 - x0, y1 - y0)
+
+    @property
+    def is_empty(self) -> bool:
+        """No pixel is inside."""
+        return self.width <= 0 or self.height <= 0
+
+    def overlap(self, other: "Box") -> float:
+        """Intersection over union, 0 to 1."""
+        x0, y0 = max(self.x, other.x), max(self.y, other.y)
+        x1 = min(self.x + self.width, other.x + other.width)
+        y1 = min(self.y + self.height, other.y + other.height)
+        shared = max(0, x1 - x0) * max(0, y1 - y0)
+        union = self.width * self.height + other.width * other.height - shared
+        return shared / union if union > 0 else 0.0
+
+    @classmethod
+    def around(cls, pixels: FloatArray) -> "Box | None":
+        """The smallest box around pixel positions (N, 2); None when none is finite."""
+        finite = pixels[np.isfinite(pixels).all(axis=1)]
+        if len(finite) == 0:
+            return None
+        low = np.floor(finite.min(axis=0)).astype(int)
+        high = np.ceil(finite.max(axis=0)).astype(int)
+        return cls(int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RectifiedGeometry:
+    """Geometry of a rectified pair: one focal length, one centre, the right camera at +x.
+
+    A point (x, y, z) mm in the rectified left camera is seen at u = f x / z + cx in the left and at
+    u - f B / z in the right picture, both at v = f y / z + cy.
+    """
+
+    focal_px: float
+    centre_x_px: float
+    centre_y_px: float
+    baseline_mm: float
+    width: int
+    height: int
+    rectified_from_left: RigidTransform
+
+    @property
+    def camera_matrix(self) -> FloatArray:
+        """(3, 3) of both rectified cameras."""
+        return np.array(
+            [
+                [self.focal_px, 0.0, self.centre_x_px],
+                [0.0, self.focal_px, self.centre_y_px],
+                [0.0, 0.0, 1.0],
+            ]
+        )
+
+    def disparity_px(self, depth_mm: float) -> float:
+        """Disparity of a point at that depth."""
+        return self.focal_px * self.baseline_mm / depth_mm
+
+    def depth_mm(self, disparity_px: float) -> float:
+        """Depth of a point with that disparity."""
+        return self.focal_px * self.baseline_mm / disparity_px
+
+    def project(self, points_mm: FloatArray) -> FloatArray:
+        """(N, 2) px in the left picture of points (N, 3) mm; NaN at or behind the camera."""
+        z = np.where(points_mm[:, 2] > 1e-6, points_mm[:, 2], np.nan)
+        return np.column_stack(
+            [
+                self.focal_px * points_mm[:, 0] / z + self.centre_x_px,
+                self.focal_px * points_mm[:, 1] / z + self.centre_y_px,
+            ]
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RectifiedPair:
+    """Rectified pictures and their geometry; `box` is the region of interest in the left one."""
+
+    left: Image
+    right: Image
+    geometry: RectifiedGeometry
+    box: Box
+
+
+@dataclass(frozen=True, eq=False)
+class Rectifier:
+    """Rectifies the pictures of one rig; the maps are made once.
+
+    Source: Bouguet's method as in OpenCV's `stereoRectify`, zero disparity at infinity.
+    """
+
+    rig: StereoRig
+    _solved: tuple[Any, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        import cv2
+
+        rig = self.rig
+        size = (rig.width, rig.height)
+        r1, r2, p1, p2, *_ = cv2.stereoRectify(
+            np.array(rig.left.matrix),
+            np.array(rig.left.distortion),
+            np.array(rig.right.matrix),
+            np.array(rig.right.distortion),
+            size,
+            np.array(rig.right_from_left.rotation),
+            np.array(rig.right_from_left.translation_mm).reshape(3, 1),
+            flags=cv2.CALIB_ZERO_DISPARITY,
+            alpha=-1,
+        )
+        if p2[0, 3] >= 0.0 or abs(p2[1, 3]) > 1e-9:
+            raise ValueError(
+                "the right camera must stand to the right of the left one (are they swapped?)"
+            )
+        object.__setattr__(self, "_solved", (r1, r2, p1, p2))
+
+    @cached_property
+    def geometry(self) -> RectifiedGeometry:
+        """Focal length, centre and baseline, from the projection matrices only."""
+        r1, _, p1, p2 = self._solved
+        return RectifiedGeometry(
+            focal_px=float(p1[0, 0]),
+            centre_x_px=float(p1[0, 2]),
+            centre_y_px=float(p1[1, 2]),
+            baseline_mm=float(-p2[0, 3] / p2[0, 0]),
+            width=self.rig.width,
+            height=self.rig.height,
+            rectified_from_left=RigidTransform.from_parts("left_rect", "left", r1, np.zeros(3)),
+        )
+
+    @cached_property
+    def maps(self) -> tuple[Any, Any, Any, Any]:
+        """Float maps: left x, left y, right x, right y.
+
+        Fixed-point maps differ by up to 2 grey levels.
+        """
+        import cv2
+
+        r1, r2, p1, p2 = self._solved
+        size = (self.rig.width, self.rig.height)
+        left = cv2.initUndistortRectifyMap(
+            np.array(self.rig.left.matrix),
+            np.array(self.rig.left.distortion),
+            r1,
+            p1,
+            size,
+            cv2.CV_32FC1,
+        )
+        right = cv2.initUndistortRectifyMap(
+            np.array(self.rig.right.matrix),
+            np.array(self.rig.right.distortion),
+            r2,
+            p2,
+            size,
+            cv2.CV_32FC1,
+        )
+        return (*left, *right)
+
+    def rectify(self, left: Image, right: Image, box: Box | None = None) -> RectifiedPair:
+        """Rectify both pictures; `box` (in the rectified left view) is passed on clipped.
+
+        Raises:
+            ValueError: pictures of another size than the rig's.
+        """
+        import cv2
+
+        if left.shape[:2] != (self.rig.height, self.rig.width) or left.shape != right.shape:
+            raise ValueError(
+                f"pictures are {left.shape[1]}x{left.shape[0]}, "
+                f"the rig {self.rig.width}x{self.rig.height}"
+            )
+        left_x, left_y, right_x, right_y = self.maps
+        whole = Box(0, 0, self.rig.width, self.rig.height)
+        return RectifiedPair(
+            np.asarray(cv2.remap(left, left_x, left_y, cv2.INTER_LINEAR), dtype=np.uint8),
+            np.asarray(cv2.remap(right, right_x, right_y, cv2.INTER_LINEAR), dtype=np.uint8),
+            self.geometry,
+            whole if box is None else box.clipped(whole.width, whole.height),
+        )

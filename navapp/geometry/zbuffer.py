@@ -1,0 +1,106 @@
+"""The z-buffer: what a camera sees of a mesh at a pose."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.camera import Camera
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import Box, RectifiedGeometry
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.zbuffer_kernels import raster_nearest
+
+# A vertex hidden by less than this is still the surface itself, seen at a grazing angle.
+_SELF_OCCLUSION_MM = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RenderedView:
+    """Depth and triangle per pixel of a box.
+
+    Attributes:
+        depth_mm: (h, w) float32 along the optical axis, NaN where the mesh is not seen.
+        face_index: (h, w) int32, -1 where the mesh is not seen.
+        box: place of the buffer in the picture; it may reach beyond the picture.
+    """
+
+    depth_mm: NDArray[np.float32]
+    face_index: NDArray[np.int32]
+    box: Box
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """(h, w) pixels where the mesh is seen."""
+        seen: NDArray[np.bool_] = self.face_index >= 0
+        return seen
+
+    def silhouette(self) -> NDArray[np.bool_]:
+        """(h, w) seen pixels with an unseen 4-neighbour."""
+        seen = np.pad(self.mask, 1)
+        inner = seen[:-2, 1:-1] & seen[2:, 1:-1] & seen[1:-1, :-2] & seen[1:-1, 2:]
+        edge: NDArray[np.bool_] = self.mask & ~inner
+        return edge
+
+
+def render(mesh: TriangleMesh, camera_from_mesh: RigidTransform, camera: Camera) -> RenderedView:
+    """The mesh as that camera sees it, lens distortion included (exact at the vertices)."""
+    points_mm = camera_from_mesh.apply(mesh.vertices_mm)
+    whole = Box(0, 0, camera.width, camera.height)
+    return _raster(camera.project(points_mm), points_mm[:, 2], mesh.faces, whole)
+
+
+def render_rectified(
+    mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry, box: Box
+) -> RenderedView:
+    """The mesh in a box of the rectified left view."""
+    points_mm = rectified_from_mesh.apply(mesh.vertices_mm)
+    return _raster(geometry.project(points_mm), points_mm[:, 2], mesh.faces, box)
+
+
+def projected_box(
+    mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry
+) -> Box | None:
+    """Box around the mesh in the rectified left view, clipped; None when it is out of view."""
+    around = Box.around(geometry.project(rectified_from_mesh.apply(mesh.vertices_mm)))
+    if around is None:
+        return None
+    clipped = around.clipped(geometry.width, geometry.height)
+    return None if clipped.is_empty else clipped
+
+
+def unhidden_vertices(
+    mesh: TriangleMesh,
+    rectified_from_mesh: RigidTransform,
+    geometry: RectifiedGeometry,
+    view: RenderedView,
+) -> NDArray[np.bool_]:
+    """(V,) vertices that the view shows: inside its box and not behind another part of the mesh."""
+    points_mm = rectified_from_mesh.apply(mesh.vertices_mm)
+    pixels = geometry.project(points_mm)
+    finite = np.isfinite(pixels).all(axis=1)
+    column = np.full(len(pixels), -1)
+    row = np.full(len(pixels), -1)
+    # Rounding by floor(u + 0.5): pixel centres lie at integers.
+    column[finite] = np.floor(pixels[finite, 0] + 0.5).astype(int) - view.box.x
+    row[finite] = np.floor(pixels[finite, 1] + 0.5).astype(int) - view.box.y
+    inside = (column >= 0) & (column < view.box.width) & (row >= 0) & (row < view.box.height)
+    shown = np.zeros(len(pixels), dtype=bool)
+    surface_mm = view.depth_mm[row[inside], column[inside]]
+    shown[inside] = points_mm[inside, 2] <= surface_mm + _SELF_OCCLUSION_MM
+    return shown
+
+
+def _raster(
+    pixels: FloatArray, depths_mm: FloatArray, faces: NDArray[np.int32], box: Box
+) -> RenderedView:
+    inverse_depth = np.zeros((max(box.height, 0), max(box.width, 0)), dtype=np.float32)
+    face_index = np.full(inverse_depth.shape, -1, dtype=np.int32)
+    if not box.is_empty and len(faces):
+        shifted = np.ascontiguousarray(pixels - (box.x, box.y))
+        raster_nearest(
+            shifted, np.ascontiguousarray(depths_mm), np.array(faces), inverse_depth, face_index
+        )
+    depth = np.full(inverse_depth.shape, np.nan, dtype=np.float32)
+    np.divide(1.0, inverse_depth, out=depth, where=face_index >= 0)
+    return RenderedView(depth, face_index, box)

@@ -1,0 +1,128 @@
+"""What can be drawn over the video: one function a layer, one line in the table."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.camera import Camera
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import RigidTransform
+from navapp.geometry.zbuffer import RenderedView, render
+from navapp.values import Plan, StageSpec
+
+Image = NDArray[np.uint8]
+
+# BGR. Guides are green; a candidate that nobody has accepted is amber.
+GUIDE_COLOUR = (120, 230, 60)
+CANDIDATE_COLOUR = (40, 180, 255)
+TARGET_COLOUR = (255, 240, 80)
+CURVE_COLOURS = {"artery": (60, 60, 235), "vein": (220, 90, 60), "nerve": (60, 220, 250)}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What the layers draw: one bone at one pose, seen by the left camera."""
+
+    plan: Plan
+    stage: StageSpec
+    mesh: TriangleMesh
+    left_from_bone: RigidTransform
+    camera: Camera
+    is_candidate: bool
+
+    @cached_property
+    def view(self) -> RenderedView:
+        """The bone as the left camera sees it, distortion included; rendered once."""
+        return render(self.mesh, self.left_from_bone, self.camera)
+
+    @property
+    def colour(self) -> tuple[int, int, int]:
+        """Of the bone's outline."""
+        return CANDIDATE_COLOUR if self.is_candidate else GUIDE_COLOUR
+
+
+def draw_bone(image: Image, scene: Scene) -> None:
+    """Outline, and creases and shape as a light veil, so that the bone beneath stays visible."""
+    import cv2
+
+    view = scene.view
+    mask = view.mask
+    if not mask.any():
+        return
+    faces = scene.mesh.faces[view.face_index[mask]]
+    normals = scene.left_from_bone.rotate(scene.mesh.normals[faces].mean(axis=1))
+    # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
+    steep = 1.0 - np.clip(np.abs(normals[:, 2]), 0.0, 1.0)
+    share = (0.10 + 0.35 * steep)[:, None]
+    tinted = image[mask] * (1.0 - share) + np.array(scene.colour) * share
+    image[mask] = tinted.astype(np.uint8)
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(image, contours, -1, scene.colour, 2)
+
+
+def draw_targets(image: Image, scene: Scene) -> None:
+    """The stage's targets as crosses with their names."""
+    import cv2
+
+    for name in scene.stage.targets:
+        points = scene.plan.targets.get(name)
+        if points is None or not name.startswith(f"{scene.stage.bone}/"):
+            continue
+        for u, v in scene.camera.project(scene.left_from_bone.apply(points.reshape(-1, 3))):
+            if not (np.isfinite(u) and np.isfinite(v)):
+                continue
+            centre = (round(float(u)), round(float(v)))
+            cv2.drawMarker(image, centre, (0, 0, 0), cv2.MARKER_CROSS, 19, 4)
+            cv2.drawMarker(image, centre, TARGET_COLOUR, cv2.MARKER_CROSS, 17, 2)
+            text = name.split("/", 1)[1].replace("_", " ")
+            put_text(image, text, (centre[0] + 12, centre[1] - 8), 0.5, TARGET_COLOUR)
+
+
+def draw_curves(image: Image, scene: Scene) -> None:
+    """Vessels and nerves beside the bone, dashed where the bone hides them."""
+    import cv2
+
+    view = scene.view
+    for name, points in scene.plan.curves.items():
+        in_camera = scene.left_from_bone.apply(points)
+        pixels = scene.camera.project(in_camera)
+        colour = next((c for key, c in CURVE_COLOURS.items() if key in name), TARGET_COLOUR)
+        for k in range(len(pixels) - 1):
+            segment = pixels[k : k + 2]
+            if not np.isfinite(segment).all():
+                continue
+            is_hidden = _is_behind(view, segment[0], float(in_camera[k, 2]))
+            if is_hidden and k % 2:
+                continue
+            start, end = (tuple(int(value) for value in np.round(p)) for p in segment)
+            cv2.line(image, start, end, colour, 1 if is_hidden else 2)
+
+
+def put_text(
+    image: Image, text: str, at: tuple[int, int], size: float, colour: tuple[int, int, int]
+) -> None:
+    """Text with a dark rim, readable on any picture."""
+    import cv2
+
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    cv2.putText(image, text, at, font, size, (0, 0, 0), 3)
+    cv2.putText(image, text, at, font, size, colour, 1)
+
+
+def _is_behind(view: RenderedView, pixel: NDArray[np.float64], depth_mm: float) -> bool:
+    u, v = (int(value) for value in np.round(pixel))
+    if not (0 <= v < view.depth_mm.shape[0] and 0 <= u < view.depth_mm.shape[1]):
+        return False
+    surface = view.depth_mm[v, u]
+    return bool(np.isfinite(surface) and depth_mm > surface)
+
+
+Layer = Callable[[Image, Scene], None]
+
+LAYERS: Mapping[str, Layer] = MappingProxyType(
+    {"bone": draw_bone, "targets": draw_targets, "curves": draw_curves}
+)

@@ -1,0 +1,6 @@
+"""Before the operation: surfaces and targets become a plan."""
+
+from navapp.preop.plan_files import read_plan, write_plan
+from navapp.preop.surfaces import ImportedSurface, import_surface
+
+__all__ = ["ImportedSurface", "import_surface", "read_plan", "write_plan"]

@@ -1,0 +1,167 @@
+"""Plan folders: plan.json, one PLY a bone, a picture of each."""
+
+import hashlib
+import json
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from navapp.errors import InputError, PlanError
+from navapp.geometry.ply import read_ply, write_ply
+from navapp.preop.preview import draw_preview
+from navapp.values import BoneModel, Plan
+
+_FILE = "plan.json"
+_FORMAT = 1
+
+
+def write_plan(folder: str | Path, plan: Plan) -> None:
+    """Write a plan folder whole: it appears complete or not at all.
+
+    An older plan at the same place is replaced; any other folder with something in it is refused.
+
+    Raises:
+        PlanError: the place is taken by something that is not a plan, or cannot be written.
+    """
+    folder = Path(folder)
+    if not plan.bones:
+        raise PlanError("a plan needs at least one bone", remedy="give --surface femur=FILE")
+    if folder.exists() and not (folder / _FILE).is_file() and any(_entries(folder)):
+        raise PlanError(
+            f"{folder} exists and is not a plan",
+            subject=str(folder),
+            remedy="choose a new folder for --out",
+        )
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    except OSError as error:
+        raise PlanError(
+            f"plan folder {folder} cannot be written ({error.strerror})",
+            subject=str(folder),
+            remedy="choose a folder that you may write to",
+        ) from error
+    try:
+        _write_content(temporary, plan)
+        temporary.chmod(0o755)
+        _put_in_place(temporary, folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def read_plan(folder: str | Path) -> Plan:
+    """Read a plan folder and check it against its own hashes.
+
+    Raises:
+        PlanError: missing, empty, half-written or changed since it was made.
+    """
+    folder = Path(folder)
+    path = folder / _FILE
+    if not path.is_file():
+        raise PlanError(
+            f"{folder} holds no plan",
+            subject=str(folder),
+            remedy="make one with `navapp plan --surface femur=FILE --out FOLDER`",
+        )
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        bones = {name: _read_bone(folder, name, entry) for name, entry in content["bones"].items()}
+        plan = Plan(
+            bones,
+            {name: np.array(points) for name, points in content["targets"].items()},
+            {name: np.array(points) for name, points in content["curves"].items()},
+            name=folder.name,
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, InputError) as error:
+        if isinstance(error, PlanError):
+            raise
+        raise _damaged(folder, str(error)) from error
+    if not bones:
+        raise PlanError(
+            f"plan {folder} is empty: it has no bone",
+            subject=str(folder),
+            remedy="make it again with `navapp plan`",
+        )
+    if plan.digest != content.get("hash"):
+        raise _damaged(folder, "its content does not match its hash")
+    return plan
+
+
+def _entries(folder: Path) -> list[Path]:
+    return list(folder.iterdir()) if folder.is_dir() else [folder]
+
+
+def _write_content(folder: Path, plan: Plan) -> None:
+    bones: dict[str, Any] = {}
+    for name, bone in plan.bones.items():
+        file = f"{name}.ply"
+        write_ply(folder / file, bone.mesh)
+        (folder / f"preview_{name}.png").write_bytes(draw_preview(bone.mesh))
+        bones[name] = {
+            "file": file,
+            "sha256": _sha256(folder / file),
+            "side": bone.side,
+            "version": bone.version,
+            "cartilage_mm": bone.cartilage_mm.tolist() if bone.cartilage_mm.any() else None,
+            "cartilage_sd_mm": (
+                bone.cartilage_sd_mm.tolist() if bone.cartilage_sd_mm.any() else None
+            ),
+        }
+    content = {
+        "format": _FORMAT,
+        "space": "LPS",
+        "unit": "mm",
+        "bones": bones,
+        "targets": {name: points.tolist() for name, points in plan.targets.items()},
+        "curves": {name: points.tolist() for name, points in plan.curves.items()},
+        "hash": plan.digest,
+    }
+    (folder / _FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def _put_in_place(temporary: Path, folder: Path) -> None:
+    """Rename; an older plan is moved aside first and put back when the rename fails."""
+    if not folder.exists():
+        temporary.rename(folder)
+        return
+    aside = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
+    folder.rename(aside / "plan")
+    try:
+        temporary.rename(folder)
+    except OSError:
+        (aside / "plan").rename(folder)
+        raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
+    path = folder / entry["file"]
+    if not path.is_file():
+        raise _damaged(folder, f"{entry['file']} is missing")
+    if _sha256(path) != entry["sha256"]:
+        raise _damaged(folder, f"{entry['file']} was changed or cut short")
+    mesh, _ = read_ply(path)
+    return BoneModel(
+        name,
+        mesh,
+        entry["side"],
+        np.array(entry["cartilage_mm"] or []),
+        np.array(entry["cartilage_sd_mm"] or []),
+        version=int(entry["version"]),
+    )
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _damaged(folder: Path, why: str) -> PlanError:
+    return PlanError(
+        f"plan {folder} is damaged: {why}",
+        subject=str(folder),
+        remedy="make it again with `navapp plan`",
+    )

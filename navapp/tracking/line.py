@@ -1,0 +1,283 @@
+"""The line: one stereo frame in, one judged pose out.
+
+`Line.track` is the frame's whole way in the paper's order. No step knows a device, a thread or the
+terminal; what is remembered between frames is handed in and out as a `TrackState`.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import Box, Rectifier
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.zbuffer import projected_box
+from navapp.registration import (
+    PointToPlaneSettings,
+    RegistrationModel,
+    distinct,
+    find_candidates,
+    fit_icp,
+    fit_point_to_plane,
+    tilted_starts,
+)
+from navapp.registration.point_to_plane import estimate_at
+from navapp.stereo import SgbmSettings, fill_occlusions, match_sgbm, reproject
+from navapp.tracking.judge import Judge
+from navapp.tracking.motion import TrackState
+from navapp.values import (
+    BoneModel,
+    DisparityMap,
+    PoseEstimate,
+    Prior,
+    Reason,
+    StageTimings,
+    Status,
+    SurfaceCloud,
+    TrackedFrame,
+    Verdict,
+)
+
+Image = NDArray[np.uint8]
+Method = Literal["bimcc", "icp"]
+
+
+class RegistrationCancelled(Exception):  # noqa: N818 (asked for by the operator)
+    """The operator stopped a first registration."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """How the line works.
+
+    Attributes:
+        method: `icp` is the paper's baseline chain; anything else the production one.
+        depth_mm: nearest and farthest surface without a prediction.
+        box_margin_px, band_margin_mm: around the predicted bone while tracking.
+        search_margin_px, search_band_mm: the same for a first registration.
+        stride_px: every n-th pixel each way enters the estimate.
+    """
+
+    method: Method = "bimcc"
+    depth_mm: tuple[float, float] = (300.0, 700.0)
+    box_margin_px: int = 16
+    band_margin_mm: float = 15.0
+    search_margin_px: int = 60
+    search_band_mm: float = 35.0
+    stride_px: int = 3
+    tilt_deg: float = 15.0
+    n_refined: int = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Goal:
+    """What the judge measures a pose against: the stage's targets and tolerance."""
+
+    targets_mm: FloatArray
+    tolerance_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """The surface in the bone's box, and how long it took."""
+
+    disparity: DisparityMap
+    cloud: SurfaceCloud
+    timings: StageTimings
+
+
+class Line:
+    """The steps of one rig and one bone; holds only what is constant."""
+
+    def __init__(
+        self, rig: StereoRig, bone: BoneModel, settings: LineSettings | None = None
+    ) -> None:
+        self.settings = settings or LineSettings()
+        self.rig = rig
+        self.model = RegistrationModel(bone)
+        self._rectifier = Rectifier(rig)
+        self._geometry = self._rectifier.geometry
+        is_accepted = rig.quality is None or rig.quality.is_accepted
+        self._judge = Judge(self._geometry, is_accepted)
+        self._matcher = SgbmSettings()
+        self._estimator = PointToPlaneSettings()
+
+    @property
+    def centre_mm(self) -> FloatArray:
+        """(3,) mean of the model's vertices, in bone coordinates."""
+        return self.model.centre_mm
+
+    def track(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame (the paper's intra-operative loop)."""
+        predicted = self._rectified(state.predicted(captured_ns, self.centre_mm))
+        measured = self._measure(left, right, predicted, self._tracking_region(predicted))
+        if measured is None:
+            tracked = self._lost(Reason.OUT_OF_VIEW)
+            return tracked, state.updated(tracked, captured_ns, self.centre_mm)
+        started = time.perf_counter_ns()
+        estimate = self._estimate(measured.cloud, predicted)
+        timings = replace(measured.timings, estimate=_ms_since(started))
+        tracked = self._judged(estimate, measured.disparity, goal, timings, predicted)
+        return tracked, state.updated(tracked, captured_ns, self.centre_mm)
+
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None] = lambda share: None,
+    ) -> list[TrackedFrame]:
+        """Find the bone from a rough pose: distinct candidates, best first.
+
+        Args:
+            left: picture of the left camera.
+            right: of the right one, at the same instant.
+            prior: must hold a pose of this bone.
+            goal: for the judge.
+            on_progress: told the share done; raises `RegistrationCancelled` to stop.
+        """
+        start = prior.left_from_bone.get(self.model.bone.name)
+        if start is None:
+            return []
+        rough = self._rectified(start)
+        measured = self._measure(left, right, rough, self._search_region(rough))
+        if measured is None or len(measured.cloud) == 0:
+            return [self._lost(Reason.NO_SURFACE)]
+
+        def score(estimate: PoseEstimate) -> float:
+            found = self._judge.agreement(self.model, estimate.left_from_bone, measured.disparity)
+            return found.coverage * found.inlier_share
+
+        starts = tilted_starts(rough, self.centre_mm, self.settings.tilt_deg)
+        if self.settings.method == "icp":
+            starts = [rough]
+        coarse = find_candidates(measured.cloud, self.model, starts, score, on_progress)
+        refined = [
+            self._estimate(measured.cloud, estimate.left_from_bone)
+            for estimate in coarse[: self.settings.n_refined]
+        ]
+        refined.sort(key=score, reverse=True)
+        return [
+            self._judged(estimate, measured.disparity, goal, measured.timings)
+            for estimate in distinct(refined, self.centre_mm)
+        ]
+
+    def assess(
+        self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
+    ) -> TrackedFrame:
+        """Judge a pose as it stands, without moving it."""
+        pose = self._rectified(left_from_bone)
+        measured = self._measure(left, right, pose, self._tracking_region(pose))
+        if measured is None:
+            return self._lost(Reason.OUT_OF_VIEW)
+        estimate = estimate_at(
+            measured.cloud, self.model, pose, settings=self._estimator,
+            stride_px=self.settings.stride_px,
+        )  # fmt: skip
+        return self._judged(estimate, measured.disparity, goal, measured.timings)
+
+    def _measure(
+        self,
+        left: Image,
+        right: Image,
+        rectified_from_bone: RigidTransform,
+        region: "tuple[Box, tuple[float, float]] | None",
+    ) -> Measurement | None:
+        """Rectify, match in the box and band, fill, reproject."""
+        if region is None:
+            return None
+        box, band_px = region
+        t0 = time.perf_counter_ns()
+        pair = self._rectifier.rectify(_luma(left), _luma(right), box)
+        t1 = time.perf_counter_ns()
+        matched = match_sgbm(pair, band_px, self._matcher)
+        t2 = time.perf_counter_ns()
+        filled = matched if self.settings.method == "icp" else fill_occlusions(matched)
+        t3 = time.perf_counter_ns()
+        cloud = reproject(filled, self._geometry, self.settings.stride_px)
+        timings = StageTimings(
+            rectify=(t1 - t0) / 1e6, stereo=(t2 - t1) / 1e6, fill=(t3 - t2) / 1e6
+        )
+        return Measurement(filled, cloud, timings)
+
+    def _estimate(self, cloud: SurfaceCloud, start: RigidTransform) -> PoseEstimate:
+        if self.settings.method == "icp":
+            return fit_icp(cloud, self.model, start)
+        return fit_point_to_plane(
+            cloud, self.model, start, self._estimator, self.settings.stride_px
+        )
+
+    def _judged(
+        self,
+        estimate: PoseEstimate,
+        measured: DisparityMap,
+        goal: Goal,
+        timings: StageTimings,
+        predicted: RigidTransform | None = None,
+    ) -> TrackedFrame:
+        """Judge, and hand the pose out in the unrectified left camera."""
+        started = time.perf_counter_ns()
+        verdict = self._judge.judge(
+            self.model, estimate, measured, goal.targets_mm, goal.tolerance_mm, predicted
+        )
+        timings = replace(timings, judge=_ms_since(started))
+        name = self.model.bone.name
+        if verdict.predicted_tre_mm is None:
+            return TrackedFrame(name, None, verdict, timings)
+        return TrackedFrame(name, self._unrectified(estimate), verdict, timings)
+
+    def _lost(self, reason: Reason) -> TrackedFrame:
+        verdict = Verdict(Status.LOST, None, (reason,))
+        return TrackedFrame(self.model.bone.name, None, verdict, StageTimings())
+
+    def _tracking_region(self, pose: RigidTransform) -> "tuple[Box, tuple[float, float]] | None":
+        return self._region(pose, self.settings.box_margin_px, self.settings.band_margin_mm)
+
+    def _search_region(self, pose: RigidTransform) -> "tuple[Box, tuple[float, float]] | None":
+        return self._region(pose, self.settings.search_margin_px, self.settings.search_band_mm)
+
+    def _region(
+        self, pose: RigidTransform, margin_px: int, margin_mm: float
+    ) -> "tuple[Box, tuple[float, float]] | None":
+        """Box and disparity band around the model at a pose; None when it is out of view."""
+        box = projected_box(self.model.bone.mesh, pose, self._geometry)
+        if box is None:
+            return None
+        depths = pose.apply(self.model.points_mm)[:, 2]
+        near = max(float(depths.min()) - margin_mm, 50.0)
+        far = max(float(depths.max()) + margin_mm, near + 1.0)
+        grown = box.grown(margin_px).clipped(self._geometry.width, self._geometry.height)
+        return grown, (self._geometry.disparity_px(far), self._geometry.disparity_px(near))
+
+    def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
+        return self._geometry.rectified_from_left @ left_from_bone
+
+    def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
+        """The same estimate in the left camera before rectification: a pure rotation."""
+        left_from_rectified = self._geometry.rectified_from_left.inverse()
+        turn = np.kron(np.eye(2), left_from_rectified.rotation)
+        return replace(
+            estimate,
+            left_from_bone=left_from_rectified @ estimate.left_from_bone,
+            covariance=turn @ estimate.covariance @ turn.T,
+        )
+
+
+def _luma(image: Image) -> Image:
+    """Grey picture: colour adds cost and, with JPEG, halved chroma, but no disparity."""
+    import cv2
+
+    if image.ndim == 2:
+        return image
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def _ms_since(started_ns: int) -> float:
+    return (time.perf_counter_ns() - started_ns) / 1e6

@@ -1,0 +1,60 @@
+"""Where the bone will be: constant velocity, damped, forgotten after a loss."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, RigidTransform, vector_from_rotation
+from navapp.values import Status, TrackedFrame
+
+# A patient's limb slows down: the prediction takes this part of the last velocity.
+_DAMPING = 0.7
+# A gap longer than this says nothing about the velocity any more.
+_MAX_GAP_NS = 400_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackState:
+    """What is remembered of one bone from frame to frame.
+
+    Attributes:
+        left_from_bone: pose of the newest frame that was not lost.
+        captured_ns: when that was.
+        velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
+        n_lost: frames lost since then.
+    """
+
+    left_from_bone: RigidTransform
+    captured_ns: int
+    velocity: FloatArray
+    n_lost: int = 0
+
+    @classmethod
+    def at_rest(cls, left_from_bone: RigidTransform, captured_ns: int) -> "TrackState":
+        """A pose without motion."""
+        return cls(left_from_bone, captured_ns, np.zeros(6))
+
+    def predicted(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
+        """The pose expected at a moment."""
+        seconds = (captured_ns - self.captured_ns) / 1e9
+        twist = _DAMPING * seconds * self.velocity
+        return self.left_from_bone.moved(twist, self.left_from_bone.apply(centre_mm))
+
+    def updated(
+        self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
+    ) -> "TrackState":
+        """After a frame: a lost one keeps the pose and forgets the velocity."""
+        pose = tracked.left_from_bone
+        if pose is None or tracked.verdict.status is Status.LOST:
+            return TrackState(self.left_from_bone, self.captured_ns, np.zeros(6), self.n_lost + 1)
+        elapsed_ns = captured_ns - self.captured_ns
+        velocity = np.zeros(6)
+        if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
+            velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
+        return TrackState(pose, captured_ns, velocity)
+
+
+def twist_between(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> FloatArray:
+    """(6,) twist (mm, rad) that moves pose a to pose b, left, about the bone's centre."""
+    shift = b.apply(centre_mm) - a.apply(centre_mm)
+    return np.concatenate([shift, vector_from_rotation(b.rotation @ a.rotation.T)])

@@ -1,0 +1,388 @@
+"""What flows between the steps of the line: plain values, no behaviour beyond small derivations.
+
+Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectification, OpenCV axes.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import FloatArray, RigidTransform, read_only, skew
+
+Side = Literal["left", "right"]
+
+# Chi-square quantile of three degrees of freedom at 95 %: safe bound of a 3-D Gaussian's length.
+_CHI2_3_95 = 7.815
+
+
+class Origin(IntEnum):
+    """Where a disparity comes from."""
+
+    UNKNOWN = 0
+    MATCHED = 1
+    FILLED_BORDER = 2
+    FILLED_INTERIOR = 3
+    MISMATCH_FILLED = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisparityMap:
+    """Disparity of the rectified left view inside a box.
+
+    Attributes:
+        disparity_px: (h, w) float32, NaN where unknown.
+        sigma_px: (h, w) float32 standard deviation, NaN where unknown.
+        origin: (h, w) uint8 of `Origin`.
+        x, y: place of the box's first pixel in the rectified picture.
+    """
+
+    disparity_px: NDArray[np.float32]
+    sigma_px: NDArray[np.float32]
+    origin: NDArray[np.uint8]
+    x: int
+    y: int
+
+    @property
+    def matched_share(self) -> float:
+        """Share of pixels with a measured disparity."""
+        return float((self.origin == Origin.MATCHED).mean()) if self.origin.size else 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceCloud:
+    """Points seen by the stereo camera, in the rectified left camera.
+
+    Attributes:
+        points_mm: (N, 3).
+        sigma_ray_mm: (N,) standard deviation along the ray through the point.
+        pixels: (N, 2) int32 column and row in the rectified left view.
+        origin: (N,) uint8 of `Origin`.
+    """
+
+    points_mm: FloatArray
+    sigma_ray_mm: FloatArray
+    pixels: NDArray[np.int32]
+    origin: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.points_mm)
+
+    def selected(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> "SurfaceCloud":
+        """A part of the cloud."""
+        return SurfaceCloud(
+            self.points_mm[mask], self.sigma_ray_mm[mask], self.pixels[mask], self.origin[mask]
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoneModel:
+    """A bone as planned, in plan coordinates (LPS, mm).
+
+    Attributes:
+        name: `femur`, `tibia`, `patella`.
+        mesh: surface with outward normals.
+        side: of the patient; None when unknown.
+        cartilage_mm: (V,) mean thickness of what the camera sees above the bone.
+        cartilage_sd_mm: (V,) its standard deviation.
+        is_removed: (V,) parts that a stage has cut away.
+        version: counts the changes by stages.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    side: Side | None = None
+    cartilage_mm: FloatArray = field(default_factory=lambda: np.empty(0))
+    cartilage_sd_mm: FloatArray = field(default_factory=lambda: np.empty(0))
+    is_removed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+    version: int = 0
+
+    def __post_init__(self) -> None:
+        n = len(self.mesh.vertices_mm)
+        for name, kind in (
+            ("cartilage_mm", float),
+            ("cartilage_sd_mm", float),
+            ("is_removed", bool),
+        ):
+            values = getattr(self, name)
+            values = read_only(values if len(values) else np.zeros(n), kind)
+            if values.shape != (n,):
+                raise ValueError(f"{self.name}: {name} needs one value per vertex")
+            object.__setattr__(self, name, values)
+
+
+class Reason(Enum):
+    """Why a pose is not good, or why nothing is shown. The value is the phrase for people."""
+
+    # of the judge
+    NO_SURFACE = "no surface was measured where the bone should be"
+    TOO_FEW_POINTS = "too few points on the bone"
+    COVERAGE_LOW = "too little of the bone is seen"
+    SURFACE_MISFIT = "surface does not fit the model"
+    OUTLIERS = "too many points fit no surface of the model"
+    NOT_CONVERGED = "the estimate did not settle"
+    DEGENERATE = "the seen surface leaves a direction free"
+    TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
+    JUMPED = "the pose jumped further than a patient moves"
+    RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
+    OUT_OF_VIEW = "the bone is outside the picture"
+    # of the session
+    NOT_NAVIGATING = "no registration has been accepted"
+    BONE_LOST = "the bone is lost"
+    BLANKED = "blanked by the operator"
+    CAMERA_SILENT = "the camera sends no picture"
+    DEVICE_FAULT = "a device has failed"
+    POSE_TOO_OLD = "the pose is too old"
+    STAGE_WITHOUT_BONE = "the plan has no model of this stage's bone"
+
+    @property
+    def remedy(self) -> str:
+        """What the operator can do."""
+        return _REMEDIES[self]
+
+
+_REMEDIES = {
+    Reason.NO_SURFACE: "aim the cameras at the bone, or check the light",
+    Reason.TOO_FEW_POINTS: "clear the view, or check the light",
+    Reason.COVERAGE_LOW: "move the instrument or hand away",
+    Reason.SURFACE_MISFIT: "check that this is the right bone and plan; register again",
+    Reason.OUTLIERS: "clear the view of the bone; register again",
+    Reason.NOT_CONVERGED: "hold still, or register again",
+    Reason.DEGENERATE: "expose more of the bone",
+    Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
+    Reason.JUMPED: "wait for the next frames, or register again",
+    Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",
+    Reason.OUT_OF_VIEW: "bring the bone back into both pictures",
+    Reason.NOT_NAVIGATING: "register, then accept the candidate",
+    Reason.BONE_LOST: "clear the view; it is searched for where it was last seen",
+    Reason.BLANKED: "press the show key to leave blank",
+    Reason.CAMERA_SILENT: "check the camera's cable",
+    Reason.DEVICE_FAULT: "see the events, then check the device",
+    Reason.POSE_TOO_OLD: "wait for the next frame",
+    Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseEstimate:
+    """A bone's pose and how well the measurement fixes it.
+
+    Attributes:
+        left_from_bone: rigid transform, target `left`, source the bone's name.
+        covariance: (6, 6) of the twist (translation mm first, rotation rad second), applied from
+            the left about the mean of the model's vertices.
+        n_points: points that entered.
+        inlier_share: their weighted share that the robust weight kept.
+        rms_mm: weighted rms of the point-to-plane residual of those.
+        expected_rms_mm: what the measurement's own sigma predicts for it.
+        iterations: of the solver.
+        is_converged: the solver met its step limit.
+        reasons: what the solver itself has against the result.
+    """
+
+    left_from_bone: RigidTransform
+    covariance: FloatArray
+    n_points: int
+    inlier_share: float
+    rms_mm: float
+    expected_rms_mm: float
+    iterations: int
+    is_converged: bool
+    reasons: tuple[Reason, ...] = ()
+
+
+class Status(Enum):
+    """The judge's word on a pose."""
+
+    OK = "OK"
+    DEGRADED = "DEGRADED"
+    LOST = "LOST"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The judge's answer for one frame.
+
+    Attributes:
+        status: only OK may be shown.
+        predicted_tre_mm: 95 % bound of the mean error over the stage's targets, or over the visible
+            vertices when the plan names no targets; None without a pose.
+        reasons: why it is not OK.
+        coverage: share of the visible model that was measured and fits.
+        occluded_share: share of the visible model that something nearer hides.
+        inlier_share: share of the measured, not hidden model pixels that fit.
+        rms_mm, expected_rms_mm: of the residual.
+    """
+
+    status: Status
+    predicted_tre_mm: float | None = None
+    reasons: tuple[Reason, ...] = ()
+    coverage: float = 0.0
+    occluded_share: float = 0.0
+    inlier_share: float = 0.0
+    rms_mm: float | None = None
+    expected_rms_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StageTimings:
+    """How long the parts of one frame took, ms of real time."""
+
+    rectify: float = 0.0
+    stereo: float = 0.0
+    fill: float = 0.0
+    estimate: float = 0.0
+    judge: float = 0.0
+    overlay: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Sum."""
+        return self.rectify + self.stereo + self.fill + self.estimate + self.judge + self.overlay
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedFrame:
+    """What the line answers for one frame and one bone."""
+
+    bone: str
+    estimate: PoseEstimate | None
+    verdict: Verdict
+    timings: StageTimings
+
+    @property
+    def left_from_bone(self) -> RigidTransform | None:
+        """The pose, when there is one."""
+        return None if self.estimate is None else self.estimate.left_from_bone
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """The rough start that an operator can give; any part may be absent.
+
+    Attributes:
+        left_from_bone: bone name -> rough pose.
+        approach_axis: unit vector in femur coordinates from the bone towards the cameras.
+        approach_half_angle_deg: of the cone around it.
+        box: x, y, width, height in the left picture, px.
+    """
+
+    left_from_bone: Mapping[str, RigidTransform] = field(default_factory=dict)
+    approach_axis: FloatArray | None = None
+    approach_half_angle_deg: float = 180.0
+    box: tuple[int, int, int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A pre-operative plan.
+
+    Attributes:
+        bones: name -> model.
+        targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
+        curves: name -> (N, 3) polylines beside the femur (vessels, nerves), mm.
+        digest: hash of the content.
+        name: for people.
+    """
+
+    bones: Mapping[str, BoneModel]
+    targets: Mapping[str, FloatArray] = field(default_factory=dict)
+    curves: Mapping[str, FloatArray] = field(default_factory=dict)
+    digest: str = ""
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
+        object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
+        object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
+        if not self.digest:
+            object.__setattr__(self, "digest", _digest(self))
+
+    def targets_of(self, names: tuple[str, ...]) -> FloatArray:
+        """(N, 3) target points of those names that the plan has; may be empty."""
+        found = [self.targets[name].reshape(-1, 3) for name in names if name in self.targets]
+        return np.concatenate(found) if found else np.empty((0, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class StageSpec:
+    """One surgical stage, as a row of the table in `navapp.control.stages`."""
+
+    number: int
+    name: str
+    bone: str
+    tolerance_mm: float
+    tolerance_deg: float
+    targets: tuple[str, ...]
+    layers: tuple[str, ...]
+    gates: tuple[str, ...]
+    measurements: tuple[str, ...] = ()
+
+
+class OverlayMode(Enum):
+    """Over the video, or alone on black for the half-silvered mirror."""
+
+    VIDEO = "video"
+    MIRROR = "mirror"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OverlayPicture:
+    """A picture to be shown until it expires: (H, W, 3) uint8 BGR."""
+
+    image: NDArray[np.uint8]
+    valid_until_ns: int
+    mode: OverlayMode
+    pose_age_ns: int
+
+
+def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
+    """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
+    positions = left_from_bone.apply(mesh.vertices_mm)
+    towards = np.einsum("ij,ij->i", left_from_bone.rotate(mesh.normals), positions)
+    facing: NDArray[np.bool_] = towards < -0.2 * np.linalg.norm(positions, axis=1)
+    return facing
+
+
+def predicted_tre_mm(
+    estimate: PoseEstimate, centre_mm: FloatArray, targets_mm: FloatArray
+) -> float:
+    """95 % bound of the mean error over target points of a bone.
+
+    Args:
+        estimate: pose and covariance.
+        centre_mm: (3,) mean of the model's vertices, in bone coordinates.
+        targets_mm: (N, 3) in bone coordinates.
+
+    Source: C(p) = J S J^T with J = [I | -[p - c]x]; |e| <= sqrt(7.815 * largest eigenvalue of C).
+    """
+    if len(targets_mm) == 0:
+        raise ValueError("no targets to predict an error for")
+    rotation = estimate.left_from_bone.rotation
+    bounds = []
+    for offset in (targets_mm - centre_mm) @ rotation.T:
+        jacobian = np.hstack([np.eye(3), -skew(offset)])
+        spread = jacobian @ estimate.covariance @ jacobian.T
+        bounds.append(np.sqrt(_CHI2_3_95 * max(float(np.linalg.eigvalsh(spread)[-1]), 0.0)))
+    return float(np.mean(bounds))
+
+
+def _digest(plan: Plan) -> str:
+    """Hash of everything in a plan that changes what is shown."""
+    digest = hashlib.sha256()
+    for name in sorted(plan.bones):
+        bone = plan.bones[name]
+        digest.update(f"{name}:{bone.side}:{bone.version}".encode())
+        for array in (bone.mesh.vertices_mm, bone.mesh.faces, bone.cartilage_mm, bone.is_removed):
+            digest.update(np.ascontiguousarray(array).tobytes())
+    for points_by_name in (plan.targets, plan.curves):
+        for name in sorted(points_by_name):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(points_by_name[name], dtype=np.float64).tobytes())
+    return digest.hexdigest()[:12]
