@@ -167,10 +167,13 @@ def check_accepted(rig: Any, is_allowed: bool, diagnostics: Diagnostics) -> None
 
 def built_in_plan(simulation: "Simulation") -> "Plan":
     """The plan of the simulated patient: the surfaces that a perfect CT would have given."""
+    from navapp.geometry.mesh import TriangleMesh
     from navapp.values import BoneModel, Plan
 
+    # Normals as any reader of the plan's files computes them, so that a replay finds the same.
     bones = {
-        name: BoneModel(name, mesh, simulation.side) for name, mesh in simulation.bones.items()
+        name: BoneModel(name, TriangleMesh(mesh.vertices_mm, mesh.faces), simulation.side)
+        for name, mesh in simulation.bones.items()
     }
     return Plan(bones, simulation.targets, simulation.curves, name="sim:plan")
 

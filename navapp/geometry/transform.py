@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 _ORTHOGONALITY_TOLERANCE = 1e-4
+_EXACT = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,11 +34,14 @@ class RigidTransform:
             raise ValueError(f"{self.name}: a rigid transform is a finite 4x4 matrix")
         if np.abs(matrix[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
             raise ValueError(f"{self.name}: the last row must be 0 0 0 1")
-        rotation = nearest_rotation(matrix[:3, :3])
-        if np.abs(rotation - matrix[:3, :3]).max() > _ORTHOGONALITY_TOLERANCE:
-            kind = "a reflection" if np.linalg.det(matrix[:3, :3]) < 0 else "not a rotation"
-            raise ValueError(f"{self.name}: the 3x3 part is {kind}")
-        matrix[:3, :3] = rotation
+        given = matrix[:3, :3]
+        # A rotation that is one already keeps its bits, so that written poses read back the same.
+        if np.abs(given.T @ given - np.eye(3)).max() > _EXACT or np.linalg.det(given) < 0.0:
+            rotation = nearest_rotation(given)
+            if np.abs(rotation - given).max() > _ORTHOGONALITY_TOLERANCE:
+                kind = "a reflection" if np.linalg.det(given) < 0.0 else "not a rotation"
+                raise ValueError(f"{self.name}: the 3x3 part is {kind}")
+            matrix[:3, :3] = rotation
         matrix.setflags(write=False)
         object.__setattr__(self, "matrix", matrix)
 

@@ -1,0 +1,248 @@
+"""A stereo camera that hands out recorded frames."""
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal, get_args
+
+from drivers.clock import Clock
+from drivers.frames import FrameMeter, Image, StereoFrame
+from drivers.interfaces import CameraInfo
+from drivers.recorded_sources import RecordedSource, open_folder
+from drivers.recorded_videos import StereoVideo
+from navapp.errors import (
+    DeviceLost,
+    EndOfSequence,
+    SequenceError,
+    UnsupportedControl,
+    UsageError,
+)
+
+Order = Literal["forward", "pingpong"]
+
+
+class ReplayCamera:
+    """Steps through a folder of pairs, a session folder or videos; moves the clock along.
+
+    Capture times are the recorded ones, else multiples of the frame period from 0 in the order of
+    reading; walking backwards, time still runs forwards, by the same intervals. Opening again
+    starts again.
+    """
+
+    def __init__(
+        self,
+        source: str | Path,
+        clock: Clock,
+        *,
+        order: Order = "forward",
+        n_frames: int | None = None,
+        start: int = 0,
+        rate_hz: float = 15.0,
+        rig_id: str = "",
+        split_side_by_side: bool = False,
+    ) -> None:
+        """Set up; nothing is read before `open`.
+
+        Args:
+            source: folder, two videos `LEFT,RIGHT`, or one video to be split.
+            clock: moved to each capture time.
+            order: `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.
+            n_frames: at most so many.
+            start: frames with a smaller number are left out.
+            rate_hz: where the source has neither times nor a rate.
+            rig_id: of the rig that took the pictures.
+            split_side_by_side: each picture of the one video holds both eyes.
+
+        Raises:
+            UsageError: settings that mean nothing.
+        """
+        if order not in get_args(Order):
+            raise UsageError(f"unknown order {order!r}", remedy="use forward or pingpong")
+        if n_frames is not None and n_frames < 1:
+            raise UsageError(f"{n_frames} frames cannot be replayed", remedy="ask for at least 1")
+        if not rate_hz > 0.0:
+            raise UsageError(f"a rate of {rate_hz:g} Hz is none", remedy="use a positive rate")
+        self._source_name = str(source)
+        self._clock = clock
+        self._order = order
+        self._n_frames = n_frames
+        self._start = start
+        self._default_rate_hz = rate_hz
+        self._rig_id = rig_id
+        self._splits = split_side_by_side
+        self._source: RecordedSource | None = None
+        self._places: Iterator[int] = iter(())
+        self._size = (0, 0)
+        self._length: int | None = None
+        self._last: StereoFrame | None = None
+        self._last_place = 0
+        self._meter = FrameMeter()
+
+    @property
+    def info(self) -> CameraInfo:
+        """Size and length are known once it was opened."""
+        return CameraInfo(
+            name=f"replay:{Path(self._source_name).name}",
+            backend="replay",
+            is_simulated=False,
+            is_stepped=True,
+            width=self._size[0],
+            height=self._size[1],
+            measured_rate_hz=self._meter.rate_hz,
+            measured_skew_ms=self._meter.skew_ms,
+            n_frames=self._length,
+        )
+
+    def open(self) -> None:
+        """Find all pairs and decode the first.
+
+        Raises:
+            SequenceError: nothing there, unpaired, damaged.
+            UsageError: a video that needs a partner, a split of something that is no video.
+        """
+        if self._source is not None:
+            return
+        source = open_source(self._source_name, self._splits)
+        try:
+            places = [place for place, n in enumerate(source.numbers) if n >= self._start]
+            if not places:
+                raise SequenceError(
+                    f"{self._source_name} ends at number {source.numbers[-1]}, before the "
+                    f"start {self._start}",
+                    subject=self._source_name,
+                    remedy="start earlier",
+                )
+            left, _ = self._loaded(source, places[0])
+        except BaseException:
+            source.close()
+            raise
+        self._size = (left.shape[1], left.shape[0])
+        whole = len(places) if self._order == "forward" else 2 * len(places) - 1
+        if self._n_frames is not None:
+            is_endless = self._order == "pingpong"
+            whole = self._n_frames if is_endless else min(whole, self._n_frames)
+        self._length = whole
+        self._places = itertools.islice(_walk(places, self._order), whole)
+        self._last, self._meter = None, FrameMeter()
+        self._source = source
+
+    def read(self, timeout_s: float) -> StereoFrame:
+        """Load the next pair, however long that takes.
+
+        Raises:
+            SequenceError: a picture is damaged, or differs from the first in size.
+            DeviceLost, EndOfSequence: see `StereoCamera.read`.
+        """
+        if self._source is None:
+            raise DeviceLost(
+                f"the recording {self._source_name} is not open",
+                subject=self._source_name,
+                remedy="open it before reading",
+            )
+        place = next(self._places, None)
+        if place is None:
+            raise EndOfSequence(f"{self._source_name} ended", subject=self._source_name)
+        left, right = self._loaded(self._source, place)
+        if (left.shape[1], left.shape[0]) != self._size:
+            raise SequenceError(
+                f"pair {self._source.numbers[place]} of {self._source_name} differs in size from "
+                f"the first: {left.shape[1]}x{left.shape[0]} against "
+                f"{self._size[0]}x{self._size[1]}",
+                subject=self._source_name,
+                remedy="remove it, or replay the sizes as sequences of their own",
+            )
+        captured_ns, skew_ns = self._times(self._source, place)
+        self._clock.wait_until_ns(captured_ns)
+        self._last = StereoFrame(
+            left,
+            right,
+            captured_ns,
+            max(captured_ns, self._clock.now_ns()),
+            skew_ns,
+            sequence=0 if self._last is None else self._last.sequence + 1,
+            rig_id=self._rig_id,
+            source_index=self._source.numbers[place],
+        )
+        self._last_place = place
+        self._meter.add(self._last)
+        return self._last
+
+    def set(self, control: str, value: float) -> float:
+        """A recording has no controls."""
+        raise UnsupportedControl(
+            f"a recording cannot change {control}",
+            subject=control,
+            remedy="use a live camera",
+        )
+
+    def close(self) -> None:
+        """Release the source."""
+        if self._source is not None:
+            self._source.close()
+            self._source = None
+
+    def _loaded(self, source: RecordedSource, place: int) -> tuple[Image, Image]:
+        left, right = source.load(place)
+        if left.shape != right.shape:
+            raise SequenceError(
+                f"left and right of pair {source.numbers[place]} of {self._source_name} differ in "
+                f"size or colour: {_size_text(left)} against {_size_text(right)}",
+                subject=self._source_name,
+                remedy="both pictures of a pair must be alike",
+            )
+        return left, right
+
+    def _times(self, source: RecordedSource, place: int) -> tuple[int, int]:
+        """Capture time and skew in ns of the pair that is read next."""
+        period_s = 1.0 / (source.rate_hz or self._default_rate_hz)
+        if source.times is None:
+            n_before = 0 if self._last is None else self._last.sequence + 1
+            return round(n_before * period_s * 1e9), 0
+        times = source.times[place]
+        if self._last is None:
+            return times.captured_ns, times.skew_ns
+        interval_ns = abs(times.captured_ns - source.times[self._last_place].captured_ns)
+        if place == self._last_place:  # a single pair, walked again and again
+            interval_ns = round(period_s * 1e9)
+        return self._last.captured_ns + interval_ns, times.skew_ns
+
+
+def open_source(source: str, split_side_by_side: bool = False) -> RecordedSource:
+    """The recorded pairs behind a path, or behind two paths of videos joined by a comma.
+
+    Raises:
+        SequenceError: missing, empty, unpaired or unreadable.
+        UsageError: one video without a split, or a split of something else.
+    """
+    path = Path(source)
+    parts = source.split(",")
+    if path.exists() and path.is_dir() != split_side_by_side:
+        return open_folder(path) if path.is_dir() else StereoVideo([path])
+    if path.is_dir() or (len(parts) == 2 and split_side_by_side):
+        raise UsageError(
+            f"{source} cannot be split side by side: it is not one video", subject=source
+        )
+    if path.exists():
+        raise UsageError(
+            f"{source} is one video for two eyes",
+            subject=source,
+            remedy="give LEFT,RIGHT, or --split side-by-side when it shows both",
+        )
+    if len(parts) == 2 and all(part.strip() for part in parts):
+        return StereoVideo([Path(part.strip()) for part in parts])
+    raise SequenceError(
+        f"there is no recording {source}",
+        subject=source,
+        remedy="give a folder of pairs, a session folder, or two videos LEFT,RIGHT",
+    )
+
+
+def _walk(places: list[int], order: Order) -> Iterator[int]:
+    """Places in the order of reading; `pingpong` never ends."""
+    if order == "forward" or len(places) == 1:
+        return iter(places) if order == "forward" else itertools.repeat(places[0])
+    return itertools.cycle(places + places[-2:0:-1])
+
+
+def _size_text(picture: Image) -> str:
+    return f"{picture.shape[1]}x{picture.shape[0]} {'grey' if picture.ndim == 2 else 'colour'}"

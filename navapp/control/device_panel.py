@@ -1,0 +1,35 @@
+"""What the devices panel says."""
+
+from drivers.interfaces import CameraInfo, DisplayInfo, MirrorInfo, PowerState, ProjectorStatus
+from navapp.control.states import DeviceHealth, DeviceLine
+
+
+def camera_line(info: CameraInfo, trouble: str) -> DeviceLine:
+    """The stereo camera."""
+    rate = "" if info.measured_rate_hz is None else f" {info.measured_rate_hz:.0f} Hz"
+    health = DeviceHealth.LOST if trouble else DeviceHealth.OK
+    return DeviceLine("camera", info.name, health, trouble or f"{info.width}x{info.height}{rate}")
+
+
+def display_line(info: DisplayInfo, trouble: str) -> DeviceLine:
+    """The display."""
+    health = DeviceHealth.TROUBLE if trouble else DeviceHealth.OK
+    return DeviceLine("display", info.name, health, trouble or f"{info.width}x{info.height}")
+
+
+def projector_line(name: str, status: ProjectorStatus) -> DeviceLine:
+    """The projector's control line."""
+    if status.power is PowerState.ABSENT:
+        return DeviceLine("projector", name, DeviceHealth.ABSENT, "not used")
+    if status.faults or status.power is PowerState.FAULT:
+        return DeviceLine("projector", name, DeviceHealth.TROUBLE, ", ".join(status.faults))
+    return DeviceLine("projector", name, DeviceHealth.OK, status.power.value)
+
+
+def mirror_line(info: MirrorInfo, angle_deg: float | None) -> DeviceLine:
+    """The mirror's mount."""
+    angle = "position unknown" if angle_deg is None else f"{angle_deg:.1f} deg"
+    if not info.is_movable:
+        return DeviceLine("mirror", info.name, DeviceHealth.ABSENT, f"fixed, {angle}")
+    health = DeviceHealth.TROUBLE if angle_deg is None else DeviceHealth.OK
+    return DeviceLine("mirror", info.name, health, angle)

@@ -1,0 +1,184 @@
+"""The search for the stage's bone: first registration, candidates under review, accepted tracks."""
+
+from dataclasses import dataclass, replace
+
+from drivers.frames import StereoFrame
+from navapp.control.executors import Executor, Job, JobCancelled
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking import Line, LineSettings, TrackState
+from navapp.tracking.line import Goal
+from navapp.values import (
+    Plan,
+    Prior,
+    Reason,
+    StageSpec,
+    StageTimings,
+    Status,
+    TrackedFrame,
+    Verdict,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A pose under review.
+
+    Attributes:
+        track: where it is now.
+        tracked: the line's newest answer for it.
+        is_held: judged as it stands (proposed by hand), not followed.
+        number: it is the n-th ...
+        count: ... of how many.
+    """
+
+    track: TrackState
+    tracked: TrackedFrame
+    is_held: bool = False
+    number: int = 1
+    count: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """A first registration that runs, and the frame that it looks at."""
+
+    job: Job[list[TrackedFrame]]
+    frame: StereoFrame
+
+
+class Pursuit:
+    """What is known of the bones of one session; one of them, the stage's, is looked for."""
+
+    def __init__(
+        self,
+        rig: StereoRig,
+        plan: Plan,
+        prior: Prior,
+        settings: LineSettings,
+        executor: Executor,
+    ) -> None:
+        self._rig = rig
+        self._plan = plan
+        self._prior = prior
+        self._settings = settings
+        self._executor = executor
+        self._lines: dict[str, Line] = {}
+        self._tracks: dict[str, TrackState] = {}
+        self._candidates: list[Candidate] = []
+        self._search: _Search | None = None
+
+    @property
+    def candidate(self) -> Candidate | None:
+        """The pose under review."""
+        return self._candidates[0] if self._candidates else None
+
+    @property
+    def progress(self) -> float | None:
+        """Share done of the search that runs; None when none runs."""
+        return None if self._search is None else self._search.job.progress
+
+    def is_planned(self, stage: StageSpec) -> bool:
+        """The plan has a model of the stage's bone."""
+        return stage.bone in self._plan.bones
+
+    def is_accepted(self, stage: StageSpec) -> bool:
+        """A pose of the stage's bone was accepted before."""
+        return stage.bone in self._tracks
+
+    def search(self, stage: StageSpec, frame: StereoFrame) -> None:
+        """Start a first registration on a frame, unless one runs."""
+        if self._search is not None:
+            return
+        line, goal, prior = self._line(stage), self._goal(stage), self._prior
+        job: Job[list[TrackedFrame]] = Job(
+            lambda report: line.register(frame.left, frame.right, prior, goal, report)
+        )
+        self._search = _Search(job, frame)
+        self._executor.start(job)
+
+    def take_over(self, next_sequence: int) -> "tuple[Candidate | None, Reason | None] | None":
+        """Bring the answers of a finished search under review.
+
+        Returns:
+            None while nothing is due; the best candidate; or no candidate and why (no reason: no
+            start was known).
+        """
+        search = self._search
+        if search is None or not self._executor.is_due(search.job, next_sequence):
+            return None
+        self._search = None
+        if isinstance(search.job.error, JobCancelled):
+            return None
+        if search.job.error is not None:
+            raise search.job.error
+        answers = search.job.result or []
+        found = [
+            (answer, answer.left_from_bone)
+            for answer in answers
+            if answer.verdict.status is not Status.LOST
+        ]
+        captured_ns = search.frame.captured_ns
+        self._candidates = [
+            Candidate(TrackState.at_rest(pose, captured_ns), answer, False, number, len(found))
+            for number, (answer, pose) in enumerate(found, start=1)
+            if pose is not None
+        ]
+        if self._candidates:
+            return self._candidates[0], None
+        reasons = answers[0].verdict.reasons if answers else ()
+        return None, reasons[0] if reasons else None
+
+    def drop(self) -> None:
+        """Stop the search and forget the candidates; accepted tracks stay."""
+        if self._search is not None:
+            self._search.job.cancel()
+            self._search = None
+        self._candidates = []
+
+    def propose(self, stage: StageSpec, pose: RigidTransform, now_ns: int) -> None:
+        """Put a pose under review that will be judged as it stands."""
+        self.drop()
+        # Until a frame has judged it, it is lost: it cannot be accepted.
+        unjudged = TrackedFrame(stage.bone, None, Verdict(Status.LOST), StageTimings())
+        self._candidates = [Candidate(TrackState.at_rest(pose, now_ns), unjudged, is_held=True)]
+
+    def accept(self, stage: StageSpec) -> None:
+        """The candidate is the bone's pose from now on."""
+        self._tracks[stage.bone] = self._candidates[0].track
+        self._candidates = []
+
+    def reject(self) -> Candidate:
+        """Take the candidate out; the next one, if any, comes under review."""
+        return self._candidates.pop(0)
+
+    def review(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Follow the candidate into a frame, or judge a proposed pose where it stands."""
+        candidate = self._candidates[0]
+        line, goal, track = self._line(stage), self._goal(stage), candidate.track
+        if candidate.is_held:
+            tracked = line.assess(frame.left, frame.right, track.left_from_bone, goal)
+        else:
+            tracked, track = line.track(frame.left, frame.right, frame.captured_ns, track, goal)
+        self._candidates[0] = replace(candidate, tracked=tracked, track=track)
+        return tracked
+
+    def follow(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Follow the accepted bone into a frame."""
+        tracked, self._tracks[stage.bone] = self._line(stage).track(
+            frame.left,
+            frame.right,
+            frame.captured_ns,
+            self._tracks[stage.bone],
+            self._goal(stage),
+        )
+        return tracked
+
+    def _line(self, stage: StageSpec) -> Line:
+        name = stage.bone
+        if name not in self._lines:
+            self._lines[name] = Line(self._rig, self._plan.bones[name], self._settings)
+        return self._lines[name]
+
+    def _goal(self, stage: StageSpec) -> Goal:
+        return Goal(self._plan.targets_of(stage.targets), stage.tolerance_mm)

@@ -1,0 +1,141 @@
+"""Faults of a simulated camera, written down as data."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Any
+
+from navapp.errors import ConfigurationError
+
+
+class FaultKind(Enum):
+    """What can go wrong."""
+
+    UNPLUG = "unplug"
+    """Gone from the bus: reading and opening fail; it must be opened again."""
+    FREEZE = "freeze"
+    """The same picture and capture time again and again, as from a stalled camera."""
+    DROP = "drop"
+    """Frames vanish."""
+    DELAY = "delay"
+    """Frames come late."""
+    BLACKOUT_LEFT = "blackout_left"
+    """No light reaches the left sensor."""
+    BLACKOUT_RIGHT = "blackout_right"
+    """No light reaches the right sensor."""
+    WRONG_SERIAL = "wrong_serial"
+    """Opened now, it is another camera."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault: active for `start_s` <= t < `start_s` + `duration_s`.
+
+    Attributes:
+        kind: what goes wrong.
+        start_s: since the camera was opened for the first time.
+        duration_s: infinite for a fault that stays.
+        delay_s: of a DELAY: how much later frames come.
+
+    Raises:
+        ValueError: a negative or missing time.
+    """
+
+    kind: FaultKind
+    start_s: float
+    duration_s: float
+    delay_s: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.start_s) and self.start_s >= 0.0):
+            raise ValueError("start_s must not be negative")
+        if not self.duration_s > 0.0:
+            raise ValueError("duration_s must be positive")
+        if not (math.isfinite(self.delay_s) and self.delay_s >= 0.0):
+            raise ValueError("delay_s must not be negative")
+
+    @property
+    def start_ns(self) -> int:
+        """`start_s` in ns."""
+        return round(self.start_s * 1e9)
+
+    def is_active(self, elapsed_ns: int) -> bool:
+        """Whether it happens at that time since the first opening."""
+        if math.isinf(self.duration_s):
+            return elapsed_ns >= self.start_ns
+        return self.start_ns <= elapsed_ns < self.start_ns + round(self.duration_s * 1e9)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultScript:
+    """What happens when; empty means that all goes well."""
+
+    faults: tuple[Fault, ...] = ()
+
+    def is_active(self, kind: FaultKind, elapsed_ns: int) -> bool:
+        """Whether a fault of that kind happens at that time since the first opening."""
+        return any(fault.kind is kind and fault.is_active(elapsed_ns) for fault in self.faults)
+
+    def delay_ns(self, elapsed_ns: int) -> int:
+        """How late frames exposed at that time come."""
+        delays_s = (
+            fault.delay_s
+            for fault in self.faults
+            if fault.kind is FaultKind.DELAY and fault.is_active(elapsed_ns)
+        )
+        return round(max(delays_s, default=0.0) * 1e9)
+
+    def first_moment_ns(self, kind: FaultKind, after_ns: int, until_ns: int) -> int | None:
+        """The first moment of `after_ns` <= t <= `until_ns` at which that fault happens."""
+        moments_ns = [
+            max(fault.start_ns, after_ns)
+            for fault in self.faults
+            if fault.kind is kind and fault.is_active(max(fault.start_ns, after_ns))
+        ]
+        first_ns = min(moments_ns, default=None)
+        return first_ns if first_ns is not None and first_ns <= until_ns else None
+
+
+def fault_script(entries: Iterable[Mapping[str, Any]]) -> FaultScript:
+    """A script from a list of tables, as a configuration file holds them.
+
+    Args:
+        entries: each with `kind`, `start_s`, `duration_s`, and `delay_s` for a delay.
+
+    Raises:
+        ConfigurationError: an unknown kind or key, a missing or impossible value.
+    """
+    return FaultScript(tuple(_fault(entry, number) for number, entry in enumerate(entries, 1)))
+
+
+def _fault(entry: Mapping[str, Any], number: int) -> Fault:
+    """One entry; `number` counts from 1, for messages."""
+    kinds = {kind.value: kind for kind in FaultKind}
+    kind = kinds.get(str(entry.get("kind")))
+    if kind is None:
+        raise _refusal(number, f"has the kind {entry.get('kind')!r}", f"use {', '.join(kinds)}")
+    known = [field.name for field in fields(Fault)]
+    if kind is not FaultKind.DELAY:
+        known.remove("delay_s")
+    for key in entry:
+        if key not in known:
+            raise _refusal(
+                number, f"({kind.value}) has the unknown key {key!r}", f"use {', '.join(known)}"
+            )
+    times_s: dict[str, float] = {}
+    for key in known[1:]:
+        value = entry.get(key)
+        if value is None and key == "delay_s":
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise _refusal(number, f"({kind.value}) needs the number {key}", "give it in seconds")
+        times_s[key] = float(value)
+    try:
+        return Fault(kind, **times_s)
+    except ValueError as error:
+        raise _refusal(number, f"({kind.value}) is impossible", str(error)) from None
+
+
+def _refusal(number: int, problem: str, remedy: str) -> ConfigurationError:
+    return ConfigurationError(f"fault {number} {problem}", subject="faults", remedy=remedy)
