@@ -1,0 +1,1 @@
+"""The operator's screen: a terminal client that reads snapshots and submits commands."""

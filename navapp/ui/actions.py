@@ -1,0 +1,243 @@
+"""The one table of what the operator can do: it feeds keys, footer, help and command palette."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from textual.binding import Binding, BindingType
+
+from navapp.control.states import (
+    Accept,
+    Blank,
+    Cancel,
+    Command,
+    DeviceHealth,
+    EnterStage,
+    Quit,
+    Reconnect,
+    Register,
+    Reject,
+    SessionState,
+    Show,
+    Snapshot,
+)
+from navapp.values import Status
+
+_KEY_LABELS = {"space": "SPACE"}
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One thing the operator can do.
+
+    Attributes:
+        name: for programs.
+        key: as Textual names it; single characters stand for themselves.
+        label: one or two words for the footer.
+        description: a sentence for help and palette.
+        is_enabled: whether it makes sense now.
+        command: made from the snapshot; None for what the screen does by itself.
+        slot: place in the footer; actions that share one exclude each other. Empty: not there.
+        needs_width: in the footer of wide terminals only.
+        is_everywhere: works on every screen, also while a question is open and while the session
+            is silent.
+    """
+
+    name: str
+    key: str
+    label: str
+    description: str
+    is_enabled: Callable[[Snapshot], bool]
+    command: Callable[[Snapshot], Command] | None = None
+    slot: str = ""
+    needs_width: bool = False
+    is_everywhere: bool = False
+
+    @property
+    def key_label(self) -> str:
+        """The key for people."""
+        return _KEY_LABELS.get(self.key, self.key)
+
+    def binding(self) -> Binding:
+        """For Textual."""
+        return Binding(self.key, f"app.act('{self.name}')", self.description, show=False)
+
+
+def _always(_snapshot: Snapshot) -> bool:
+    return True
+
+
+def _in_states(*states: SessionState) -> Callable[[Snapshot], bool]:
+    return lambda snapshot: snapshot.state in states
+
+
+def _is_review(snapshot: Snapshot) -> bool:
+    return snapshot.state is SessionState.REVIEW and snapshot.is_candidate
+
+
+def is_acceptable(snapshot: Snapshot) -> bool:
+    """A candidate waits that the judge does not call lost; another one is refused anyway."""
+    verdict = snapshot.verdict
+    return _is_review(snapshot) and verdict is not None and verdict.status is not Status.LOST
+
+
+def _can_change_stage(snapshot: Snapshot) -> bool:
+    return snapshot.state in (
+        SessionState.READY,
+        SessionState.REVIEW,
+        SessionState.NAVIGATING,
+        SessionState.SUSPENDED,
+    )
+
+
+def _has_neighbour(step: int) -> Callable[[Snapshot], bool]:
+    return lambda snapshot: (
+        _can_change_stage(snapshot) and 1 <= snapshot.stage.number + step <= len(snapshot.stages)
+    )
+
+
+def _to_neighbour(step: int) -> Callable[[Snapshot], Command]:
+    return lambda snapshot: EnterStage(snapshot.stage.number + step)
+
+
+def _has_failed_device(snapshot: Snapshot) -> bool:
+    healths = {device.health for device in snapshot.devices}
+    is_failed = bool(healths & {DeviceHealth.TROUBLE, DeviceHealth.LOST})
+    return is_failed or snapshot.state is SessionState.FAULT
+
+
+def _stage_action(number: int) -> Action:
+    return Action(
+        f"stage-{number}",
+        str(number),
+        f"stage {number}",
+        f"go to stage {number}",
+        lambda snapshot: _can_change_stage(snapshot) and snapshot.stage.number != number,
+        lambda _: EnterStage(number),
+    )
+
+
+ACTIONS: tuple[Action, ...] = (
+    Action(
+        "blank",
+        "space",
+        "blank",
+        "make the display dark, at once; works on every screen",
+        _always,
+        lambda _: Blank(),
+        slot="blank",
+        is_everywhere=True,
+    ),
+    Action(
+        "show",
+        "v",
+        "show",
+        "leave blank: show the guides on the display again",
+        lambda snapshot: snapshot.is_blanked,
+        lambda _: Show(),
+        slot="show",
+    ),
+    Action(
+        "accept",
+        "a",
+        "accept",
+        "accept the candidate under review",
+        is_acceptable,
+        lambda _: Accept(),
+        slot="accept",
+    ),
+    Action(
+        "reject",
+        "r",
+        "reject",
+        "reject the candidate under review",
+        _is_review,
+        lambda _: Reject(),
+        slot="reject",
+    ),
+    Action(
+        "register",
+        "g",
+        "register",
+        "register: find the bone from the session's start pose",
+        _in_states(
+            SessionState.READY,
+            SessionState.REVIEW,
+            SessionState.NAVIGATING,
+            SessionState.SUSPENDED,
+        ),
+        lambda _: Register(),
+        slot="register",
+    ),
+    Action(
+        "cancel",
+        "c",
+        "cancel",
+        "cancel the registration that is running",
+        _in_states(SessionState.REGISTERING),
+        lambda _: Cancel(),
+        slot="register",
+    ),
+    Action(
+        "previous-stage",
+        "[",
+        "back",
+        "go back to the previous stage",
+        _has_neighbour(-1),
+        _to_neighbour(-1),
+        slot="previous",
+        needs_width=True,
+    ),
+    Action(
+        "next-stage",
+        "]",
+        "next",
+        "go on to the next stage",
+        _has_neighbour(1),
+        _to_neighbour(1),
+        slot="next",
+    ),
+    *(_stage_action(number) for number in range(1, 6)),
+    Action(
+        "reconnect",
+        "o",
+        "reopen",
+        "open lost devices again, now",
+        _has_failed_device,
+        lambda _: Reconnect(),
+    ),
+    Action("devices", "d", "devices", "see the devices in detail", _always, slot="devices"),
+    Action(
+        "events",
+        "e",
+        "events",
+        "see all events",
+        _always,
+        slot="events",
+        needs_width=True,
+    ),
+    Action("help", "?", "help", "see all keys", _always, slot="help"),
+    Action(
+        "quit",
+        "q",
+        "quit",
+        "end the session; asks first while navigating",
+        _always,
+        lambda _: Quit(),
+        slot="quit",
+    ),
+)
+
+ACTION_OF_NAME = {action.name: action for action in ACTIONS}
+ACTION_OF_KEY_EVERYWHERE = {action.key: action for action in ACTIONS if action.is_everywhere}
+
+
+def bindings() -> list[BindingType]:
+    """Of the application."""
+    return [action.binding() for action in ACTIONS]
+
+
+def is_possible(action: Action, snapshot: Snapshot, is_silent: bool) -> bool:
+    """Whether the action may be done; on a silent session only what needs no judgement is."""
+    if is_silent and action.is_enabled is not _always:
+        return False
+    return action.is_enabled(snapshot)

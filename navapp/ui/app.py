@@ -1,0 +1,239 @@
+"""The application: polls the session, passes views to the screens, submits commands."""
+
+import asyncio
+import os
+import signal
+import sys
+import traceback
+from pathlib import Path
+from typing import ClassVar
+
+from textual import events
+from textual.app import App
+from textual.binding import BindingType
+from textual.screen import Screen
+
+from navapp.control.states import DeviceHealth, EventLevel, Quit, SessionState, Snapshot
+from navapp.errors import DeviceError, NavappError
+from navapp.ui.actions import ACTION_OF_KEY_EVERYWHERE, ACTION_OF_NAME, bindings, is_possible
+from navapp.ui.main_screen import MainScreen
+from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
+from navapp.ui.palette import ActionProvider
+from navapp.ui.screens import ViewScreen
+from navapp.ui.session import Session
+from navapp.ui.symbols import UNICODE, Symbols, symbols_for
+from navapp.ui.terminal import own_terminal
+from navapp.ui.theme import NAVAPP_THEME
+from navapp.ui.view import View
+
+POLLS_PER_S = 8
+# Numbers that change faster than four times a second cannot be read.
+_POLLS_PER_TEXT = 2
+# Two seconds without a new snapshot: the screen no longer believes the old one.
+_SILENT_AFTER_POLLS = 16
+# Kernels that compile at the first start may keep a session busy.
+_SILENT_AFTER_POLLS_AT_START = 60 * POLLS_PER_S
+_START_STATES = (SessionState.OFFLINE, SessionState.STARTING)
+_ASKING_STATES = (SessionState.NAVIGATING, SessionState.SUSPENDED)
+_PAGES = {"help": HelpPage, "devices": DevicesPage, "events": EventsPage}
+
+
+class NavigationApp(App[int]):
+    """The operator's screen for one session.
+
+    Args:
+        session: that runs elsewhere.
+        title: first word of the title line.
+        symbols: that the terminal can draw.
+        polls_per_s: how often the newest snapshot is taken; 0 means only when `poll` is called.
+    """
+
+    CSS_PATH = Path(__file__).with_name("navapp.tcss")
+    COMMANDS = {ActionProvider}  # noqa: RUF012 (as the base class has it)
+    BINDINGS: ClassVar[list[BindingType]] = bindings()
+    ENABLE_COMMAND_PALETTE = True
+    ALLOW_SELECT = False
+
+    def __init__(
+        self,
+        session: Session,
+        title: str = "navapp",
+        *,
+        symbols: Symbols = UNICODE,
+        polls_per_s: int = POLLS_PER_S,
+    ) -> None:
+        super().__init__()
+        self.register_theme(NAVAPP_THEME)
+        self.theme = NAVAPP_THEME.name
+        self.title = title
+        self._session = session
+        self._symbols = symbols
+        self._polls_per_s = polls_per_s
+        self._n_polls = 0
+        self._n_unchanged = 0
+        snapshot = session.snapshot()
+        start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
+        self._view = View(snapshot, symbols, start_ns, title=title)
+        self._known_alarms: frozenset[object] = frozenset()
+        self.failure: Exception | None = None
+
+    def get_default_screen(self) -> Screen[None]:
+        """The main screen."""
+        return MainScreen(self._view)
+
+    def on_mount(self) -> None:
+        """Begin to look."""
+        self._ring(self._view.snapshot)
+        if self._polls_per_s > 0:
+            self.set_interval(1 / self._polls_per_s, self.poll)
+
+    def poll(self) -> None:
+        """Take the newest snapshot and show it on every screen."""
+        old, snapshot = self._view, self._session.snapshot()
+        is_same = snapshot.time_ns == old.snapshot.time_ns
+        self._n_unchanged = self._n_unchanged + 1 if is_same else 0
+        is_start = snapshot.state in _START_STATES
+        limit = _SILENT_AFTER_POLLS_AT_START if is_start else _SILENT_AFTER_POLLS
+        is_silent = self._n_unchanged >= limit
+        self._view = View(snapshot, self._symbols, old.start_ns, is_silent, self.title)
+        self._n_polls += 1
+        is_text_due = self._n_polls % _POLLS_PER_TEXT == 0 or _status(self._view) != _status(old)
+        for screen in self.screen_stack:
+            if isinstance(screen, ViewScreen):
+                screen.show(self._view, is_text_due=is_text_due)
+        self._ring(snapshot)
+        if snapshot.is_over and snapshot.state is not SessionState.FAULT:
+            self.exit(0)
+
+    def _ring(self, snapshot: Snapshot) -> None:
+        """Ring once for alarms that were not there before."""
+        alarms = frozenset(event for event in snapshot.events if event.level is EventLevel.ALARM)
+        if alarms - self._known_alarms:
+            self.bell()
+        self._known_alarms = alarms
+
+    def action_act(self, name: str) -> None:
+        """Do an action of the table, when it is possible on the newest snapshot shown."""
+        action, view = ACTION_OF_NAME[name], self._view
+        if not is_possible(action, view.snapshot, view.is_silent):
+            return
+        if name == "quit":
+            self._ask_to_quit(view)
+        elif name in _PAGES:
+            self.push_screen(_PAGES[name](view))
+        elif action.command is not None:
+            self._session.submit(action.command(view.snapshot))
+
+    def _ask_to_quit(self, view: View) -> None:
+        def finish(is_sure: bool | None) -> None:
+            if is_sure:
+                self._session.submit(Quit())
+                self.exit(0)
+
+        if any(isinstance(screen, QuitQuestion) for screen in self.screen_stack):
+            return
+        if view.snapshot.state in _ASKING_STATES:
+            self.push_screen(QuitQuestion(view), finish)
+        else:
+            finish(is_sure=True)
+
+    async def on_event(self, event: events.Event) -> None:
+        """Keys for everywhere come before anything that has the focus, a text field included."""
+        if isinstance(event, events.Key) and event.key in ACTION_OF_KEY_EVERYWHERE:
+            self.action_act(ACTION_OF_KEY_EVERYWHERE[event.key].name)
+            return
+        await super().on_event(event)
+
+    async def action_quit(self) -> None:
+        """Textual's own way to quit asks too."""
+        self.action_act("quit")
+
+    def action_help_quit(self) -> None:
+        """What Textual does at ctrl+c."""
+        self.action_act("quit")
+
+    def _handle_exception(self, error: Exception) -> None:
+        """Keep what ends the application, for the sentence afterwards."""
+        self.failure = self.failure or error
+        super()._handle_exception(error)
+
+    def _fatal_error(self) -> None:
+        """End without a traceback on the screen."""
+        self._close_messages_no_wait()
+
+    def panic(self, *_renderables: object) -> None:
+        """As `_fatal_error`, for errors that would draw themselves."""
+        self._close_messages_no_wait()
+
+
+def _status(view: View) -> tuple[object, ...]:
+    """What must be seen at once when it changes."""
+    snapshot = view.snapshot
+    return (
+        view.is_silent,
+        snapshot.state,
+        snapshot.reasons,
+        snapshot.is_blanked,
+        snapshot.is_candidate,
+        snapshot.stage,
+    )
+
+
+def run_app(session: Session, log_path: Path, title: str = "navapp") -> int:
+    """Run the screen until it ends, then stop the session, whatever happened.
+
+    Args:
+        session: that runs already.
+        log_path: takes what libraries print meanwhile, and the traceback of a failure.
+        title: first word of the title line.
+
+    Returns:
+        Exit code; 128 and the number of the signal that ended it. After a failure one sentence is
+        on the standard error.
+    """
+    failure: Exception | None = None
+    try:
+        with own_terminal(log_path):
+            symbols = symbols_for(getattr(sys.__stdout__, "encoding", None), os.environ)
+            app = NavigationApp(session, title, symbols=symbols)
+            code = asyncio.run(_drive(app))
+            failure = app.failure
+            if failure is not None:
+                traceback.print_exception(failure, file=sys.stderr)
+            elif code == 0:
+                failure = _fault(session.snapshot())
+    except Exception as error:  # noqa: BLE001 (any failure ends in one sentence)
+        failure = error
+    finally:
+        session.stop()
+    if failure is None:
+        return code
+    return _say(failure, log_path)
+
+
+async def _drive(app: NavigationApp) -> int:
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+        loop.add_signal_handler(number, app.exit, 128 + number)
+    result = await app.run_async(mouse=False)
+    return 1 if result is None else result
+
+
+def _fault(snapshot: Snapshot) -> NavappError | None:
+    """The fault that the session ended in, with its last alarm's text."""
+    if snapshot.state is not SessionState.FAULT:
+        return None
+    alarms = [event.text for event in snapshot.events if event.level is EventLevel.ALARM]
+    text = alarms[-1] if alarms else "the session ended in a fault"
+    is_device = any(device.health is DeviceHealth.LOST for device in snapshot.devices)
+    return DeviceError(text) if is_device else NavappError(text)
+
+
+def _say(failure: Exception, log_path: Path) -> int:
+    if isinstance(failure, NavappError):
+        text, code = str(failure), failure.exit_code
+    else:
+        text = f"the screen failed ({type(failure).__name__}: {failure}): see {log_path}"
+        code = 1
+    sys.stderr.write(f"navapp: error: {' '.join(text.split())}\n")
+    return code

@@ -1,0 +1,72 @@
+"""The main screen: picture, panels, stages, events, keys."""
+
+from textual.app import ComposeResult
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+
+from navapp.ui.devices import DevicesPanel
+from navapp.ui.event_list import EventList
+from navapp.ui.footer import KeyFooter
+from navapp.ui.line_panel import LinePanel
+from navapp.ui.picture import NOTICE, PictureView
+from navapp.ui.pose import PosePanel, navigable_line, reason_lines
+from navapp.ui.screens import ViewScreen
+from navapp.ui.stepper import StageStepper
+from navapp.ui.text_view import TextView
+from navapp.ui.title import TitleLine
+from navapp.ui.view import View
+from navapp.ui.work import WorkLine
+
+
+class SmallNotice(TextView):
+    """Stands in for everything on a terminal that is too small: the essential, in words."""
+
+    def __init__(self) -> None:
+        super().__init__("small")
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """Most important line first."""
+        return [
+            navigable_line(view, width),
+            *reason_lines(view, width),
+            Content(f"{'sim, ' if view.is_simulated else ''}{_stage_and_state(view)}"),
+            Content.assemble(("SPACE", "bold $primary"), " blank"),
+            Content.styled("make the terminal 80 x 24", "$text-muted"),
+            Content.styled(NOTICE, "$text-muted"),
+        ]
+
+
+def _stage_and_state(view: View) -> str:
+    stage = view.snapshot.stage
+    return f"stage {stage.number} {stage.name}, {view.state_word.lower()}"
+
+
+class MainScreen(ViewScreen[None]):
+    """Laid out for 80 x 24 and for wide terminals by the style sheet."""
+
+    HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012 (as the base class has it)
+        (0, "-narrow"),
+        (80, "-enough"),
+        (140, "-wide"),
+    ]
+    VERTICAL_BREAKPOINTS = [  # noqa: RUF012
+        (0, "-low"),
+        (24, "-even"),
+        (40, "-tall"),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """From top to bottom."""
+        yield SmallNotice()
+        with Vertical(id="body"):
+            yield TitleLine()
+            with Horizontal(id="middle"):
+                yield PictureView()
+                with Vertical(id="panels"):
+                    yield PosePanel()
+                    yield LinePanel()
+                    yield DevicesPanel()
+            yield StageStepper()
+            yield WorkLine()
+            yield EventList()
+            yield KeyFooter()

@@ -1,0 +1,159 @@
+"""The pages over the main screen: help, devices, events, and the question before quitting."""
+
+import dataclasses
+import textwrap
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical, VerticalScroll
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
+from navapp.ui.devices import device_line
+from navapp.ui.event_list import event_line
+from navapp.ui.picture import NOTICE
+from navapp.ui.screens import PageScreen, ViewScreen
+from navapp.ui.text_view import TextView
+from navapp.ui.title import TitleLine
+from navapp.ui.view import View
+
+
+class PageKeys(TextView):
+    """The last line of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__("footer")
+        self._text = text
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """How to leave, and that the display can still be blanked."""
+        return [
+            Content.assemble(
+                (" SPACE", "bold $primary"), " blank  ", ("ESC", "bold $primary"), self._text
+            )
+        ]
+
+
+class KeyTable(TextView):
+    """All actions with their keys."""
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """A line an action; the five stages share one."""
+        lines = []
+        for action in ACTIONS:
+            if action.name.startswith("stage-"):
+                if action.name != "stage-1":
+                    continue
+                key, text, is_now = "1 - 5", "go to that stage", True
+            else:
+                key, text = action.key_label, action.description
+                is_now = is_possible(action, view.snapshot, view.is_silent)
+            text_style = "$foreground" if is_now else "$text-muted"
+            note = "" if is_now else "  (not now)"
+            lines.append(
+                Content.assemble((f" {key:>7}  ", "bold $primary"), (text + note, text_style))
+            )
+        lines.append(Content.assemble((f" {'ctrl+p':>7}  ", "bold $primary"), "find a command"))
+        return [*lines, Content(""), Content.styled(f" {view.title}: {NOTICE}", "$text-muted")]
+
+
+class HelpPage(PageScreen):
+    """All keys, from the action table."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("question_mark", "dismiss", "back", show=False)
+    ]
+
+    def compose(self) -> ComposeResult:
+        """Title, keys, last line."""
+        yield TitleLine()
+        with Vertical(classes="page") as page:
+            page.border_title = "keys"
+            yield KeyTable("keys")
+        yield PageKeys(" back")
+
+
+class DeviceDetails(TextView):
+    """Every device with its name and what it says."""
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """A line a device, what it says below."""
+        lines = []
+        for device in view.snapshot.devices:
+            lines.append(device_line(view, dataclasses.replace(device, detail=""), width))
+            said = textwrap.wrap(device.detail, max(width - 2, 1)) or [""]
+            lines += [Content(f"  {line}") for line in said]
+        return lines or [Content("no devices")]
+
+
+class DevicesPage(PageScreen):
+    """Devices in detail; lost ones can be opened again from here."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("d", "dismiss", "back", show=False),
+        ACTION_OF_NAME["reconnect"].binding(),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """Title, devices, last line."""
+        yield TitleLine()
+        with Vertical(classes="page") as page:
+            page.border_title = "devices"
+            yield DeviceDetails("details")
+        yield PageKeys(" back  o reopen lost devices")
+
+
+class EventsPage(PageScreen):
+    """All events that the snapshot holds, scrollable, newest first."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("e", "dismiss", "back", show=False)]
+
+    def compose(self) -> ComposeResult:
+        """Title, events, last line."""
+        yield TitleLine()
+        with VerticalScroll(classes="page") as page:
+            page.border_title = "events"
+            yield Static(id="all-events")
+        yield PageKeys(" back  arrows, PgUp, PgDn scroll")
+
+    def show(self, view: View, *, is_text_due: bool) -> None:
+        """Take over new events when there are any."""
+        is_new = view.snapshot.events != self.view.snapshot.events
+        super().show(view, is_text_due=is_text_due)
+        events = self.query_one("#all-events", Static)
+        if is_new or not events.content:
+            width = max(self.size.width - 4, 20)
+            lines = [event_line(view, event, width) for event in view.snapshot.events[::-1]]
+            events.update(Content("\n").join(lines or [Content(" nothing happened yet")]))
+
+
+class QuestionText(TextView):
+    """What quitting means, and the two answers."""
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """Words first, keys below."""
+        return [
+            Content.styled("End the session?", "bold $foreground"),
+            Content("The display goes dark, the registration is lost."),
+            Content(""),
+            Content.assemble(
+                ("y", "bold $primary"), " end   ", ("n", "bold $primary"), " stay   ",
+                ("SPACE", "bold $primary"), " blank only",
+            ),
+        ]  # fmt: skip
+
+
+class QuitQuestion(ViewScreen[bool], ModalScreen[bool]):
+    """Asked once while navigating; only `y` ends the session."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("y", "dismiss(True)", "end", show=False),
+        Binding("n,escape", "dismiss(False)", "stay", show=False),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """A box over the picture, which goes on."""
+        yield QuestionText("question")

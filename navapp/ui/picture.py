@@ -1,0 +1,71 @@
+"""The picture with the overlay, as half blocks in a frame that says what it is."""
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.segment import Segment
+from textual import events
+from textual.geometry import Region
+from textual.strip import Strip
+from textual.widget import Widget
+
+from navapp.ui.halfblocks import cell_codes, row_strip
+from navapp.ui.view import Level, View
+
+_WAITING = "waiting for the first picture"
+NOTICE = "research, not for clinical use"
+
+
+class PictureView(Widget):
+    """Shows the newest preview; repaints the rows that changed."""
+
+    def __init__(self) -> None:
+        super().__init__(id="picture")
+        self.border_subtitle = NOTICE
+        self._preview: NDArray[np.uint8] | None = None
+        self._codes: NDArray[np.int32] = np.empty((0, 0), dtype=np.int32)
+        self._strips: list[Strip] = []
+        self._ramp = ""
+
+    def show(self, view: View) -> None:
+        """Take over the newest picture and say how it stands."""
+        if self.border_title != view.picture_title:
+            self.border_title = view.picture_title
+        for level in Level:
+            self.set_class(level is view.level, f"-{level.name.lower()}")
+        self._ramp = view.symbols.ramp
+        if view.snapshot.preview is not self._preview:
+            self._preview = view.snapshot.preview
+            self._redraw()
+
+    def on_resize(self, _event: events.Resize) -> None:
+        """Fit the picture into the new box."""
+        self._redraw()
+
+    def _redraw(self) -> None:
+        columns, rows = self.content_size
+        preview = self._preview
+        if columns < 1 or rows < 1 or preview is None or preview.size == 0:
+            self._strips, self._codes = [], np.empty((0, 0), dtype=np.int32)
+            self.refresh()
+            return
+        codes = cell_codes(preview, columns, rows)
+        if codes.shape != self._codes.shape or not self._strips:
+            self._strips = [row_strip(row, self._ramp) for row in codes]
+            self._codes = codes
+            self.refresh()
+            return
+        changed = np.flatnonzero((codes != self._codes).any(axis=1)).tolist()
+        for y in changed:
+            self._strips[y] = row_strip(codes[y], self._ramp)
+        self._codes = codes
+        if changed:
+            self.refresh(*(Region(0, y, columns, 1) for y in changed))
+
+    def render_line(self, y: int) -> Strip:
+        """The prepared row."""
+        if y < len(self._strips):
+            return self._strips[y]
+        width, height = self.content_size
+        if not self._strips and y == height // 2:
+            return Strip([Segment(_WAITING[:width].center(width), self.rich_style)], width)
+        return Strip.blank(width, self.rich_style)

@@ -1,0 +1,147 @@
+"""The pose panel: may guides be shown, and if not, why and what to do."""
+
+import textwrap
+
+from textual.content import Content
+
+from navapp.control.states import Snapshot
+from navapp.ui.actions import is_acceptable
+from navapp.ui.gauges import Number, bar
+from navapp.ui.text_view import TextView
+from navapp.ui.view import Level, View
+from navapp.values import Status
+
+# Lines at the bottom that the error with its bar always takes.
+_GAUGE_LINES = 2
+
+_STATUS_LEVELS = {
+    Status.OK: Level.OK,
+    Status.DEGRADED: Level.ATTENTION,
+    Status.LOST: Level.BAD,
+}
+
+
+class PosePanel(TextView):
+    """First line: navigable, yes or no. Last lines: the error. Between: figures, or the reason."""
+
+    def __init__(self) -> None:
+        super().__init__("pose")
+        self.border_title = "pose"
+
+    def show(self, view: View) -> None:
+        """Say in the frame whose figures these are."""
+        title = "candidate" if view.is_review else "pose"
+        if self.border_title != title:
+            self.border_title = title
+        super().show(view)
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """All lines, the gauge at the bottom."""
+        middle = _candidate(view, width) if view.is_review else _middle(view, width)
+        room = max(height - 1 - _GAUGE_LINES, 0)
+        middle = (middle + [Content("")] * room)[:room]
+        return [navigable_line(view, width), *middle, *_error(view, width)]
+
+
+def navigable_line(view: View, width: int) -> Content:
+    """The filled line that says yes or no."""
+    word = "yes" if view.is_navigable else "NO"
+    more = len(view.snapshot.reasons) - 1
+    hint = f"+{more} more" if more > 0 and not view.is_silent and not view.is_review else ""
+    text = f" {view.mark(view.level)} NAVIGABLE  {word}"
+    return Content.styled(f"{text}{hint.rjust(width - len(text) - 1)} "[:width], view.level.band)
+
+
+def reason_lines(view: View, width: int) -> list[Content]:
+    """The first reason and its remedy, wrapped, with a free column at the right."""
+    problem, remedy = view.reason
+    room = max(width - 1, 1)
+    lines = [Content.styled(line, view.level.value) for line in textwrap.wrap(problem, room)]
+    return lines + [Content(line) for line in textwrap.wrap(remedy, room)]
+
+
+def _other_reasons(view: View, width: int) -> list[Content]:
+    """Seen where there is room."""
+    others = () if view.is_silent else view.snapshot.reasons[1:]
+    texts = [
+        line for reason in others for line in textwrap.wrap(f"also: {reason.value}", width - 1)
+    ]
+    return [Content.styled(text, "$text-muted") for text in texts]
+
+
+def _middle(view: View, width: int) -> list[Content]:
+    if not view.is_navigable:
+        return [*reason_lines(view, width), *_other_reasons(view, width)]
+    snapshot = view.snapshot
+    return [
+        Content(""),
+        _figure("age", Number.WHOLE, snapshot.pose_age_ms, "ms"),
+        _figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"),
+        _figure("occluded", Number.WHOLE, _occluded_percent(snapshot), "%"),
+        *_fit(snapshot),
+    ]
+
+
+def _candidate(view: View, width: int) -> list[Content]:
+    """The judge's word on the candidate and the figures to decide by."""
+    snapshot, verdict = view.snapshot, view.snapshot.verdict
+    status = Status.LOST if verdict is None else verdict.status
+    level = _STATUS_LEVELS[status]
+    lines = [Content.styled(f"{view.mark(level)} judged {status.value}", level.value)]
+    figures = [_figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"), *_fit(snapshot)]
+    accept = ("a", "bold $foreground"), " accept   "
+    asks = [
+        Content.assemble(*(accept if is_acceptable(snapshot) else ()), ("r", "bold"), " reject")
+    ]
+    if verdict is not None and verdict.reasons:
+        why = textwrap.wrap(verdict.reasons[0].value, width)[:2]
+        lines += [Content.styled(line, level.value) for line in why]
+        figures = figures[:2]
+    return [*lines, *figures, *asks]
+
+
+def _fit(snapshot: Snapshot) -> list[Content]:
+    verdict = snapshot.verdict
+    rms = None if verdict is None else verdict.rms_mm
+    expected = None if verdict is None else verdict.expected_rms_mm
+    return [
+        _figure("rms", Number.MM, rms, "mm"),
+        _figure("expected", Number.MM, expected, "mm"),
+    ]
+
+
+def _figure(name: str, number: Number, value: float | None, unit: str) -> Content:
+    return Content.assemble(
+        (f"{name:<10}", "$text-muted"), number.text(value).rjust(7), (f" {unit}", "$text-muted")
+    )
+
+
+def _seen_percent(snapshot: Snapshot) -> float | None:
+    return None if snapshot.verdict is None else 100.0 * snapshot.verdict.coverage
+
+
+def _occluded_percent(snapshot: Snapshot) -> float | None:
+    return None if snapshot.verdict is None else 100.0 * snapshot.verdict.occluded_share
+
+
+def _error(view: View, width: int) -> list[Content]:
+    """The error's bound and its bar against the stage's tolerance."""
+    snapshot = view.snapshot
+    error = None
+    if snapshot.verdict is not None and not view.is_silent:
+        error = snapshot.verdict.predicted_tre_mm
+    tolerance = snapshot.stage.tolerance_mm
+    is_over = error is not None and error > tolerance
+    style = Level.BAD.value if is_over else "bold $foreground"
+    bar_style = Level.BAD.value if is_over else "$success"
+    return [
+        Content.assemble(
+            ("error  ", "$text-muted"),
+            (f"{view.symbols.at_most} {Number.MM.text(error)} mm", style),
+            ("  over" if is_over else "", style),
+        ),
+        Content.assemble(
+            (bar(error, tolerance, max(width - 5, 4), view.symbols), bar_style),
+            (f"{tolerance:5.2f}", "$text-muted"),
+        ),
+    ]

@@ -1,0 +1,47 @@
+"""Base of the screens: each passes views on to its widgets."""
+
+from typing import ClassVar, Generic, TypeVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.screen import ModalScreen, Screen
+
+from navapp.ui.picture import PictureView
+from navapp.ui.text_view import TextView
+from navapp.ui.view import View
+
+ResultT = TypeVar("ResultT")
+
+
+class ViewScreen(Screen[ResultT], Generic[ResultT]):
+    """A screen that shows views; the first at once when it appears."""
+
+    def __init__(self, view: View) -> None:
+        super().__init__()
+        self.view = view
+
+    def on_mount(self) -> None:
+        """Plain frames where the terminal draws no others."""
+        self.set_class(self.view.symbols.is_ascii, "-ascii")
+        self.show(self.view, is_text_due=True)
+
+    def show(self, view: View, *, is_text_due: bool) -> None:
+        """Pass a view on; text only when it is due, the picture always."""
+        self.view = view
+        for picture in self.query(PictureView):
+            picture.show(view)
+        if is_text_due:
+            for widget in self.query(TextView):
+                widget.show(view)
+
+
+class PageScreen(ViewScreen[None], ModalScreen[None]):
+    """A page over the main screen: keys of the main screen rest, except those for everywhere."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape,q", "dismiss", "back", show=False),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """Each page its own."""
+        raise NotImplementedError

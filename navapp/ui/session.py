@@ -1,0 +1,21 @@
+"""What the screen needs of a session that runs elsewhere."""
+
+from typing import Protocol
+
+from navapp.control.states import Command, Snapshot
+
+
+class Session(Protocol):
+    """A running session as its clients see it. No call blocks."""
+
+    def snapshot(self) -> Snapshot:
+        """The newest snapshot."""
+        ...
+
+    def submit(self, command: Command) -> None:
+        """Hand over a command; what became of it is in a later snapshot."""
+        ...
+
+    def stop(self) -> None:
+        """End the session's thread and darken the display; may be called twice."""
+        ...

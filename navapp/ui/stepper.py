@@ -1,0 +1,50 @@
+"""The five stages in a row, and what the present one asks for."""
+
+from textual.content import Content
+
+from navapp.ui.gauges import cut
+from navapp.ui.text_view import TextView
+from navapp.ui.view import View
+from navapp.values import StageSpec
+
+
+class StageStepper(TextView):
+    """One line; with more room also the gates and measurements of the present stage."""
+
+    def __init__(self) -> None:
+        super().__init__("stepper")
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """The row of stages first."""
+        stage, steps = view.snapshot.stage, _steps(view)
+        room = max(width - steps.cell_length, 0)
+        limits = f"{stage.tolerance_mm:.2f} mm {stage.tolerance_deg:.1f} deg "
+        limits = f"limits {limits}" if room >= len(limits) + 10 else limits
+        row = Content.assemble(steps, (limits.rjust(room), "$text-muted"))
+        if height < 2:
+            return [row]
+        return [
+            row,
+            _named("before the next stage", stage.gates, view, width),
+            _named("measured here", stage.measurements, view, width),
+        ]
+
+
+def _steps(view: View) -> Content:
+    present = view.snapshot.stage.number
+    parts: list[Content | str | tuple[str, str]] = [" "]
+    for index, stage in enumerate(view.snapshot.stages):
+        if index:
+            parts.append((f" {view.symbols.dash} ", "$text-muted"))
+        parts.append(_step(stage, is_present=stage.number == present))
+    return Content.assemble(*parts)
+
+
+def _step(stage: StageSpec, *, is_present: bool) -> tuple[str, str]:
+    name = stage.name.upper() if is_present else stage.name
+    return f"{stage.number} {name}", "bold $primary" if is_present else "$text-muted"
+
+
+def _named(name: str, items: tuple[str, ...], view: View, width: int) -> Content:
+    text = f" {view.symbols.dot} ".join(items) or "nothing"
+    return Content.assemble((f" {name:<22} ", "$text-muted"), cut(text, width - 25, view.symbols))

@@ -1,0 +1,63 @@
+"""The terminal belongs to the screen: what libraries print goes to a log."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from navapp.errors import InputError, UsageError
+
+
+@contextlib.contextmanager
+def own_terminal(log_path: Path) -> Iterator[None]:
+    """Send file descriptors 1 and 2 to a log; only `sys.__stdout__`, `__stderr__` stay terminal.
+
+    Textual writes to `sys.__stderr__`. Native code writes to the descriptors, Python code to
+    `sys.stdout` and `sys.stderr`, which keep theirs; so all of that ends in the log.
+
+    Raises:
+        UsageError: there is no terminal.
+        InputError: the log cannot be written.
+    """
+    if not (os.isatty(0) and os.isatty(1)):
+        raise UsageError(
+            "the operator's screen needs a terminal", remedy="start it in one, or add --headless"
+        )
+    log = _opened(log_path)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    saved = os.dup(1), os.dup(2)
+    streams = sys.__stdout__, sys.__stderr__
+    terminal = os.fdopen(
+        os.dup(1), "w", buffering=1, encoding=sys.stdout.encoding or "utf-8", errors="replace"
+    )
+    os.dup2(log, 1)
+    os.dup2(log, 2)
+    os.close(log)
+    sys.__stdout__ = sys.__stderr__ = terminal  # type: ignore[misc]
+    try:
+        yield
+    finally:
+        sys.__stdout__, sys.__stderr__ = streams  # type: ignore[misc]
+        # A terminal that was closed takes no more text.
+        with contextlib.suppress(OSError):
+            terminal.close()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os.dup2(saved[0], 1)
+        os.dup2(saved[1], 2)
+        for descriptor in saved:
+            os.close(descriptor)
+
+
+def _opened(log_path: Path) -> int:
+    try:
+        log_path.parent.mkdir(parents=True, exist_ok=True)
+        return os.open(log_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    except OSError as error:
+        raise InputError(
+            f"{log_path}: the log cannot be written ({error.strerror})",
+            subject=str(log_path),
+            remedy="choose another folder",
+        ) from error

@@ -1,0 +1,175 @@
+"""What a snapshot means to the operator: words, symbols and levels, without any widget."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from navapp.control.states import DeviceHealth, EventLevel, SessionState, Snapshot
+from navapp.ui.symbols import Symbols
+from navapp.values import Reason
+
+_NS_PER_S = 1_000_000_000
+
+
+class Level(Enum):
+    """How something stands; the value is the style."""
+
+    OK = "bold $success"
+    ATTENTION = "bold $warning"
+    BAD = "bold $error"
+    QUIET = "$text-muted"
+
+    @property
+    def band(self) -> str:
+        """Style of a filled line."""
+        return _BANDS[self]
+
+
+_BANDS = {
+    Level.OK: "bold $background on $success",
+    Level.ATTENTION: "bold $background on $warning",
+    Level.BAD: "bold $text-on-error on $error",
+    Level.QUIET: "$text-muted on $panel",
+}
+
+_STATE_LEVELS = {
+    SessionState.OFFLINE: Level.QUIET,
+    SessionState.NAVIGATING: Level.OK,
+    SessionState.SUSPENDED: Level.BAD,
+    SessionState.FAULT: Level.BAD,
+}
+
+_HEALTH_LEVELS = {
+    DeviceHealth.OK: Level.OK,
+    DeviceHealth.ABSENT: Level.QUIET,
+    DeviceHealth.TROUBLE: Level.ATTENTION,
+    DeviceHealth.LOST: Level.BAD,
+}
+
+_EVENT_LEVELS = {
+    EventLevel.INFO: Level.QUIET,
+    EventLevel.WARNING: Level.ATTENTION,
+    EventLevel.ALARM: Level.BAD,
+}
+
+
+# Where a registration cannot be started or accepted yet, it is no remedy.
+_WAITING = {
+    SessionState.OFFLINE: "wait for the devices",
+    SessionState.STARTING: "wait until the session is ready",
+    SessionState.REGISTERING: "wait for the candidate",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A snapshot with what the client itself knows.
+
+    Attributes:
+        snapshot: the newest.
+        symbols: that the terminal can draw.
+        start_ns: the session's time that counts as 00:00.
+        is_silent: the session has given nothing new for too long; nothing in the snapshot is
+            believed any more.
+        title: of the application.
+    """
+
+    snapshot: Snapshot
+    symbols: Symbols
+    start_ns: int
+    is_silent: bool = False
+    title: str = "navapp"
+
+    @property
+    def is_navigable(self) -> bool:
+        """Guides may be shown, and the word is fresh."""
+        return self.snapshot.is_navigable and not self.is_silent
+
+    @property
+    def is_review(self) -> bool:
+        """A candidate waits for the operator."""
+        return self.snapshot.state is SessionState.REVIEW and self.snapshot.is_candidate
+
+    @property
+    def is_simulated(self) -> bool:
+        """The rig is a simulation."""
+        return self.snapshot.rig_name.lower().startswith("sim")
+
+    @property
+    def is_picture_old(self) -> bool:
+        """The preview is the last one before the camera fell silent."""
+        is_stopped = self.snapshot.is_camera_silent or self.snapshot.state is SessionState.FAULT
+        return is_stopped and self.snapshot.preview is not None
+
+    @property
+    def level(self) -> Level:
+        """Navigable is OK; not navigable is BAD where guides are expected, ATTENTION elsewhere."""
+        if self.is_silent or self.snapshot.state in (SessionState.SUSPENDED, SessionState.FAULT):
+            return Level.BAD
+        if self.is_navigable:
+            return Level.OK
+        is_expected = (
+            self.snapshot.state is SessionState.NAVIGATING and not self.snapshot.is_blanked
+        )
+        return Level.BAD if is_expected else Level.ATTENTION
+
+    @property
+    def state_level(self) -> Level:
+        """Of the word for the session's state."""
+        if self.is_silent:
+            return Level.BAD
+        return _STATE_LEVELS.get(self.snapshot.state, Level.ATTENTION)
+
+    @property
+    def state_word(self) -> str:
+        """The session's state."""
+        return "SILENT" if self.is_silent else self.snapshot.state.name
+
+    @property
+    def reason(self) -> tuple[str, str]:
+        """The first reason's sentence and its remedy; empty texts when navigable."""
+        if self.is_silent:
+            return "the session gives no answer", "press q, then start it again"
+        if not self.snapshot.reasons:
+            return "", ""
+        first = self.snapshot.reasons[0]
+        is_waiting = first is Reason.NOT_NAVIGATING and self.snapshot.state in _WAITING
+        return first.value, _WAITING[self.snapshot.state] if is_waiting else first.remedy
+
+    @property
+    def picture_title(self) -> str:
+        """What the picture is, and what is wrong with it."""
+        dot = self.symbols.dot
+        if self.is_silent:
+            return f"left view {dot} FROZEN, no answer"
+        if self.is_picture_old:
+            return f"left view {dot} OLD PICTURE, no new one comes"
+        if self.snapshot.is_blanked:
+            return f"left view {dot} BLANKED, the display is dark"
+        if self.is_review:
+            return f"left view {dot} CANDIDATE, not accepted"
+        return "left view" if self.is_navigable else f"left view {dot} NO GUIDES"
+
+    def mark(self, level: Level) -> str:
+        """The symbol of a level."""
+        symbols = self.symbols
+        return {
+            Level.OK: symbols.ok,
+            Level.ATTENTION: symbols.attention,
+            Level.BAD: symbols.bad,
+            Level.QUIET: symbols.absent,
+        }[level]
+
+    def clock(self, time_ns: int) -> str:
+        """Minutes and seconds since the session's start, `mm:ss`."""
+        seconds = max(time_ns - self.start_ns, 0) // _NS_PER_S
+        return f"{seconds // 60:02d}:{seconds % 60:02d}"
+
+
+def health_level(health: DeviceHealth) -> Level:
+    """Of a device."""
+    return _HEALTH_LEVELS[health]
+
+
+def event_level(level: EventLevel) -> Level:
+    """Of an event."""
+    return _EVENT_LEVELS[level]

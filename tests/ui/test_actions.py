@@ -1,0 +1,53 @@
+from collections import Counter
+
+import pytest
+
+from navapp.control.stages import STAGES
+from navapp.control.states import SessionState
+from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
+from navapp.values import Status, Verdict
+from tests.ui import snapshots
+
+
+def test_every_key_has_one_action() -> None:
+    assert Counter(action.key for action in ACTIONS).most_common(1)[0][1] == 1
+
+
+@pytest.mark.parametrize("state", list(SessionState))
+@pytest.mark.parametrize("is_silent", [False, True])
+def test_blank_and_quit_are_possible_in_every_state(state: SessionState, is_silent: bool) -> None:
+    snapshot = snapshots.navigating(state=state)
+    assert is_possible(ACTION_OF_NAME["blank"], snapshot, is_silent)
+    assert is_possible(ACTION_OF_NAME["quit"], snapshot, is_silent)
+
+
+def test_nothing_is_accepted_on_an_old_word() -> None:
+    assert is_possible(ACTION_OF_NAME["accept"], snapshots.review(), is_silent=False)
+    assert not is_possible(ACTION_OF_NAME["accept"], snapshots.review(), is_silent=True)
+
+
+@pytest.mark.parametrize("state", [s for s in SessionState if s is not SessionState.REVIEW])
+def test_accept_and_reject_need_a_review(state: SessionState) -> None:
+    snapshot = snapshots.review(state=state)
+    assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
+    assert not is_possible(ACTION_OF_NAME["reject"], snapshot, is_silent=False)
+
+
+def test_a_review_without_candidate_accepts_nothing() -> None:
+    snapshot = snapshots.review(is_candidate=False)
+    assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
+
+
+def test_stages_end_at_the_first_and_the_last() -> None:
+    first = snapshots.navigating(stage=STAGES[0])
+    last = snapshots.navigating(stage=STAGES[-1])
+    assert not is_possible(ACTION_OF_NAME["previous-stage"], first, is_silent=False)
+    assert is_possible(ACTION_OF_NAME["next-stage"], first, is_silent=False)
+    assert is_possible(ACTION_OF_NAME["previous-stage"], last, is_silent=False)
+    assert not is_possible(ACTION_OF_NAME["next-stage"], last, is_silent=False)
+
+
+def test_a_candidate_that_is_lost_can_only_be_rejected() -> None:
+    snapshot = snapshots.review(verdict=Verdict(Status.LOST))
+    assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
+    assert is_possible(ACTION_OF_NAME["reject"], snapshot, is_silent=False)

@@ -1,0 +1,223 @@
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from navapp.control.stages import STAGES
+from navapp.control.states import (
+    DeviceHealth,
+    DeviceLine,
+    Event,
+    EventLevel,
+    SessionState,
+    Snapshot,
+)
+from navapp.ui.devices import DevicesPanel
+from navapp.ui.event_list import event_line
+from navapp.ui.footer import KeyFooter
+from navapp.ui.pose import PosePanel, reason_lines
+from navapp.ui.stepper import StageStepper
+from navapp.ui.symbols import ASCII, UNICODE, Symbols
+from navapp.ui.text_view import TextView
+from navapp.ui.title import TitleLine
+from navapp.ui.view import Level, View
+from navapp.values import Reason, Status, Verdict
+from tests.ui import snapshots
+
+# Room of the panels at 80 x 24.
+WIDTH, POSE_LINES, DEVICE_LINES = 25, 9, 2
+
+
+def view_of(snapshot: Snapshot, symbols: Symbols = UNICODE, *, is_silent: bool = False) -> View:
+    return View(snapshot, symbols, snapshots.START_NS, is_silent)
+
+
+def lines_of(widget: TextView, view: View, width: int, height: int) -> list[str]:
+    return [line.plain for line in widget.build(view, width, height)]
+
+
+@pytest.mark.parametrize("reason", list(Reason))
+def test_every_reason_with_its_remedy_fits_the_small_panel(reason: Reason) -> None:
+    view = view_of(snapshots.suspended(reasons=(reason,)))
+    assert len(reason_lines(view, WIDTH)) <= POSE_LINES - 3
+    text = " ".join(line.plain for line in reason_lines(view, WIDTH))
+    assert reason.value in text
+    assert reason.remedy in text
+
+
+def test_the_pose_panel_says_yes_only_when_navigable() -> None:
+    first = lines_of(PosePanel(), view_of(snapshots.navigating()), WIDTH, POSE_LINES)[0]
+    assert "NAVIGABLE  yes" in first
+    first = lines_of(PosePanel(), view_of(snapshots.suspended()), WIDTH, POSE_LINES)[0]
+    assert "NAVIGABLE  NO" in first
+    assert "+2 more" in first
+
+
+def test_a_silent_session_is_not_navigable_whatever_its_last_word() -> None:
+    view = view_of(snapshots.navigating(), is_silent=True)
+    text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
+    assert "NAVIGABLE  NO" in text
+    assert "no answer" in text
+    assert "0.21" not in text
+    assert "FROZEN" in view.picture_title
+    assert view.level is Level.BAD
+
+
+@pytest.mark.parametrize("snapshot", [snapshots.navigating(), snapshots.suspended()])
+def test_the_error_keeps_its_place(snapshot: Snapshot) -> None:
+    lines = lines_of(PosePanel(), view_of(snapshot), WIDTH, POSE_LINES)
+    assert len(lines) == POSE_LINES
+    assert lines[-2].startswith("error  ≤ ")
+    assert all(len(line) <= WIDTH for line in lines)
+
+
+def test_an_error_beyond_the_tolerance_is_called_over() -> None:
+    assert "over" in lines_of(PosePanel(), view_of(snapshots.suspended()), WIDTH, POSE_LINES)[-2]
+    assert "over" not in "".join(
+        lines_of(PosePanel(), view_of(snapshots.navigating()), WIDTH, POSE_LINES)
+    )
+
+
+def test_a_candidate_shows_what_the_judge_has_against_it() -> None:
+    verdict = Verdict(Status.DEGRADED, 2.4, (Reason.DEGENERATE,), 0.2, 0.3, 0.5, 0.9, 0.2)
+    view = view_of(snapshots.review(verdict=verdict))
+    text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
+    assert "judged DEGRADED" in text
+    assert Reason.DEGENERATE.value in text
+    assert "a accept" in text
+    assert "CANDIDATE, not accepted" in view.picture_title
+
+
+def test_a_candidate_without_verdict_counts_as_lost() -> None:
+    view = view_of(snapshots.review(verdict=None))
+    text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
+    assert "judged LOST" in text
+    assert "a accept" not in text
+    assert "r reject" in text
+
+
+@pytest.mark.parametrize("snapshot", [snapshots.starting(), snapshots.registering()])
+def test_who_has_to_wait_is_told_to_wait(snapshot: Snapshot) -> None:
+    assert view_of(snapshot).reason[1].startswith("wait ")
+
+
+@pytest.mark.parametrize("changes", [{"is_camera_silent": True}, {"state": SessionState.FAULT}])
+def test_a_picture_that_stands_still_is_called_old(changes: dict[str, Any]) -> None:
+    title = view_of(snapshots.navigating(reasons=(Reason.CAMERA_SILENT,), **changes)).picture_title
+    assert "OLD PICTURE" in title
+    view = view_of(snapshots.starting(is_camera_silent=True))
+    assert "OLD PICTURE" not in view.picture_title
+
+
+def test_devices_stand_in_pairs_while_all_is_well() -> None:
+    lines = lines_of(DevicesPanel(), view_of(snapshots.navigating()), WIDTH, DEVICE_LINES)
+    assert "camera" in lines[0]
+    assert "display" in lines[0]
+    assert len(lines) == DEVICE_LINES
+
+
+def test_a_lost_device_stands_first_with_the_word() -> None:
+    lines = lines_of(DevicesPanel(), view_of(snapshots.suspended()), WIDTH, DEVICE_LINES)
+    assert "display" in lines[0]
+    assert "LOST" in lines[0]
+    assert lines[1] == "3 others without trouble"
+
+
+def test_troubles_that_do_not_fit_are_counted() -> None:
+    devices = tuple(DeviceLine(f"d{i}", "", DeviceHealth.LOST) for i in range(5))
+    view = view_of(snapshots.navigating(devices=devices))
+    assert lines_of(DevicesPanel(), view, WIDTH, DEVICE_LINES)[1] == "and 4 more in trouble"
+
+
+def test_no_devices_are_no_lines() -> None:
+    assert lines_of(DevicesPanel(), view_of(snapshots.navigating(devices=())), WIDTH, 2) == []
+
+
+def test_the_title_says_sim_only_of_a_simulated_rig() -> None:
+    (line,) = lines_of(TitleLine(), view_of(snapshots.navigating()), 80, 1)
+    assert " sim " in line
+    (line,) = lines_of(TitleLine(), view_of(snapshots.navigating(rig_name="oak 7")), 80, 1)
+    assert " sim " not in line
+
+
+@pytest.mark.parametrize("width", [80, 100, 160])
+@pytest.mark.parametrize("make", [TitleLine, KeyFooter, StageStepper])
+@pytest.mark.parametrize("symbols", [UNICODE, ASCII])
+def test_lines_fit_their_width(width: int, make: Callable[[], TextView], symbols: Symbols) -> None:
+    for stage in STAGES:
+        snapshot = snapshots.blanked(stage=stage, is_recording=True, rig_name="simulated " * 9)
+        (line, *_) = lines_of(make(), view_of(snapshot, symbols), width, 1)
+        assert len(line) <= width
+        if make is TitleLine:
+            assert "NAVIGATING" in line
+            assert "BLANKED" in line
+
+
+def test_keys_keep_their_place_in_the_footer() -> None:
+    places = {
+        lines_of(KeyFooter(), view_of(snapshot), 80, 1)[0].index("q quit")
+        for snapshot in (
+            snapshots.navigating(),
+            snapshots.registering(),
+            snapshots.review(),
+            snapshots.blanked(),
+        )
+    }
+    assert len(places) == 1
+
+
+def test_cancel_takes_the_place_of_register_while_that_runs() -> None:
+    (line,) = lines_of(KeyFooter(), view_of(snapshots.registering()), 80, 1)
+    assert "c cancel" in line
+    assert "g register" not in line
+
+
+def test_wide_stepper_names_gates_and_measurements() -> None:
+    lines = lines_of(StageStepper(), view_of(snapshots.navigating()), 160, 3)
+    assert "entry point checked with the tip" in lines[1]
+    assert "drill angle" in lines[2]
+
+
+def test_an_event_is_one_line_without_control_codes() -> None:
+    event = Event(
+        snapshots.START_NS + 3_725 * snapshots.S, "x", "a\nb \x1b[2J" + "c" * 99, EventLevel.ALARM
+    )
+    line = event_line(view_of(snapshots.navigating()), event, 60).plain
+    assert line.startswith("  62:05 ✗ ALARM a b ")
+    assert "\x1b" not in line
+    assert "\n" not in line
+    assert len(line) <= 60
+
+
+@pytest.mark.parametrize(
+    ("snapshot", "level"),
+    [
+        (snapshots.navigating(), Level.OK),
+        (snapshots.navigating(reasons=(Reason.JUMPED,)), Level.BAD),
+        (snapshots.suspended(), Level.BAD),
+        (snapshots.blanked(), Level.ATTENTION),
+        (snapshots.review(), Level.ATTENTION),
+        (snapshots.starting(), Level.ATTENTION),
+    ],
+)
+def test_levels(snapshot: Snapshot, level: Level) -> None:
+    assert view_of(snapshot).level is level
+
+
+@pytest.mark.parametrize(
+    "snapshot",
+    [
+        snapshots.navigating(),
+        snapshots.suspended(),
+        snapshots.review(),
+        snapshots.starting(),
+        snapshots.blanked(),
+    ],
+)
+def test_plain_terminals_get_ascii_only(snapshot: Snapshot) -> None:
+    view = view_of(dataclasses.replace(snapshot), ASCII)
+    for widget in (PosePanel(), DevicesPanel(), TitleLine(), KeyFooter(), StageStepper()):
+        for line in lines_of(widget, view, 80, 3):
+            assert line.isascii()
+    assert view.picture_title.isascii()

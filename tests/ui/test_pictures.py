@@ -1,0 +1,47 @@
+"""Pictures of the screen; look at a difference before accepting it with --snapshot-update."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from textual.pilot import Pilot
+
+from navapp.control.states import Snapshot
+from navapp.ui.app import NavigationApp
+from navapp.ui.picture import PictureView
+from navapp.ui.pose import PosePanel
+from navapp.ui.symbols import ASCII
+from tests.ui import snapshots
+
+STATES: dict[str, tuple[Callable[[], Snapshot], str, str]] = {
+    "navigating": (snapshots.navigating, "NAVIGABLE  yes", "left view"),
+    "suspended": (snapshots.suspended, "NAVIGABLE  NO", "left view · NO GUIDES"),
+    "review": (snapshots.review, "judged OK", "left view · CANDIDATE, not accepted"),
+    "starting": (snapshots.starting, "NAVIGABLE  NO", "left view · NO GUIDES"),
+    "blanked": (snapshots.blanked, "NAVIGABLE  NO", "left view · BLANKED, the display is dark"),
+}
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)], ids=["80x24", "160x48"])
+@pytest.mark.parametrize("state", list(STATES))
+def test_screen(state: str, size: tuple[int, int], snap_compare: Callable[..., bool]) -> None:
+    make, words, title = STATES[state]
+    app = NavigationApp(snapshots.ScriptedSession(make()), polls_per_s=0)
+
+    async def look(pilot: Pilot[Any]) -> None:
+        await pilot.pause()
+        assert words in str(pilot.app.screen.query_one(PosePanel).render())
+        assert pilot.app.screen.query_one(PictureView).border_title == title
+
+    assert snap_compare(app, terminal_size=size, run_before=look)
+
+
+def test_plain_terminal(snap_compare: Callable[..., bool]) -> None:
+    session = snapshots.ScriptedSession(snapshots.suspended())
+    assert snap_compare(NavigationApp(session, symbols=ASCII, polls_per_s=0))
+
+
+@pytest.mark.parametrize("key", ["question_mark", "d", "q"], ids=["help", "devices", "quit"])
+def test_page(key: str, snap_compare: Callable[..., bool]) -> None:
+    app = NavigationApp(snapshots.ScriptedSession(snapshots.navigating()), polls_per_s=0)
+    assert snap_compare(app, press=[key])
