@@ -79,7 +79,7 @@ class DisplaySection(Section):
 
     backend: Literal["simulated"] = "simulated"
     """simulated."""
-    valid_ms: Positive = 250.0
+    valid_ms: Positive = 500.0
     """A picture without a newer one turns black after this."""
 
 

@@ -23,7 +23,6 @@ from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 
-# The simulator's world is at rest for the session's first moments, like a patient on the table.
 _ENTRY_POINTS = "navapp.devices"
 
 
@@ -182,11 +181,16 @@ def _open_simulated(configuration: Configuration, *, is_headless: bool) -> Opene
 
 def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
     anatomy = world.anatomy
+    joint_z_mm = float(anatomy.bones["femur"].vertices_mm[:, 2].min())
     return Simulation(
         bones=dict(anatomy.bones),
         side=world.scenario.side,
-        targets={name: np.asarray(point) for name, point in anatomy.landmarks.items()},
-        curves={name: np.asarray(points) for name, points in anatomy.curves.items()},
+        targets={name: np.array(point) for name, point in anatomy.landmarks.items()},
+        # Beyond the joint a vessel follows the tibia: with the knee flexed it is elsewhere.
+        curves={
+            name: np.asarray(points)[np.asarray(points)[:, 2] > joint_z_mm]
+            for name, points in anatomy.curves.items()
+        },
         nominal_left_from_femur=world.nominal_left_from_femur,
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,

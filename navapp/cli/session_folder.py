@@ -9,7 +9,7 @@ from navapp import __version__
 from navapp.cli.sessions import prior_to_json, read_prior
 from navapp.config import Configuration, as_toml
 from navapp.control.operators import RecordedEvents, read_events
-from navapp.control.recorder import SessionRecorder
+from navapp.control.recorder import BackgroundSink, SessionRecorder
 from navapp.errors import SequenceError
 from navapp.geometry.ply import write_whole
 from navapp.geometry.rig import StereoRig, read_rig, write_rig
@@ -58,7 +58,9 @@ def start_recording(
         "first_stage": first_stage,
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
-    return SessionRecorder(folder, frames, with_pictures=configuration.recording.pictures)
+    return SessionRecorder(
+        folder, BackgroundSink(frames), with_pictures=configuration.recording.pictures
+    )
 
 
 def is_session(folder: str | Path) -> bool:

@@ -72,7 +72,7 @@ class SessionOptions:
 
     line: LineSettings = field(default_factory=LineSettings)
     first_stage: StageSpec = STAGES[0]
-    overlay_valid_ms: float = 250.0
+    overlay_valid_ms: float = 500.0
     rig_name: str = ""
 
 
@@ -241,7 +241,8 @@ class SessionController:
     def _show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
         """Compose, show until it expires, keep a preview; also how long composing took."""
         started_ns = time.perf_counter_ns()
-        mark = "SIMULATED" if self._camera.camera.info.is_simulated else ""
+        is_simulated = self._camera.camera.info.is_simulated or self._rig.name.startswith("sim:")
+        mark = "SIMULATED" if is_simulated else ""
         image = compose(frame.left, snapshot, self._rig, self._plan, mark)
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._options.overlay_valid_ms * 1e6)

@@ -6,8 +6,7 @@ from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job, JobCancelled
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import Line, LineSettings, TrackState
-from navapp.tracking.line import Goal
+from navapp.tracking import Goal, Line, LineSettings, TrackState
 from navapp.values import (
     Plan,
     Prior,

@@ -7,7 +7,9 @@ poses.jsonl    pose and verdict of every frame
 """
 
 import json
+import threading
 from pathlib import Path
+from queue import Queue
 from typing import Any, Protocol, TextIO
 
 from drivers.frames import StereoFrame
@@ -26,6 +28,48 @@ class FrameSink(Protocol):
     def close(self) -> None:
         """No more will come."""
         ...
+
+
+class BackgroundSink:
+    """Hands frames to a sink in a thread of its own: encoding pictures must not slow the line.
+
+    A full queue makes the caller wait: a recording with holes would not replay to the same poses.
+
+    Raises:
+        NavappError: what the sink raised, at the next call.
+    """
+
+    def __init__(self, sink: FrameSink, max_waiting: int = 8) -> None:
+        self._sink = sink
+        self._waiting: Queue[tuple[StereoFrame, bool] | None] = Queue(max_waiting)
+        self._error: Exception | None = None
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._thread.start()
+
+    def add(self, frame: StereoFrame, with_pictures: bool) -> None:
+        """Keep one, soon."""
+        self._raise_error()
+        self._waiting.put((frame, with_pictures))
+
+    def close(self) -> None:
+        """Wait until everything is kept."""
+        self._waiting.put(None)
+        self._thread.join()
+        self._sink.close()
+        self._raise_error()
+
+    def _raise_error(self) -> None:
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
+
+    def _run(self) -> None:
+        while (item := self._waiting.get()) is not None:
+            if self._error is None:
+                try:
+                    self._sink.add(*item)
+                except Exception as error:  # noqa: BLE001 (raised again in the caller's thread)
+                    self._error = error
 
 
 class SessionRecorder:

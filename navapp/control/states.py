@@ -175,7 +175,6 @@ class Snapshot:
         is_bone_planned: the plan has a model of the stage's bone.
         is_camera_silent: no picture has come for longer than the camera's period explains.
         events: the newest, oldest first.
-        headline: identity of the rig, side and plan, for the title line.
     """
 
     time_ns: int

@@ -79,7 +79,7 @@ def draw_targets(image: Image, scene: Scene) -> None:
             cv2.drawMarker(image, centre, (0, 0, 0), cv2.MARKER_CROSS, 19, 4)
             cv2.drawMarker(image, centre, TARGET_COLOUR, cv2.MARKER_CROSS, 17, 2)
             text = name.split("/", 1)[1].replace("_", " ")
-            put_text(image, text, (centre[0] + 12, centre[1] - 8), 0.5, TARGET_COLOUR)
+            put_text(image, text, _label_place(text, centre, scene), 0.45, TARGET_COLOUR)
 
 
 def draw_curves(image: Image, scene: Scene) -> None:
@@ -108,9 +108,21 @@ def put_text(
     """Text with a dark rim, readable on any picture."""
     import cv2
 
-    font = cv2.FONT_HERSHEY_SIMPLEX
-    cv2.putText(image, text, at, font, size, (0, 0, 0), 3)
-    cv2.putText(image, text, at, font, size, colour, 1)
+    # A thicker stroke would have other letter widths: the rim is the same text, moved.
+    for dx, dy in ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, 2)):
+        moved = (at[0] + dx, at[1] + dy)
+        cv2.putText(image, text, moved, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 1)
+    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1)
+
+
+def _label_place(text: str, centre: tuple[int, int], scene: Scene) -> tuple[int, int]:
+    """Beside the bone's middle line, away from it, so that labels do not run into each other."""
+    middle = scene.camera.project(scene.left_from_bone.apply(scene.mesh.centroid_mm[None]))[0, 0]
+    if abs(centre[0] - middle) < 15.0:
+        return centre[0] - 4 * len(text), centre[1] - 16
+    if centre[0] > middle:
+        return centre[0] + 14, centre[1] + 5
+    return centre[0] - 14 - 8 * len(text), centre[1] + 5
 
 
 def _is_behind(view: RenderedView, pixel: NDArray[np.float64], depth_mm: float) -> bool:

@@ -37,14 +37,17 @@ def fill_occlusions(disparity_map: DisparityMap, max_gap_px: int = MAX_GAP_PX) -
     is_interior = ~known & ~is_border & _is_hidden(disparity, known, from_left)
     is_mismatch = ~known & ~is_border & ~is_interior
 
-    farther = np.fmin(from_left, from_right)
+    # NaN on the left compares as false: then the right neighbour speaks, however near it is.
+    takes_left = (from_left <= from_right) | ~np.isfinite(from_right)
+    farther = np.where(takes_left, from_left, from_right)
+    farther_gap = np.where(takes_left, left_gap, right_gap)
     filled = disparity.copy()
     origin = disparity_map.origin.copy()
     sigma = disparity_map.sigma_px.copy()
     for where, value, gap, label in (
         (is_border, from_right, right_gap, Origin.FILLED_BORDER),
         (is_interior, from_left, left_gap, Origin.FILLED_INTERIOR),
-        (is_mismatch, farther, np.minimum(left_gap, right_gap), Origin.MISMATCH_FILLED),
+        (is_mismatch, farther, farther_gap, Origin.MISMATCH_FILLED),
     ):
         usable = where & np.isfinite(value) & (gap <= max_gap_px)
         filled[usable] = value[usable]

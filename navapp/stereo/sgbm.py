@@ -22,22 +22,25 @@ class SgbmSettings:
             smooth slanted surfaces (0.13-0.27 px median deviation) is its largest part.
         uniqueness_percent: how much better the best match must be than the second.
         speckle_px: smaller islands of similar disparity are removed.
+        contrast_grey: a window of the left picture with a smaller range of grey levels (no light,
+            glare) matches everything, so it matches nothing.
     """
 
     window_px: int = 5
     sigma_px: float = 0.25
     uniqueness_percent: int = 5
     speckle_px: int = 80
+    contrast_grey: int = 3
 
 
 def match_sgbm(
     pair: RectifiedPair, band_px: tuple[float, float], settings: SgbmSettings | None = None
 ) -> DisparityMap:
-    """Match the box of a rectified pair; nothing outside the band is found.
+    """Match the box of a rectified pair; nothing outside the band's window is found.
 
     Args:
         pair: rectified pictures; `pair.box` is matched.
-        band_px: smallest and largest disparity expected.
+        band_px: smallest and largest disparity expected; see `disparity_window`.
         settings: of the matcher.
 
     Returns:
@@ -74,10 +77,14 @@ def match_sgbm(
     )
     raw = np.asarray(matcher.compute(left, right))[:, lead:].astype(np.float32)
     disparity = (raw / np.float32(_OPENCV_SCALE) + np.float32(lowest)).astype(np.float32)
-    # The right partner must be inside its picture.
+    # A pixel and its right partner must be inside their pictures.
+    rows = np.arange(box.y, box.y + box.height)[:, None]
     columns = np.arange(box.x, box.x + box.width, dtype=np.float32)
     partner = columns - disparity
-    is_matched = (raw >= 0.0) & (partner >= 0.0) & (partner <= pair.geometry.width - 1)
+    last_row, last_column = pair.left.shape[0] - 1, pair.left.shape[1] - 1
+    is_matched = (raw >= 0.0) & (partner >= 0.0) & (partner <= last_column)
+    is_matched &= (columns >= 0.0) & (columns <= last_column) & (rows >= 0) & (rows <= last_row)
+    is_matched &= _has_contrast(left, settings)[:, lead:]
     return _map(disparity, is_matched, settings, box)
 
 
@@ -93,10 +100,24 @@ def disparity_window(band_px: tuple[float, float]) -> tuple[int, int]:
 def _crop(image: NDArray[np.uint8], x0: int, width: int, box: Box) -> NDArray[np.uint8]:
     """Columns x0 .. x0 + width - 1 of the box's rows; black outside the picture."""
     out = np.zeros((box.height, width, *image.shape[2:]), dtype=np.uint8)
-    start, stop = max(x0, 0), min(x0 + width, image.shape[1])
-    if stop > start:
-        out[:, start - x0 : stop - x0] = image[box.y : box.y + box.height, start:stop]
+    inside = Box(x0, box.y, width, box.height).clipped(image.shape[1], image.shape[0])
+    if not inside.is_empty:
+        x, y = inside.x - x0, inside.y - box.y
+        out[y : y + inside.height, x : x + inside.width] = image[
+            inside.y : inside.y + inside.height, inside.x : inside.x + inside.width
+        ]
     return out
+
+
+def _has_contrast(image: NDArray[np.uint8], settings: SgbmSettings) -> NDArray[np.bool_]:
+    """(h, w) pixels whose window holds something to match."""
+    import cv2
+
+    window = np.ones((settings.window_px, settings.window_px), dtype=np.uint8)
+    spread = cv2.subtract(cv2.dilate(image, window), cv2.erode(image, window))
+    found = np.asarray(spread) >= settings.contrast_grey
+    has_contrast: NDArray[np.bool_] = found if image.ndim == 2 else found.any(axis=2)
+    return has_contrast
 
 
 def _map(

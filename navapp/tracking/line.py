@@ -46,8 +46,12 @@ Image = NDArray[np.uint8]
 Method = Literal["bimcc", "icp"]
 
 
-class RegistrationCancelled(Exception):  # noqa: N818 (asked for by the operator)
-    """The operator stopped a first registration."""
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """How far around the predicted bone is looked: in the picture, and in depth."""
+
+    box_px: int
+    band_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,18 +61,18 @@ class LineSettings:
     Attributes:
         method: `icp` is the paper's baseline chain; anything else the production one.
         depth_mm: nearest and farthest surface without a prediction.
-        box_margin_px, band_margin_mm: around the predicted bone while tracking.
-        search_margin_px, search_band_mm: the same for a first registration.
-        stride_px: every n-th pixel each way enters the estimate.
+        tracking: margins from frame to frame.
+        search: margins of a first registration, and after a loss.
+        max_points: about so many measured points enter an estimate.
+        tilt_deg: of the starts of a first registration.
+        n_refined: so many of its answers are refined.
     """
 
     method: Method = "bimcc"
     depth_mm: tuple[float, float] = (300.0, 700.0)
-    box_margin_px: int = 16
-    band_margin_mm: float = 15.0
-    search_margin_px: int = 60
-    search_band_mm: float = 35.0
-    stride_px: int = 3
+    tracking: Margins = Margins(box_px=16, band_mm=15.0)
+    search: Margins = Margins(box_px=60, band_mm=35.0)
+    max_points: int = 2500
     tilt_deg: float = 15.0
     n_refined: int = 3
 
@@ -87,6 +91,7 @@ class Measurement:
 
     disparity: DisparityMap
     cloud: SurfaceCloud
+    stride_px: int
     timings: StageTimings
 
 
@@ -104,7 +109,8 @@ class Line:
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
         self._matcher = SgbmSettings()
-        self._estimator = PointToPlaneSettings()
+        self._wide = PointToPlaneSettings()
+        self._near = PointToPlaneSettings(radii_mm=self._wide.radii_mm[1:])
 
     @property
     def centre_mm(self) -> FloatArray:
@@ -115,13 +121,15 @@ class Line:
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame (the paper's intra-operative loop)."""
+        is_lost = state.n_lost > 0
+        margins = self.settings.search if is_lost else self.settings.tracking
         predicted = self._rectified(state.predicted(captured_ns, self.centre_mm))
-        measured = self._measure(left, right, predicted, self._tracking_region(predicted))
+        measured = self._measure(left, right, predicted, margins)
         if measured is None:
             tracked = self._lost(Reason.OUT_OF_VIEW)
             return tracked, state.updated(tracked, captured_ns, self.centre_mm)
         started = time.perf_counter_ns()
-        estimate = self._estimate(measured.cloud, predicted)
+        estimate = self._estimate(measured, predicted, self._wide if is_lost else self._near)
         timings = replace(measured.timings, estimate=_ms_since(started))
         tracked = self._judged(estimate, measured.disparity, goal, timings, predicted)
         return tracked, state.updated(tracked, captured_ns, self.centre_mm)
@@ -141,13 +149,13 @@ class Line:
             right: of the right one, at the same instant.
             prior: must hold a pose of this bone.
             goal: for the judge.
-            on_progress: told the share done; raises `RegistrationCancelled` to stop.
+            on_progress: told the share done; what it raises stops the search.
         """
         start = prior.left_from_bone.get(self.model.bone.name)
         if start is None:
             return []
         rough = self._rectified(start)
-        measured = self._measure(left, right, rough, self._search_region(rough))
+        measured = self._measure(left, right, rough, self.settings.search)
         if measured is None or len(measured.cloud) == 0:
             return [self._lost(Reason.NO_SURFACE)]
 
@@ -160,7 +168,7 @@ class Line:
             starts = [rough]
         coarse = find_candidates(measured.cloud, self.model, starts, score, on_progress)
         refined = [
-            self._estimate(measured.cloud, estimate.left_from_bone)
+            self._estimate(measured, estimate.left_from_bone, self._wide)
             for estimate in coarse[: self.settings.n_refined]
         ]
         refined.sort(key=score, reverse=True)
@@ -174,12 +182,11 @@ class Line:
     ) -> TrackedFrame:
         """Judge a pose as it stands, without moving it."""
         pose = self._rectified(left_from_bone)
-        measured = self._measure(left, right, pose, self._tracking_region(pose))
+        measured = self._measure(left, right, pose, self.settings.tracking)
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
         estimate = estimate_at(
-            measured.cloud, self.model, pose, settings=self._estimator,
-            stride_px=self.settings.stride_px,
+            measured.cloud, self.model, pose, settings=self._near, stride_px=measured.stride_px
         )  # fmt: skip
         return self._judged(estimate, measured.disparity, goal, measured.timings)
 
@@ -188,9 +195,10 @@ class Line:
         left: Image,
         right: Image,
         rectified_from_bone: RigidTransform,
-        region: "tuple[Box, tuple[float, float]] | None",
+        margins: Margins,
     ) -> Measurement | None:
-        """Rectify, match in the box and band, fill, reproject."""
+        """Rectify, match in the box and band around a pose, fill, reproject; None out of view."""
+        region = self._region(rectified_from_bone, margins)
         if region is None:
             return None
         box, band_px = region
@@ -201,18 +209,20 @@ class Line:
         t2 = time.perf_counter_ns()
         filled = matched if self.settings.method == "icp" else fill_occlusions(matched)
         t3 = time.perf_counter_ns()
-        cloud = reproject(filled, self._geometry, self.settings.stride_px)
+        n_matched = filled.matched_share * filled.origin.size
+        stride_px = max(1, round((n_matched / self.settings.max_points) ** 0.5))
+        cloud = reproject(filled, self._geometry, stride_px)
         timings = StageTimings(
             rectify=(t1 - t0) / 1e6, stereo=(t2 - t1) / 1e6, fill=(t3 - t2) / 1e6
         )
-        return Measurement(filled, cloud, timings)
+        return Measurement(filled, cloud, stride_px, timings)
 
-    def _estimate(self, cloud: SurfaceCloud, start: RigidTransform) -> PoseEstimate:
+    def _estimate(
+        self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
+    ) -> PoseEstimate:
         if self.settings.method == "icp":
-            return fit_icp(cloud, self.model, start)
-        return fit_point_to_plane(
-            cloud, self.model, start, self._estimator, self.settings.stride_px
-        )
+            return fit_icp(measured.cloud, self.model, start)
+        return fit_point_to_plane(measured.cloud, self.model, start, settings, measured.stride_px)
 
     def _judged(
         self,
@@ -237,23 +247,17 @@ class Line:
         verdict = Verdict(Status.LOST, None, (reason,))
         return TrackedFrame(self.model.bone.name, None, verdict, StageTimings())
 
-    def _tracking_region(self, pose: RigidTransform) -> "tuple[Box, tuple[float, float]] | None":
-        return self._region(pose, self.settings.box_margin_px, self.settings.band_margin_mm)
-
-    def _search_region(self, pose: RigidTransform) -> "tuple[Box, tuple[float, float]] | None":
-        return self._region(pose, self.settings.search_margin_px, self.settings.search_band_mm)
-
     def _region(
-        self, pose: RigidTransform, margin_px: int, margin_mm: float
-    ) -> "tuple[Box, tuple[float, float]] | None":
+        self, pose: RigidTransform, margins: Margins
+    ) -> tuple[Box, tuple[float, float]] | None:
         """Box and disparity band around the model at a pose; None when it is out of view."""
         box = projected_box(self.model.bone.mesh, pose, self._geometry)
         if box is None:
             return None
         depths = pose.apply(self.model.points_mm)[:, 2]
-        near = max(float(depths.min()) - margin_mm, 50.0)
-        far = max(float(depths.max()) + margin_mm, near + 1.0)
-        grown = box.grown(margin_px).clipped(self._geometry.width, self._geometry.height)
+        near = max(float(depths.min()) - margins.band_mm, 50.0)
+        far = max(float(depths.max()) + margins.band_mm, near + 1.0)
+        grown = box.grown(margins.box_px).clipped(self._geometry.width, self._geometry.height)
         return grown, (self._geometry.disparity_px(far), self._geometry.disparity_px(near))
 
     def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:

@@ -1,0 +1,63 @@
+"""Shared by all tests: the user's settings hidden, leaks found, skips counted."""
+
+import os
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+import navapp  # sets the environment before any heavy import
+
+assert navapp.__version__
+
+DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
+
+
+@pytest.fixture(autouse=True)
+def _own_settings(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No configuration of the person who runs the tests is found."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_left_behind() -> Iterator[None]:
+    """A test that leaves a thread of ours or a child process behind fails."""
+    threads = set(threading.enumerate())
+    children = {child.pid for child in psutil.Process().children(recursive=True)}
+    yield
+    left = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
+    for thread in left:
+        thread.join(2.0)
+    still = [t.name for t in left if t.is_alive() and not _is_of_a_library(t)]
+    new = [c for c in psutil.Process().children(recursive=True) if c.pid not in children]
+    _, alive = psutil.wait_procs(new, timeout=2.0)
+    assert not still, f"threads left behind: {still}"
+    assert not alive, f"processes left behind: {alive}"
+
+
+def _is_of_a_library(thread: threading.Thread) -> bool:
+    # asyncio keeps its pool for the life of the loop, xdist its reader for the life of the worker.
+    return thread.name.startswith(("asyncio_", "ThreadPoolExecutor", "Dummy"))
+
+
+@pytest.fixture
+def data() -> Path:
+    """The folder of recorded data; the test is skipped, and counted, without it."""
+    if not DATA.is_dir():
+        pytest.skip(f"no recorded data in {DATA} (set NAVAPP_DATA)")
+    return DATA
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say how much was skipped: a silent skip looks like a pass."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    without_data = sum("NAVAPP_DATA" in str(report.longrepr) for report in skipped)
+    terminalreporter.write_line(
+        f"skipped: {len(skipped)} tests, {without_data} of them for want of recorded data"
+    )

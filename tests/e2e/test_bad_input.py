@@ -1,0 +1,214 @@
+"""Bad input: one clear sentence, the right exit code, nothing half-written."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from navapp.cli.main import run
+from navapp.geometry import RigQuality, StereoRig, write_rig
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.ply import write_ply
+from navapp.preop import write_plan
+from navapp.values import BoneModel, Plan
+from sim_devices.anatomy import make_knee
+from sim_devices.rigs import default_rig
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("plans") / "plan"
+    mesh = make_knee().bones["femur"]
+    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "right")
+    write_plan(folder, Plan({"femur": bone}))
+    return folder
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    write_rig(tmp_path / "rig.yml", default_rig(320, 180))
+    return tmp_path / "rig.yml"
+
+
+@pytest.fixture
+def prior(tmp_path: Path) -> Path:
+    pose = np.eye(4)
+    pose[2, 3] = 450.0
+    path = tmp_path / "prior.json"
+    path.write_text(json.dumps({"camera_from_model": pose.tolist()}), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def pairs(tmp_path: Path) -> Path:
+    folder = tmp_path / "pairs"
+    folder.mkdir()
+    noise = np.random.default_rng(1).integers(0, 255, (180, 320, 3), dtype=np.uint8)
+    for number in range(4):
+        for side in ("left", "right"):
+            cv2.imwrite(str(folder / f"{side}_{number:04d}.jpg"), noise)
+    return folder
+
+
+def refused(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], code: int, *words: str
+) -> None:
+    """The command ends with that code and one sentence that holds the words."""
+    capsys.readouterr()
+    assert run(["--quiet", *arguments]) == code
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("navapp: error: ")
+    for word in words:
+        assert word in lines[0]
+
+
+def replay(pairs: Path, rig: Path, plan: Path, prior: Path) -> list[str]:
+    return [
+        "replay", str(pairs), "--rig", str(rig), "--plan", str(plan), "--prior", str(prior),
+    ]  # fmt: skip
+
+
+def test_a_missing_rig(pairs, plan, prior, tmp_path, capsys) -> None:
+    missing = tmp_path / "none.yml"
+    refused(replay(pairs, missing, plan, prior), capsys, 3, "none.yml", "does not exist")
+
+
+def test_a_damaged_rig(pairs, rig, plan, prior, capsys) -> None:
+    rig.write_bytes(rig.read_bytes()[:300])
+    refused(replay(pairs, rig, plan, prior), capsys, 3, "rig.yml")
+
+
+def test_a_rig_of_another_size(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    write_rig(rig, default_rig(640, 360))
+    out = tmp_path / "o.json"
+    arguments = [*replay(pairs, rig, plan, prior), "--json", str(out), "--overlay", str(out) + "d"]
+    refused(arguments, capsys, 3, "320x180", "640x360")
+    assert not out.exists()
+    assert not Path(str(out) + "d").exists()
+
+
+def test_a_rig_that_was_not_accepted(pairs, rig, plan, prior, capsys) -> None:
+    good = default_rig(320, 180)
+    bad = StereoRig(
+        good.left, good.right, good.right_from_left, quality=RigQuality(False, ("too few views",))
+    )
+    write_rig(rig, bad)
+    refused(replay(pairs, rig, plan, prior), capsys, 3, "too few views", "--allow-unaccepted")
+
+
+def test_unequal_counts(pairs, rig, plan, prior, capsys) -> None:
+    (pairs / "right_0003.jpg").unlink()
+    refused(replay(pairs, rig, plan, prior), capsys, 3, "3")
+
+
+def test_a_corrupt_picture_in_the_middle(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    picture = pairs / "left_0002.jpg"
+    picture.write_bytes(picture.read_bytes()[:2000])
+    out = tmp_path / "o.json"
+    arguments = [*replay(pairs, rig, plan, prior), "--json", str(out)]
+    refused(arguments, capsys, 3, "left_0002.jpg")
+    assert not out.exists()
+
+
+def test_a_missing_sequence(rig, plan, prior, tmp_path, capsys) -> None:
+    refused(replay(tmp_path / "nowhere", rig, plan, prior), capsys, 3, "nowhere")
+
+
+def test_an_empty_plan(pairs, rig, prior, tmp_path, capsys) -> None:
+    (tmp_path / "empty").mkdir()
+    refused(replay(pairs, rig, tmp_path / "empty", prior), capsys, 3, "empty", "navapp plan")
+
+
+def test_a_plan_that_was_cut_short(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    import shutil
+
+    copy = tmp_path / "copy"
+    shutil.copytree(plan, copy)
+    (copy / "femur.ply").write_bytes((plan / "femur.ply").read_bytes()[:-100])
+    refused(replay(pairs, rig, copy, prior), capsys, 3, "copy", "femur.ply")
+
+
+def test_a_damaged_prior(pairs, rig, plan, prior, capsys) -> None:
+    prior.write_text('{"camera_from_model": [[1, 0], [0, 1]]}', encoding="utf-8")
+    refused(replay(pairs, rig, plan, prior), capsys, 3, "prior.json")
+
+
+def test_an_unknown_key_in_the_configuration(tmp_path, capsys) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text("[camera.simulated]\nsacle = 0.5\n", encoding="utf-8")
+    refused(
+        ["--config", str(path), "run", "--headless", "--frames", "2"],
+        capsys, 2, "camera.simulated.sacle", "scale",
+    )  # fmt: skip
+
+
+def test_a_missing_configuration(tmp_path, capsys) -> None:
+    refused(
+        ["--config", str(tmp_path / "c.toml"), "config", "show"], capsys, 2, "c.toml", "config init"
+    )
+
+
+def test_no_plan_at_all(pairs, rig, prior, capsys) -> None:
+    refused(["replay", str(pairs), "--rig", str(rig), "--prior", str(prior)], capsys, 2, "--plan")
+
+
+def test_no_rig_at_all(pairs, plan, prior, capsys) -> None:
+    arguments = ["replay", str(pairs), "--plan", str(plan), "--prior", str(prior)]
+    refused(arguments, capsys, 2, "--rig")
+
+
+def test_a_bone_that_the_plan_does_not_have(pairs, rig, plan, prior, capsys) -> None:
+    refused([*replay(pairs, rig, plan, prior), "--bone", "tibia"], capsys, 2, "tibia", "femur")
+
+
+def test_pingpong_without_an_end(pairs, rig, plan, prior, capsys) -> None:
+    arguments = [*replay(pairs, rig, plan, prior), "--order", "pingpong"]
+    refused(arguments, capsys, 2, "--frames")
+
+
+def test_json_into_a_folder_that_does_not_exist(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    arguments = [*replay(pairs, rig, plan, prior), "--json", str(tmp_path / "no" / "o.json")]
+    refused(arguments, capsys, 3, "o.json")
+
+
+def test_a_surface_that_is_no_surface(tmp_path, capsys) -> None:
+    path = tmp_path / "f.ply"
+    path.write_bytes(b"ply\nformat ascii 1.0\n")
+    out = tmp_path / "plan"
+    refused(["plan", "--surface", f"femur={path}", "--out", str(out)], capsys, 3, "f.ply")
+    assert not out.exists()
+    assert [entry.name for entry in tmp_path.iterdir()] == ["f.ply"]
+
+
+def test_a_surface_in_metres(tmp_path, capsys) -> None:
+    mesh = make_knee().bones["femur"]
+    write_ply(tmp_path / "f.ply", TriangleMesh(mesh.vertices_mm / 1000.0, mesh.faces))
+    arguments = ["plan", "--surface", f"femur={tmp_path / 'f.ply'}", "--out", str(tmp_path / "p")]
+    refused(arguments, capsys, 3, "1000")
+
+
+def test_a_plan_over_something_else(tmp_path, capsys) -> None:
+    mesh = make_knee().bones["femur"]
+    write_ply(tmp_path / "f.ply", mesh)
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (precious / "thesis.txt").write_text("years of work", encoding="utf-8")
+    arguments = ["plan", "--surface", f"femur={tmp_path / 'f.ply'}", "--out", str(precious)]
+    refused(arguments, capsys, 3, "precious")
+    assert (precious / "thesis.txt").read_text(encoding="utf-8") == "years of work"
+
+
+def test_wrong_usage_is_exit_code_2(capsys) -> None:
+    assert run(["run", "--no-such-option"]) == 2
+    assert run([]) == 2
+    assert run(["run", "--frames", "0"]) == 2
+    assert run(["run", "--headless", "--stage", "sewing"]) == 2
+
+
+@pytest.mark.parametrize("verb", ["run", "replay", "plan", "doctor", "config"])
+def test_every_verb_has_help_with_an_example(verb: str, capsys) -> None:
+    assert run([verb, "--help"]) == 0
+    assert "example" in capsys.readouterr().out

@@ -1,0 +1,54 @@
+"""The main job on recorded pictures with truth; skipped, and counted, without the data."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from navapp.cli.main import run
+from navapp.evaluation import mean_tre_mm
+from navapp.geometry.ply import read_ply
+from navapp.geometry.transform import RigidTransform
+from navapp.values import BoneModel
+
+# What a plain chain reaches with block matching; the bar is «finds and follows», not accuracy.
+WORST_OK_MM = 1.5
+
+
+@pytest.mark.data
+@pytest.mark.slow
+@pytest.mark.parametrize("phantom", ["phantom_a", "phantom_c"])
+def test_most_frames_of_a_recorded_operation_get_a_pose(
+    data: Path, tmp_path: Path, phantom: str
+) -> None:
+    root = data / phantom
+    plan, poses, overlay = tmp_path / "plan", tmp_path / "poses.json", tmp_path / "overlay"
+    surface = f"femur={root / 'femur.ply'}"
+    assert run(["--quiet", "plan", "--surface", surface, "--out", str(plan)]) == 0
+    arguments = [
+        "--quiet", "replay", str(root / "patient"), "--rig", str(root / "rig.yml"),
+        "--plan", str(plan), "--prior", str(root / "patient" / "prior.json"),
+        "--overlay", str(overlay), "--json", str(poses),
+    ]  # fmt: skip
+    assert run(arguments) == 0
+    frames = json.loads(poses.read_text(encoding="utf-8"))["frames"]
+    truth = {
+        entry["index"]: RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
+        for entry in json.loads((root / "patient" / "truth.json").read_text())["frames"]
+    }
+    bone = BoneModel("femur", read_ply(root / "femur.ply")[0])
+    errors_mm = [
+        mean_tre_mm(
+            RigidTransform("left", "femur", frame["camera_from_model"]),
+            truth[frame["index"]],
+            bone,
+            np.empty((0, 3)),
+        )
+        for frame in frames
+        if frame["status"] == "OK"
+    ]
+    assert len(frames) == len(truth)
+    assert len(errors_mm) >= 0.7 * len(frames)
+    assert max(errors_mm) < WORST_OK_MM
+    assert len(list(overlay.glob("overlay_*.jpg"))) == len(frames)

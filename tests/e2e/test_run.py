@@ -1,0 +1,105 @@
+"""`navapp run --headless` on the simulated rig, and the replay of what it recorded."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from navapp.cli.main import run
+
+MOVING = """
+[camera.simulated]
+motion = "patient"
+"""
+
+
+@pytest.fixture
+def moving(tmp_path: Path) -> Path:
+    path = tmp_path / "moving.toml"
+    path.write_text(MOVING, encoding="utf-8")
+    return path
+
+
+def result(path: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return content
+
+
+@pytest.mark.slow
+def test_the_scripted_operator_refuses_a_wrong_pose_then_accepts_and_tracks(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    assert run(["--quiet", "run", "--headless", "--frames", "24", "--json", str(out)]) == 0
+    content = result(out)
+    frames = content["frames"]
+    assert content["command"] == "run"
+    assert content["units"] == {"length": "mm", "angle": "deg"}
+    assert len(frames) == 24
+    wrong = [f for f in frames if f["tre_mm"] is not None and f["tre_mm"] > 3.0]
+    assert wrong, "the script must offer a wrong pose"
+    assert all(f["status"] != "OK" and f["state"] == "review" for f in wrong)
+    tracked = [f for f in frames if f["state"] == "navigating"]
+    assert len(tracked) >= 15
+    assert all(f["status"] == "OK" and f["tre_mm"] < 1.5 for f in tracked)
+    assert content["summary"]["tre_mm"]["max"] < 1.5
+
+
+@pytest.mark.slow
+def test_a_recorded_session_replays_to_the_same_poses(tmp_path: Path, moving: Path) -> None:
+    session, first, second = tmp_path / "session", tmp_path / "a.json", tmp_path / "b.json"
+    options = ["--quiet", "--config", str(moving)]
+    recording = ["run", "--headless", "--frames", "12", "--record", str(session)]
+    assert run([*options, *recording, "--json", str(first)]) == 0
+    assert run(["--quiet", "replay", str(session), "--json", str(second)]) == 0
+    for a, b in zip(result(first)["frames"], result(second)["frames"], strict=True):
+        assert a["camera_from_model"] == b["camera_from_model"]
+        assert (a["state"], a["status"], a["reasons"]) == (b["state"], b["status"], b["reasons"])
+
+
+def test_a_session_is_never_recorded_over_another(
+    tmp_path: Path, moving: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session = tmp_path / "session"
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "2"]
+    run([*options, "--record", str(session)])
+    before = {path: path.read_bytes() for path in session.rglob("*") if path.is_file()}
+    capsys.readouterr()
+    assert run([*options, "--record", str(session)]) == 3
+    assert str(session) in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in session.rglob("*") if path.is_file()} == before
+
+
+def test_the_operators_script_is_followed(tmp_path: Path, moving: Path) -> None:
+    script, out = tmp_path / "script.toml", tmp_path / "out.json"
+    script.write_text(
+        '[[step]]\ndo = "register"\n[[step]]\ndo = "stage"\nstage = "drilling"\nat_frame = 5\n'
+        '[[step]]\ndo = "blank"\nat_frame = 8\n',
+        encoding="utf-8",
+    )
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "10"]
+    assert run([*options, "--operator", str(script), "--json", str(out)]) == 0
+    stages = [frame["stage"] for frame in result(out)["frames"]]
+    assert stages[0] == "opening"
+    assert stages[-1] == "drilling"
+
+
+def test_nothing_found_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    # Another person's knee in the plan: the judge must not call anything OK.
+    other = tmp_path / "other.toml"
+    other.write_text("[camera.simulated]\nseed = 1\n", encoding="utf-8")
+    plan = make_foreign_plan(tmp_path)
+    options = ["--quiet", "--config", str(other), "run", "--headless", "--frames", "8"]
+    assert run([*options, "--plan", str(plan)]) == 4
+    assert "no frame was OK" in capsys.readouterr().err
+
+
+def make_foreign_plan(folder: Path) -> Path:
+    from navapp.geometry.mesh import TriangleMesh
+    from navapp.preop import write_plan
+    from navapp.values import BoneModel, Plan
+    from sim_devices.anatomy import KneeSpec, make_knee
+
+    mesh = make_knee(KneeSpec(seed=7, side="left", sex="male")).bones["femur"]
+    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "left")
+    write_plan(folder / "foreign", Plan({"femur": bone}))
+    return folder / "foreign"

@@ -1,0 +1,109 @@
+"""Import rules, proven at run time and by import-linter; each contract is seen to fail."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+HEAVY = ("open3d", "depthai", "textual", "SimpleITK", "pygame", "numba", "scipy", "cv2", "serial")
+
+
+def modules_after(statement: str) -> set[str]:
+    code = f"{statement}; import sys; sys.stdout.write(' '.join(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_the_command_line_starts_without_any_heavy_package() -> None:
+    loaded = modules_after("import navapp.cli.main as m; m._parser()")
+    assert not loaded & set(HEAVY)
+
+
+def test_the_whole_line_runs_without_hardware_packages_and_open3d() -> None:
+    loaded = modules_after("import navapp.control.controller, navapp.devices, navapp.cli.run")
+    assert not loaded & {"open3d", "depthai", "textual", "serial", "pygame"}
+
+
+@pytest.mark.parametrize(
+    "package",
+    ["control", "tracking", "stereo", "registration", "overlay", "preop", "geometry", "values"],
+)
+def test_the_pipeline_and_control_never_load_the_simulator(package: str) -> None:
+    loaded = modules_after(f"import navapp.{package}, pkgutil, importlib")
+    assert not any(name.split(".")[0] == "sim_devices" for name in loaded)
+
+
+def test_the_simulator_loads_nothing_that_it_is_used_to_test() -> None:
+    loaded = modules_after("import sim_devices.world, sim_devices.camera, sim_devices.truth")
+    ours = {name for name in loaded if name.startswith("navapp.")}
+    allowed = ("navapp.geometry", "navapp.errors", "navapp.environment")
+    assert {name for name in ours if not name.startswith(allowed)} == set()
+    assert not any("zbuffer" in name for name in ours)
+
+
+def lint(folder: Path) -> subprocess.CompletedProcess[str]:
+    runner = "import sys; from importlinter.cli import lint_imports_command as c; c(sys.argv[1:])"
+    return subprocess.run(
+        [sys.executable, "-c", runner, "--no-cache"],
+        cwd=folder,
+        env={"PYTHONPATH": str(folder), "PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the packages that can be spoiled."""
+    folder = tmp_path_factory.mktemp("checkout")
+    for package in ("navapp", "drivers", "sim_devices", "calibration"):
+        shutil.copytree(
+            ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__")
+        )
+    shutil.copy(ROOT / "pyproject.toml", folder)
+    return folder
+
+
+def test_the_contracts_hold(checkout: Path) -> None:
+    done = lint(checkout)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+BREACHES = {
+    "navapp/geometry/camera.py": "import navapp.values",
+    "navapp/tracking/line.py": "import sim_devices.truth",
+    "navapp/tracking/judge.py": "import navapp.overlay",
+    "navapp/control/pursuit.py": "import sim_devices.world",
+    "navapp/control/sources.py": "import drivers.replay_camera",
+    "navapp/ui/app.py": "import navapp.devices",
+    "navapp/evaluation/truth.py": "import navapp.ui.app",
+    "drivers/frames.py": "import navapp.values",
+    "sim_devices/sensor.py": "import navapp.geometry.zbuffer",
+    "calibration/__init__.py": "import drivers.frames",
+}
+
+
+@pytest.mark.parametrize("path", BREACHES)
+def test_a_deliberate_breach_is_found(checkout: Path, path: str) -> None:
+    file = checkout / path
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f"{text}\n{BREACHES[path]}\n", encoding="utf-8")
+    try:
+        done = lint(checkout)
+    finally:
+        file.write_text(text, encoding="utf-8")
+    assert done.returncode == 1
+    assert "BROKEN" in done.stdout
+
+
+def test_a_package_without_a_place_is_found(checkout: Path) -> None:
+    stray = checkout / "navapp" / "stray.py"
+    stray.write_text('"""Nowhere."""\n', encoding="utf-8")
+    try:
+        assert lint(checkout).returncode == 1
+    finally:
+        stray.unlink()
