@@ -1,0 +1,314 @@
+"""Renders posed bodies into one picture: z-buffer, then shading; what never moves is kept."""
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.camera import Camera
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import RigidTransform
+from sim_devices.materials import MaterialId
+from sim_devices.raster_kernels import project_vertices, raster_triangles
+from sim_devices.shading_kernels import shade
+from sim_devices.textures import COARSE_VOXEL_MM, FINE_VOXEL_MM, NoiseTile
+
+FloatImage = NDArray[np.float32]
+
+# Pixels per cell of the coarse depth picture from which crevices are darkened.
+_OCCLUSION_STRIDE = 4
+_OCCLUSION_REACH_MM = 9.0
+_OCCLUSION_DEPTH_MM = 22.0
+_EMPTY_DEPTH_MM = 700.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """A rigid piece of the scene.
+
+    Attributes:
+        body: whose pose it follows.
+        mesh: in that body's frame, closed or seen from its front only.
+        material: of its surface.
+        mark: (V,) 0 to 1, where the material's marked colour shows; None for nowhere.
+        exposure: (V,) 0 to 1, light that reaches the vertex; None for all.
+        texture_sign: -1 looks the texture up mirrored in x (a left knee).
+    """
+
+    body: str
+    mesh: TriangleMesh
+    material: MaterialId
+    mark: NDArray[np.float64] | None = None
+    exposure: NDArray[np.float64] | None = None
+    texture_sign: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """What a rendering is made of besides shapes.
+
+    Attributes:
+        materials: table of `materials.material_table`.
+        tile: the solid noise.
+        lamps: (L, 4) direction towards the lamp in the lamps' frame, strength. Operating lamps
+            hang a metre away and are broad: over the site their direction is constant.
+        ambient: light from everywhere.
+        vignetting: loss of light in the corner of the picture, 0 to 1.
+    """
+
+    materials: NDArray[np.float32]
+    tile: NoiseTile
+    lamps: NDArray[np.float64]
+    ambient: float = 0.16
+    vignetting: float = 0.18
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthPicture:
+    """What each pixel of a picture shows.
+
+    Attributes:
+        depth_mm: (H, W) float32 along the optical axis; 0 where nothing is seen.
+        body: (H, W) int16 index into `bodies`; -1 where nothing is seen.
+        bodies: names.
+    """
+
+    depth_mm: FloatImage
+    body: NDArray[np.int16]
+    bodies: tuple[str, ...]
+
+
+class _Geometry:
+    """The parts of a scene in one set of arrays."""
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self.parts = tuple(parts)
+        self.bodies = tuple(dict.fromkeys(part.body for part in parts))
+        offsets = np.cumsum([0, *(len(part.mesh.vertices_mm) for part in parts)])
+        self.face_offsets = np.cumsum([0, *(len(part.mesh.faces) for part in parts)])
+        self.vertices = [part.mesh.vertices_mm for part in parts]
+        self.vertex_slices = [slice(int(a), int(b)) for a, b in pairwise(offsets)]
+        self.faces = np.concatenate(
+            [part.mesh.faces + np.int32(start) for part, start in zip(parts, offsets, strict=False)]
+        ).astype(np.int32)
+        self.attributes = np.concatenate([_attributes(part) for part in parts])
+        counts = [len(part.mesh.faces) for part in parts]
+        self.part_of_face = np.repeat(np.arange(len(parts), dtype=np.uint8), counts)
+        self.material_of_face = np.repeat(
+            np.array([int(part.material) for part in parts], dtype=np.uint8), counts
+        )
+        # Two parts of the same stuff must not show the same pattern side by side.
+        shift = [17.3 * self.bodies.index(part.body) for part in parts]
+        self.texture = np.array(
+            [
+                [part.texture_sign, s, 2.0 * s, 0.7 * s]
+                for part, s in zip(parts, shift, strict=True)
+            ],
+            dtype=np.float32,
+        )
+
+
+def _attributes(part: Part) -> NDArray[np.float32]:
+    columns = np.ones((len(part.mesh.vertices_mm), 5), dtype=np.float32)
+    columns[:, :3] = part.mesh.normals
+    columns[:, 3] = 0.0 if part.mark is None else part.mark
+    if part.exposure is not None:
+        columns[:, 4] = part.exposure
+    return columns
+
+
+class Renderer:
+    """Pictures of one scene by one camera.
+
+    Args:
+        camera: with its distortion.
+        parts: of the scene.
+        surfaces: lamps, materials, noise.
+        static_bodies: bodies whose pose never changes; they are drawn once and kept.
+
+    `render` and `depth` may be called from several threads; calls wait for each other.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        parts: Sequence[Part],
+        surfaces: Surfaces,
+        static_bodies: frozenset[str] = frozenset(),
+    ) -> None:
+        self._camera = camera
+        self._surfaces = surfaces
+        self._geometry = _Geometry(parts)
+        self._static = [part.body in static_bodies for part in self._geometry.parts]
+        self._numbers = _camera_numbers(camera)
+        self._rays = _rays(camera)
+        shape = (camera.height, camera.width)
+        self._screen = np.zeros((len(self._geometry.attributes), 3))
+        self._inverse_depth = np.zeros(shape, dtype=np.float32)
+        self._triangle = np.full(shape, -1, dtype=np.int32)
+        self._background: tuple[FloatImage, FloatImage, NDArray[np.int32]] | None = None
+        self._lock = threading.Lock()
+
+    def render(
+        self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
+    ) -> FloatImage:
+        """(H, W, 3) float32 BGR radiance; `poses` are camera_from_body of every body."""
+        with self._lock:
+            image_kept, inverse_depth_kept, _ = self._kept(poses, camera_from_lamps)
+            image = image_kept.copy()
+            box = self._project(poses, static=False)
+            if box is not None:
+                # All of it, not only the box: crevices are found in the surroundings too, and
+                # no picture may depend on the one before.
+                self._inverse_depth[:] = inverse_depth_kept
+                # Static surfaces are in the picture already: only moving ones get a triangle.
+                self._triangle[box[1] : box[3], box[0] : box[2]] = -1
+                self._raster(box, static=False)
+                self._shade(box, poses, camera_from_lamps, image)
+            return image
+
+    def depth(
+        self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
+    ) -> DepthPicture:
+        """What each pixel shows, from the same z-buffer as `render`."""
+        with self._lock:
+            _, inverse_depth_kept, triangle_kept = self._kept(poses, camera_from_lamps)
+            self._inverse_depth[:] = inverse_depth_kept
+            self._triangle[:] = triangle_kept
+            box = self._project(poses, static=False)
+            if box is not None:
+                self._raster(box, static=False)
+            seen = self._triangle >= 0
+            geometry = self._geometry
+            index = [geometry.bodies.index(part.body) for part in geometry.parts]
+            body_of_part = np.array(index, dtype=np.int16)
+            body = np.full(seen.shape, -1, dtype=np.int16)
+            body[seen] = body_of_part[geometry.part_of_face[self._triangle[seen]]]
+            depth_mm = np.zeros(seen.shape, dtype=np.float32)
+            depth_mm[seen] = 1.0 / self._inverse_depth[seen]
+            return DepthPicture(depth_mm, body, geometry.bodies)
+
+    def _kept(
+        self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
+    ) -> tuple[FloatImage, FloatImage, NDArray[np.int32]]:
+        """Picture, z-buffer and triangles of what never moves, drawn at the first call."""
+        if self._background is None:
+            whole = np.array([0, 0, self._camera.width, self._camera.height], dtype=np.int64)
+            image = np.zeros((self._camera.height, self._camera.width, 3), dtype=np.float32)
+            self._inverse_depth.fill(0.0)
+            self._triangle.fill(-1)
+            self._project(poses, static=True)
+            self._raster(whole, static=True)
+            self._shade(whole, poses, camera_from_lamps, image)
+            self._background = (image, self._inverse_depth.copy(), self._triangle.copy())
+        return self._background
+
+    def _project(
+        self, poses: Mapping[str, RigidTransform], *, static: bool
+    ) -> NDArray[np.int64] | None:
+        """Project the static or the moving parts; the box of pixels that they can touch."""
+        size = np.array([self._camera.width, self._camera.height], dtype=np.float64)
+        lows, highs = [size], [np.zeros(2)]
+        for k, part in enumerate(self._geometry.parts):
+            if self._static[k] != static:
+                continue
+            screen = self._screen[self._geometry.vertex_slices[k]]
+            pose = np.ascontiguousarray(poses[part.body].matrix[:3])
+            bounds = np.empty(4)
+            project_vertices(self._geometry.vertices[k], pose, self._numbers, screen, bounds)
+            low, high = np.maximum(bounds[:2], 0.0), np.minimum(bounds[2:] + 1.0, size)
+            if (low < high).all():
+                lows.append(np.floor(low))
+                highs.append(np.ceil(high))
+        box = np.concatenate([np.min(lows, axis=0), np.max(highs, axis=0)]).astype(np.int64)
+        return None if len(lows) == 1 else box
+
+    def _raster(self, box: NDArray[np.int64], *, static: bool) -> None:
+        geometry = self._geometry
+        for k in range(len(geometry.parts)):
+            if self._static[k] == static:
+                first, last = int(geometry.face_offsets[k]), int(geometry.face_offsets[k + 1])
+                faces = geometry.faces[first:last]
+                raster_triangles(
+                    self._screen, faces, first, box, self._inverse_depth, self._triangle
+                )
+
+    def _shade(
+        self,
+        box: NDArray[np.int64],
+        poses: Mapping[str, RigidTransform],
+        camera_from_lamps: RigidTransform,
+        image: FloatImage,
+    ) -> None:
+        geometry, surfaces = self._geometry, self._surfaces
+        directions = camera_from_lamps.rotate(surfaces.lamps[:, :3])
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        inverse = [poses[part.body].inverse() for part in geometry.parts]
+        lamps = np.empty((len(inverse), len(directions), 4), dtype=np.float32)
+        for k, body_from_camera in enumerate(inverse):
+            lamps[k, :, :3] = body_from_camera.rotate(directions)
+            lamps[k, :, 3] = surfaces.lamps[:, 3]
+        corner_px2 = 0.25 * (self._camera.width**2 + self._camera.height**2)
+        constants = np.array(
+            [1.0 / FINE_VOXEL_MM, 1.0 / COARSE_VOXEL_MM, surfaces.vignetting / corner_px2],
+            dtype=np.float32,
+        )
+        shade(
+            (
+                self._triangle,
+                self._inverse_depth,
+                self._occlusion(),
+                self._rays,
+                box,
+                np.float32(_OCCLUSION_STRIDE),
+            ),
+            (
+                self._screen,
+                geometry.faces,
+                geometry.attributes,
+                geometry.part_of_face,
+                geometry.material_of_face,
+            ),
+            (
+                np.array([pose.matrix[:3] for pose in inverse], dtype=np.float32),
+                lamps,
+                geometry.texture,
+            ),
+            (surfaces.materials, surfaces.tile.values, np.float32(surfaces.ambient), constants),
+            image,
+        )
+
+    def _occlusion(self) -> FloatImage:
+        """Light left in crevices: pixels behind their surroundings' mean depth lose some.
+
+        Source: Luft, Colditz, Deussen, Image enhancement by unsharp masking the depth buffer
+        (SIGGRAPH 2006).
+        """
+        import cv2
+
+        coarse = np.ascontiguousarray(self._inverse_depth[::_OCCLUSION_STRIDE, ::_OCCLUSION_STRIDE])
+        depth = np.where(coarse > 0.0, 1.0 / np.maximum(coarse, 1e-6), _EMPTY_DEPTH_MM)
+        depth = depth.astype(np.float32)
+        reach_px = self._camera.focal_px / float(np.median(depth)) * _OCCLUSION_REACH_MM
+        sigma = max(0.8, reach_px / _OCCLUSION_STRIDE)
+        behind = depth - cv2.GaussianBlur(depth, (0, 0), sigma)
+        light: FloatImage = np.clip(1.0 - behind / _OCCLUSION_DEPTH_MM, 0.25, 1.0)
+        return light.astype(np.float32)
+
+
+def _camera_numbers(camera: Camera) -> NDArray[np.float64]:
+    numbers = np.zeros(16)
+    matrix = camera.matrix
+    numbers[:4] = matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]
+    numbers[4 : 4 + min(12, camera.distortion.size)] = camera.distortion[:12]
+    return numbers
+
+
+def _rays(camera: Camera) -> FloatImage:
+    """(H, W, 2) x / z and y / z of every pixel's ray."""
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
+    rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
+    return np.ascontiguousarray(rays.reshape(camera.height, camera.width, 2), dtype=np.float32)

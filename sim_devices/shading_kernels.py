@@ -1,0 +1,325 @@
+"""Shading of the rastered picture: solid texture, lamps, wet highlights."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import float32, int32, njit, uint32
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+
+# Columns of the material table (materials.Material.row).
+_COLOUR, _SECOND, _MARKED = 0, 3, 6
+_MIX_AT, _MIX_SLOPE, _FINE, _COARSE, _PORES, _BUMP = 9, 10, 11, 12, 13, 14
+_MARK_NOISE, _SPECULAR, _SHININESS, _MARKED_SPECULAR, _BLOOD_AT, _WRAP = 15, 16, 17, 18, 19, 20
+
+# The swizzle and shift of the second lookup keep it unrelated to the first.
+_SHIFT_X, _SHIFT_Y, _SHIFT_Z = 41.3, 17.9, 73.1
+_INV_SIGMA = 1.0 / 40.0
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _floor(value: float) -> int:
+    whole = int(value)
+    return whole - 1 if value < whole else whole
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _low(cell: int) -> Any:
+    return float32(int32(cell) & 255)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _high(cell: int) -> Any:
+    return float32(int32(cell) >> 8)
+
+
+@njit(cache=True, nogil=True)
+def sample_tile(tile: NDArray[np.uint16], x: float, y: float, z: float, out: Floats) -> None:
+    """Trilinear value of both channels and the gradient of the first, at a point in voxels.
+
+    Args:
+        tile: (n, n, n) uint16, periodic, n a power of two; first channel in the low byte.
+        x: position in voxels.
+        y: likewise.
+        z: likewise.
+        out: (5,) float32 out: both values in deviations, then the gradient per voxel.
+    """
+    mask = tile.shape[0] - 1
+    ix, iy, iz = _floor(x), _floor(y), _floor(z)
+    fx, fy, fz = float32(x - ix), float32(y - iy), float32(z - iz)
+    # Unsigned indices spare the test for negative ones.
+    x0, x1 = uint32(ix & mask), uint32((ix + 1) & mask)
+    y0, y1 = uint32(iy & mask), uint32((iy + 1) & mask)
+    z0, z1 = uint32(iz & mask), uint32((iz + 1) & mask)
+    t000, t001 = tile[x0, y0, z0], tile[x0, y0, z1]
+    t010, t011 = tile[x0, y1, z0], tile[x0, y1, z1]
+    t100, t101 = tile[x1, y0, z0], tile[x1, y0, z1]
+    t110, t111 = tile[x1, y1, z0], tile[x1, y1, z1]
+    one = float32(1.0)
+    sigma = float32(_INV_SIGMA)
+    v000, v001, v010, v011 = _low(t000), _low(t001), _low(t010), _low(t011)
+    v100, v101, v110, v111 = _low(t100), _low(t101), _low(t110), _low(t111)
+    a00, a01 = v000 + fz * (v001 - v000), v010 + fz * (v011 - v010)
+    a10, a11 = v100 + fz * (v101 - v100), v110 + fz * (v111 - v110)
+    b0, b1 = a00 + fy * (a01 - a00), a10 + fy * (a11 - a10)
+    out[0] = (b0 + fx * (b1 - b0) - float32(128.0)) * sigma
+    out[2] = (b1 - b0) * sigma
+    out[3] = ((one - fx) * (a01 - a00) + fx * (a11 - a10)) * sigma
+    out[4] = (
+        (one - fx) * ((one - fy) * (v001 - v000) + fy * (v011 - v010))
+        + fx * ((one - fy) * (v101 - v100) + fy * (v111 - v110))
+    ) * sigma
+    c00 = _high(t000) + fz * (_high(t001) - _high(t000))
+    c01 = _high(t010) + fz * (_high(t011) - _high(t010))
+    c10 = _high(t100) + fz * (_high(t101) - _high(t100))
+    c11 = _high(t110) + fz * (_high(t111) - _high(t110))
+    d0, d1 = c00 + fy * (c01 - c00), c10 + fy * (c11 - c10)
+    out[1] = (d0 + fx * (d1 - d0) - float32(128.0)) * sigma
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _step(value: float) -> Any:
+    """Smooth step of a value clamped to 0 .. 1."""
+    t = min(float32(1.0), max(float32(0.0), value))
+    return t * t * (float32(3.0) - float32(2.0) * t)
+
+
+@njit(cache=True, nogil=True)
+def albedo_at(
+    materials: Floats, row: int, fine: Floats, coarse: Floats, mark: float, out: Floats
+) -> None:
+    """Reflectance of a point from its noise, and how wet it is.
+
+    Args:
+        materials: (M, 21) float32 table.
+        row: of the table.
+        fine: (5,) float32 of `sample_tile`.
+        coarse: likewise, of the coarse lookup.
+        mark: 0 to 1.
+        out: (5,) float32 out: B, G, R, factor of the highlight, share of blood.
+    """
+    one = float32(1.0)
+    mixed = _step(
+        (float32(0.8) * coarse[0] + float32(0.6) * fine[1] - materials[row, _MIX_AT])
+        * materials[row, _MIX_SLOPE]
+        + float32(0.5)
+    )
+    frayed = mark + materials[row, _MARK_NOISE] * (
+        float32(0.7) * coarse[1] + float32(0.5) * fine[1]
+    ) * (float32(4.0) * mark * (one - mark))
+    marked = _step((frayed - float32(0.25)) * float32(2.0))
+    texture = one + materials[row, _FINE] * fine[0] + materials[row, _COARSE] * coarse[0]
+    texture -= materials[row, _PORES] * _step((float32(-1.2) - fine[0]) * float32(1.2))
+    texture = max(texture, float32(0.1))
+    bloody = _step(
+        (coarse[1] + float32(0.22) * fine[1] - materials[row, _BLOOD_AT]) * float32(3.0)
+        + float32(0.5)
+    )
+    # A film of blood is thin at its border and hides the ground in its middle.
+    film = bloody * (float32(0.84) + float32(0.08) * fine[0])
+    film = min(one, max(float32(0.0), film))
+    for k in range(3):
+        value = materials[row, _COLOUR + k] + mixed * (
+            materials[row, _SECOND + k] - materials[row, _COLOUR + k]
+        )
+        value += marked * (materials[row, _MARKED + k] - value)
+        out[k] = value * texture
+    out[0] += film * (float32(0.020) - out[0])
+    out[1] += film * (float32(0.022) - out[1])
+    out[2] += film * (float32(0.23) - out[2])
+    wet = one + marked * (materials[row, _MARKED_SPECULAR] - one)
+    wet *= max(float32(0.0), one + float32(0.45) * coarse[1])
+    out[3] = materials[row, _SPECULAR] * wet + film * float32(0.9)
+    out[4] = film
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _bilinear(grid: Floats, x: float, y: float) -> Any:
+    """Value of a coarse grid; positions are clamped to it."""
+    x = min(max(x, float32(0.0)), float32(grid.shape[1] - 1))
+    y = min(max(y, float32(0.0)), float32(grid.shape[0] - 1))
+    x0, y0 = int(x), int(y)
+    x1, y1 = min(x0 + 1, grid.shape[1] - 1), min(y0 + 1, grid.shape[0] - 1)
+    fx, fy = float32(x - x0), float32(y - y0)
+    top = grid[y0, x0] + fx * (grid[y0, x1] - grid[y0, x0])
+    bottom = grid[y1, x0] + fx * (grid[y1, x1] - grid[y1, x0])
+    return top + fy * (bottom - top)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _corner_weights(
+    screen: NDArray[np.float64], a: int, b: int, c: int, x: int, y: int, weights: Floats
+) -> None:
+    """Perspective-correct weights of a triangle's corners at a pixel."""
+    ua, va = screen[a, 0], screen[a, 1]
+    ub, vb = screen[b, 0], screen[b, 1]
+    uc, vc = screen[c, 0], screen[c, 1]
+    wa = ((uc - ub) * (y - vb) - (vc - vb) * (x - ub)) * screen[a, 2]
+    wb = ((ua - uc) * (y - vc) - (va - vc) * (x - uc)) * screen[b, 2]
+    wc = ((ub - ua) * (y - va) - (vb - va) * (x - ua)) * screen[c, 2]
+    scale = 1.0 / (wa + wb + wc)
+    weights[0] = wa * scale
+    weights[1] = wb * scale
+    weights[2] = wc * scale
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _place(
+    poses: Floats, part: int, ray_x: float, ray_y: float, z: float, point: Floats, eye: Floats
+) -> None:
+    """The seen point and the camera's centre in the body's frame."""
+    x, y = ray_x * z, ray_y * z
+    for k in range(3):
+        eye[k] = poses[part, k, 3]
+        point[k] = (
+            poses[part, k, 0] * x
+            + poses[part, k, 1] * y
+            + poses[part, k, 2] * z
+            + poses[part, k, 3]
+        )
+
+
+@njit(cache=True, nogil=True)
+def light_at(
+    lamps: Floats,
+    part: int,
+    normal: Floats,
+    point: Floats,
+    eye: Floats,
+    wrap: float,
+    shininess: float,
+    out: Floats,
+) -> None:
+    """Diffuse and highlight sums of all lamps at one point.
+
+    Args:
+        lamps: (P, L, 4) float32 unit direction towards the lamp, strength.
+        part: whose frame.
+        normal: (3,) float32 unit, in the body's frame.
+        point: (3,) float32 mm, likewise.
+        eye: (3,) float32 mm, likewise.
+        wrap: of the material.
+        shininess: of the material.
+        out: (2,) float32 out: diffuse, highlight.
+    """
+    one = float32(1.0)
+    vx, vy, vz = eye[0] - point[0], eye[1] - point[1], eye[2] - point[2]
+    length = one / math.sqrt(vx * vx + vy * vy + vz * vz)
+    vx, vy, vz = vx * length, vy * length, vz * length
+    diffuse = float32(0.0)
+    highlight = float32(0.0)
+    unwrap = one / (one + wrap)
+    for k in range(lamps.shape[1]):
+        lx, ly, lz = lamps[part, k, 0], lamps[part, k, 1], lamps[part, k, 2]
+        cosine = normal[0] * lx + normal[1] * ly + normal[2] * lz
+        diffuse += lamps[part, k, 3] * max(float32(0.0), (cosine + wrap) * unwrap)
+        if cosine <= float32(0.0):
+            continue
+        hx, hy, hz = lx + vx, ly + vy, lz + vz
+        squared = hx * hx + hy * hy + hz * hz
+        t = normal[0] * hx + normal[1] * hy + normal[2] * hz
+        if t <= float32(0.0):
+            continue
+        # Schlick's rational form instead of a power: t / (n - n t + t), squared for a short tail.
+        t = t / math.sqrt(squared)
+        lobe = t / (shininess - shininess * t + t)
+        highlight += lamps[part, k, 3] * lobe * lobe
+    out[0] = diffuse
+    out[1] = highlight
+
+
+@njit(cache=True, nogil=True)
+def shade(
+    frame: tuple[Any, ...],
+    geometry: tuple[Any, ...],
+    parts: tuple[Any, ...],
+    surface: tuple[Any, ...],
+    image: Floats,
+) -> None:
+    """Colour every pixel of the box that shows a triangle.
+
+    Args:
+        frame: (triangle (H, W) int32 with -1 for none, inverse_depth (H, W) float32, occlusion
+            (h, w) float32 on a grid of every `stride`-th pixel, rays (H, W, 2) float32,
+            box (4,) int64, stride).
+        geometry: (screen (V, 3) float64, faces (F, 3) int32, attributes (V, 5) float32: normal,
+            mark, exposure; part_of_face (F,) uint8, material_of_face (F,) uint8).
+        parts: (body_from_camera (P, 3, 4) float32, lamps (P, L, 4) float32 directions
+            in body frames and strengths,
+            texture (P, 4) float32: sign of x and shift of the texture).
+        surface: (materials (M, 21) float32, tile (n, n, n) uint16, ambient, constants (3,)
+            float32: fine and coarse voxels per mm, vignetting per px^2).
+        image: (H, W, 3) float32 out, BGR.
+    """
+    triangle, inverse_depth, occlusion, rays, box, stride = frame
+    screen, faces, attributes, part_of_face, material_of_face = geometry
+    body_from_camera, lamps, texture = parts
+    materials, tile, ambient, constants = surface
+    one = float32(1.0)
+    # Reused by every pixel.
+    weights, normal = np.empty(3, np.float32), np.empty(3, np.float32)
+    point, eye = np.empty(3, np.float32), np.empty(3, np.float32)
+    fine, coarse = np.empty(5, np.float32), np.empty(5, np.float32)
+    colour, sums = np.empty(5, np.float32), np.empty(2, np.float32)
+    middle_x, middle_y = float32(0.5 * (image.shape[1] - 1)), float32(0.5 * (image.shape[0] - 1))
+    for y in range(box[1], box[3]):
+        for x in range(box[0], box[2]):
+            if triangle[y, x] < 0:
+                continue
+            face = uint32(triangle[y, x])
+            a, b, c = uint32(faces[face, 0]), uint32(faces[face, 2]), uint32(faces[face, 1])
+            part = part_of_face[face]
+            row = material_of_face[face]
+            _corner_weights(screen, a, b, c, x, y, weights)
+            z = one / inverse_depth[y, x]
+            _place(body_from_camera, part, rays[y, x, 0], rays[y, x, 1], z, point, eye)
+            px = point[0] * texture[part, 0] + texture[part, 1]
+            py, pz = point[1] + texture[part, 2], point[2] + texture[part, 3]
+            scale = constants[0]
+            # The block is contiguous along the picture's rows, for the cache.
+            sample_tile(tile, pz * scale, py * scale, px * scale, fine)
+            scale = constants[1]
+            sample_tile(
+                tile,
+                py * scale + float32(_SHIFT_X),
+                pz * scale + float32(_SHIFT_Y),
+                px * scale + float32(_SHIFT_Z),
+                coarse,
+            )
+            mark = (
+                weights[0] * attributes[a, 3]
+                + weights[1] * attributes[b, 3]
+                + weights[2] * attributes[c, 3]
+            )
+            albedo_at(materials, row, fine, coarse, mark, colour)
+            bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])
+            for k in range(3):
+                normal[k] = (
+                    weights[0] * attributes[a, k]
+                    + weights[1] * attributes[b, k]
+                    + weights[2] * attributes[c, k]
+                )
+            normal[0] -= bump * fine[4] * texture[part, 0]
+            normal[1] -= bump * fine[3]
+            normal[2] -= bump * fine[2]
+            length = one / math.sqrt(
+                normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]
+            )
+            for k in range(3):
+                normal[k] *= length
+            wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
+            light_at(lamps, part, normal, point, eye, wrap, shininess, sums)
+            exposure = (
+                weights[0] * attributes[a, 4]
+                + weights[1] * attributes[b, 4]
+                + weights[2] * attributes[c, 4]
+            )
+            exposure *= _bilinear(occlusion, float32(x) / stride, float32(y) / stride)
+            dx, dy = float32(x) - middle_x, float32(y) - middle_y
+            exposure *= one - constants[2] * (dx * dx + dy * dy)
+            diffuse = (sums[0] + ambient) * exposure
+            highlight = sums[1] * colour[3] * exposure
+            for k in range(3):
+                image[y, x, k] = colour[k] * diffuse + highlight

@@ -1,0 +1,288 @@
+"""The simulated operating site: an opened knee on the table, seen by two cameras."""
+
+import threading
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.errors import UsageError
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from sim_devices.anatomy import KneeAnatomy, KneeSpec, make_knee, mirrored
+from sim_devices.cartilage import cartilage_thickness_mm, with_cartilage, worn
+from sim_devices.layout import (
+    flexed,
+    left_from_table,
+    misplaced,
+    nearer,
+    nominal_table_from_femur,
+)
+from sim_devices.materials import material_table
+from sim_devices.motion import LegMotion, drill_motion, sweep_offset_mm
+from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
+from sim_devices.rigs import default_rig
+from sim_devices.scenario import Scenario
+from sim_devices.stages import STAGES, Site, entry_point, worn_patch
+from sim_devices.textures import noise_tile
+from sim_devices.tissue import SKIN_BELOW_TOP_MM, make_drape, make_tissue, trimmed
+
+Eye = Literal["left", "right"]
+
+_TISSUE_FOLLOWS = 0.9
+# How far from the joint line the surgeon laid the bones bare.
+_BARE_FEMUR_MM = 62.0
+_BARE_TIBIA_MM = 27.0
+_DEFECT_RADIUS_MM = 9.0
+_HAND_ABOVE_MM = 32.0
+_MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+# Direction in the table's frame (z away from the cameras), strength.
+_LAMPS = np.array(
+    [
+        [-480.0, -420.0, -800.0, 0.50],
+        [560.0, -260.0, -800.0, 0.34],
+        [80.0, 420.0, -1000.0, 0.14],
+    ]
+)
+
+
+class World:
+    """An operation that runs by itself: bodies move with the time, the stage is set from outside.
+
+    World time 0 is the start. All methods may be called from any thread.
+
+    Args:
+        scenario: patient, scene, motion.
+
+    Raises:
+        UsageError: the scenario starts with a stage that does not exist.
+    """
+
+    approach_half_angle_deg = 30.0
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.rig: StereoRig = default_rig()
+        self.anatomy: KneeAnatomy = make_knee(
+            KneeSpec(scenario.seed, scenario.side, scenario.sex, scenario.age_group)
+        )
+        self._is_left = scenario.side == "left"
+        right = {
+            name: mirrored(mesh) if self._is_left else mesh for name, mesh in self._surfaces_mm()
+        }
+        self._left_from_table = left_from_table(self.rig)
+        self._nominal = nominal_table_from_femur()
+        self._start = misplaced(self._nominal, scenario.seed)
+        self._femur_from_tibia = flexed(right["femur"], right["tibia"])
+        self._motion = LegMotion(scenario.motion, scenario.seed)
+        self._site = self._make_site(right)
+        self._surfaces = Surfaces(
+            material_table(scenario.contrast, scenario.blood),
+            noise_tile(scenario.seed),
+            _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
+        )
+        self._lock = threading.Lock()
+        self._renderers: dict[tuple[str, Eye, float], Renderer] = {}
+        self._parts: dict[str, tuple[Part, ...]] = {}
+        self._stage = ""
+        self.set_stage(scenario.stage)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """The bodies that can be tracked."""
+        return ("femur", "tibia")
+
+    @property
+    def stage(self) -> str:
+        """The surgical stage in force."""
+        return self._stage
+
+    @property
+    def nominal_left_from_femur(self) -> RigidTransform:
+        """Where the femur lies according to the book: the rough start that an operator has."""
+        return self._seen(self._nominal)
+
+    @property
+    def approach_axis(self) -> FloatArray:
+        """(3,) unit vector in femur model coordinates from the bone towards the cameras."""
+        femur_from_left = self.nominal_left_from_femur.inverse()
+        middle = 0.5 * self.rig.right_from_left.inverse().translation_mm
+        direction = femur_from_left.apply(middle)
+        unit: FloatArray = direction / np.linalg.norm(direction)
+        return unit
+
+    def set_stage(self, name: str) -> None:
+        """Show another surgical stage from the next picture on.
+
+        Raises:
+            UsageError: there is no such stage.
+        """
+        if name not in STAGES:
+            raise UsageError(
+                f"the simulator shows no stage {name!r}",
+                subject=name,
+                remedy=f"choose one of {', '.join(STAGES)}",
+            )
+        with self._lock:
+            self._stage = name
+
+    def left_from_body(self, body: str, time_ns: int) -> RigidTransform:
+        """True pose of a body in the left camera.
+
+        Args:
+            body: one of `bodies`, or another moving thing of the scene.
+            time_ns: world time.
+
+        Raises:
+            UsageError: there is no such body.
+        """
+        return self._seen(self._table_from_body(body, time_ns / 1e9))
+
+    def render(self, eye: Eye, time_ns: int, scale: float = 1.0) -> NDArray[np.float32]:
+        """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure.
+
+        Args:
+            eye: which camera.
+            time_ns: world time.
+            scale: of the picture against the rig's.
+        """
+        renderer, parts = self._renderer(eye, scale)
+        poses, camera_from_table = self._poses(eye, parts, time_ns)
+        return renderer.render(poses, camera_from_table)
+
+    def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
+        """True depth and body of every pixel of the picture that `render` gives."""
+        renderer, parts = self._renderer(eye, scale)
+        poses, camera_from_table = self._poses(eye, parts, time_ns)
+        return renderer.depth(poses, camera_from_table)
+
+    def _renderer(self, eye: Eye, scale: float) -> tuple[Renderer, tuple[Part, ...]]:
+        with self._lock:
+            stage = self._stage
+            parts = self._parts.get(stage)
+            if parts is None:
+                parts = tuple(self._sided(part) for part in STAGES[stage](self._site))
+                self._parts[stage] = parts
+            key = (stage, eye, scale)
+            if key not in self._renderers:
+                rig = self.rig if scale == 1.0 else self.rig.scaled(scale)
+                camera = rig.left if eye == "left" else rig.right
+                self._renderers[key] = Renderer(
+                    camera, parts, self._surfaces_at(scale), frozenset({"drape"})
+                )
+            return self._renderers[key], parts
+
+    def _surfaces_at(self, scale: float) -> Surfaces:
+        """Smaller pictures need a blurred texture, or its finest octave would flicker."""
+        if scale >= 0.8:
+            return self._surfaces
+        blur = 0.6 * (1.0 / scale - 1.0)
+        tile = noise_tile(self.scenario.seed, round(blur, 1))
+        return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
+
+    def _poses(
+        self, eye: Eye, parts: tuple[Part, ...], time_ns: int
+    ) -> tuple[dict[str, RigidTransform], RigidTransform]:
+        """camera_from_body of everything in the scene, and camera_from_table."""
+        camera_from_left = (
+            RigidTransform.identity("left", "left") if eye == "left" else self.rig.right_from_left
+        )
+        poses = {
+            body: camera_from_left @ self.left_from_body(body, time_ns)
+            for body in dict.fromkeys(part.body for part in parts)
+        }
+        return poses, camera_from_left @ self._left_from_table
+
+    def _table_from_body(self, body: str, time_s: float) -> RigidTransform:
+        """As for a right knee."""
+        twist = self._motion.twist(time_s)
+        centre = self._start.translation_mm
+        femur = self._start.moved(twist, centre)
+        if body == "femur":
+            return femur
+        if body == "tibia":
+            bend = rotation_from_vector((self._motion.bend_rad(time_s), 0.0, 0.0))
+            turned = RigidTransform.from_parts("femur", "femur", bend, np.zeros(3))
+            return femur @ turned @ self._femur_from_tibia
+        if body == "tissue":
+            rest = RigidTransform.identity("table", "tissue")
+            return rest.moved(_TISSUE_FOLLOWS * twist, centre)
+        if body == "drape":
+            return RigidTransform.identity("table", "drape")
+        if body == "hand":
+            offset = sweep_offset_mm(self.scenario.instrument, time_s)
+            height = float(self._site.tissue.mesh.vertices_mm[:, 2].min()) - _HAND_ABOVE_MM
+            return RigidTransform.from_parts(
+                "table", "hand", np.eye(3), offset + np.array([0.0, 0.0, height])
+            )
+        if body in ("drill", "chuck"):
+            site = self._site
+            tool = drill_motion(site.entry_mm, site.entry_axis, time_s, turns=body == "drill")
+            return femur @ RigidTransform("femur", body, tool)
+        raise UsageError(
+            f"there is no body {body!r} in the simulated world",
+            subject=body,
+            remedy=f"choose one of {', '.join(self.bodies)}",
+        )
+
+    def _seen(self, table_from_body: RigidTransform) -> RigidTransform:
+        """left_from_body of a pose that was made as for a right knee."""
+        if self._is_left:
+            table_from_body = RigidTransform(
+                "table", table_from_body.source, _MIRROR @ table_from_body.matrix @ _MIRROR
+            )
+        return self._left_from_table @ table_from_body
+
+    def _sided(self, part: Part) -> Part:
+        if not self._is_left:
+            return part
+        return Part(part.body, mirrored(part.mesh), part.material, part.mark, part.exposure, -1.0)
+
+    def _defect_mm(self) -> FloatArray:
+        """(3,) middle of the worn patch: on the medial condyle, in front of its lowest point."""
+        condyle = self.anatomy.landmarks["femur/medial_condyle"]
+        middle: FloatArray = condyle + np.array([0.0, -6.0, 0.0])
+        return middle
+
+    def _surfaces_mm(self) -> Iterator[tuple[str, TriangleMesh]]:
+        """The bones as a camera sees them: with their cartilage, worn at the defect."""
+        for name, bone in self.anatomy.bones.items():
+            if self.scenario.cartilage_mm == 0.0:
+                yield name, bone
+                continue
+            thickness = cartilage_thickness_mm(
+                self.anatomy, name, self.scenario.cartilage_mm, self.scenario.seed
+            )
+            if name == "femur":
+                thickness = worn(bone, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
+            yield name, with_cartilage(bone, thickness)
+
+    def _make_site(self, right: dict[str, TriangleMesh]) -> Site:
+        femur = self._start
+        laid = {"femur": femur, "tibia": femur @ self._femur_from_tibia}
+        on_table = [right[name].transformed(pose) for name, pose in laid.items()]
+        bare = [
+            nearer(
+                right["femur"], float(right["femur"].vertices_mm[:, 2].min()) + _BARE_FEMUR_MM, -1.0
+            ),
+            nearer(
+                right["tibia"], float(right["tibia"].vertices_mm[:, 2].max()) - _BARE_TIBIA_MM, 1.0
+            ),
+        ]
+        exposed = [mesh.transformed(pose) for mesh, pose in zip(bare, laid.values(), strict=True)]
+        tissue = make_tissue(exposed, on_table, self.scenario.seed)
+        top = -min(float(bone.vertices_mm[:, 2].min()) for bone in on_table)
+        mirror = np.array([-1.0, 1.0, 1.0]) if self._is_left else np.ones(3)
+        notch = self.anatomy.landmarks["femur/notch"] * mirror
+        axis = rotation_from_vector((np.radians(-6.0), 0.0, 0.0)) @ (0.0, 0.0, 1.0)
+        return Site(
+            bones=right,
+            worn=worn_patch(right["femur"], self._defect_mm() * mirror, _DEFECT_RADIUS_MM),
+            is_covered=self.scenario.cartilage_mm > 0.0,
+            tissue=trimmed(tissue),
+            drape=make_drape(tissue, top - SKIN_BELOW_TOP_MM - 11.0, self.scenario.seed),
+            entry_mm=entry_point(right["femur"], notch + np.array([0.0, -10.0, 0.0]), axis),
+            entry_axis=axis,
+        )
