@@ -95,8 +95,8 @@ def sweep_offset_mm(kind: InstrumentKind, time_s: float) -> FloatArray:
     inside = smooth_step((phase - 0.10) / 0.30) * smooth_step((0.90 - phase) / 0.30)
     wander = np.array(
         [
-            9.0 * np.sin(4.0 * np.pi * phase) - 14.0,
-            7.0 * np.sin(6.0 * np.pi * phase + 1.0) - 10.0,
+            9.0 * np.sin(4.0 * np.pi * phase) - 22.0,
+            7.0 * np.sin(6.0 * np.pi * phase + 1.0) - 18.0,
             4.0 * np.sin(2.0 * np.pi * phase),
         ]
     )

@@ -166,6 +166,39 @@ def _corner_weights(
 
 
 @njit(cache=True, nogil=True, inline="always")
+def _blend(attributes: Floats, a: int, b: int, c: int, column: int, weights: Floats) -> Any:
+    """An attribute between its values at the corners."""
+    return (
+        weights[0] * attributes[a, column]
+        + weights[1] * attributes[b, column]
+        + weights[2] * attributes[c, column]
+    )
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _bumped_normal(
+    attributes: Floats,
+    a: int,
+    b: int,
+    c: int,
+    weights: Floats,
+    bump: float,
+    sign: float,
+    fine: Floats,
+    normal: Floats,
+) -> None:
+    """The smooth normal, tilted by the noise's slope; `sign` is -1 in a mirrored texture."""
+    # The tile was sampled with its axes reversed.
+    nx = _blend(attributes, a, b, c, 0, weights) - bump * fine[4] * sign
+    ny = _blend(attributes, a, b, c, 1, weights) - bump * fine[3]
+    nz = _blend(attributes, a, b, c, 2, weights) - bump * fine[2]
+    scale = float32(1.0) / math.sqrt(nx * nx + ny * ny + nz * nz)
+    normal[0] = nx * scale
+    normal[1] = ny * scale
+    normal[2] = nz * scale
+
+
+@njit(cache=True, nogil=True, inline="always")
 def _place(
     poses: Floats, part: int, ray_x: float, ray_y: float, z: float, point: Floats, eye: Floats
 ) -> None:
@@ -288,34 +321,13 @@ def shade(
                 px * scale + float32(_SHIFT_Z),
                 coarse,
             )
-            mark = (
-                weights[0] * attributes[a, 3]
-                + weights[1] * attributes[b, 3]
-                + weights[2] * attributes[c, 3]
-            )
+            mark = _blend(attributes, a, b, c, 3, weights)
             albedo_at(materials, row, fine, coarse, mark, colour)
             bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])
-            for k in range(3):
-                normal[k] = (
-                    weights[0] * attributes[a, k]
-                    + weights[1] * attributes[b, k]
-                    + weights[2] * attributes[c, k]
-                )
-            normal[0] -= bump * fine[4] * texture[part, 0]
-            normal[1] -= bump * fine[3]
-            normal[2] -= bump * fine[2]
-            length = one / math.sqrt(
-                normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]
-            )
-            for k in range(3):
-                normal[k] *= length
+            _bumped_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
             wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
             light_at(lamps, part, normal, point, eye, wrap, shininess, sums)
-            exposure = (
-                weights[0] * attributes[a, 4]
-                + weights[1] * attributes[b, 4]
-                + weights[2] * attributes[c, 4]
-            )
+            exposure = _blend(attributes, a, b, c, 4, weights)
             exposure *= _bilinear(occlusion, float32(x) / stride, float32(y) / stride)
             dx, dy = float32(x) - middle_x, float32(y) - middle_y
             exposure *= one - constants[2] * (dx * dx + dy * dy)

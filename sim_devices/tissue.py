@@ -23,7 +23,7 @@ SHEET_RADIUS_MM = 100.0
 EXPOSED_DEPTH_MM = 46.0
 SKIN_BELOW_TOP_MM = 4.0
 DRAPE_HOLE_MM = 75.0
-DRAPE_GAP_MM = 4.0
+DRAPE_GAP_MM = 5.0
 # Distance over which the wound's wall reaches the skin.
 WALL_MM = 24.0
 
@@ -153,7 +153,7 @@ def _raised(tissue: Sheet, places: FloatArray) -> FloatArray:
     near = np.asarray(cv2.dilate(height, np.ones((7, 7), np.uint8)), dtype=np.float64)
     cells = (places[:, ::-1].T + grid.half_mm) / grid.cell_mm
     # The leg moves under the cloth, most where it is far from the knee.
-    slack = DRAPE_GAP_MM + 0.15 * np.maximum(np.hypot(*places.T) - DRAPE_HOLE_MM, 0.0)
+    slack = DRAPE_GAP_MM + 0.22 * np.maximum(np.hypot(*places.T) - DRAPE_HOLE_MM, 0.0)
     raised: FloatArray = map_coordinates(near, cells, order=1, mode="nearest") + slack
     return np.where((np.abs(places) < grid.half_mm).all(axis=1), raised, -np.inf)
 

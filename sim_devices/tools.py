@@ -88,9 +88,9 @@ def hand_meshes() -> tuple[TriangleMesh, TriangleMesh]:
         palm = tip + 135.0 * axis + np.array([12.0, 10.0, -4.0])
         pieces.append(_limb([start, 0.5 * (start + knuckle) + 4.0 * around, knuckle, palm], 8.2))
     wrist = tip + 135.0 * axis + np.array([12.0, 10.0, -4.0])
-    pieces.append(_limb([wrist - 20.0 * axis, wrist, wrist + np.array([60.0, 60.0, -4.0])], 27.0))
+    pieces.append(_limb([wrist - 20.0 * axis, wrist, wrist + np.array([60.0, 60.0, -4.0])], 23.0))
     sleeve = [wrist + np.array([40.0, 42.0, -4.0]), wrist + np.array([330.0, 260.0, 20.0])]
-    pieces.append(_limb(sleeve, 33.0))
+    pieces.append(_limb(sleeve, 27.0))
     return joined(pieces), tool
 
 

@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from navapp.geometry.rectification import Rectifier
+from navapp.geometry.transform import RigidTransform, rotation_angle_deg
+from sim_devices.rigs import BASELINE_MM, TOE_IN_DEG, WORKING_DISTANCE_MM, default_rig
+
+
+def test_the_rig_has_the_promised_size_baseline_and_focal_length():
+    rig = default_rig()
+    assert (rig.width, rig.height) == (1280, 720)
+    assert rig.baseline_mm == pytest.approx(BASELINE_MM)
+    assert rig.left.focal_px == pytest.approx(1400.0, rel=0.01)
+    assert rig.serials == ("SIM-L", "SIM-R")
+    assert rig.left.is_distorted
+    assert rig.right.is_distorted
+    turned = rotation_angle_deg(rig.right_from_left, RigidTransform.identity("right", "left"))
+    assert turned == pytest.approx(2.0 * TOE_IN_DEG, abs=0.1)
+
+
+def test_the_cameras_converge():
+    rig = default_rig()
+    axis_of_right = rig.right_from_left.rotation[2]
+    assert axis_of_right[0] < -0.05
+
+
+def test_the_rig_can_be_rectified_and_sees_the_working_distance_inside_the_pictures():
+    geometry = Rectifier(default_rig()).geometry
+    assert 150.0 < geometry.disparity_px(WORKING_DISTANCE_MM) < 300.0
+
+
+def test_another_size_is_the_same_rig_scaled():
+    half = default_rig(640, 360)
+    np.testing.assert_allclose(half.left.matrix, default_rig().scaled(0.5).left.matrix)
+    assert (half.width, half.height) == (640, 360)
+
+
+def test_another_shape_is_refused():
+    with pytest.raises(ValueError, match="16:9"):
+        default_rig(640, 480)
