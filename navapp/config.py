@@ -1,13 +1,16 @@
 """The TOML configuration: frozen models that refuse unknown keys and name the nearest known one."""
 
+import datetime
 import difflib
+import json
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from navapp.errors import ConfigurationError
 
@@ -17,11 +20,21 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
+def _rising(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] >= values[1]:
+        raise ValueError("the first must be smaller than the second")
+    return values
+
+
 class Section(BaseModel):
     """One table of the file."""
 
     model_config = ConfigDict(
-        frozen=True, extra="forbid", strict=True, use_attribute_docstrings=True
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
     )
 
 
@@ -59,7 +72,11 @@ class CameraSection(BaseModel):
 
     # Tables of third-party devices, [camera.NAME], are passed through unchecked.
     model_config = ConfigDict(
-        frozen=True, extra="allow", strict=True, use_attribute_docstrings=True
+        frozen=True,
+        extra="allow",
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
     )
 
     backend: str = "simulated"
@@ -68,7 +85,7 @@ class CameraSection(BaseModel):
     """Rig file (OpenCV YAML); simulated cameras bring their own."""
     rate_hz: Positive = 15.0
     """Pairs per second asked for, or assumed where a recording has no times."""
-    depth_mm: tuple[Positive, Positive] = (300.0, 700.0)
+    depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (300.0, 700.0)
     """Nearest and farthest surface that is searched without a prediction."""
     simulated: SimulationSection = SimulationSection()
     """The simulated patient and rig."""
@@ -276,7 +293,8 @@ def _table(name: str, model: type[BaseModel], values: BaseModel, with_comments: 
         lines.append(f"# {key} =" if value is None else f"{key} = {_literal(value)}")
     for key, value in (values.model_extra or {}).items():
         if isinstance(value, Mapping):
-            inner += [f"[{name}.{key}]", *(f"{k} = {_literal(v)}" for k, v in value.items()), ""]
+            entries = [f"{_key(k)} = {_literal(v)}" for k, v in value.items()]
+            inner += [f"[{name}.{_key(key)}]", *entries, ""]
     return [*lines, "", *inner]
 
 
@@ -284,10 +302,16 @@ def _literal(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
+        # TOML's escapes are JSON's, except that it wants one for DEL, too.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{k} = {_literal(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(k)} = {_literal(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_literal(item) for item in value) + "]"
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
     return repr(value)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _literal(name)

@@ -376,13 +376,21 @@ def predicted_tre_mm(
 def _digest(plan: Plan) -> str:
     """Hash of everything in a plan that changes what is shown."""
     digest = hashlib.sha256()
+
+    def add(label: str, array: NDArray[np.generic]) -> None:
+        # With its length, so that the same bytes cut elsewhere are something else.
+        digest.update(f"{label}:{array.size}:".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+
     for name in sorted(plan.bones):
         bone = plan.bones[name]
-        digest.update(f"{name}:{bone.side}:{bone.version}".encode())
-        for array in (bone.mesh.vertices_mm, bone.mesh.faces, bone.cartilage_mm, bone.is_removed):
-            digest.update(np.ascontiguousarray(array).tobytes())
-    for points_by_name in (plan.targets, plan.curves):
+        digest.update(f"bone {name}:{bone.side}:{bone.version}".encode())
+        add("vertices", bone.mesh.vertices_mm)
+        add("faces", bone.mesh.faces)
+        add("cartilage", bone.cartilage_mm)
+        add("its deviation", bone.cartilage_sd_mm)
+        add("removed", bone.is_removed)
+    for kind, points_by_name in (("target", plan.targets), ("curve", plan.curves)):
         for name in sorted(points_by_name):
-            digest.update(name.encode())
-            digest.update(np.ascontiguousarray(points_by_name[name], dtype=np.float64).tobytes())
+            add(f"{kind} {name}", np.asarray(points_by_name[name], dtype=np.float64))
     return digest.hexdigest()[:12]

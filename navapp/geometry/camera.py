@@ -15,9 +15,9 @@ class Camera:
     Pixel (0, 0) is the centre of the top-left pixel.
 
     Attributes:
-        matrix: (3, 3) K, px.
+        matrix: (3, 3) K, px, without skew.
         distortion: (n,) OpenCV coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1..s4 [tx ty]]]]; n may
-            be 0, 4, 5, 8, 12 or 14.
+            be 0, 4, 5, 8, 12 or 14, the tilt (tx, ty) only 0.
         width, height: of the picture, px.
 
     Raises:
@@ -36,8 +36,15 @@ class Camera:
             raise ValueError("a camera matrix is a finite 3x3 matrix")
         if matrix[0, 0] <= 0.0 or matrix[1, 1] <= 0.0:
             raise ValueError("focal lengths must be positive")
+        if np.abs(matrix[[1, 2, 2, 2], [0, 0, 1, 2]] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
+            raise ValueError("a camera matrix has the rows fx 0 cx, 0 fy cy and 0 0 1")
+        # OpenCV's rectification would silently ignore it.
+        if abs(matrix[0, 1]) > 1e-9:
+            raise ValueError("a camera matrix with skew is not supported")
         if distortion.size not in (0, 4, 5, 8, 12, 14) or not np.isfinite(distortion).all():
             raise ValueError("distortion needs 0, 4, 5, 8, 12 or 14 finite coefficients")
+        if distortion[12:].any():
+            raise ValueError("a tilted sensor (tx, ty) is not supported")
         if self.width <= 0 or self.height <= 0:
             raise ValueError("width and height must be positive")
         object.__setattr__(self, "matrix", matrix)
@@ -64,7 +71,7 @@ class Camera:
         y = points[front, 1] / points[front, 2]
         if self.is_distorted:
             x, y = distort(x, y, self.distortion)
-        pixels[front, 0] = self.matrix[0, 0] * x + self.matrix[0, 1] * y + self.matrix[0, 2]
+        pixels[front, 0] = self.matrix[0, 0] * x + self.matrix[0, 2]
         pixels[front, 1] = self.matrix[1, 1] * y + self.matrix[1, 2]
         return pixels
 
@@ -73,6 +80,8 @@ class Camera:
         import cv2
 
         points = np.array(pixels, dtype=np.float64).reshape(-1, 1, 2)
+        if len(points) == 0:
+            return np.empty((0, 3))
         criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-12)
         flat = cv2.undistortPoints(
             points, np.array(self.matrix), np.array(self.distortion), criteria=criteria
@@ -98,8 +107,6 @@ def distort(x: FloatArray, y: FloatArray, distortion: FloatArray) -> tuple[Float
     """Distorted normalised coordinates of undistorted ones (OpenCV's model up to thin prism)."""
     k = np.zeros(14)
     k[: distortion.size] = distortion
-    if k[12] != 0.0 or k[13] != 0.0:
-        raise ValueError("a tilted sensor (tx, ty) is not supported")
     r2 = x * x + y * y
     radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (
         1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))

@@ -39,8 +39,8 @@ class TriangleMesh:
         normals = self.normals
         if len(normals) == 0:
             normals = vertex_normals(vertices, faces)
-        if normals.shape != vertices.shape:
-            raise ValueError("there must be one normal per vertex")
+        if normals.shape != vertices.shape or not np.isfinite(normals).all():
+            raise ValueError("there must be one finite normal per vertex")
         object.__setattr__(self, "vertices_mm", vertices)
         object.__setattr__(self, "faces", faces)
         object.__setattr__(self, "normals", read_only(normals))
@@ -59,6 +59,8 @@ class TriangleMesh:
 
     def volume_mm3(self) -> float:
         """Signed volume (positive when the normals point outwards), from signed tetrahedra."""
+        if len(self.faces) == 0:
+            return 0.0
         corners = (self.vertices_mm - self.centroid_mm)[self.faces]
         return float(
             np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
@@ -81,6 +83,8 @@ class TriangleMesh:
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 
+        if len(self.faces) == 0:
+            return TriangleMesh(np.empty((0, 3)), self.faces)
         n = len(self.vertices_mm)
         rows = np.concatenate([self.faces[:, 0], self.faces[:, 1]])
         columns = np.concatenate([self.faces[:, 1], self.faces[:, 2]])
@@ -96,14 +100,19 @@ class TriangleMesh:
 
 
 def vertex_normals(vertices_mm: FloatArray, faces: IntArray) -> FloatArray:
-    """(V, 3) unit normals: the mean of the adjacent faces' normals, weighted by their area."""
+    """(V, 3) unit normals: the mean of the adjacent faces' normals, weighted by their area.
+
+    A vertex of no face, or of degenerate ones only, has the normal 0.
+    """
     corners = vertices_mm[faces]
-    face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(vertices_mm)
-    for column in range(3):
-        index = faces[:, column]
-        for axis in range(3):
-            normals[:, axis] += np.bincount(index, face_normals[:, axis], len(vertices_mm))
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    # Coordinates beyond all measure overflow; the mesh refuses normals that are not finite.
+    with np.errstate(over="ignore", invalid="ignore"):
+        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        for column in range(3):
+            index = faces[:, column]
+            for axis in range(3):
+                normals[:, axis] += np.bincount(index, face_normals[:, axis], len(vertices_mm))
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
     unit: FloatArray = normals / np.where(length > 0.0, length, 1.0)
     return unit

@@ -1,6 +1,7 @@
 """PLY files, with the comments that say which space and unit the numbers are in."""
 
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -16,6 +17,9 @@ _TYPES = {
     "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
+
+
+_END_OF_HEADER = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
 
 
 class PlyHeader:
@@ -42,6 +46,10 @@ class PlyHeader:
                 raise damaged(path, f"unknown header line '{line.strip()[:60]}'")
         if self.format not in ("ascii", "binary_little_endian", "binary_big_endian"):
             raise damaged(path, f"unknown format '{self.format}'")
+        for name, count, properties in self.elements:
+            names = [p for p, _, _ in properties]
+            if len(set(names)) < len(names) or (count and not names):
+                raise damaged(path, f"the properties of element '{name}' are missing or doubled")
 
     def _add_property(self, path: Path, words: list[str]) -> None:
         is_list = len(words) == 5 and words[1].lower() == "list"
@@ -78,14 +86,13 @@ def read_ply(path: str | Path) -> tuple[TriangleMesh, PlyHeader]:
             subject=str(path),
             remedy="give the path of an existing PLY file",
         ) from error
-    end = content.find(b"end_header")
-    if not content[:3].lower() == b"ply" or end < 0:
+    end = _END_OF_HEADER.search(content)
+    if not content[:3].lower() == b"ply" or end is None:
         raise damaged(path, "it does not begin with a PLY header")
-    body = content.find(b"\n", end) + 1
-    header = PlyHeader(path, content[: end + 10].decode("ascii", errors="replace"))
+    header = PlyHeader(path, content[: end.start()].decode("ascii", errors="replace"))
     try:
-        columns = _read_elements(header, content, body)
-    except (ValueError, IndexError) as error:
+        columns = _read_elements(header, content, end.end())
+    except (ValueError, IndexError, OverflowError) as error:
         raise damaged(path, "it is cut short or its numbers are broken") from error
     vertex = columns.get("vertex", {})
     if not all(axis in vertex for axis in "xyz"):
@@ -95,7 +102,7 @@ def read_ply(path: str | Path) -> tuple[TriangleMesh, PlyHeader]:
     polygons = face.get("vertex_indices", face.get("vertex_index", np.empty((0, 3), dtype="i4")))
     try:
         mesh = TriangleMesh(vertices, _triangles(polygons))
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise damaged(path, str(error)) from error
     return mesh, header
 
@@ -190,6 +197,8 @@ def _read_lists(
             length = 1
             if counter:
                 length = int(np.frombuffer(content, order + counter, 1, offset)[0])
+                if length < 0:  # to numpy, -1 would be the rest of the file
+                    raise ValueError(f"a list of {length} numbers")
                 offset += np.dtype(counter).itemsize
             rows[p].append(np.frombuffer(content, order + kind, length, offset))
             offset += np.dtype(kind).itemsize * length
@@ -197,6 +206,9 @@ def _read_lists(
 
 
 def _read_ascii(header: PlyHeader, body: bytes) -> dict[str, dict[str, NDArray[np.generic]]]:
+    # Without its last line break a file may have lost digits of its last number.
+    if body.strip() and not body.endswith((b"\n", b"\r")):
+        raise ValueError("cut short")
     words = body.split()
     position = 0
     columns: dict[str, dict[str, NDArray[np.generic]]] = {}
@@ -212,7 +224,7 @@ def _read_ascii(header: PlyHeader, body: bytes) -> dict[str, dict[str, NDArray[n
                 if len(values) != length:
                     raise IndexError(name)
                 position += length
-                rows[p].append(values.astype(kind) if counter else values[0])
+                rows[p].append(_exactly(values, kind) if counter else values[0])
         columns[name] = {
             p: np.array(rows[p], dtype=object if counter else kind)
             for p, kind, counter in properties
@@ -220,12 +232,24 @@ def _read_ascii(header: PlyHeader, body: bytes) -> dict[str, dict[str, NDArray[n
     return columns
 
 
+def _exactly(values: NDArray[np.float64], kind: str) -> NDArray[np.generic]:
+    """Numbers of a text in the type that the header promises; whole where it says whole."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        result = values.astype(kind)
+    if kind[0] != "f" and not np.array_equal(result, values):
+        raise ValueError("a whole number was expected")
+    return result
+
+
 def _triangles(polygons: NDArray[np.generic]) -> NDArray[np.int32]:
     """(F, 3) triangles; polygons are cut into fans."""
+    kinds = {p.dtype.kind for p in polygons} if polygons.dtype == object else {polygons.dtype.kind}
+    if "f" in kinds:
+        raise ValueError("its faces do not name vertices by whole numbers")
     if polygons.dtype != object:
         return np.asarray(polygons, dtype=np.int64).reshape(-1, 3).astype(np.int32)
     triangles: list[tuple[int, int, int]] = []
     for polygon in polygons:
         corner = [int(index) for index in np.atleast_1d(polygon)]
         triangles += [(corner[0], corner[i], corner[i + 1]) for i in range(1, len(corner) - 1)]
-    return np.array(triangles, dtype=np.int32).reshape(-1, 3)
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3).astype(np.int32)

@@ -197,15 +197,18 @@ class Rectifier:
         """Rectify both pictures; `box` (in the rectified left view) is passed on clipped.
 
         Raises:
-            ValueError: pictures of another size than the rig's.
+            ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
         """
         import cv2
 
-        if left.shape[:2] != (self.rig.height, self.rig.width) or left.shape != right.shape:
-            raise ValueError(
-                f"pictures are {left.shape[1]}x{left.shape[0]}, "
-                f"the rig {self.rig.width}x{self.rig.height}"
-            )
+        for picture in (left, right):
+            if picture.shape[:2] != (self.rig.height, self.rig.width):
+                raise ValueError(
+                    f"pictures are {picture.shape[1]}x{picture.shape[0]}, "
+                    f"the rig {self.rig.width}x{self.rig.height}"
+                )
+        if left.shape != right.shape:
+            raise ValueError("one picture of the pair is grey and the other coloured")
         left_x, left_y, right_x, right_y = self.maps
         whole = Box(0, 0, self.rig.width, self.rig.height)
         return RectifiedPair(

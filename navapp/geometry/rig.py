@@ -11,7 +11,7 @@ import numpy as np
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.ply import write_whole
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.transform import RigidTransform
 
 # What other programs call the same thing; the first name is ours.
 _SYNONYMS = {
@@ -82,10 +82,13 @@ class StereoRig:
         """Hash of the numbers: two rigs with the same geometry have the same id."""
         digest = hashlib.sha256()
         for camera in (self.left, self.right):
-            digest.update(np.round(camera.matrix, 9).tobytes())
-            digest.update(np.round(camera.distortion, 12).tobytes())
+            # Absent coefficients are zeros, and adding 0 makes -0 a plain 0.
+            distortion = np.zeros(14)
+            distortion[: camera.distortion.size] = camera.distortion
+            digest.update((np.round(camera.matrix, 9) + 0.0).tobytes())
+            digest.update((np.round(distortion, 12) + 0.0).tobytes())
             digest.update(f"{camera.width}x{camera.height}".encode())
-        digest.update(np.round(self.right_from_left.matrix, 9).tobytes())
+        digest.update((np.round(self.right_from_left.matrix, 9) + 0.0).tobytes())
         return digest.hexdigest()[:12]
 
     def scaled(self, factor: float) -> "StereoRig":
@@ -114,10 +117,7 @@ def read_rig(path: str | Path) -> StereoRig:
             remedy="give the OpenCV YAML file that the calibration wrote",
         )
     values = _read_storage(path)
-    size = values.get("size", values.get("image_size"))
     width, height = values.get("image_width"), values.get("image_height")
-    if width is None and size is not None:
-        width, height = np.asarray(size).reshape(-1)[:2]
     missing = [key for key in _SYNONYMS if key not in values]
     if width is None or height is None:
         missing.insert(0, "image_width and image_height")
@@ -136,7 +136,7 @@ def read_rig(path: str | Path) -> StereoRig:
             _quality(values),
             str(values.get("rig_name", path.stem)),
         )
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise RigError(
             f"rig file {path} describes no possible rig ({error})",
             subject=str(path),
@@ -145,12 +145,22 @@ def read_rig(path: str | Path) -> StereoRig:
 
 
 def write_rig(path: str | Path, rig: StereoRig) -> None:
-    """Write OpenCV YAML 1.0, whole or not at all."""
+    """Write OpenCV YAML 1.0, whole or not at all.
+
+    The quality record comes first: a file that is cut short later on loses numbers that it cannot
+    be read without, never just the verdict.
+    """
     import cv2
 
     # OpenCV 5 writes YAML 1.2 unless asked; older readers know 1.0 only.
     yaml_format = getattr(cv2, "FILE_STORAGE_FORMAT_YAML_1_0", cv2.FILE_STORAGE_FORMAT_YAML)
     storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | yaml_format)
+    storage.write("rig_name", rig.name)
+    storage.write("rig_id", rig.rig_id)
+    storage.write("serial_left", rig.serials[0])
+    storage.write("serial_right", rig.serials[1])
+    if rig.quality is not None:
+        _write_quality(storage, rig.quality)
     storage.write("image_width", rig.width)
     storage.write("image_height", rig.height)
     for index, camera in ((1, rig.left), (2, rig.right)):
@@ -162,57 +172,43 @@ def write_rig(path: str | Path, rig: StereoRig) -> None:
         )
     storage.write("R", np.array(rig.right_from_left.rotation))
     storage.write("T", np.array(rig.right_from_left.translation_mm).reshape(3, 1))
-    storage.write("rig_name", rig.name)
-    storage.write("rig_id", rig.rig_id)
-    storage.write("serial_left", rig.serials[0])
-    storage.write("serial_right", rig.serials[1])
-    if rig.quality is not None:
-        storage.write("accepted", int(rig.quality.is_accepted))
-        storage.write("reasons", "; ".join(rig.quality.reasons))
-        uncertainty_mm = rig.quality.uncertainty_mm
-        storage.write("uncertainty_mm", -1.0 if uncertainty_mm is None else uncertainty_mm)
     write_whole(path, storage.releaseAndGetString().encode("utf-8"))
+
+
+def _write_quality(storage: Any, quality: RigQuality) -> None:
+    import cv2
+
+    storage.write("accepted", int(quality.is_accepted))
+    storage.startWriteStruct("reasons", cv2.FILE_NODE_SEQ)
+    for reason in quality.reasons:
+        storage.write("", reason)
+    storage.endWriteStruct()
+    storage.write(
+        "uncertainty_mm", -1.0 if quality.uncertainty_mm is None else quality.uncertainty_mm
+    )
 
 
 def _quality(values: dict[str, Any]) -> RigQuality | None:
     if "accepted" not in values:
         return None
     uncertainty_mm = float(values.get("uncertainty_mm", -1.0))
-    reasons = tuple(part for part in str(values.get("reasons", "")).split("; ") if part)
     known = uncertainty_mm >= 0.0 and math.isfinite(uncertainty_mm)
-    return RigQuality(int(values["accepted"]) == 1, reasons, uncertainty_mm if known else None)
+    return RigQuality(
+        int(values["accepted"]) == 1,
+        tuple(values.get("reasons", ())),
+        uncertainty_mm if known else None,
+    )
 
 
 def _read_storage(path: Path) -> dict[str, Any]:
     """Every known entry of an OpenCV storage file, under our names."""
     import cv2
 
-    values: dict[str, Any] = {}
     try:
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         if not storage.isOpened():
             raise ValueError("not an OpenCV storage file")
-        for name, synonyms in _SYNONYMS.items():
-            for synonym in synonyms:
-                # A node must stay in a variable: the storage frees the ones that nobody holds.
-                node = storage.getNode(synonym)
-                if not node.empty() and node.mat() is not None:
-                    values[name] = _matrix(node.mat())
-                    break
-        for name in ("image_width", "image_height", "accepted", "uncertainty_mm"):
-            node = storage.getNode(name)
-            if not node.empty():
-                values[name] = node.real()
-        for name in ("size", "image_size"):
-            node = storage.getNode(name)
-            if not node.empty():
-                values[name] = (
-                    [node.at(i).real() for i in range(node.size())] if node.isSeq() else node.mat()
-                )
-        for name in ("serial_left", "serial_right", "rig_name", "reasons"):
-            node = storage.getNode(name)
-            if not node.empty() and node.isString():
-                values[name] = node.string()
+        values = {**_read_matrices(storage), **_read_scalars(storage)}
         storage.release()
     except (cv2.error, SystemError, ValueError) as error:
         raise RigError(
@@ -223,5 +219,46 @@ def _read_storage(path: Path) -> dict[str, Any]:
     return values
 
 
-def _matrix(value: Any) -> FloatArray:
-    return np.asarray(value, dtype=np.float64)
+# A node must stay in a variable: the storage frees the ones that nobody holds.
+
+
+def _read_matrices(storage: Any) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name, synonyms in _SYNONYMS.items():
+        for synonym in synonyms:
+            node = storage.getNode(synonym)
+            if not node.empty() and node.mat() is not None:
+                values[name] = np.asarray(node.mat(), dtype=np.float64)
+                break
+    return values
+
+
+def _read_scalars(storage: Any) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for name in ("size", "image_size"):
+        node = storage.getNode(name)
+        if node.empty():
+            continue
+        size = [_number(node.at(i)) for i in range(node.size())] if node.isSeq() else node.mat()
+        size = np.asarray(size, dtype=np.float64).reshape(-1)
+        if size.size != 2:
+            raise ValueError(f"{name} is not a width and a height")
+        values["image_width"], values["image_height"] = size
+    for name in ("image_width", "image_height", "accepted", "uncertainty_mm"):
+        node = storage.getNode(name)
+        if not node.empty():
+            values[name] = _number(node)
+    for name in ("serial_left", "serial_right", "rig_name"):
+        node = storage.getNode(name)
+        if not node.empty() and node.isString():
+            values[name] = node.string()
+    node = storage.getNode("reasons")
+    if not node.empty() and node.isSeq():
+        values["reasons"] = [node.at(i).string() for i in range(node.size())]
+    return values
+
+
+def _number(node: Any) -> float:
+    if not (node.isInt() or node.isReal()):
+        raise ValueError("a number was expected")
+    return float(node.real())

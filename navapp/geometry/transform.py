@@ -164,7 +164,8 @@ def vector_from_rotation(rotation: ArrayLike) -> FloatArray:
     # Half a turn: the axis is the eigenvector of R to the eigenvalue 1.
     values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     half_turn: FloatArray = vectors[:, int(np.argmax(values))] * angle
-    return half_turn
+    # The eigenvector has no sign; just short of half a turn the rotation has one.
+    return half_turn if half_turn @ axis >= 0.0 else -half_turn
 
 
 def rotation_angle_deg(a: RigidTransform, b: RigidTransform) -> float:

@@ -22,7 +22,9 @@ def raster_nearest(
         inverse_depth: (h, w) in place, 1/mm, 0 where nothing is seen.
         face_index: (h, w) in place, -1 where nothing is seen.
 
-    1/z is linear in the picture, so it is what is interpolated.
+    1/z is linear in the picture, so it is what is interpolated. Each weight is taken from the two
+    ends of its edge: a neighbour computes the same number with the other sign, so that no pixel on
+    a shared edge is lost to both.
     """
     height, width = inverse_depth.shape
     for f in range(faces.shape[0]):
@@ -46,9 +48,9 @@ def raster_nearest(
         scale = 1.0 / area
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
-                wb = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) * scale
-                wc = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) * scale
-                wa = 1.0 - wb - wc
+                wa = ((bx - x) * (cy - y) - (by - y) * (cx - x)) * scale
+                wb = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) * scale
+                wc = ((ax - x) * (by - y) - (ay - y) * (bx - x)) * scale
                 if wa < 0.0 or wb < 0.0 or wc < 0.0:
                     continue
                 value = wa * ia + wb * ib + wc * ic

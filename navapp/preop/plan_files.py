@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,12 @@ import numpy as np
 
 from navapp.errors import InputError, PlanError
 from navapp.geometry.ply import read_ply, write_ply
+from navapp.geometry.transform import FloatArray
 from navapp.preop.preview import draw_preview
 from navapp.values import BoneModel, Plan
 
 _FILE = "plan.json"
-_FORMAT = 1
+_CONVENTIONS = {"format": 1, "space": "LPS", "unit": "mm"}
 
 
 def write_plan(folder: str | Path, plan: Plan) -> None:
@@ -39,15 +41,13 @@ def write_plan(folder: str | Path, plan: Plan) -> None:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     except OSError as error:
-        raise PlanError(
-            f"plan folder {folder} cannot be written ({error.strerror})",
-            subject=str(folder),
-            remedy="choose a folder that you may write to",
-        ) from error
+        raise _not_written(folder, error) from error
     try:
         _write_content(temporary, plan)
         temporary.chmod(0o755)
         _put_in_place(temporary, folder)
+    except OSError as error:
+        raise _not_written(folder, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
 
@@ -59,23 +59,30 @@ def read_plan(folder: str | Path) -> Plan:
         PlanError: missing, empty, half-written or changed since it was made.
     """
     folder = Path(folder)
-    path = folder / _FILE
-    if not path.is_file():
+    if not (folder / _FILE).is_file():
         raise PlanError(
             f"{folder} holds no plan",
             subject=str(folder),
             remedy="make one with `navapp plan --surface femur=FILE --out FOLDER`",
         )
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = _read_content(folder)
         bones = {name: _read_bone(folder, name, entry) for name, entry in content["bones"].items()}
         plan = Plan(
             bones,
-            {name: np.array(points) for name, points in content["targets"].items()},
-            {name: np.array(points) for name, points in content["curves"].items()},
+            {name: _points(points) for name, points in content["targets"].items()},
+            {name: _points(points) for name, points in content["curves"].items()},
             name=folder.name,
         )
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, InputError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        InputError,
+    ) as error:
         if isinstance(error, PlanError):
             raise
         raise _damaged(folder, str(error)) from error
@@ -88,6 +95,17 @@ def read_plan(folder: str | Path) -> Plan:
     if plan.digest != content.get("hash"):
         raise _damaged(folder, "its content does not match its hash")
     return plan
+
+
+def _read_content(folder: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((folder / _FILE).read_text(encoding="utf-8"))
+    if any(content[key] != value for key, value in _CONVENTIONS.items()):
+        raise PlanError(
+            f"plan {folder} is of another format",
+            subject=str(folder),
+            remedy="make it again with `navapp plan`",
+        )
+    return content
 
 
 def _entries(folder: Path) -> list[Path]:
@@ -109,11 +127,10 @@ def _write_content(folder: Path, plan: Plan) -> None:
             "cartilage_sd_mm": (
                 bone.cartilage_sd_mm.tolist() if bone.cartilage_sd_mm.any() else None
             ),
+            "removed": np.flatnonzero(bone.is_removed).tolist(),
         }
     content = {
-        "format": _FORMAT,
-        "space": "LPS",
-        "unit": "mm",
+        **_CONVENTIONS,
         "bones": bones,
         "targets": {name: points.tolist() for name, points in plan.targets.items()},
         "curves": {name: points.tolist() for name, points in plan.curves.items()},
@@ -128,14 +145,19 @@ def _put_in_place(temporary: Path, folder: Path) -> None:
         temporary.rename(folder)
         return
     aside = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
-    folder.rename(aside / "plan")
     try:
-        temporary.rename(folder)
+        folder.rename(aside / "plan")
+        try:
+            temporary.rename(folder)
+        except OSError:
+            (aside / "plan").rename(folder)
+            raise
     except OSError:
-        (aside / "plan").rename(folder)
+        # Goes only when it is empty: an older plan that could not be put back stays there.
+        with suppress(OSError):
+            aside.rmdir()
         raise
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
@@ -145,13 +167,28 @@ def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
     if _sha256(path) != entry["sha256"]:
         raise _damaged(folder, f"{entry['file']} was changed or cut short")
     mesh, _ = read_ply(path)
+    is_removed = np.zeros(len(mesh.vertices_mm), dtype=bool)
+    is_removed[np.array(entry["removed"], dtype=np.intp)] = True
     return BoneModel(
         name,
         mesh,
         entry["side"],
         np.array(entry["cartilage_mm"] or []),
         np.array(entry["cartilage_sd_mm"] or []),
+        is_removed,
         version=int(entry["version"]),
+    )
+
+
+def _points(rows: Any) -> FloatArray:
+    return np.array(rows, dtype=np.float64).reshape(-1, 3)
+
+
+def _not_written(folder: Path, error: OSError) -> PlanError:
+    return PlanError(
+        f"plan folder {folder} cannot be written ({error.strerror})",
+        subject=str(folder),
+        remedy="choose a folder that you may write to, with space left",
     )
 
 

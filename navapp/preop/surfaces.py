@@ -40,8 +40,15 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
             remedy="export the bone's surface, not its points",
         )
     mesh = _in_lps(mesh, header, path, warnings)
-    _check_size(mesh, name, path)
     whole = mesh.largest_component()
+    if len(whole.faces) < _MIN_FACES:
+        raise PlanError(
+            f"surface {path} of the {name} is in separate pieces of at most "
+            f"{len(whole.faces)} triangles",
+            subject=str(path),
+            remedy="export one closed surface whose triangles have shared vertices",
+        )
+    _check_size(whole, name, path)
     if len(whole.faces) < len(mesh.faces):
         n_lost = len(mesh.faces) - len(whole.faces)
         warnings.append(f"{name}: {n_lost} triangles of separate pieces were left out")

@@ -1,0 +1,316 @@
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+
+from navapp.config import FILE_NAME, Configuration, as_toml, find_file, load, parse
+from navapp.errors import ConfigurationError
+
+# A value other than the default for every key that there is.
+CHANGED: dict[str, Any] = {
+    "camera": {
+        "backend": "oak",
+        "rig": "rigs/a b.yml",
+        "rate_hz": 30.0,
+        "depth_mm": [250.0, 900.5],
+        "simulated": {
+            "seed": 7,
+            "side": "left",
+            "sex": "male",
+            "age_group": "old",
+            "cartilage_mm": 1.25,
+            "motion": "jump",
+            "instrument": "sweep",
+            "scale": 0.5,
+            "stepped": True,
+            "skew_ms": -3.5,
+            "grey": True,
+            "faults": [{"kind": "freeze", "start_s": 1.5, "duration_s": 2}],
+        },
+    },
+    "display": {"backend": "simulated", "valid_ms": 100.0},
+    "projector": {"backend": "none"},
+    "mirror": {"backend": "fixed", "calibrated_deg": 44.5},
+    "plan": {"path": 'plans\\p "1"', "prior": "prior.json"},
+    "stereo": {},
+    "registration": {},
+    "tracking": {"method": "icp"},
+    "calibration": {},
+    "overlay": {},
+    "stages": {"first": "3"},
+    "recording": {"folder": "sessions/1", "pictures": False},
+    "link": {},
+    "ui": {},
+}
+ONLY_ONE_VALUE = {"display.backend", "projector.backend", "mirror.backend"}
+
+
+def keys_of(model: type[BaseModel], prefix: str = "") -> list[str]:
+    found = []
+    for name, field in model.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            found += keys_of(kind, f"{prefix}{name}.")
+        else:
+            found.append(prefix + name)
+    return found
+
+
+def value_at(content: Any, key: str) -> Any:
+    for part in key.split("."):
+        content = content[part] if isinstance(content, dict) else getattr(content, part)
+    return content
+
+
+KEYS = keys_of(Configuration)
+
+
+def nested(key: str, value: Any) -> dict[str, Any]:
+    for part in reversed(key.split(".")):
+        value = {part: value}
+    return value
+
+
+@pytest.mark.parametrize("with_comments", [False, True])
+def test_the_defaults_come_back(with_comments):
+    text = as_toml(Configuration(), with_comments)
+    assert parse(tomllib.loads(text), "x") == Configuration()
+    assert parse({}, "x") == Configuration()
+
+
+@pytest.mark.parametrize("with_comments", [False, True])
+def test_every_key_of_every_section_comes_back(with_comments):
+    configuration = parse(CHANGED, "x")
+    for key in KEYS:
+        same = value_at(configuration, key) == value_at(Configuration(), key)
+        assert same == (key in ONLY_ONE_VALUE), key
+    again = parse(tomllib.loads(as_toml(configuration, with_comments)), "x")
+    assert again == configuration
+
+
+def test_a_file_to_start_from_explains_every_key_and_section():
+    text = as_toml(Configuration(), True)
+    lines = text.splitlines()
+    for name in Configuration.model_fields:
+        assert f"[{name}]" in lines
+    for key in KEYS:
+        name = key.rsplit(".", 1)[-1]
+        (place,) = (
+            i
+            for i, line in enumerate(lines)
+            if line.lstrip("# ").startswith(f"{name} =")
+            and section_of(lines, i) == key.rsplit(".", 1)[0]
+        )
+        assert lines[place - 1].startswith("# "), key
+    assert "research software" in lines[0]
+
+
+def section_of(lines: list[str], index: int) -> str:
+    return next(line[1:-1] for line in reversed(lines[:index]) if line.startswith("["))
+
+
+TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    TEXT,
+    st.floats(1e-300, 1e300),
+    st.floats(-1e300, 1e300),
+    st.dictionaries(TEXT, TEXT, max_size=3),
+)
+def test_any_text_and_number_comes_back(text, positive, number, table):
+    content = {
+        "camera": {
+            "rig": text,
+            "rate_hz": positive,
+            "simulated": {"skew_ms": number, "faults": [table]},
+            "oak-d": {"key": text, **table},
+        }
+    }
+    configuration = parse(content, "x")
+    assert parse(tomllib.loads(as_toml(configuration, True)), "x") == configuration
+
+
+def test_tables_of_third_parties_pass_through():
+    text = """
+    [camera]
+    backend = "zed"
+    [camera.zed]
+    gain = 3
+    levels = [1, 2.5]
+    made = 2024-05-06
+    at = 2024-05-06T07:08:09Z
+    limits = { low = 1, "high est" = true }
+    "a key" = "x"
+    [camera."my camera"]
+    on = false
+    """
+    configuration = parse(tomllib.loads(text), "x")
+    zed = configuration.camera.model_extra["zed"]
+    assert zed["gain"] == 3
+    assert zed["limits"] == {"low": 1, "high est": True}
+    again = parse(tomllib.loads(as_toml(configuration, True)), "x")
+    assert again == configuration
+    assert again.camera.model_extra == configuration.camera.model_extra
+
+
+@pytest.mark.parametrize("value", [1, "x", True, [1], [{"a": 1}]])
+def test_other_keys_of_the_camera_must_be_tables(value):
+    with pytest.raises(ConfigurationError, match=r"unknown key 'camera\.rate'.*rate_hz"):
+        parse({"camera": {"rate": value}}, "x")
+
+
+@pytest.mark.parametrize(
+    ("content", "key", "nearest"),
+    [
+        ({"camra": {}}, "camra", "camera"),
+        ({"display": {"valid_s": 1.0}}, "display.valid_s", "valid_ms"),
+        ({"camera": {"simulated": {"sead": 1}}}, "camera.simulated.sead", "seed"),
+        ({"tracking": {"metod": "icp"}}, "tracking.metod", "method"),
+        ({"recording": {"picture": True}}, "recording.picture", "pictures"),
+    ],
+)
+def test_an_unknown_key_names_the_nearest_known_one(content, key, nearest):
+    with pytest.raises(ConfigurationError) as caught:
+        parse(content, "my.toml")
+    assert str(caught.value) == f"my.toml: unknown key '{key}': did you mean '{nearest}'?"
+    assert caught.value.subject == key
+
+
+def test_an_unknown_key_like_no_other_names_what_is_known():
+    with pytest.raises(ConfigurationError, match=r"known here: backend, valid_ms$"):
+        parse({"display": {"xyzzy": 1}}, "x")
+    with pytest.raises(ConfigurationError, match=r"known here: nothing$"):
+        parse({"ui": {"xyzzy": 1}}, "x")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("camera", 5),
+        ("camera.backend", 5),
+        ("camera.rate_hz", "fast"),
+        ("camera.rate_hz", True),
+        ("camera.depth_mm", 300.0),
+        ("camera.depth_mm", [300.0]),
+        ("camera.depth_mm", [300.0, 400.0, 500.0]),
+        ("camera.simulated", "yes"),
+        ("camera.simulated.seed", 1.5),
+        ("camera.simulated.side", "middle"),
+        ("camera.simulated.grey", 1),
+        ("camera.simulated.stepped", "no"),
+        ("camera.simulated.faults", [3]),
+        ("recording.pictures", "true"),
+        ("tracking.method", "magic"),
+        ("display.backend", "hdmi"),
+        ("mirror.backend", "moving"),
+        ("projector.backend", "serial"),
+        ("stages.first", 1),
+    ],
+)
+def test_a_wrong_type_names_the_key(key, value):
+    with pytest.raises(ConfigurationError) as caught:
+        parse(nested(key, value), "my.toml")
+    assert caught.value.subject.startswith(key)
+    assert str(caught.value).startswith(f"my.toml: {key}")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("camera.rate_hz", 0.0),
+        ("camera.rate_hz", -1.0),
+        ("camera.rate_hz", float("inf")),
+        ("camera.rate_hz", float("nan")),
+        ("camera.depth_mm", [0.0, 300.0]),
+        ("camera.depth_mm", [700.0, 300.0]),
+        ("camera.depth_mm", [300.0, 300.0]),
+        ("camera.simulated.cartilage_mm", -0.1),
+        ("camera.simulated.cartilage_mm", 3.1),
+        ("camera.simulated.scale", 0.0),
+        ("camera.simulated.scale", 1.01),
+        ("camera.simulated.skew_ms", float("nan")),
+        ("display.valid_ms", 0.0),
+        ("mirror.calibrated_deg", float("inf")),
+    ],
+)
+def test_a_value_out_of_bounds_names_the_key(key, value):
+    with pytest.raises(ConfigurationError) as caught:
+        parse(nested(key, value), "x")
+    assert caught.value.subject.startswith(key)
+
+
+@pytest.mark.parametrize("key", ["camera.simulated.cartilage_mm", "camera.simulated.scale"])
+def test_the_bounds_themselves_are_allowed(key):
+    value = {"cartilage_mm": 3.0, "scale": 1.0}[key.rsplit(".", 1)[1]]
+    assert value_at(parse(nested(key, value), "x"), key) == value
+
+
+def test_whole_numbers_are_taken_for_lengths():
+    assert parse({"camera": {"depth_mm": [200, 800]}}, "x").camera.depth_mm == (200.0, 800.0)
+
+
+def test_a_configuration_cannot_be_changed():
+    with pytest.raises(ValidationError, match="frozen"):
+        Configuration().camera.backend = "replay"
+
+
+@pytest.mark.parametrize("content", [b"[camera", b"x = ", b"[a]\n[a]\n", b"a = 1\na = 2\n"])
+def test_broken_toml_is_refused_by_file_name(tmp_path, content):
+    (tmp_path / "my.toml").write_bytes(content)
+    with pytest.raises(ConfigurationError, match=r"my\.toml is not valid TOML"):
+        load(tmp_path / "my.toml")
+
+
+def test_an_unreadable_file_is_refused_by_name(tmp_path):
+    (tmp_path / "my.toml").write_bytes(b"\xff\xfe\x80")
+    for path in (tmp_path / "my.toml", tmp_path / "none.toml", tmp_path):
+        with pytest.raises(ConfigurationError, match="cannot be read") as caught:
+            load(path)
+        assert caught.value.subject == str(path)
+
+
+def test_a_file_is_loaded(tmp_path):
+    (tmp_path / "my.toml").write_text('[tracking]\nmethod = "icp"\n', encoding="utf-8")
+    assert load(tmp_path / "my.toml").tracking.method == "icp"
+    assert load(None) == Configuration()
+
+
+def test_the_file_given_comes_first_then_the_folder_then_the_home(tmp_path, monkeypatch):
+    here, home = tmp_path / "here", tmp_path / "home"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    assert find_file(None) is None
+
+    users = home / ".config" / "navapp" / FILE_NAME
+    users.parent.mkdir(parents=True)
+    users.write_text("", encoding="utf-8")
+    assert find_file(None) == users
+
+    configured = tmp_path / "xdg" / "navapp" / FILE_NAME
+    configured.parent.mkdir(parents=True)
+    configured.write_text("", encoding="utf-8")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "xdg"))
+    assert find_file(None) == configured
+
+    (here / FILE_NAME).write_text("", encoding="utf-8")
+    assert find_file(None) == Path(FILE_NAME)
+
+    given_file = tmp_path / "given.toml"
+    given_file.write_text("", encoding="utf-8")
+    assert find_file(str(given_file)) == given_file
+
+
+def test_a_given_file_that_does_not_exist_is_refused(tmp_path):
+    with pytest.raises(ConfigurationError, match=r"none\.toml does not exist.*config init"):
+        find_file(tmp_path / "none.toml")
+    with pytest.raises(ConfigurationError, match="does not exist"):
+        find_file(tmp_path)

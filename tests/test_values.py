@@ -1,0 +1,261 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.values import (
+    BoneModel,
+    DisparityMap,
+    Origin,
+    Plan,
+    PoseEstimate,
+    Reason,
+    StageTimings,
+    SurfaceCloud,
+    TrackedFrame,
+    Verdict,
+    predicted_tre_mm,
+    visible_vertices,
+)
+from navapp.values import Status as PoseStatus
+from tests.geometry.shapes import cube, sphere
+
+POSE = RigidTransform.from_parts(
+    "left", "femur", rotation_from_vector([0.4, -0.9, 0.3]), [20.0, -10.0, 420.0]
+)
+
+
+def estimate(covariance):
+    return PoseEstimate(POSE, covariance, 1000, 0.9, 0.4, 0.4, 5, True)
+
+
+def random_covariance(rng):
+    root = rng.normal(size=(6, 6)) * np.array([0.3, 0.3, 0.3, 5e-3, 5e-3, 5e-3])[:, None]
+    return root @ root.T
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_predicted_error_bounds_the_sampled_one(seed):
+    """Twists drawn from the covariance move the targets by less than the bound, 19 times of 20."""
+    rng = np.random.default_rng(seed)
+    covariance = random_covariance(rng)
+    if seed >= 4:
+        # One direction alone: the bound must not profit from the others.
+        direction = rng.normal(size=6) * [0.5, 0.5, 0.5, 0.01, 0.01, 0.01]
+        covariance = np.outer(direction, direction)
+    centre, targets = rng.normal(size=3) * 10, rng.normal(size=(5, 3)) * 40
+    bound = predicted_tre_mm(estimate(covariance), centre, targets)
+    twists = rng.multivariate_normal(np.zeros(6), covariance, 2000, method="eigh")
+    true = POSE.apply(targets)
+    errors = [
+        np.linalg.norm(POSE.moved(twist, POSE.apply(centre)).apply(targets) - true, axis=1).mean()
+        for twist in twists
+    ]
+    assert np.mean(np.array(errors) <= bound) >= 0.95
+    # A bound that is never approached says nothing.
+    assert bound < 3.0 * np.quantile(errors, 0.95)
+
+
+def test_the_predicted_error_of_a_shift_is_its_chi_square_quantile():
+    covariance = np.diag([0.01, 0.01, 0.01, 0, 0, 0])
+    bound = predicted_tre_mm(estimate(covariance), np.zeros(3), np.eye(3) * 70)
+    assert bound == pytest.approx(0.1 * np.sqrt(7.815), rel=1e-9)
+
+
+def test_the_predicted_error_grows_with_the_distance_from_the_centre():
+    covariance = np.diag([0, 0, 0, 1e-4, 1e-4, 1e-4])
+    centre = np.array([5.0, 6.0, 7.0])
+    bounds = [
+        predicted_tre_mm(estimate(covariance), centre, np.add(centre, [[d, 0.0, 0.0]]))
+        for d in (0.0, 10.0, 20.0)
+    ]
+    np.testing.assert_allclose(bounds, np.array([0, 0.1, 0.2]) * np.sqrt(7.815), atol=1e-9)
+
+
+def test_a_turn_that_a_shift_undoes_leaves_its_point_without_error():
+    """Shift and turn are correlated: the target that they leave in place is certain."""
+    target, centre = np.array([[30.0, -5.0, 12.0]]), np.array([5.0, 6.0, 7.0])
+    turn = np.array([0.01, -0.02, 0.005])
+    offset = POSE.rotate(target[0] - centre)
+    twist = np.r_[-np.cross(turn, offset), turn]
+    covariance = np.outer(twist, twist)
+    assert predicted_tre_mm(estimate(covariance), centre, target) < 1e-6
+    # On the other side of the centre both add up.
+    opposite = predicted_tre_mm(estimate(covariance), centre, 2 * centre - target)
+    expected = 2 * np.linalg.norm(np.cross(turn, offset)) * np.sqrt(7.815)
+    assert opposite == pytest.approx(expected, rel=1e-6)
+
+
+def test_no_targets_have_no_predicted_error():
+    with pytest.raises(ValueError, match="no targets"):
+        predicted_tre_mm(estimate(np.eye(6)), np.zeros(3), np.empty((0, 3)))
+
+
+def test_vertices_that_face_the_camera_are_visible():
+    ball = sphere(30.0, 24)
+    visible = visible_vertices(ball, POSE)
+    positions = POSE.apply(ball.vertices_mm)
+    normals = (positions - POSE.translation_mm) / 30.0
+    cosine = np.einsum("ij,ij->i", normals, -positions) / np.linalg.norm(positions, axis=1)
+    assert visible[cosine > 0.21].all()
+    assert not visible[cosine < 0.19].any()
+    assert not visible_vertices(ball.flipped(), POSE)[cosine > 0].any()
+
+
+def test_a_bone_fills_in_what_is_not_given():
+    bone = BoneModel("femur", cube())
+    for values, kind in ((bone.cartilage_mm, float), (bone.is_removed, bool)):
+        assert values.shape == (8,)
+        assert values.dtype == kind
+        assert not values.any()
+    assert bone.cartilage_sd_mm.shape == (8,)
+    assert (bone.side, bone.version) == (None, 0)
+
+
+@pytest.mark.parametrize("name", ["cartilage_mm", "cartilage_sd_mm", "is_removed"])
+@pytest.mark.parametrize("count", [1, 7, 9])
+def test_a_bone_needs_one_value_per_vertex(name, count):
+    with pytest.raises(ValueError, match=rf"femur: {name} needs one value per vertex"):
+        BoneModel("femur", cube(), **{name: np.ones(count)})
+
+
+def test_a_bone_cannot_be_changed_from_outside():
+    thickness = np.ones(8)
+    bone = BoneModel("femur", cube(), cartilage_mm=thickness)
+    thickness[0] = 5.0
+    assert bone.cartilage_mm[0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        bone.is_removed[0] = True
+
+
+def make_plan(**changes):
+    bone_changes = {
+        key: changes.pop(key)
+        for key in ("mesh", "side", "cartilage_mm", "cartilage_sd_mm", "is_removed", "version")
+        if key in changes
+    }
+    bone = BoneModel(**{"name": "femur", "mesh": cube(40.0), "side": "left", **bone_changes})
+    content = {
+        "bones": {"femur": bone},
+        "targets": {
+            "femur/a": np.array([[1.0, 2, 3]]),
+            "femur/b": np.array([[4.0, 5, 6], [7, 8, 9]]),
+        },
+        "curves": {"nerve": np.array([[0.5, 0.5, 0.5], [1, 1, 1]])},
+    }
+    return Plan(**{**content, **changes})
+
+
+def one(n=8, place=3):
+    values = np.zeros(n)
+    values[place] = 1e-9
+    return values
+
+
+CHANGES = [
+    {"mesh": cube(40.000000001)},
+    {"mesh": TriangleMesh(cube(40.0).vertices_mm, np.roll(cube().faces, 1, axis=0))},
+    {"side": "right"},
+    {"side": None},
+    {"version": 1},
+    {"cartilage_mm": one()},
+    {"cartilage_sd_mm": one()},
+    {"is_removed": one() > 0},
+    {"bones": {"tibia": BoneModel("tibia", cube(40.0), "left")}},
+    {"targets": {}},
+    {"curves": {}},
+    {"targets": {"femur/a": np.array([[1.0, 2, 3.0000001]]), "femur/b": np.ones((2, 3))}},
+    {"curves": {"nerve": np.array([[0.5, 0.5, 0.5], [1, 1, 2]])}},
+    {"curves": {"artery": np.array([[0.5, 0.5, 0.5], [1, 1, 1]])}},
+    # The same points under the other heading, and cut elsewhere.
+    {"targets": {}, "curves": {"nerve": np.ones((1, 3))}},
+    {"curves": {}, "targets": {"nerve": np.ones((1, 3))}},
+    {"targets": {"a": np.frombuffer(b"b" * 24).reshape(1, 3), "b": np.ones((1, 3))}},
+    {"targets": {"a": np.frombuffer(b"b" * 24).reshape(1, 3), "bb": np.ones((1, 3))}},
+]
+
+
+def test_the_digest_changes_with_the_content():
+    digests = [make_plan().digest, *(make_plan(**change).digest for change in CHANGES)]
+    assert len(set(digests)) == len(digests)
+    assert all(len(digest) == 12 for digest in digests)
+
+
+def test_the_digest_is_of_the_content_only():
+    plan = make_plan()
+    assert make_plan(name="another name").digest == plan.digest
+    reversed_targets = dict(reversed(plan.targets.items()))
+    assert make_plan(targets=reversed_targets).digest == plan.digest
+
+
+def test_a_plan_cannot_be_changed_from_outside():
+    targets = {"femur/a": np.ones((1, 3))}
+    plan = make_plan(targets=targets)
+    targets["femur/b"] = np.zeros((1, 3))
+    assert set(plan.targets) == {"femur/a"}
+    with pytest.raises(TypeError):
+        plan.bones["tibia"] = plan.bones["femur"]
+
+
+def test_targets_are_gathered_in_the_order_asked_for():
+    plan = make_plan()
+    np.testing.assert_array_equal(
+        plan.targets_of(("femur/b", "femur/none", "femur/a")), [[4, 5, 6], [7, 8, 9], [1, 2, 3]]
+    )
+    assert plan.targets_of(("femur/none",)).shape == (0, 3)
+    assert plan.targets_of(()).shape == (0, 3)
+
+
+@pytest.mark.parametrize("reason", Reason)
+def test_every_reason_is_a_phrase_with_a_remedy(reason):
+    assert len(reason.remedy) > 10
+    for text in (reason.value, reason.remedy):
+        assert not text.endswith(".")
+        assert text[0].islower()
+
+
+def test_no_two_reasons_say_the_same():
+    assert len({reason.value for reason in Reason}) == len(Reason.__members__)
+
+
+def test_the_matched_share_counts_measured_pixels_only():
+    origin = np.array([[Origin.MATCHED, Origin.FILLED_BORDER], [Origin.UNKNOWN, Origin.MATCHED]])
+    empty = np.zeros((2, 2), dtype=np.float32)
+    disparity = DisparityMap(empty, empty, origin.astype(np.uint8), 3, 4)
+    assert disparity.matched_share == 0.5
+    nothing = np.empty((0, 0))
+    assert dataclasses.replace(disparity, origin=nothing.astype(np.uint8)).matched_share == 0.0
+
+
+def test_a_part_of_a_cloud_keeps_its_columns_together():
+    cloud = SurfaceCloud(
+        np.arange(12.0).reshape(4, 3),
+        np.arange(4.0),
+        np.arange(8, dtype=np.int32).reshape(4, 2),
+        np.arange(4, dtype=np.uint8),
+    )
+    assert len(cloud) == 4
+    for part in (
+        cloud.selected(np.array([0, 1, 0, 1], dtype=bool)),
+        cloud.selected(np.array([1, 3])),
+    ):
+        assert len(part) == 2
+        np.testing.assert_array_equal(part.points_mm, [[3, 4, 5], [9, 10, 11]])
+        np.testing.assert_array_equal(part.sigma_ray_mm, [1, 3])
+        np.testing.assert_array_equal(part.pixels, [[2, 3], [6, 7]])
+        np.testing.assert_array_equal(part.origin, [1, 3])
+
+
+def test_the_total_is_the_sum_of_all_timings():
+    fields = dataclasses.fields(StageTimings)
+    timings = StageTimings(*(2.0**i for i in range(len(fields))))
+    assert timings.total == 2.0 ** len(fields) - 1.0
+
+
+def test_a_frame_without_an_estimate_has_no_pose():
+    lost = TrackedFrame("femur", None, Verdict(PoseStatus.LOST), StageTimings())
+    assert lost.left_from_bone is None
+    found = dataclasses.replace(lost, estimate=estimate(np.eye(6)))
+    assert found.left_from_bone is POSE
