@@ -86,7 +86,7 @@ class CameraSection(BaseModel):
     rate_hz: Positive = 15.0
     """Pairs per second asked for, or assumed where a recording has no times."""
     depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (300.0, 700.0)
-    """Nearest and farthest surface that is searched without a prediction."""
+    """Nearest and farthest surface that the rig is used for."""
     simulated: SimulationSection = SimulationSection()
     """The simulated patient and rig."""
 

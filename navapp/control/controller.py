@@ -120,6 +120,7 @@ class SessionController:
         self._tracked_at_ns = 0
         self._preview: Image | None = None
         self._last_sequence = -1
+        self._has_guides_shown = False
         self._is_blanked = False
         self._is_over = False
         self._state = SessionState.STARTING
@@ -155,6 +156,7 @@ class SessionController:
             if frame is not None:
                 self._handle_frame(frame)
         self._snapshot = self._decided()
+        self._withdraw_guides()
         return self._snapshot
 
     def close(self) -> None:
@@ -217,8 +219,10 @@ class SessionController:
     def _look_for_bone(self, frame: StereoFrame) -> TrackedFrame | None:
         """Register, review or follow, as the state asks."""
         if self._state is SessionState.REGISTERING:
-            self._pursuit.search(self._stage, frame)
-            self._take_over(frame.sequence)
+            # A search that began earlier is taken over before a frame, never within one: its
+            # answer belongs to another picture and must be followed into this one first.
+            if self._pursuit.search(self._stage, frame):
+                self._take_over(frame.sequence)
             candidate = self._pursuit.candidate
             return None if candidate is None else candidate.tracked
         if self._state is SessionState.REVIEW:
@@ -250,6 +254,7 @@ class SessionController:
         if not self._is_blanked:
             try:
                 size = display.info.width, display.info.height
+                self._has_guides_shown = snapshot.is_navigable or snapshot.is_candidate
                 display.show(fitted(image, *size), valid_until_ns)
                 self._display_trouble = ""
             except DeviceError as error:
@@ -262,6 +267,13 @@ class SessionController:
         self._preview = make_preview(image)
         age_ns = self._clock.now_ns() - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
+
+    def _withdraw_guides(self) -> None:
+        """Turn a picture dark whose guides a command or the passing time has made wrong."""
+        may_stay = self._snapshot.is_navigable or self._snapshot.is_candidate
+        if self._has_guides_shown and not may_stay:
+            self._devices.display.blank()
+            self._has_guides_shown = False
 
     def _take_over(self, next_sequence: int) -> None:
         """Bring a finished registration under review, when there is one."""
@@ -315,6 +327,9 @@ class SessionController:
 
     def _on_propose(self, command: Propose) -> None:
         if not self._can_look("propose"):
+            return
+        if command.left_from_bone.source != self._stage.bone:
+            self._refuse("propose", f"the pose is not one of the {self._stage.bone}")
             return
         self._tracked = None
         self._pursuit.propose(self._stage, command.left_from_bone, self._clock.now_ns())
@@ -373,10 +388,11 @@ class SessionController:
             return
         is_other_bone = stage.bone != self._stage.bone
         self._stage = stage
+        # What was judged by the old stage's targets and tolerance says nothing in the new one.
+        self._tracked = None
         self._announce_stage()
         if is_other_bone and self._state not in (SessionState.STARTING, SessionState.FAULT):
             self._pursuit.drop()
-            self._tracked = None
             self._fall_back(f"the {stage.bone} is now the bone to follow")
 
     def _announce_stage(self) -> None:
@@ -439,8 +455,8 @@ class SessionController:
             devices=(
                 camera_line(self._camera.camera.info, self._camera.trouble),
                 display_line(self._devices.display.info, self._display_trouble),
-                projector_line(self._devices.projector.name, self._devices.projector.status()),
-                mirror_line(self._devices.mirror.info, self._devices.mirror.position_deg()),
+                projector_line(self._devices.projector),
+                mirror_line(self._devices.mirror),
             ),
             events=tuple(self._events),
             progress=self._progress(),

@@ -1,7 +1,8 @@
 """What the devices panel says."""
 
-from drivers.interfaces import CameraInfo, DisplayInfo, MirrorInfo, PowerState, ProjectorStatus
+from drivers.interfaces import CameraInfo, DisplayInfo, MirrorMount, PowerState, ProjectorControl
 from navapp.control.states import DeviceHealth, DeviceLine
+from navapp.errors import DeviceError
 
 
 def camera_line(info: CameraInfo, trouble: str) -> DeviceLine:
@@ -17,17 +18,27 @@ def display_line(info: DisplayInfo, trouble: str) -> DeviceLine:
     return DeviceLine("display", info.name, health, trouble or f"{info.width}x{info.height}")
 
 
-def projector_line(name: str, status: ProjectorStatus) -> DeviceLine:
-    """The projector's control line."""
+def projector_line(projector: ProjectorControl) -> DeviceLine:
+    """The projector's control line; one that does not answer is told, not raised."""
+    try:
+        status = projector.status()
+    except DeviceError as error:
+        return DeviceLine("projector", projector.name, DeviceHealth.LOST, str(error))
     if status.power is PowerState.ABSENT:
-        return DeviceLine("projector", name, DeviceHealth.ABSENT, "not used")
+        return DeviceLine("projector", projector.name, DeviceHealth.ABSENT, "not used")
     if status.faults or status.power is PowerState.FAULT:
-        return DeviceLine("projector", name, DeviceHealth.TROUBLE, ", ".join(status.faults))
-    return DeviceLine("projector", name, DeviceHealth.OK, status.power.value)
+        faults = ", ".join(status.faults)
+        return DeviceLine("projector", projector.name, DeviceHealth.TROUBLE, faults)
+    return DeviceLine("projector", projector.name, DeviceHealth.OK, status.power.value)
 
 
-def mirror_line(info: MirrorInfo, angle_deg: float | None) -> DeviceLine:
-    """The mirror's mount."""
+def mirror_line(mirror: MirrorMount) -> DeviceLine:
+    """The mirror's mount; one that does not answer is told, not raised."""
+    info = mirror.info
+    try:
+        angle_deg = mirror.position_deg()
+    except DeviceError as error:
+        return DeviceLine("mirror", info.name, DeviceHealth.LOST, str(error))
     angle = "position unknown" if angle_deg is None else f"{angle_deg:.1f} deg"
     if not info.is_movable:
         return DeviceLine("mirror", info.name, DeviceHealth.ABSENT, f"fixed, {angle}")

@@ -114,11 +114,13 @@ class RecordedExecutor:
         job.run()
 
     def is_due(self, job: Job[T], sequence: int) -> bool:
-        """After the frame that the recording names; at once when it names none."""
-        if self._due and sequence < self._due[0]:
+        """After the frame that the recording names; never when it names none.
+
+        A job that was cancelled before it ended was not taken over, and must not be here.
+        """
+        if not self._due or sequence < self._due[0]:
             return False
-        if self._due:
-            self._due.pop(0)
+        self._due.pop(0)
         return job.is_finished
 
     def close(self) -> None:

@@ -114,13 +114,13 @@ class ScriptedOperator:
 
     def _decide(self, snapshot: Snapshot) -> list[Command]:
         """On a candidate: turn it, accept it or reject it."""
-        if snapshot.verdict is None or snapshot.left_from_bone is None:
+        if snapshot.verdict is None:
             return []
         step = self._steps[0] if self._steps else ScriptStep("register")
-        if step.do == "propose" and self._phase == "registering":
+        pose = snapshot.left_from_bone
+        if step.do == "propose" and self._phase == "registering" and pose is not None:
             self._phase = "proposed"
             turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
-            pose = snapshot.left_from_bone
             # About a point of the bone: where the model's origin is, in the camera.
             return [Reject(), Propose(pose.moved(turn, pose.translation_mm))]
         if snapshot.verdict.status is not Status.OK:

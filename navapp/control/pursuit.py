@@ -85,16 +85,17 @@ class Pursuit:
         """A pose of the stage's bone was accepted before."""
         return stage.bone in self._tracks
 
-    def search(self, stage: StageSpec, frame: StereoFrame) -> None:
-        """Start a first registration on a frame, unless one runs."""
+    def search(self, stage: StageSpec, frame: StereoFrame) -> bool:
+        """Start a first registration on a frame, unless one runs; whether it was started."""
         if self._search is not None:
-            return
+            return False
         line, goal, prior = self._line(stage), self._goal(stage), self._prior
         job: Job[list[TrackedFrame]] = Job(
             lambda report: line.register(frame.left, frame.right, prior, goal, report)
         )
         self._search = _Search(job, frame)
         self._executor.start(job)
+        return True
 
     def take_over(self, next_sequence: int) -> "tuple[Candidate | None, Reason | None] | None":
         """Bring the answers of a finished search under review.

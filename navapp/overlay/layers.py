@@ -22,6 +22,8 @@ CANDIDATE_COLOUR = (40, 180, 255)
 TARGET_COLOUR = (255, 240, 80)
 CURVE_COLOURS = {"artery": (60, 60, 235), "vein": (220, 90, 60), "nerve": (60, 220, 250)}
 
+_FARTHEST_PX = 20_000.0
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -73,7 +75,7 @@ def draw_targets(image: Image, scene: Scene) -> None:
         if points is None or not name.startswith(f"{scene.stage.bone}/"):
             continue
         for u, v in scene.camera.project(scene.left_from_bone.apply(points.reshape(-1, 3))):
-            if not (np.isfinite(u) and np.isfinite(v)):
+            if not _is_drawable(np.array([u, v])):
                 continue
             centre = (round(float(u)), round(float(v)))
             cv2.drawMarker(image, centre, (0, 0, 0), cv2.MARKER_CROSS, 19, 4)
@@ -93,7 +95,7 @@ def draw_curves(image: Image, scene: Scene) -> None:
         colour = next((c for key, c in CURVE_COLOURS.items() if key in name), TARGET_COLOUR)
         for k in range(len(pixels) - 1):
             segment = pixels[k : k + 2]
-            if not np.isfinite(segment).all():
+            if not _is_drawable(segment):
                 continue
             is_hidden = _is_behind(view, segment[0], float(in_camera[k, 2]))
             if is_hidden and k % 2:
@@ -123,6 +125,11 @@ def _label_place(text: str, centre: tuple[int, int], scene: Scene) -> tuple[int,
     if centre[0] > middle:
         return centre[0] + 14, centre[1] + 5
     return centre[0] - 14 - 8 * len(text), centre[1] + 5
+
+
+def _is_drawable(pixels: NDArray[np.float64]) -> bool:
+    """Whether OpenCV can draw there: points beside the lens project millions of pixels away."""
+    return bool((np.abs(pixels) < _FARTHEST_PX).all())
 
 
 def _is_behind(view: RenderedView, pixel: NDArray[np.float64], depth_mm: float) -> bool:

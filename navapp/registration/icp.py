@@ -4,7 +4,7 @@ import numpy as np
 
 from navapp.geometry.transform import RigidTransform, nearest_rotation
 from navapp.registration.model import RegistrationModel
-from navapp.registration.point_to_plane import estimate_at
+from navapp.registration.point_to_plane import MIN_POINTS, estimate_at
 from navapp.values import PoseEstimate, SurfaceCloud
 
 _MAX_ITERATIONS = 60
@@ -12,16 +12,22 @@ _STEP_MM = 2e-3
 
 
 def fit_icp(
-    cloud: SurfaceCloud, model: RegistrationModel, rectified_from_bone: RigidTransform
+    cloud: SurfaceCloud,
+    model: RegistrationModel,
+    rectified_from_bone: RigidTransform,
+    stride_px: int = 1,
 ) -> PoseEstimate:
     """Plain ICP: every point pairs with its nearest model point, all weigh the same.
 
+    Arguments as those of `fit_point_to_plane`; too few points are left to the reasons as there.
     Kept for comparison: without a robust weight whatever is not bone pulls the pose.
 
     Source: the paper, state of the art, equation (1); Besl and McKay 1992; SVD step by Kabsch.
     """
     pose = rectified_from_bone
     iterations, is_converged = 0, False
+    if len(cloud) < MIN_POINTS:
+        return estimate_at(cloud, model, pose, iterations, is_converged)
     for iterations in range(1, _MAX_ITERATIONS + 1):  # noqa: B007 (reported)
         moved = pose.inverse().apply(cloud.points_mm)
         index, _ = model.nearest(moved, np.inf)
@@ -32,7 +38,7 @@ def fit_icp(
         if shift + turn < _STEP_MM:
             is_converged = True
             break
-    return estimate_at(cloud, model, pose, iterations, is_converged)
+    return estimate_at(cloud, model, pose, iterations, is_converged, stride_px=stride_px)
 
 
 def kabsch(scene_mm: np.ndarray, model_mm: np.ndarray, frames: RigidTransform) -> RigidTransform:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import nearest_vertices
 from navapp.values import BoneModel
@@ -23,6 +24,7 @@ class RegistrationModel:
         normals: (V, 3) unit, outward.
         sigma_mm: (V,) of the surface along the normal (model and cartilage).
         is_usable: (V,) False for parts that a stage removed.
+        seen_mesh: those points and the triangles that are left: what a camera should see.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
     """
 
@@ -36,6 +38,8 @@ class RegistrationModel:
         self.normals: FloatArray = np.array(mesh.normals)
         self.sigma_mm: FloatArray = np.hypot(self.SURFACE_SIGMA_MM, bone.cartilage_sd_mm)
         self.is_usable: NDArray[np.bool_] = ~bone.is_removed
+        is_left = self.is_usable[mesh.faces].all(axis=1)
+        self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], mesh.normals)
         self.centre_mm: FloatArray = mesh.centroid_mm
 
     @cached_property

@@ -82,19 +82,23 @@ def match_sgbm(
     columns = np.arange(box.x, box.x + box.width, dtype=np.float32)
     partner = columns - disparity
     last_row, last_column = pair.left.shape[0] - 1, pair.left.shape[1] - 1
-    is_matched = (raw >= 0.0) & (partner >= 0.0) & (partner <= last_column)
+    is_matched = (raw > 0.0) & (raw < _OPENCV_SCALE * (n_disparities - 1))
+    is_matched &= (partner >= 0.0) & (partner <= last_column)
     is_matched &= (columns >= 0.0) & (columns <= last_column) & (rows >= 0) & (rows <= last_row)
     is_matched &= _has_contrast(left, settings)[:, lead:]
     return _map(disparity, is_matched, settings, box)
 
 
 def disparity_window(band_px: tuple[float, float]) -> tuple[int, int]:
-    """Lowest disparity and number of disparities (a multiple of 16) that hold the band."""
+    """Lowest disparity and number of disparities (a multiple of 16) that hold the band.
+
+    At least one more stands on either side: a best match at the window's end is no minimum.
+    """
     low, high = band_px
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ValueError(f"a disparity band needs two growing numbers, not {band_px}")
-    lowest = int(np.floor(low))
-    return lowest, _BLOCK * max(1, int(np.ceil((high - lowest + 1) / _BLOCK)))
+    lowest = int(np.floor(low)) - 1
+    return lowest, _BLOCK * max(1, int(np.ceil((high - lowest + 2) / _BLOCK)))
 
 
 def _crop(image: NDArray[np.uint8], x0: int, width: int, box: Box) -> NDArray[np.uint8]:
@@ -116,8 +120,7 @@ def _has_contrast(image: NDArray[np.uint8], settings: SgbmSettings) -> NDArray[n
     window = np.ones((settings.window_px, settings.window_px), dtype=np.uint8)
     spread = cv2.subtract(cv2.dilate(image, window), cv2.erode(image, window))
     found = np.asarray(spread) >= settings.contrast_grey
-    has_contrast: NDArray[np.bool_] = found if image.ndim == 2 else found.any(axis=2)
-    return has_contrast
+    return found if image.ndim == 2 else np.asarray(found.any(axis=2), dtype=np.bool_)
 
 
 def _map(

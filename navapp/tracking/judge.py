@@ -140,7 +140,7 @@ class Judge:
     ) -> RenderedView:
         height, width = measured.disparity_px.shape
         return render_rectified(
-            model.bone.mesh, pose, self._geometry, Box(measured.x, measured.y, width, height)
+            model.seen_mesh, pose, self._geometry, Box(measured.x, measured.y, width, height)
         )
 
     def _compare(

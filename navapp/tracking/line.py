@@ -60,7 +60,7 @@ class LineSettings:
 
     Attributes:
         method: `icp` is the paper's baseline chain; anything else the production one.
-        depth_mm: nearest and farthest surface without a prediction.
+        depth_mm: nearest and farthest surface that the rig is used for.
         tracking: margins from frame to frame.
         search: margins of a first registration, and after a loss.
         max_points: about so many measured points enter an estimate.
@@ -221,7 +221,7 @@ class Line:
         self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
     ) -> PoseEstimate:
         if self.settings.method == "icp":
-            return fit_icp(measured.cloud, self.model, start)
+            return fit_icp(measured.cloud, self.model, start, measured.stride_px)
         return fit_point_to_plane(measured.cloud, self.model, start, settings, measured.stride_px)
 
     def _judged(
@@ -250,13 +250,15 @@ class Line:
     def _region(
         self, pose: RigidTransform, margins: Margins
     ) -> tuple[Box, tuple[float, float]] | None:
-        """Box and disparity band around the model at a pose; None when it is out of view."""
+        """Box and disparity band around the model at a pose; None out of view or out of depth."""
         box = projected_box(self.model.bone.mesh, pose, self._geometry)
         if box is None:
             return None
         depths = pose.apply(self.model.points_mm)[:, 2]
-        near = max(float(depths.min()) - margins.band_mm, 50.0)
-        far = max(float(depths.max()) + margins.band_mm, near + 1.0)
+        near = max(float(depths.min()) - margins.band_mm, self.settings.depth_mm[0])
+        far = min(float(depths.max()) + margins.band_mm, self.settings.depth_mm[1])
+        if near >= far:
+            return None
         grown = box.grown(margins.box_px).clipped(self._geometry.width, self._geometry.height)
         return grown, (self._geometry.disparity_px(far), self._geometry.disparity_px(near))
 

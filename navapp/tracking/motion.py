@@ -35,8 +35,11 @@ class TrackState:
         return cls(left_from_bone, captured_ns, np.zeros(6))
 
     def predicted(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
-        """The pose expected at a moment."""
-        seconds = (captured_ns - self.captured_ns) / 1e9
+        """The pose expected at a moment; where it was last seen after a long gap."""
+        elapsed_ns = captured_ns - self.captured_ns
+        if elapsed_ns > _MAX_GAP_NS:
+            return self.left_from_bone
+        seconds = elapsed_ns / 1e9
         twist = _DAMPING * seconds * self.velocity
         return self.left_from_bone.moved(twist, self.left_from_bone.apply(centre_mm))
 

@@ -1,0 +1,92 @@
+"""Accuracy on simulated frames: first registration from the nominal pose, then tracking."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from drivers.clock import ManualClock
+from navapp.geometry.mesh import TriangleMesh
+from navapp.tracking import Goal, Line, TrackState
+from navapp.values import BoneModel, Prior, Status, visible_vertices
+from sim_devices.camera import SimulatedCamera
+from sim_devices.scenario import Scenario
+from sim_devices.sensor import SensorModel
+from sim_devices.truth import TruthOracle
+from sim_devices.world import World
+
+KNEES = ((1, "right"), (2, "left"), (3, "right"))
+N_TRACKED = 5
+GOAL = Goal(np.empty((0, 3)), 2.0)
+
+WORST_MM = 1.2
+MEDIAN_MM = 0.9
+OK_SHARE = 0.8
+COVERED_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One frame: what was answered, and how far off it was."""
+
+    knee: str
+    number: int
+    status: Status
+    bound_mm: float
+    tre_mm: float
+
+
+@lru_cache(maxsize=3)
+def run(seed: int, side: str) -> tuple[Judged, ...]:
+    world = World(Scenario(seed=seed, side=side, motion="patient"))
+    camera = SimulatedCamera(
+        world, ManualClock(), is_stepped=True, sensor=SensorModel(seed=seed)
+    )  # fmt: skip
+    camera.open()
+    oracle = TruthOracle(world, camera.world_time_ns)
+    mesh = world.anatomy.bones["femur"]
+    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), side)
+    line = Line(world.rig, bone)
+    judged = []
+
+    def judge(frame, tracked) -> None:
+        assert tracked.left_from_bone is not None, f"no pose in frame {frame.sequence}"
+        true = oracle.left_from_body("femur", frame.captured_ns)
+        points = mesh.vertices_mm[visible_vertices(mesh, true)]
+        error = np.linalg.norm(tracked.left_from_bone.apply(points) - true.apply(points), axis=1)
+        verdict = tracked.verdict
+        judged.append(
+            Judged(
+                f"{side} {seed}", frame.sequence, verdict.status, verdict.predicted_tre_mm,
+                float(error.mean()),
+            )
+        )  # fmt: skip
+
+    frame = camera.read(1.0)
+    prior = Prior({"femur": world.nominal_left_from_femur})
+    first = line.register(frame.left, frame.right, prior, GOAL)[0]
+    judge(frame, first)
+    state = TrackState.at_rest(first.left_from_bone, frame.captured_ns)
+    for _ in range(N_TRACKED):
+        frame = camera.read(1.0)
+        tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        judge(frame, tracked)
+    return tuple(judged)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "side"), KNEES)
+def test_no_frame_that_is_called_ok_is_far_off(seed: int, side: str) -> None:
+    judged = run(seed, side)
+    errors = [frame.tre_mm for frame in judged if frame.status is Status.OK]
+    assert len(errors) >= OK_SHARE * len(judged), judged
+    assert max(errors) <= WORST_MM, judged
+    assert np.median(errors) <= MEDIAN_MM, judged
+
+
+@pytest.mark.slow
+def test_the_predicted_bound_covers_the_error() -> None:
+    frames = [frame for knee in KNEES for frame in run(*knee)]
+    covered = [frame.tre_mm <= frame.bound_mm for frame in frames]
+    assert np.mean(covered) >= COVERED_SHARE, frames

@@ -1,0 +1,255 @@
+"""A room without pictures: black frames, and a line that answers what the test says."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from drivers.clock import ManualClock
+from drivers.fixed_mirror import FixedMirror
+from drivers.frames import StereoFrame
+from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
+from drivers.no_projector import NoProjector
+from navapp.control.controller import SessionController, SessionHooks, SessionOptions
+from navapp.control.executors import Executor, InlineExecutor
+from navapp.control.results import FrameResult
+from navapp.control.states import Command, Event, Snapshot
+from navapp.errors import DeviceError, DeviceLost, DeviceTimeout, EndOfSequence
+from navapp.geometry.camera import Camera
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.tracking import TrackState
+from navapp.values import (
+    BoneModel,
+    Plan,
+    PoseEstimate,
+    Prior,
+    Reason,
+    StageTimings,
+    Status,
+    TrackedFrame,
+    Verdict,
+)
+from sim_devices.display import SimulatedDisplay
+from tests.registration.shapes import grid_mesh
+
+WIDTH, HEIGHT = 320, 240
+PERIOD_NS = 66_000_000
+# Rows that neither the banner nor the mark reaches: on black pictures they show guides only.
+CLEAR = slice(60, 180)
+
+
+def a_rig(name: str = "sim:rig") -> StereoRig:
+    matrix = np.array([[200.0, 0, 159.5], [0, 200.0, 119.5], [0, 0, 1]])
+    camera = Camera(matrix, np.zeros(0), WIDTH, HEIGHT)
+    shift = RigidTransform.from_parts("right", "left", np.eye(3), (-60.0, 0.0, 0.0))
+    return StereoRig(camera, camera, shift, ("L1", "R1"), name=name)
+
+
+def a_plan(*bones: str) -> Plan:
+    mesh = grid_mesh(lambda x, y: 0.01 * (x * x + y * y), 40.0, 8.0)
+    return Plan({name: BoneModel(name, mesh, "right") for name in bones or ("femur", "tibia")})
+
+
+def a_pose(bone: str = "femur", x_mm: float = 0.0, turn_deg: float = 0.0) -> RigidTransform:
+    rotation = rotation_from_vector((0.0, np.radians(turn_deg), 0.0))
+    return RigidTransform.from_parts("left", bone, rotation, (x_mm, 0.0, 300.0))
+
+
+def answer(
+    status: Status = Status.OK,
+    *reasons: Reason,
+    pose: RigidTransform | None = None,
+    has_pose: bool = True,
+) -> TrackedFrame:
+    """What the line says of a frame."""
+    pose = pose or a_pose()
+    estimate = PoseEstimate(pose, 0.01 * np.eye(6), 500, 0.9, 0.2, 0.2, 3, True)
+    bound = 0.8 if has_pose else None
+    verdict = Verdict(status, bound, reasons, 0.7, 0.0, 0.9, 0.2, 0.2)
+    return TrackedFrame(pose.source, estimate if has_pose else None, verdict, StageTimings())
+
+
+@dataclass
+class Script:
+    """What the fake line answers; changed by the test as it goes."""
+
+    found: list[TrackedFrame] = field(default_factory=lambda: [answer()])
+    tracked: TrackedFrame = field(default_factory=answer)
+    assessed: TrackedFrame = field(default_factory=answer)
+    gate: threading.Event | None = None
+    started: threading.Event = field(default_factory=threading.Event)
+    error: Exception | None = None
+    calls: list[str] = field(default_factory=list)
+
+
+class FakeLine:
+    """Stands for `navapp.tracking.Line`."""
+
+    script: Script
+
+    def __init__(self, rig: StereoRig, bone: BoneModel, settings: object) -> None:
+        self.bone = bone
+
+    def register(self, left, right, prior, goal, on_progress=lambda share: None):
+        self.script.calls.append(f"register {self.bone.name}")
+        self.script.started.set()
+        on_progress(0.5)
+        if self.script.gate is not None:
+            self.script.gate.wait(10.0)
+        on_progress(1.0)
+        if self.script.error is not None:
+            raise self.script.error
+        return list(self.script.found)
+
+    def track(self, left, right, captured_ns, state: TrackState, goal):
+        self.script.calls.append(f"track {self.bone.name}")
+        tracked = self.script.tracked
+        return tracked, state.updated(tracked, captured_ns, np.zeros(3))
+
+    def assess(self, left, right, left_from_bone, goal):
+        self.script.calls.append(f"assess {self.bone.name}")
+        tracked = self.script.assessed
+        if tracked.estimate is None:
+            return tracked
+        return replace(tracked, estimate=replace(tracked.estimate, left_from_bone=left_from_bone))
+
+
+class FakeCamera:
+    """Black pictures, one a read; moves the manual clock by a period each."""
+
+    def __init__(self, clock: ManualClock, n_frames: int | None = None) -> None:
+        self._clock = clock
+        self._sequence = 0
+        self._n_frames = n_frames
+        self.is_open = False
+        self.is_silent = False
+        self.error: Exception | None = None
+        self.opening_error: DeviceError | None = None
+
+    @property
+    def info(self) -> CameraInfo:
+        return CameraInfo("fake camera", "fake", False, True, WIDTH, HEIGHT, ("L1", "R1"))
+
+    def open(self) -> None:
+        if self.opening_error is not None:
+            raise self.opening_error
+        self.is_open = True
+
+    def read(self, timeout_s: float) -> StereoFrame:
+        if not self.is_open:
+            raise DeviceLost("the fake camera is closed")
+        if self.error is not None:
+            raise self.error
+        if self.is_silent:
+            self._clock.advance_ns(round(timeout_s * 1e9))
+            raise DeviceTimeout("no frame")
+        if self._n_frames is not None and self._sequence >= self._n_frames:
+            raise EndOfSequence("over")
+        self._clock.advance_ns(PERIOD_NS)
+        now_ns = self._clock.now_ns()
+        picture = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
+        frame = StereoFrame(picture, picture, now_ns, now_ns, 0, self._sequence, "rig")
+        self._sequence += 1
+        return frame
+
+    def set(self, control: str, value: float) -> float:
+        raise NotImplementedError
+
+    def close(self) -> None:
+        self.is_open = False
+
+
+class Bench:
+    """A controller on fakes, and what came out of it."""
+
+    def __init__(
+        self,
+        monkeypatch,
+        *,
+        executor: Executor | None = None,
+        plan: Plan | None = None,
+        options: SessionOptions | None = None,
+        can_reopen: bool = True,
+        camera: FakeCamera | None = None,
+        projector: ProjectorControl | None = None,
+        mirror: MirrorMount | None = None,
+        hooks: SessionHooks | None = None,
+    ) -> None:
+        self.script = Script()
+        line = type("ScriptedLine", (FakeLine,), {"script": self.script})
+        monkeypatch.setattr("navapp.control.pursuit.Line", line)
+        self.clock = ManualClock(10**9)
+        self.camera = camera or FakeCamera(self.clock)
+        self.camera._clock = self.clock
+        self.display = SimulatedDisplay(self.clock, WIDTH, HEIGHT)
+        self.events: list[Event] = []
+        self.results: list[FrameResult] = []
+        self.take_overs: list[int] = []
+        self.camera.open()
+        self.display.open()
+        given = hooks or SessionHooks()
+        self.controller = SessionController(
+            DeviceSet(
+                self.camera, self.display, projector or NoProjector(),
+                mirror or FixedMirror(45.0), self.clock,
+            ),
+            a_rig(),
+            plan or a_plan(),
+            Prior({"femur": a_pose()}),
+            executor=executor or InlineExecutor(),
+            options=options,
+            hooks=replace(
+                given,
+                on_frame=(self.results.append,),
+                on_event=(self.events.append,),
+                on_take_over=(self.take_overs.append,),
+                reopen_camera=self._reopen if can_reopen else None,
+            ),
+        )  # fmt: skip
+
+    def _reopen(self) -> FakeCamera:
+        self.camera.open()
+        return self.camera
+
+    @property
+    def snapshot(self) -> Snapshot:
+        return self.controller.snapshot
+
+    @property
+    def state(self) -> str:
+        return self.snapshot.state.value
+
+    @property
+    def shows_guides(self) -> bool:
+        """Anything is drawn over the black video."""
+        return bool(self.display.visible_image()[CLEAR].any())
+
+    @property
+    def is_dark(self) -> bool:
+        return not self.display.visible_image().any()
+
+    def frames(self, n: int = 1) -> Snapshot:
+        for _ in range(n):
+            self.controller.step()
+        return self.snapshot
+
+    def do(self, command: Command) -> Snapshot:
+        """Give a command and have it handled."""
+        self.controller.submit(command)
+        return self.controller.step()
+
+    def refused(self) -> str:
+        """What was refused last."""
+        return next((e.text for e in reversed(self.events) if e.kind == "refused"), "")
+
+
+def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) -> None:
+    """Poll something that another thread brings about."""
+    import time
+
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, f"waited in vain for {what}"
+        time.sleep(0.002)

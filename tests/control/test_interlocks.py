@@ -1,0 +1,76 @@
+from dataclasses import replace
+
+import pytest
+
+from navapp.control.interlocks import MAX_POSE_AGE_MS, navigable
+from navapp.control.stages import STAGES
+from navapp.control.states import SessionState, Snapshot
+from navapp.values import Reason, Status, Verdict
+from tests.control.fakes import a_pose
+
+GOOD = Snapshot(
+    time_ns=0,
+    state=SessionState.NAVIGATING,
+    stage=STAGES[0],
+    stages=STAGES,
+    reasons=(),
+    verdict=Verdict(Status.OK, 0.5),
+    left_from_bone=a_pose(),
+    pose_age_ms=10.0,
+)
+
+
+def test_everything_in_order_is_navigable() -> None:
+    assert navigable(GOOD) == ()
+    assert navigable(replace(GOOD, pose_age_ms=MAX_POSE_AGE_MS)) == ()
+
+
+@pytest.mark.parametrize("state", [s for s in SessionState if s is not SessionState.NAVIGATING])
+def test_no_other_state_is_navigable(state: SessionState) -> None:
+    assert navigable(replace(GOOD, state=state))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"is_blanked": True}, Reason.BLANKED),
+        ({"is_camera_silent": True}, Reason.CAMERA_SILENT),
+        ({"is_bone_planned": False}, Reason.STAGE_WITHOUT_BONE),
+        ({"state": SessionState.FAULT}, Reason.DEVICE_FAULT),
+        ({"state": SessionState.SUSPENDED}, Reason.BONE_LOST),
+        ({"state": SessionState.REVIEW}, Reason.NOT_NAVIGATING),
+        ({"verdict": None}, Reason.BONE_LOST),
+        ({"left_from_bone": None}, Reason.BONE_LOST),
+        ({"pose_age_ms": None}, Reason.POSE_TOO_OLD),
+        ({"pose_age_ms": MAX_POSE_AGE_MS + 1.0}, Reason.POSE_TOO_OLD),
+        ({"verdict": Verdict(Status.DEGRADED, 9.0, (Reason.TRE_TOO_LARGE,))}, Reason.TRE_TOO_LARGE),
+        ({"verdict": Verdict(Status.LOST)}, Reason.BONE_LOST),
+        ({"verdict": Verdict(Status.DEGRADED)}, Reason.BONE_LOST),
+    ],
+)
+def test_each_thing_that_is_wrong_is_named_first(change, reason: Reason) -> None:
+    assert navigable(replace(GOOD, **change))[0] is reason
+
+
+def test_everything_that_is_wrong_is_named_the_most_urgent_first() -> None:
+    bad = replace(
+        GOOD, is_blanked=True, is_camera_silent=True, is_bone_planned=False, pose_age_ms=9e9,
+        verdict=Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,)),
+    )  # fmt: skip
+    assert navigable(bad) == (
+        Reason.BLANKED,
+        Reason.CAMERA_SILENT,
+        Reason.STAGE_WITHOUT_BONE,
+        Reason.OUT_OF_VIEW,
+        Reason.POSE_TOO_OLD,
+    )
+
+
+def test_the_snapshots_own_answer_is_not_looked_at() -> None:
+    assert navigable(replace(GOOD, reasons=(Reason.BLANKED,))) == ()
+
+
+@pytest.mark.parametrize("reason", list(Reason))
+def test_every_reason_has_a_phrase_and_a_remedy(reason: Reason) -> None:
+    assert reason.value
+    assert reason.remedy

@@ -1,0 +1,215 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from navapp.control.executors import RecordedExecutor, ThreadExecutor
+from navapp.control.operators import (
+    RecordedOperator,
+    ReplayOperator,
+    ScriptedOperator,
+    ScriptStep,
+    read_events,
+    read_script,
+)
+from navapp.control.runner import run_headless
+from navapp.control.states import Accept, Blank, EnterStage, Propose, Register, Reject, Show
+from navapp.errors import ConfigurationError, SequenceError, UsageError
+from navapp.geometry.transform import rotation_angle_deg
+from navapp.values import Reason, Status
+from tests.control.fakes import Bench, FakeCamera, a_pose, answer
+
+LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
+GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
+
+
+@pytest.fixture
+def bench(monkeypatch) -> Bench:
+    return Bench(monkeypatch, camera=FakeCamera(None, n_frames=40))
+
+
+def commands_of(bench: Bench, operator) -> list:
+    """What the operator did during the whole sequence."""
+    given = []
+    submit = bench.controller.submit
+    bench.controller.submit = lambda command: (given.append(command), submit(command))
+    run_headless(bench.controller, operator)
+    return given
+
+
+def kinds(commands) -> list[str]:
+    return [type(command).__name__ for command in commands]
+
+
+@pytest.mark.parametrize("wrong", [LOST, GONE, answer(Status.DEGRADED, Reason.OUTLIERS)])
+def test_the_script_offers_a_wrong_pose_first_and_rejects_it(bench: Bench, wrong) -> None:
+    bench.script.assessed = wrong
+    given = commands_of(bench, ScriptedOperator())
+    assert kinds(given) == ["Register", "Reject", "Propose", "Reject", "Register", "Accept"]
+    proposed = next(c for c in given if isinstance(c, Propose)).left_from_bone
+    assert rotation_angle_deg(proposed, a_pose()) == pytest.approx(15.0)
+    assert bench.state == "navigating"
+
+
+def test_a_judge_that_takes_the_wrong_pose_is_found_out(bench: Bench) -> None:
+    given = commands_of(bench, ScriptedOperator())
+    assert kinds(given)[:4] == ["Register", "Reject", "Propose", "Accept"]
+
+
+def test_the_script_accepts_only_what_is_ok_and_gives_up_some_time(bench: Bench) -> None:
+    bench.script.found = [answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)]
+    given = commands_of(bench, ScriptedOperator((ScriptStep("register"),)))
+    assert "Accept" not in kinds(given)
+    assert kinds(given).count("Register") == 8
+
+
+def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) -> None:
+    operator = ScriptedOperator((ScriptStep("register"),))
+    bench.frames(1)
+    assert operator.commands(bench.snapshot) == [Register()]
+    bench.do(Register())
+    bench.script.tracked = GONE
+    bench.frames(2)
+    assert bench.snapshot.left_from_bone is None
+    assert operator.commands(bench.snapshot) == [Reject()]
+
+
+def test_steps_wait_for_their_frame(bench: Bench) -> None:
+    steps = (
+        ScriptStep("register"),
+        ScriptStep("blank", at_frame=8),
+        ScriptStep("show", at_frame=12),
+        ScriptStep("stage", stage="drilling", at_frame=15),
+    )
+    dark = []
+    bench.controller._hooks = replace(
+        bench.controller._hooks, on_frame=(lambda r: dark.append(bench.is_dark),)
+    )
+    given = commands_of(bench, ScriptedOperator(steps))
+    assert given == [Register(), Accept(), Blank(), Show(), EnterStage(2)]
+    assert [number for number, is_dark in enumerate(dark) if is_dark] == [9, 10, 11, 12]
+
+
+def test_a_replays_operator_accepts_what_is_not_lost(bench: Bench) -> None:
+    bench.script.found = [answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)]
+    assert kinds(commands_of(bench, ReplayOperator())) == ["Register", "Accept"]
+
+
+def test_a_replays_operator_rejects_a_lost_candidate(bench: Bench) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    bench.script.tracked = LOST
+    bench.frames(2)
+    assert ReplayOperator().commands(bench.snapshot) == [Reject()]
+
+
+def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
+    given = commands_of(bench, ReplayOperator(each_frame=True))
+    assert set(kinds(given)) == {"Register"}
+    assert bench.script.calls.count("register femur") >= 39
+
+
+def test_a_recorded_operator_gives_each_command_after_the_same_frame(bench: Bench) -> None:
+    recorded = [(-1, Show()), (2, Register()), (5, Accept()), (5, Blank())]
+    told: list[tuple[int, object]] = []
+    bench.controller._hooks = replace(
+        bench.controller._hooks, on_command=(lambda c, s: told.append((s, c)),)
+    )
+    run_headless(bench.controller, RecordedOperator(list(recorded)))
+    assert told == recorded
+
+
+def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
+    """Worker, cancelled search and second search included."""
+    import threading
+
+    live = Bench(monkeypatch, executor=ThreadExecutor(), camera=FakeCamera(None, n_frames=30))
+    told: list[tuple[int, object]] = []
+    live.controller._hooks = replace(
+        live.controller._hooks, on_command=(lambda c, s: told.append((s, c)),)
+    )
+    from navapp.control.states import Cancel
+    from tests.control.fakes import wait_for
+
+    for number in (1, 2):
+        live.script.gate = threading.Event()
+        live.script.started.clear()
+        live.frames(2)
+        live.do(Register())
+        live.frames(4)
+        assert live.script.started.wait(5.0)
+        if number == 1:
+            live.do(Cancel())
+            live.script.gate.set()
+        else:
+            live.script.gate.set()
+            job = live.controller._pursuit._search.job
+            wait_for(lambda job=job: job.is_finished, "the second search")
+    live.frames(3)
+    live.do(Accept())
+    live.frames(30)
+    live.controller.close()
+    assert live.take_overs
+
+    again = Bench(
+        monkeypatch,
+        executor=RecordedExecutor(live.take_overs),
+        camera=FakeCamera(None, n_frames=30),
+    )
+    run_headless(again.controller, RecordedOperator(told))
+    assert [r.state for r in again.results] == [r.state for r in live.results]
+    assert again.take_overs == live.take_overs
+
+
+def test_events_are_read_back_as_commands_and_take_overs(tmp_path: Path) -> None:
+    lines = [
+        {"type": "event", "sequence": -1, "text": "x"},
+        {"type": "command", "sequence": 3, "command": "register"},
+        {"type": "take_over", "sequence": 4},
+        {"type": "command", "sequence": 6, "command": "stage", "number": 2},
+    ]
+    path = tmp_path / "events.jsonl"
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    events = read_events(path)
+    assert events.commands == [(3, Register()), (6, EnterStage(2))]
+    assert events.take_overs == [4]
+
+
+@pytest.mark.parametrize(
+    "damage", ['{"type": "command", "sequ', "[]", '{"type": "event"}', '{"sequence": "x"}']
+)
+def test_damaged_events_name_their_line(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "events.jsonl"
+    path.write_text('{"type": "event", "sequence": 1}\n' + damage + "\n")
+    with pytest.raises(SequenceError, match="line 2 of"):
+        read_events(path)
+
+
+def test_a_script_file_is_read(tmp_path: Path) -> None:
+    content = {"step": [{"do": "propose", "turn_deg": 9.0}, {"do": "stage", "stage": "implant"}]}
+    assert read_script(content, "s") == (
+        ScriptStep("propose", turn_deg=9.0),
+        ScriptStep("stage", stage="implant"),
+    )
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {},
+        {"step": []},
+        {"step": [{"do": "dance"}]},
+        {"step": [{"do": "show", "at": 3}]},
+        {"step": [{"do": "show"}], "more": 1},
+        {"step": [{}]},
+    ],
+)
+def test_a_script_that_cannot_be_meant_is_refused(content) -> None:
+    with pytest.raises(ConfigurationError):
+        read_script(content, "s")
+
+
+def test_a_script_with_an_unknown_stage_is_refused() -> None:
+    with pytest.raises(UsageError, match="no stage"):
+        read_script({"step": [{"do": "stage", "stage": "dessert"}]}, "s")

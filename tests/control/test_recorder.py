@@ -1,0 +1,112 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from navapp.control.operators import read_events
+from navapp.control.recorder import BackgroundSink, SessionRecorder
+from navapp.control.states import Accept, EnterStage, Propose, Register
+from navapp.errors import InputError
+from navapp.values import Reason, Status
+from tests.control.fakes import Bench, a_pose, answer
+
+
+class Sink:
+    def __init__(self, error_at: int | None = None) -> None:
+        self.kept: list[tuple[int, bool]] = []
+        self.is_closed = False
+        self.error_at = error_at
+
+    def add(self, frame, with_pictures: bool) -> None:
+        if frame.sequence == self.error_at:
+            raise InputError("the disk is full")
+        self.kept.append((frame.sequence, with_pictures))
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def recorded(monkeypatch, folder: Path, sink: Sink) -> tuple[Bench, SessionRecorder]:
+    bench = Bench(monkeypatch)
+    recorder = SessionRecorder(folder, sink, with_pictures=False)
+    bench.controller._hooks = replace(
+        bench.controller._hooks,
+        on_frame=(recorder.on_frame,),
+        on_event=(recorder.on_event,),
+        on_command=(recorder.on_command,),
+        on_take_over=(recorder.on_take_over,),
+    )
+    return bench, recorder
+
+
+def lines(path: Path) -> list[dict]:
+    text = path.read_text()
+    assert text.endswith("\n")
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def test_every_line_is_whole_at_any_moment(monkeypatch, tmp_path: Path) -> None:
+    bench, recorder = recorded(monkeypatch, tmp_path, Sink())
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(1)
+    # Nothing is closed yet.
+    assert [line["state"] for line in lines(tmp_path / "poses.jsonl")] == ["ready", "review"]
+    assert any(line["type"] == "command" for line in lines(tmp_path / "events.jsonl"))
+    recorder.close()
+
+
+def test_a_session_is_recorded_with_all_that_a_replay_needs(monkeypatch, tmp_path: Path) -> None:
+    sink = Sink()
+    bench, recorder = recorded(monkeypatch, tmp_path, sink)
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(1)
+    bench.do(Accept())
+    bench.frames(1)
+    bench.script.tracked = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
+    bench.frames(1)
+    bench.do(EnterStage(5))
+    pose = a_pose("tibia", x_mm=2.0)
+    bench.do(Propose(pose))
+    recorder.close()
+    assert sink.is_closed
+    assert sink.kept == [(n, False) for n in range(4)]
+    events = read_events(tmp_path / "events.jsonl")
+    assert events.take_overs == [1]
+    assert [(n, type(c).__name__) for n, c in events.commands] == [
+        (0, "Register"), (1, "Accept"), (3, "EnterStage"), (3, "Propose"),
+    ]  # fmt: skip
+    read_back = events.commands[-1][1].left_from_bone
+    assert read_back.matrix.tobytes() == pose.matrix.tobytes()
+    poses = lines(tmp_path / "poses.jsonl")
+    assert [line["status"] for line in poses] == [None, "OK", "OK", "LOST"]
+    assert poses[0]["camera_from_model"] is None
+    assert poses[1]["camera_from_model"] == a_pose().to_list()
+    assert poses[3]["camera_from_model"] is None
+
+
+def a_frame(monkeypatch, number: int):
+    frame = Bench(monkeypatch).camera.read(0.1)
+    return replace(frame, sequence=number)
+
+
+def test_frames_are_kept_in_the_background_all_and_in_order(monkeypatch) -> None:
+    sink = Sink()
+    background = BackgroundSink(sink, max_waiting=2)
+    frame = a_frame(monkeypatch, 0)
+    for number in range(30):
+        background.add(replace(frame, sequence=number), True)
+    background.close()
+    assert sink.kept == [(number, True) for number in range(30)]
+    assert sink.is_closed
+
+
+def test_what_goes_wrong_in_the_background_is_raised_at_the_latest_at_the_end(monkeypatch) -> None:
+    sink = Sink(error_at=0)
+    background = BackgroundSink(sink)
+    background.add(a_frame(monkeypatch, 0), True)
+    with pytest.raises(InputError, match="disk is full"):
+        background.close()
+    assert sink.is_closed

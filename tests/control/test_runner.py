@@ -1,0 +1,58 @@
+import threading
+
+from navapp.control.runner import SessionRunner
+from navapp.control.states import Accept, Quit, Register
+from tests.control.fakes import Bench, wait_for
+
+
+def pipeline_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "pipeline"]
+
+
+def test_a_runner_turns_the_crank_and_leaves_no_thread(monkeypatch) -> None:
+    bench = Bench(monkeypatch)
+    runner = SessionRunner(bench.controller)
+    runner.start()
+    wait_for(lambda: runner.snapshot().state.value == "ready", "readiness")
+    runner.submit(Register())
+    wait_for(lambda: runner.snapshot().state.value == "review", "review")
+    runner.submit(Accept())
+    wait_for(lambda: runner.snapshot().is_navigable, "navigation")
+    runner.stop()
+    runner.stop()
+    assert pipeline_threads() == []
+    assert bench.is_dark
+    assert runner.error is None
+    assert runner.snapshot().state.value == "offline"
+    assert not runner.snapshot().is_navigable
+
+
+def test_quitting_ends_the_thread_by_itself(monkeypatch) -> None:
+    bench = Bench(monkeypatch)
+    runner = SessionRunner(bench.controller)
+    runner.start()
+    runner.submit(Quit())
+    wait_for(lambda: pipeline_threads() == [], "the end of the thread")
+    assert runner.snapshot().is_over
+    runner.stop()
+
+
+def test_an_error_in_the_thread_is_kept_and_the_display_is_dark(monkeypatch) -> None:
+    bench = Bench(monkeypatch)
+    runner = SessionRunner(bench.controller)
+    runner.start()
+    wait_for(lambda: not bench.is_dark, "a picture")
+    bench.camera.error = ZeroDivisionError("a driver's bug")
+    wait_for(lambda: pipeline_threads() == [], "the end of the thread")
+    assert isinstance(runner.error, ZeroDivisionError)
+    assert bench.is_dark
+    assert not bench.camera.is_open
+    runner.stop()
+
+
+def test_a_runner_that_never_started_closes_the_devices(monkeypatch) -> None:
+    bench = Bench(monkeypatch)
+    bench.frames(1)
+    SessionRunner(bench.controller).stop()
+    assert bench.is_dark
+    assert not bench.camera.is_open

@@ -1,0 +1,180 @@
+"""Sessions in the simulated room, with the real line."""
+
+from contextlib import ExitStack
+
+import pytest
+
+from drivers.clock import ManualClock, SystemClock
+from drivers.fixed_mirror import FixedMirror
+from drivers.interfaces import DeviceSet
+from drivers.no_projector import NoProjector
+from navapp.control.controller import SessionController, SessionHooks
+from navapp.control.executors import InlineExecutor, ThreadExecutor
+from navapp.control.operators import ScriptedOperator
+from navapp.control.runner import SessionRunner, run_headless
+from navapp.control.states import Accept, Propose, Register, Reject
+from navapp.errors import WrongDevice
+from navapp.geometry.mesh import TriangleMesh
+from navapp.values import BoneModel, Plan, Prior, Status
+from sim_devices.camera import SimulatedCamera
+from sim_devices.display import SimulatedDisplay
+from sim_devices.faults import FaultScript, fault_script
+from sim_devices.scenario import Scenario
+from sim_devices.sensor import SensorModel
+from sim_devices.truth import TruthOracle
+from sim_devices.world import World
+from tests.control.fakes import wait_for
+
+SEED = 5
+
+
+class SimulatedRoom:
+    """A controller on the simulated room; the truth stays with the test."""
+
+    def __init__(
+        self, undo: ExitStack, *, scale: float = 1.0, is_live: bool = False,
+        faults: FaultScript | None = None, n_frames: int | None = None,
+    ) -> None:  # fmt: skip
+        world = World(Scenario(seed=SEED, motion="still"))
+        self.clock = SystemClock() if is_live else ManualClock()
+        self.camera = SimulatedCamera(
+            world, self.clock, is_stepped=not is_live, scale=scale, n_frames=n_frames,
+            sensor=SensorModel(seed=SEED), faults=faults,
+        )  # fmt: skip
+        self.camera.open()
+        rig = world.rig if scale == 1.0 else world.rig.scaled(scale)
+        self.display = SimulatedDisplay(self.clock, rig.width, rig.height)
+        self.display.open()
+        self.oracle = TruthOracle(world, self.camera.world_time_ns)
+        mesh = world.anatomy.bones["femur"]
+        bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "right")
+        self.results = []
+        self.commands = []
+        self.controller = SessionController(
+            DeviceSet(self.camera, self.display, NoProjector(), FixedMirror(45.0), self.clock),
+            rig,
+            Plan({"femur": bone}),
+            Prior({"femur": world.nominal_left_from_femur}),
+            executor=ThreadExecutor() if is_live else InlineExecutor(),
+            hooks=SessionHooks(
+                on_frame=(self.results.append,),
+                on_command=(lambda command, sequence: self.commands.append(command),),
+                reopen_camera=self._reopen,
+            ),
+        )
+        undo.callback(self.controller.close)
+
+    def _reopen(self) -> SimulatedCamera:
+        self.camera.open()
+        if self.camera.info.serials[0] != "SIM-L":
+            self.camera.close()
+            raise WrongDevice("the camera has other serial numbers than the rig")
+        return self.camera
+
+    @property
+    def state(self) -> str:
+        return self.controller.snapshot.state.value
+
+    def states(self) -> list[str]:
+        return [result.state.value for result in self.results]
+
+    def frames(self, n: int) -> None:
+        for _ in range(n):
+            self.controller.step()
+
+
+@pytest.fixture
+def undo():
+    with ExitStack() as stack:
+        yield stack
+
+
+@pytest.mark.slow
+def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right_one(undo) -> None:
+    room = SimulatedRoom(undo, n_frames=8)
+    run_headless(room.controller, ScriptedOperator())
+    assert [type(command) for command in room.commands] == [
+        Register, Reject, Propose, Reject, Register, Accept,
+    ]  # fmt: skip
+    refused = next(
+        r for r in room.results
+        if r.state.value == "review" and r.tracked.verdict.status is Status.LOST
+    )  # fmt: skip
+    assert not refused.is_navigable
+    assert room.states()[-1] == "navigating"
+    for result in room.results:
+        if result.is_navigable:
+            true = room.oracle.left_from_body("femur", result.frame.captured_ns)
+            centre = room.controller._pursuit._lines["femur"].centre_mm
+            shift = result.tracked.left_from_bone.apply(centre) - true.apply(centre)
+            assert (shift**2).sum() ** 0.5 < 2.0
+    assert any(result.is_navigable for result in room.results)
+
+
+@pytest.mark.slow
+def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
+    faults = fault_script(
+        [
+            {"kind": "unplug", "start_s": 0.3, "duration_s": 2.0},
+            {"kind": "wrong_serial", "start_s": 2.3, "duration_s": 1.2},
+        ]
+    )
+    room = SimulatedRoom(undo, faults=faults)
+    room.frames(1)
+    room.controller.submit(Register())
+    room.frames(2)
+    room.controller.submit(Accept())
+    room.frames(2)
+    assert room.state == "navigating"
+    while room.state == "navigating":
+        room.frames(1)
+    assert room.state == "fault"
+    assert not room.display.visible_image().any()
+    troubles = set()
+    while room.state == "fault":
+        room.frames(1)
+        troubles.add(room.controller.snapshot.devices[0].detail)
+        assert not room.display.visible_image().any()
+    assert any("unplugged" in trouble for trouble in troubles)
+    assert any("other serial numbers" in trouble for trouble in troubles)
+    assert room.state == "suspended"
+    room.frames(1)
+    assert room.state == "navigating"
+    assert room.display.visible_image().any()
+
+
+@pytest.mark.slow
+def test_a_blackout_suspends_and_light_resumes(undo) -> None:
+    faults = fault_script([{"kind": "blackout_right", "start_s": 0.25, "duration_s": 0.2}])
+    room = SimulatedRoom(undo, faults=faults, n_frames=9)
+    room.frames(1)
+    room.controller.submit(Register())
+    room.frames(2)
+    room.controller.submit(Accept())
+    room.frames(8)
+    assert room.states()[2:4] == ["navigating", "navigating"]
+    assert room.states()[4:7] == ["suspended"] * 3
+    assert room.states()[7:] == ["navigating"] * 2
+
+
+@pytest.mark.slow
+def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
+    """Free-running camera, reader thread, worker: a proposed pose makes small pictures enough."""
+    room = SimulatedRoom(undo, scale=0.3, is_live=True)
+    runner = SessionRunner(room.controller)
+    undo.callback(runner.stop)
+    runner.start()
+    wait_for(lambda: room.state == "ready", "pictures")
+    runner.submit(Propose(room.oracle.left_from_body("femur", room.results[0].frame.captured_ns)))
+    wait_for(
+        lambda: room.state == "review" and runner.snapshot().verdict is not None, "the judge's word"
+    )
+    assert runner.snapshot().verdict.status is not Status.LOST
+    runner.submit(Accept())
+    wait_for(lambda: room.state == "navigating", "navigation")
+    runner.submit(Register())
+    wait_for(lambda: room.state == "registering", "the search")
+    wait_for(lambda: room.state != "registering", "the end of the search")
+    runner.stop()
+    assert runner.error is None
+    assert not room.display.visible_image().any()

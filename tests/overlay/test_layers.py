@@ -1,0 +1,102 @@
+import numpy as np
+import pytest
+
+from navapp.geometry.transform import RigidTransform
+from navapp.geometry.zbuffer import render
+from navapp.overlay.layers import CURVE_COLOURS, GUIDE_COLOUR, LAYERS, TARGET_COLOUR
+from tests.overlay.scenes import BEHIND, CAMERA, HEIGHT, MESH, POSE, TARGET, WIDTH, scene, video
+
+
+def black() -> np.ndarray:
+    return np.zeros((HEIGHT, WIDTH, 3), dtype=np.uint8)
+
+
+def is_colour(image: np.ndarray, colour) -> np.ndarray:
+    return (image == np.array(colour, dtype=np.uint8)).all(axis=2)
+
+
+def grown(mask: np.ndarray, by: int) -> np.ndarray:
+    import cv2
+
+    return cv2.dilate(mask.astype(np.uint8), np.ones((2 * by + 1, 2 * by + 1))).astype(bool)
+
+
+def test_the_outline_runs_where_the_model_ends() -> None:
+    image = video()
+    LAYERS["bone"](image, scene("bone"))
+    view = render(MESH, POSE, CAMERA)
+    drawn, edge = is_colour(image, GUIDE_COLOUR), view.silhouette()
+    assert drawn[edge].mean() > 0.99
+    assert not (drawn & ~grown(edge, 2)).any()
+
+
+def test_the_veil_covers_the_model_and_nothing_else() -> None:
+    before, image = video(), video()
+    LAYERS["bone"](image, scene("bone"))
+    mask = render(MESH, POSE, CAMERA).mask
+    changed = (image != before).any(axis=2)
+    assert changed[mask].mean() > 0.99
+    assert not (changed & ~grown(mask, 2)).any()
+    inner = mask & ~grown(~mask, 4)
+    # Light: what lies beneath can still be told.
+    assert np.corrcoef(before[inner][:, 0], image[inner][:, 0])[0, 1] > 0.5
+
+
+@pytest.mark.parametrize("layer", list(LAYERS))
+def test_a_bone_out_of_view_draws_nothing(layer: str) -> None:
+    image = black()
+    away = RigidTransform.from_parts("left", "femur", np.eye(3), (0.0, 3000.0, 400.0))
+    LAYERS[layer](image, scene(layer, pose=away))
+    assert not image.any()
+
+
+@pytest.mark.parametrize("layer", list(LAYERS))
+@pytest.mark.parametrize("z_mm", [-400.0, 0.0, 1e-5, 1.0, 10.0])
+def test_a_bone_behind_or_at_the_camera_is_survived(layer: str, z_mm: float) -> None:
+    pose = RigidTransform.from_parts("left", "femur", np.eye(3), (0.0, 0.0, z_mm))
+    LAYERS[layer](black(), scene(layer, pose=pose))
+
+
+@pytest.mark.parametrize("layer", ["targets", "curves"])
+@pytest.mark.parametrize("depth_mm", [1e-5, 1e-3, 0.1])
+def test_points_beside_the_lens_are_survived(layer: str, depth_mm: float) -> None:
+    """They project millions of pixels away."""
+    near = np.array([[80.0, 5.0, depth_mm], [-90.0, 7.0, 3.0], [0.0, 0.0, 400.0]])
+    points = POSE.inverse().apply(near)
+    LAYERS[layer](black(), scene(layer, targets={"femur/notch": points}, curves={"artery": points}))
+
+
+def test_targets_of_this_bone_are_marked_where_they_are_seen() -> None:
+    image = black()
+    LAYERS["targets"](image, scene("targets"))
+    u, v = np.round(CAMERA.project(POSE.apply(TARGET[None]))[0]).astype(int)
+    drawn = is_colour(image, TARGET_COLOUR)
+    assert drawn[v, u - 8 : u + 9].all()
+    assert drawn[v - 8 : v + 9, u].all()
+    other = np.round(CAMERA.project(POSE.apply(TARGET[None] + 20.0))[0]).astype(int)
+    assert not drawn[other[1] - 2 : other[1] + 3, other[0] - 2 : other[0] + 3].any()
+
+
+def test_a_curve_is_dashed_behind_the_bone_and_full_beside_it() -> None:
+    image = black()
+    LAYERS["curves"](image, scene("curves"))
+    drawn = is_colour(image, CURVE_COLOURS["artery"])
+    in_camera = POSE.apply(BEHIND)
+    pixels = CAMERA.project(in_camera)
+    mask = render(MESH, POSE, CAMERA).mask
+    middles = np.round(0.5 * (pixels[1:] + pixels[:-1])).astype(int)
+    hidden = mask[middles[:, 1], middles[:, 0]]
+    seen = drawn[middles[:, 1], middles[:, 0]]
+    assert hidden.sum() > 6
+    assert (~hidden).sum() > 4
+    assert seen[~hidden].mean() > 0.9
+    assert 0.3 < seen[hidden].mean() < 0.75
+
+
+def test_a_curve_before_the_bone_is_not_dashed() -> None:
+    image = black()
+    before = BEHIND * (0.4, 1.0, 1.0) - (0.0, 0.0, 90.0)
+    LAYERS["curves"](image, scene("curves", curves={"nerve": before}))
+    pixels = CAMERA.project(POSE.apply(before))
+    middles = np.round(0.5 * (pixels[1:] + pixels[:-1])).astype(int)
+    assert is_colour(image, CURVE_COLOURS["nerve"])[middles[:, 1], middles[:, 0]].all()

@@ -1,0 +1,77 @@
+"""Measured maps and simulated pictures whose truth is known."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from drivers.clock import ManualClock
+from drivers.frames import StereoFrame
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
+from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.tracking import Goal, Line
+from navapp.values import BoneModel, DisparityMap, Origin, Prior, visible_vertices
+from sim_devices.camera import SimulatedCamera
+from sim_devices.scenario import Scenario
+from sim_devices.sensor import SensorModel
+from sim_devices.truth import TruthOracle
+from sim_devices.world import World
+from tests.registration.shapes import GEOMETRY, TRUE
+
+GOAL = Goal(np.empty((0, 3)), 2.0)
+
+
+def measured_map(bone: BoneModel, pose: RigidTransform = TRUE, margin_px: int = 16) -> DisparityMap:
+    """What a good matcher finds of a bone alone: exact up to noise of 0.25 px."""
+    box = projected_box(bone.mesh, pose, GEOMETRY).grown(margin_px).clipped(1280, 720)
+    view = render_rectified(bone.mesh, pose, GEOMETRY, box)
+    noise = np.random.default_rng(1).normal(0.0, 0.25, view.mask.shape)
+    disparity = GEOMETRY.focal_px * GEOMETRY.baseline_mm / view.depth_mm + noise
+    return DisparityMap(
+        np.where(view.mask, disparity, np.nan).astype(np.float32),
+        np.where(view.mask, 0.25, np.nan).astype(np.float32),
+        np.where(view.mask, Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8),
+        box.x,
+        box.y,
+    )
+
+
+@dataclass(frozen=True)
+class Room:
+    """Frames of a simulated knee, the line that follows it, and the truth for judging."""
+
+    rig: StereoRig
+    line: Line
+    frames: tuple[StereoFrame, ...]
+    oracle: TruthOracle
+    prior: Prior
+
+    def truth(self, frame: StereoFrame) -> RigidTransform:
+        return self.oracle.left_from_body("femur", frame.captured_ns)
+
+    def error_mm(self, pose: RigidTransform, frame: StereoFrame) -> float:
+        """Mean over the visible vertices."""
+        truth, mesh = self.truth(frame), self.line.model.bone.mesh
+        points = mesh.vertices_mm[visible_vertices(mesh, truth)]
+        return float(np.linalg.norm(pose.apply(points) - truth.apply(points), axis=1).mean())
+
+
+@lru_cache(maxsize=4)
+def room(motion: str = "still", n_frames: int = 3, is_grey: bool = False) -> Room:
+    world = World(Scenario(seed=5, motion=motion))
+    sensor = SensorModel(seed=5, is_grey=is_grey)
+    camera = SimulatedCamera(world, ManualClock(), is_stepped=True, sensor=sensor)
+    camera.open()
+    mesh = world.anatomy.bones["femur"]
+    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "right")
+    rig = world.rig
+    frames = tuple(camera.read(1.0) for _ in range(n_frames))
+    return Room(
+        rig,
+        Line(rig, bone),
+        frames,
+        TruthOracle(world, camera.world_time_ns),
+        Prior({"femur": world.nominal_left_from_femur}),
+    )

@@ -1,0 +1,177 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.registration import RegistrationModel, fit_point_to_plane
+from navapp.registration.point_to_plane import estimate_at
+from navapp.stereo import reproject
+from navapp.tracking.judge import Judge
+from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict
+from sim_devices.anatomy import KneeSpec, make_knee
+from tests.registration.shapes import GEOMETRY, TRUE, disturbed, femur
+from tests.tracking.rooms import measured_map
+
+BONE = femur()
+MODEL = RegistrationModel(BONE)
+MAP = measured_map(BONE)
+NO_TARGETS = np.empty((0, 3))
+
+
+def verdict_on(
+    pose=TRUE, measured: DisparityMap = MAP, model=MODEL, is_accepted: bool = True,
+    tolerance_mm: float = 3.0, predicted=None,
+) -> Verdict:  # fmt: skip
+    cloud = reproject(measured, GEOMETRY, 3)
+    estimate = estimate_at(cloud, model, pose, stride_px=3)
+    judge = Judge(GEOMETRY, is_accepted)
+    return judge.judge(model, estimate, measured, NO_TARGETS, tolerance_mm, predicted)
+
+
+def test_the_truth_is_ok() -> None:
+    verdict = verdict_on()
+    assert verdict.status is Status.OK
+    assert verdict.reasons == ()
+    assert verdict.coverage > 0.9
+    assert verdict.inlier_share > 0.9
+    assert verdict.occluded_share < 0.01
+    assert 0.0 < verdict.predicted_tre_mm < 3.0
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_pose_turned_by_fifteen_degrees_is_lost(axis: int, sign: float) -> None:
+    twist = np.zeros(6)
+    twist[3 + axis] = sign * np.radians(15.0)
+    wrong = TRUE.moved(twist, TRUE.apply(MODEL.centre_mm))
+    assert verdict_on(wrong).status is Status.LOST
+
+
+@pytest.mark.parametrize("spec", [KneeSpec(1, "left"), KneeSpec(1, sex="male")])
+def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeSpec) -> None:
+    """The other side's, and one of another size."""
+    mesh = make_knee(spec).bones["femur"]
+    other = RegistrationModel(BoneModel("femur", mesh, spec.side))
+    fitted = fit_point_to_plane(reproject(MAP, GEOMETRY, 3), other, TRUE, stride_px=3)
+    verdict = verdict_on(fitted.left_from_bone, model=other)
+    assert verdict.status is not Status.OK
+    assert {Reason.SURFACE_MISFIT, Reason.OUTLIERS} & set(verdict.reasons)
+
+
+def test_another_bone_is_lost() -> None:
+    mesh = make_knee(KneeSpec(1)).bones["tibia"]
+    other = RegistrationModel(BoneModel("femur", mesh, "right"))
+    fitted = fit_point_to_plane(reproject(MAP, GEOMETRY, 3), other, TRUE, stride_px=3)
+    assert verdict_on(fitted.left_from_bone, model=other).status is Status.LOST
+
+
+def with_blob(share: float) -> DisparityMap:
+    """Something 40 mm nearer stands before the upper part of the bone."""
+    measured = MAP.disparity_px.copy()
+    rows = round(share * measured.shape[0])
+    nearer = GEOMETRY.disparity_px(float(TRUE.translation_mm[2]) - 90.0)
+    measured[-rows:] = nearer
+    origin = MAP.origin.copy()
+    origin[-rows:] = Origin.MATCHED
+    sigma = MAP.sigma_px.copy()
+    sigma[-rows:] = 0.25
+    return DisparityMap(measured, sigma, origin, MAP.x, MAP.y)
+
+
+def test_a_small_occluder_is_named_and_does_not_count_as_a_misfit() -> None:
+    verdict = verdict_on(measured=with_blob(0.25))
+    assert verdict.status is Status.OK
+    assert verdict.occluded_share > 0.1
+    assert verdict.inlier_share > 0.9
+    assert verdict.coverage < verdict_on().coverage
+
+
+def test_a_large_occluder_leaves_too_little_of_the_bone() -> None:
+    verdict = verdict_on(measured=with_blob(0.68))
+    assert verdict.status is not Status.OK
+    assert Reason.COVERAGE_LOW in verdict.reasons
+    assert verdict.occluded_share > 0.5
+
+
+def test_filled_pixels_do_not_count_as_seen() -> None:
+    filled = replace(MAP, origin=np.where(MAP.origin == 1, Origin.FILLED_INTERIOR, 0))
+    found = Judge(GEOMETRY, True).agreement(MODEL, TRUE, filled)
+    assert found.coverage == 0.0
+
+
+def test_a_rig_that_was_not_accepted_is_degraded_at_best() -> None:
+    verdict = verdict_on(is_accepted=False)
+    assert verdict.status is Status.DEGRADED
+    assert verdict.reasons == (Reason.RIG_NOT_ACCEPTED,)
+
+
+def test_the_bound_is_held_against_the_stages_tolerance() -> None:
+    bound = verdict_on().predicted_tre_mm
+    assert verdict_on(tolerance_mm=bound * 1.01).status is Status.OK
+    verdict = verdict_on(tolerance_mm=bound * 0.99)
+    assert verdict.status is Status.DEGRADED
+    assert verdict.reasons == (Reason.TRE_TOO_LARGE,)
+
+
+def test_targets_far_from_the_seen_surface_are_less_certain() -> None:
+    estimate = estimate_at(reproject(MAP, GEOMETRY, 3), MODEL, TRUE, stride_px=3)
+    judge = Judge(GEOMETRY, True)
+    near = BONE.mesh.vertices_mm[BONE.mesh.vertices_mm[:, 2].argmin()][None]
+    bounds = [
+        judge.judge(MODEL, estimate, MAP, near + np.array([0.0, 0.0, away]), 99.0).predicted_tre_mm
+        for away in (0.0, 300.0)
+    ]
+    assert bounds[1] > 2.0 * bounds[0]
+
+
+def test_a_jump_from_the_prediction_is_doubted() -> None:
+    near, far = disturbed(MODEL, 2.0, 11.0, 4), disturbed(MODEL, 2.0, 13.0, 4)
+    assert verdict_on(predicted=near).status is Status.OK
+    verdict = verdict_on(predicted=far)
+    assert verdict.status is Status.DEGRADED
+    assert verdict.reasons == (Reason.JUMPED,)
+
+
+def test_an_unknown_map_is_lost() -> None:
+    unknown = DisparityMap(
+        np.full_like(MAP.disparity_px, np.nan), MAP.sigma_px,
+        np.zeros_like(MAP.origin), MAP.x, MAP.y,
+    )  # fmt: skip
+    verdict = verdict_on(measured=unknown)
+    assert verdict.status is Status.LOST
+    assert Reason.TOO_FEW_POINTS in verdict.reasons
+    assert verdict.predicted_tre_mm is None
+
+
+def covered(thickness_mm: float):
+    """A bone with cartilage of one thickness, and the map that shows its surface."""
+    n = len(BONE.mesh.vertices_mm)
+    bone = replace(BONE, cartilage_mm=np.full(n, thickness_mm))
+    surface = replace(
+        BONE,
+        mesh=replace(
+            BONE.mesh, vertices_mm=BONE.mesh.vertices_mm + thickness_mm * BONE.mesh.normals
+        ),
+    )
+    return bone, measured_map(surface)
+
+
+def test_cartilage_that_the_plan_knows_is_expected() -> None:
+    bone, measured = covered(2.0)
+    verdict = verdict_on(measured=measured, model=RegistrationModel(bone))
+    assert verdict.status is Status.OK
+    assert verdict.coverage > 0.9
+
+
+def test_cartilage_that_the_plan_does_not_know_is_not_ok() -> None:
+    _, measured = covered(2.0)
+    assert verdict_on(measured=measured).status is not Status.OK
+
+
+def test_parts_that_were_cut_away_are_not_expected() -> None:
+    removed = BONE.mesh.vertices_mm[:, 0] > 5.0
+    kept = ~removed[BONE.mesh.faces].any(axis=1)
+    rest = replace(BONE, mesh=replace(BONE.mesh, faces=BONE.mesh.faces[kept]))
+    model = RegistrationModel(replace(BONE, is_removed=removed))
+    found = Judge(GEOMETRY, True).agreement(model, TRUE, measured_map(rest))
+    assert found.coverage > 0.85

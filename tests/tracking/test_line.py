@@ -1,0 +1,168 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.geometry.rig import RigQuality
+from navapp.registration.point_to_plane import estimate_at
+from navapp.tracking import Line, LineSettings, TrackState
+from navapp.values import Prior, Reason, Status
+from tests.tracking.rooms import GOAL, Room, room
+
+
+def follow(a: Room, line: Line, start_off=(0.0,) * 6):
+    """Track through the room's frames, from a pose a little beside the first truth."""
+    truth = a.truth(a.frames[0])
+    start = truth.moved(start_off, truth.apply(line.centre_mm))
+    state = TrackState.at_rest(start, a.frames[0].captured_ns)
+    answers = []
+    for frame in a.frames:
+        tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answers.append((frame, tracked))
+    return answers, state
+
+
+@pytest.mark.parametrize("motion", ["still", "patient"])
+@pytest.mark.slow
+def test_a_knee_is_followed(motion: str) -> None:
+    a = room(motion)
+    answers, state = follow(a, a.line, (1.5, -1.0, 2.0, 0.01, -0.015, 0.01))
+    for frame, tracked in answers:
+        assert tracked.verdict.status is Status.OK
+        assert a.error_mm(tracked.left_from_bone, frame) < 1.2
+        assert tracked.estimate.covariance.shape == (6, 6)
+        assert tracked.left_from_bone.target == "left"
+    assert state.n_lost == 0
+
+
+def test_following_twice_gives_the_same_bits() -> None:
+    a = room()
+    first, second = follow(a, a.line)[0], follow(a, a.line)[0]
+    for (_, one), (_, other) in zip(first, second, strict=True):
+        assert one.left_from_bone.matrix.tobytes() == other.left_from_bone.matrix.tobytes()
+
+
+@pytest.mark.slow
+def test_grey_pictures_do_as_well() -> None:
+    a = room(is_grey=True, n_frames=2)
+    assert a.frames[0].left.ndim == 2
+    for frame, tracked in follow(a, a.line)[0]:
+        assert a.error_mm(tracked.left_from_bone, frame) < 1.2
+
+
+@pytest.mark.parametrize(
+    ("method", "shape", "level"),
+    [("bimcc", (720, 1280), 0), ("bimcc", (720, 1280, 3), 255), ("icp", (720, 1280, 3), 0)],
+)
+def test_pictures_without_content_are_lost(method: str, shape, level: int) -> None:
+    a = room()
+    line = (
+        Line(a.rig, a.line.model.bone, LineSettings(method=method)) if method == "icp" else a.line
+    )
+    flat = np.full(shape, level, dtype=np.uint8)
+    state = TrackState.at_rest(a.truth(a.frames[0]), 0)
+    tracked, after = line.track(flat, flat, 66_000_000, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+    assert tracked.verdict.reasons
+    assert tracked.left_from_bone is None
+    assert after.left_from_bone is state.left_from_bone
+    assert all(c.verdict.status is Status.LOST for c in line.register(flat, flat, a.prior, GOAL))
+    assert line.assess(flat, flat, state.left_from_bone, GOAL).verdict.status is Status.LOST
+
+
+@pytest.mark.parametrize("eye", ["left", "right"])
+def test_one_dark_eye_is_lost(eye: str) -> None:
+    a = room()
+    frame = a.frames[0]
+    dark = replace(frame, **{eye: np.zeros_like(frame.left)})
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    tracked, _ = a.line.track(dark.left, dark.right, frame.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+
+
+@pytest.mark.parametrize("shift", [(900.0, 0.0, 0.0), (0.0, -700.0, 0.0), (0.0, 0.0, -1500.0)])
+def test_a_bone_out_of_view_is_lost_and_said_so(shift) -> None:
+    a = room()
+    frame = a.frames[0]
+    away = a.truth(frame).moved((*shift, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    state = TrackState.at_rest(away, frame.captured_ns)
+    tracked, after = a.line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+    assert tracked.verdict.reasons == (Reason.OUT_OF_VIEW,)
+    assert after.n_lost == 1
+    assessed = a.line.assess(frame.left, frame.right, away, GOAL)
+    assert assessed.verdict.reasons == (Reason.OUT_OF_VIEW,)
+    found = a.line.register(frame.left, frame.right, Prior({"femur": away}), GOAL)
+    assert [f.verdict.status for f in found] == [Status.LOST]
+
+
+def test_the_first_registration_finds_the_bone_from_the_rough_prior() -> None:
+    a = room()
+    frame, told = a.frames[0], []
+    found = a.line.register(frame.left, frame.right, a.prior, GOAL, told.append)
+    assert a.error_mm(a.prior.left_from_bone["femur"], frame) > 5.0
+    assert a.error_mm(found[0].left_from_bone, frame) < 1.2
+    assert found[0].verdict.status is Status.OK
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+def test_a_registration_can_be_stopped() -> None:
+    a = room()
+
+    class StoppedError(Exception):
+        pass
+
+    def stop(share: float) -> None:
+        if share > 0.1:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        a.line.register(a.frames[0].left, a.frames[0].right, a.prior, GOAL, stop)
+
+
+def test_without_a_start_for_this_bone_there_is_no_candidate() -> None:
+    a = room()
+    assert a.line.register(a.frames[0].left, a.frames[0].right, Prior(), GOAL) == []
+
+
+def test_a_pose_is_assessed_where_it_stands() -> None:
+    a = room()
+    frame = a.frames[0]
+    truth = a.truth(frame)
+    right = a.line.assess(frame.left, frame.right, truth, GOAL)
+    assert right.verdict.status is not Status.LOST
+    np.testing.assert_allclose(right.left_from_bone.matrix, truth.matrix, atol=1e-9)
+    turned = truth.moved((0, 0, 0, 0, np.radians(15.0), 0), truth.apply(a.line.centre_mm))
+    wrong = a.line.assess(frame.left, frame.right, turned, GOAL)
+    assert wrong.verdict.status is Status.LOST
+
+
+def test_a_rig_that_was_not_accepted_never_gives_ok() -> None:
+    a = room()
+    rig = replace(a.rig, quality=RigQuality(False, ("too few pictures",)))
+    line = Line(rig, a.line.model.bone)
+    for _, tracked in follow(a, line)[0]:
+        assert tracked.verdict.status is not Status.OK
+        assert Reason.RIG_NOT_ACCEPTED in tracked.verdict.reasons
+
+
+def test_the_covariance_turns_with_the_camera_frame() -> None:
+    """Handed out in the left camera before rectification, which is a pure rotation."""
+    a = room()
+    frame = a.frames[0]
+    line, truth = a.line, a.truth(frame)
+    estimate = line.assess(frame.left, frame.right, truth, GOAL).estimate
+    rectified_from_left = line._geometry.rectified_from_left
+    measured = line._measure(
+        frame.left, frame.right, rectified_from_left @ truth, line.settings.tracking
+    )
+    inside = estimate_at(
+        measured.cloud, line.model, rectified_from_left @ truth, settings=line._near,
+        stride_px=measured.stride_px,
+    )  # fmt: skip
+    turn = np.kron(np.eye(2), rectified_from_left.rotation)
+    np.testing.assert_allclose(
+        turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15
+    )
+    assert np.abs(estimate.covariance - inside.covariance).max() > 1e-6

@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.tracking import TrackState
+from navapp.tracking.motion import twist_between
+from navapp.values import PoseEstimate, StageTimings, Status, TrackedFrame, Verdict
+
+CENTRE = np.array([3.0, -20.0, 15.0])
+START = RigidTransform.from_parts(
+    "left", "femur", rotation_from_vector((0.4, -0.2, 0.1)), (10.0, 5.0, 450.0)
+)
+PERIOD_NS = 66_000_000
+
+
+def frame(pose: RigidTransform | None, status: Status = Status.OK) -> TrackedFrame:
+    estimate = None
+    if pose is not None:
+        estimate = PoseEstimate(pose, np.eye(6), 500, 1.0, 0.2, 0.2, 3, True)
+    return TrackedFrame("femur", estimate, Verdict(status), StageTimings())
+
+
+def moved(pose: RigidTransform, twist) -> RigidTransform:
+    return pose.moved(twist, pose.apply(CENTRE))
+
+
+STEP = np.array([1.5, -0.5, 0.8, 0.01, -0.02, 0.005])
+
+
+def test_a_bone_at_rest_is_expected_where_it_is() -> None:
+    state = TrackState.at_rest(START, 1000)
+    np.testing.assert_array_equal(state.predicted(1000 + PERIOD_NS, CENTRE).matrix, START.matrix)
+
+
+def test_a_steady_motion_goes_on_damped() -> None:
+    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    predicted = state.predicted(2 * PERIOD_NS, CENTRE)
+    expected = moved(moved(START, STEP), 0.7 * STEP)
+    np.testing.assert_allclose(predicted.matrix, expected.matrix, atol=1e-9)
+    np.testing.assert_allclose(state.velocity * PERIOD_NS / 1e9, STEP, atol=1e-9)
+
+
+def test_half_the_time_is_half_the_motion() -> None:
+    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    half = state.predicted(PERIOD_NS + PERIOD_NS // 2, CENTRE)
+    expected = moved(moved(START, STEP), 0.35 * STEP)
+    np.testing.assert_allclose(half.matrix, expected.matrix, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "lost", [frame(None, Status.LOST), frame(moved(START, 9 * STEP), Status.LOST)]
+)
+def test_a_loss_keeps_the_pose_and_forgets_the_velocity(lost: TrackedFrame) -> None:
+    moving = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    state = moving.updated(lost, 2 * PERIOD_NS, CENTRE).updated(lost, 3 * PERIOD_NS, CENTRE)
+    assert state.n_lost == 2
+    assert state.left_from_bone is moving.left_from_bone
+    assert not state.velocity.any()
+
+
+def test_the_first_pose_after_a_loss_gives_no_velocity() -> None:
+    state = TrackState.at_rest(START, 0).updated(frame(None, Status.LOST), PERIOD_NS, CENTRE)
+    state = state.updated(frame(moved(START, STEP)), 2 * PERIOD_NS, CENTRE)
+    assert state.n_lost == 0
+    assert not state.velocity.any()
+    assert state.captured_ns == 2 * PERIOD_NS
+
+
+@pytest.mark.parametrize("elapsed_ns", [0, -PERIOD_NS, 500_000_000])
+def test_a_gap_that_is_too_long_or_none_gives_no_velocity(elapsed_ns: int) -> None:
+    state = TrackState.at_rest(START, 10**9)
+    state = state.updated(frame(moved(START, STEP)), 10**9 + elapsed_ns, CENTRE)
+    assert not state.velocity.any()
+
+
+def test_an_old_velocity_says_nothing_after_a_long_silence() -> None:
+    """A camera that was away for seconds: the bone is looked for where it was last seen."""
+    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    predicted = state.predicted(PERIOD_NS + 3_000_000_000, CENTRE)
+    np.testing.assert_array_equal(predicted.matrix, state.left_from_bone.matrix)
+
+
+def test_rotations_do_not_drift_over_a_thousand_updates() -> None:
+    state = TrackState.at_rest(START, 0)
+    for number in range(1, 1001):
+        pose = state.predicted(number * PERIOD_NS, CENTRE)
+        nudge = STEP * np.sin(number / 7.0)
+        state = state.updated(frame(moved(pose, nudge)), number * PERIOD_NS, CENTRE)
+    rotation = state.left_from_bone.rotation
+    np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-11)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_the_twist_between_two_poses_moves_one_to_the_other() -> None:
+    other = moved(START, 20.0 * STEP)
+    twist = twist_between(START, other, CENTRE)
+    np.testing.assert_allclose(moved(START, twist).matrix, other.matrix, atol=1e-9)
