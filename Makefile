@@ -46,6 +46,9 @@ endif
 	@$(BIN)/navapp --quiet run --headless --frames 8 || true
 	@rm -f $(VENV)/.stamp-* && touch $@
 
+bench: setup    ## accuracy on recorded operations (data in NAVAPP_DATA)
+	@$(BIN)/python -m tests.bench.recorded_accuracy
+
 system-deps:    ## Debian packages for everything beyond the simulated session
 	apt-get update -qq
 	apt-get install -y --no-install-recommends $(SYSTEM_DEPS)

@@ -1,7 +1,9 @@
 """A stereo camera that hands out recorded frames."""
 
 import itertools
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -21,6 +23,38 @@ from navapp.errors import (
 Order = Literal["forward", "pingpong"]
 
 
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """How a recording is walked through.
+
+    Attributes:
+        order: `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.
+        n_frames: at most so many.
+        start: frames with a smaller number are left out.
+        rate_hz: where the source has neither times nor a rate.
+        is_side_by_side: each picture of the one video holds both eyes.
+
+    Raises:
+        UsageError: settings that mean nothing.
+    """
+
+    order: Order = "forward"
+    n_frames: int | None = None
+    start: int = 0
+    rate_hz: float = 15.0
+    is_side_by_side: bool = False
+
+    def __post_init__(self) -> None:
+        if self.order not in get_args(Order):
+            raise UsageError(f"unknown order {self.order!r}", remedy="use forward or pingpong")
+        if self.n_frames is not None and self.n_frames < 1:
+            raise UsageError(
+                f"{self.n_frames} frames cannot be replayed", remedy="ask for at least 1"
+            )
+        if not (math.isfinite(self.rate_hz) and self.rate_hz > 0.0):
+            raise UsageError(f"a rate of {self.rate_hz:g} Hz is none", remedy="use a positive rate")
+
+
 class ReplayCamera:
     """Steps through a folder of pairs, a session folder or videos; moves the clock along.
 
@@ -33,43 +67,22 @@ class ReplayCamera:
         self,
         source: str | Path,
         clock: Clock,
+        settings: ReplaySettings = ReplaySettings(),
         *,
-        order: Order = "forward",
-        n_frames: int | None = None,
-        start: int = 0,
-        rate_hz: float = 15.0,
         rig_id: str = "",
-        split_side_by_side: bool = False,
     ) -> None:
         """Set up; nothing is read before `open`.
 
         Args:
             source: folder, two videos `LEFT,RIGHT`, or one video to be split.
             clock: moved to each capture time.
-            order: `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.
-            n_frames: at most so many.
-            start: frames with a smaller number are left out.
-            rate_hz: where the source has neither times nor a rate.
+            settings: how it is walked through.
             rig_id: of the rig that took the pictures.
-            split_side_by_side: each picture of the one video holds both eyes.
-
-        Raises:
-            UsageError: settings that mean nothing.
         """
-        if order not in get_args(Order):
-            raise UsageError(f"unknown order {order!r}", remedy="use forward or pingpong")
-        if n_frames is not None and n_frames < 1:
-            raise UsageError(f"{n_frames} frames cannot be replayed", remedy="ask for at least 1")
-        if not rate_hz > 0.0:
-            raise UsageError(f"a rate of {rate_hz:g} Hz is none", remedy="use a positive rate")
         self._source_name = str(source)
         self._clock = clock
-        self._order = order
-        self._n_frames = n_frames
-        self._start = start
-        self._default_rate_hz = rate_hz
+        self._settings = settings
         self._rig_id = rig_id
-        self._splits = split_side_by_side
         self._source: RecordedSource | None = None
         self._places: Iterator[int] = iter(())
         self._size = (0, 0)
@@ -102,27 +115,16 @@ class ReplayCamera:
         """
         if self._source is not None:
             return
-        source = open_source(self._source_name, self._splits)
+        source = open_source(self._source_name, self._settings.is_side_by_side)
         try:
-            places = [place for place, n in enumerate(source.numbers) if n >= self._start]
-            if not places:
-                raise SequenceError(
-                    f"{self._source_name} ends at number {source.numbers[-1]}, before the "
-                    f"start {self._start}",
-                    subject=self._source_name,
-                    remedy="start earlier",
-                )
+            places = self._places_of(source)
             left, _ = self._loaded(source, places[0])
         except BaseException:
             source.close()
             raise
         self._size = (left.shape[1], left.shape[0])
-        whole = len(places) if self._order == "forward" else 2 * len(places) - 1
-        if self._n_frames is not None:
-            is_endless = self._order == "pingpong"
-            whole = self._n_frames if is_endless else min(whole, self._n_frames)
-        self._length = whole
-        self._places = itertools.islice(_walk(places, self._order), whole)
+        self._length = self._length_of(len(places))
+        self._places = itertools.islice(_walk(places, self._settings.order), self._length)
         self._last, self._meter = None, FrameMeter()
         self._source = source
 
@@ -181,6 +183,26 @@ class ReplayCamera:
             self._source.close()
             self._source = None
 
+    def _places_of(self, source: RecordedSource) -> list[int]:
+        """Where the frames from the start on are."""
+        start = self._settings.start
+        places = [place for place, number in enumerate(source.numbers) if number >= start]
+        if not places:
+            raise SequenceError(
+                f"{self._source_name} ends at number {source.numbers[-1]}, before the "
+                f"start {start}",
+                subject=self._source_name,
+                remedy="start earlier",
+            )
+        return places
+
+    def _length_of(self, n_places: int) -> int:
+        """How many frames will be handed out."""
+        n_frames = self._settings.n_frames
+        if self._settings.order == "pingpong":
+            return 2 * n_places - 1 if n_frames is None else n_frames
+        return n_places if n_frames is None else min(n_places, n_frames)
+
     def _loaded(self, source: RecordedSource, place: int) -> tuple[Image, Image]:
         left, right = source.load(place)
         if left.shape != right.shape:
@@ -194,7 +216,7 @@ class ReplayCamera:
 
     def _times(self, source: RecordedSource, place: int) -> tuple[int, int]:
         """Capture time and skew in ns of the pair that is read next."""
-        period_s = 1.0 / (source.rate_hz or self._default_rate_hz)
+        period_s = 1.0 / (source.rate_hz or self._settings.rate_hz)
         if source.times is None:
             n_before = 0 if self._last is None else self._last.sequence + 1
             return round(n_before * period_s * 1e9), 0

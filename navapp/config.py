@@ -8,16 +8,22 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from navapp.errors import ConfigurationError
 
 FILE_NAME = "navapp.toml"
 
 Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 def _rising(values: tuple[float, float]) -> tuple[float, float]:
@@ -38,10 +44,31 @@ class Section(BaseModel):
     )
 
 
+class FaultSection(Section):
+    """One scripted fault of the simulated camera; seconds since it was opened first."""
+
+    kind: Literal[
+        "unplug", "freeze", "drop", "delay", "blackout_left", "blackout_right", "wrong_serial"
+    ]
+    """What goes wrong."""
+    start_s: Annotated[float, Field(ge=0.0)]
+    """When it begins."""
+    duration_s: Annotated[float, Field(gt=0.0, allow_inf_nan=True)]
+    """How long it lasts; inf: for good."""
+    delay_s: Annotated[float, Field(ge=0.0)] = 0.3
+    """Of a delay: how much later frames come."""
+
+    @model_validator(mode="after")
+    def _has_its_own_keys(self) -> Self:
+        if "delay_s" in self.model_fields_set and self.kind != "delay":
+            raise ValueError(f"delay_s belongs to a delay, not to {self.kind}")
+        return self
+
+
 class SimulationSection(Section):
     """The simulated patient and rig."""
 
-    seed: int = 1
+    seed: Annotated[int, Field(ge=0)] = 1
     """Of the anatomy, the textures, the placement and the motion."""
     side: Literal["left", "right"] = "right"
     """Of the knee."""
@@ -49,7 +76,7 @@ class SimulationSection(Section):
     """Of the patient."""
     age_group: Literal["young", "middle", "old"] = "middle"
     """Of the patient."""
-    cartilage_mm: Annotated[float, Field(ge=0.0, le=3.0)] = 0.0
+    cartilage_mm: Annotated[float, Field(ge=0.0, le=2.6)] = 0.0
     """Mean thickness of the cartilage that the camera sees and the plan does not; 0: bare bone."""
     motion: Literal["still", "breathing", "patient", "jump"] = "breathing"
     """Of the leg."""
@@ -63,8 +90,8 @@ class SimulationSection(Section):
     """The right camera exposes later by this."""
     grey: bool = False
     """Grey pictures, like those of an OAK camera."""
-    faults: tuple[dict[str, Any], ...] = ()
-    """Scripted faults: tables with kind, start_s, duration_s."""
+    faults: tuple[FaultSection, ...] = ()
+    """Scripted faults: tables with kind, start_s, duration_s and, of a delay, delay_s."""
 
 
 class CameraSection(BaseModel):
@@ -80,7 +107,7 @@ class CameraSection(BaseModel):
     )
 
     backend: str = "simulated"
-    """simulated, replay, or the name of an installed device."""
+    """simulated, or the name of an installed device."""
     rig: str | None = None
     """Rig file (OpenCV YAML); simulated cameras bring their own."""
     rate_hz: Positive = 15.0
@@ -263,11 +290,22 @@ def _unknown_key(path: list[str], name: str) -> ConfigurationError:
 def _known_keys(path: list[str]) -> list[str]:
     model: type[BaseModel] = Configuration
     for part in path:
-        annotation = model.model_fields[part].annotation if part in model.model_fields else None
-        if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+        if part.isdigit():  # the place in a list of tables
+            continue
+        field = model.model_fields.get(part)
+        inner = None if field is None else _model_in(field.annotation)
+        if inner is None:
             return []
-        model = annotation
+        model = inner
     return list(model.model_fields)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model that a key holds, itself or in a list."""
+    for kind in (annotation, *get_args(annotation)):
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            return kind
+    return None
 
 
 def as_toml(configuration: Configuration, with_comments: bool) -> str:
@@ -304,6 +342,8 @@ def _literal(value: Any) -> str:
     if isinstance(value, str):
         # TOML's escapes are JSON's, except that it wants one for DEL, too.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
+    if isinstance(value, BaseModel):
+        value = value.model_dump(exclude_unset=True)
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(k)} = {_literal(v)}" for k, v in value.items()) + " }"
     if isinstance(value, list | tuple):

@@ -1,7 +1,7 @@
 """Composition root: the only place that turns a configuration into opened devices."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -10,14 +10,14 @@ from drivers.clock import Clock, ManualClock, SystemClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet, StereoCamera
 from drivers.no_projector import NoProjector
-from drivers.replay_camera import ReplayCamera
-from navapp.config import Configuration
+from drivers.replay_camera import ReplayCamera, ReplaySettings
+from navapp.config import Configuration, FaultSection, SimulationSection
 from navapp.errors import ConfigurationError, DeviceError, RigError, WrongDevice
 from navapp.geometry import RigidTransform, StereoRig, TriangleMesh, read_rig
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
-from sim_devices.faults import fault_script
+from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
@@ -52,18 +52,6 @@ class Simulation:
     set_stage: Callable[[str], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A recorded source to be replayed."""
-
-    source: str
-    order: Literal["forward", "pingpong"] = "forward"
-    n_frames: int | None = None
-    start: int = 0
-    rate_hz: float = 15.0
-    is_side_by_side: bool = False
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenedDevices:
     """Opened devices with the rig that took the pictures."""
@@ -90,7 +78,7 @@ def open_live(configuration: Configuration, *, is_headless: bool) -> OpenedDevic
 
 
 def open_recording(
-    recording: Recording, rig: StereoRig, configuration: Configuration
+    source: str, settings: ReplaySettings, rig: StereoRig, configuration: Configuration
 ) -> OpenedDevices:
     """Open a recorded source as the camera of a stepped session.
 
@@ -98,26 +86,12 @@ def open_recording(
         SequenceError: the source; RigError: pictures of another size than the rig's.
     """
     clock = ManualClock()
-    camera = ReplayCamera(
-        recording.source,
-        clock,
-        order=recording.order,
-        n_frames=recording.n_frames,
-        start=recording.start,
-        rate_hz=recording.rate_hz,
-        rig_id=rig.rig_id,
-        split_side_by_side=recording.is_side_by_side,
-    )
-    camera.open()
-    try:
-        _check_size(camera, rig)
-    except RigError:
-        camera.close()
-        raise
+    camera = ReplayCamera(source, clock, settings, rig_id=rig.rig_id)
+    _open_fitting(camera, rig)
     return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, _no_reopening)
 
 
-def configured_rig(configuration: Configuration) -> StereoRig:
+def _configured_rig(configuration: Configuration) -> StereoRig:
     """The rig file that the configuration names.
 
     Raises:
@@ -132,17 +106,7 @@ def configured_rig(configuration: Configuration) -> StereoRig:
 
 def _open_simulated(configuration: Configuration, *, is_headless: bool) -> OpenedDevices:
     settings = configuration.camera.simulated
-    world = World(
-        Scenario(
-            seed=settings.seed,
-            side=settings.side,
-            sex=settings.sex,
-            age_group=settings.age_group,
-            cartilage_mm=settings.cartilage_mm,
-            motion=settings.motion,
-            instrument=settings.instrument,
-        )
-    )
+    world = World(_scenario(settings))
     is_stepped = is_headless if settings.stepped is None else settings.stepped
     clock: Clock = ManualClock() if is_stepped else SystemClock()
     camera = SimulatedCamera(
@@ -152,31 +116,33 @@ def _open_simulated(configuration: Configuration, *, is_headless: bool) -> Opene
         rate_hz=configuration.camera.rate_hz,
         scale=settings.scale,
         sensor=SensorModel(seed=settings.seed, is_grey=settings.grey),
-        faults=fault_script(settings.faults),
+        faults=FaultScript(tuple(_fault(section) for section in settings.faults)),
         skew_ns=round(settings.skew_ms * 1e6),
     )
-    camera.open()
-    rig = replace(
-        world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale), name="sim:rig"
-    )
     if configuration.camera.rig is not None:
-        rig = configured_rig(configuration)
-        _check_size(camera, rig)
-    serials = camera.info.serials
-
-    def reopen() -> StereoCamera:
-        camera.open()
-        if camera.info.serials != serials:
-            found = camera.info.serials
-            camera.close()
-            raise WrongDevice(
-                f"camera {camera.info.name} has serial numbers {found}, the rig {serials}",
-                remedy="connect the cameras that the rig was calibrated with",
-            )
-        return camera
-
+        rig = _configured_rig(configuration)
+    else:
+        rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
+    _open_fitting(camera, rig)
+    reopen = _reopener(camera, camera.info.serials)
     devices = _device_set(configuration, camera, clock, rig)
     return OpenedDevices(devices, rig, reopen, _simulation(world, camera))
+
+
+def _scenario(settings: SimulationSection) -> Scenario:
+    return Scenario(
+        seed=settings.seed,
+        side=settings.side,
+        sex=settings.sex,
+        age_group=settings.age_group,
+        cartilage_mm=settings.cartilage_mm,
+        motion=settings.motion,
+        instrument=settings.instrument,
+    )
+
+
+def _fault(section: FaultSection) -> Fault:
+    return Fault(FaultKind(section.kind), section.start_s, section.duration_s, section.delay_s)
 
 
 def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
@@ -211,20 +177,15 @@ def _open_third_party(configuration: Configuration) -> OpenedDevices:
             subject="camera.backend",
             remedy="use simulated, or install the package that provides it",
         )
-    rig = configured_rig(configuration)
+    rig = _configured_rig(configuration)
     clock = SystemClock()
     settings = (configuration.camera.model_extra or {}).get(name, {})
     try:
         camera: StereoCamera = found[0].load()(settings, clock)
     except (ImportError, AttributeError, TypeError) as error:
         raise DeviceError(f"camera backend '{name}' cannot be loaded: {error}") from error
-    camera.open()
-    _check_size(camera, rig)
-
-    def reopen() -> StereoCamera:
-        camera.open()
-        return camera
-
+    _open_fitting(camera, rig)
+    reopen = _reopener(camera, camera.info.serials)
     return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
 
 
@@ -239,15 +200,36 @@ def _device_set(
     return DeviceSet(camera, display, projector, mirror, clock)
 
 
-def _check_size(camera: StereoCamera, rig: StereoRig) -> None:
+def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
+    """Open a camera; it is closed again when its pictures do not fit the rig."""
+    camera.open()
     info = camera.info
     if (info.width, info.height) != (rig.width, rig.height):
+        camera.close()
         raise RigError(
             f"the pictures of {info.name} are {info.width}x{info.height}, "
             f"the rig was calibrated at {rig.width}x{rig.height}",
             subject=info.name,
             remedy="use the rig file that belongs to these pictures",
         )
+
+
+def _reopener(camera: StereoCamera, serials: tuple[str, str]) -> Callable[[], StereoCamera]:
+    """Opens the camera again, and refuses another one that was put in its place."""
+
+    def reopen() -> StereoCamera:
+        camera.open()
+        found = camera.info.serials
+        if found != serials:
+            camera.close()
+            raise WrongDevice(
+                f"camera {camera.info.name} has serial numbers {found}, the session's {serials}",
+                subject=camera.info.name,
+                remedy="connect the cameras that the session began with",
+            )
+        return camera
+
+    return reopen
 
 
 def _no_reopening() -> StereoCamera:

@@ -64,20 +64,28 @@ class SurfaceCloud:
         sigma_ray_mm: (N,) standard deviation along the ray through the point.
         pixels: (N, 2) int32 column and row in the rectified left view.
         origin: (N,) uint8 of `Origin`.
+        stride_px: distance of neighbouring points in the picture.
     """
 
     points_mm: FloatArray
     sigma_ray_mm: FloatArray
     pixels: NDArray[np.int32]
     origin: NDArray[np.uint8]
+    stride_px: int = 1
 
     def __len__(self) -> int:
         return len(self.points_mm)
 
     def selected(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> "SurfaceCloud":
-        """A part of the cloud."""
+        """A part of the cloud; points are taken to be spread evenly over it."""
+        n_kept = int(mask.sum()) if mask.dtype == np.bool_ else len(mask)
+        thinning = (len(self) / n_kept) ** 0.5 if n_kept else 1.0
         return SurfaceCloud(
-            self.points_mm[mask], self.sigma_ray_mm[mask], self.pixels[mask], self.origin[mask]
+            self.points_mm[mask],
+            self.sigma_ray_mm[mask],
+            self.pixels[mask],
+            self.origin[mask],
+            max(1, round(self.stride_px * thinning)),
         )
 
 
@@ -174,11 +182,12 @@ class PoseEstimate:
     """A bone's pose and how well the measurement fixes it.
 
     Attributes:
-        left_from_bone: rigid transform, target `left`, source the bone's name.
+        camera_from_bone: source the bone's name; target `left_rect` inside the line, `left` (before
+            rectification) when it leaves it.
         covariance: (6, 6) of the twist (translation mm first, rotation rad second), applied from
             the left about the mean of the model's vertices.
         n_points: points that entered.
-        inlier_share: their weighted share that the robust weight kept.
+        inlier_share: their share within three sigma of the surface.
         rms_mm: weighted rms of the point-to-plane residual of those.
         expected_rms_mm: what the measurement's own sigma predicts for it.
         iterations: of the solver.
@@ -186,7 +195,7 @@ class PoseEstimate:
         reasons: what the solver itself has against the result.
     """
 
-    left_from_bone: RigidTransform
+    camera_from_bone: RigidTransform
     covariance: FloatArray
     n_points: int
     inlier_share: float
@@ -231,20 +240,21 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
-class StageTimings:
-    """How long the parts of one frame took, ms of real time."""
+class LineTimings:
+    """How long the parts of one frame took, in real time."""
 
-    rectify: float = 0.0
-    stereo: float = 0.0
-    fill: float = 0.0
-    estimate: float = 0.0
-    judge: float = 0.0
-    overlay: float = 0.0
+    rectify_ms: float = 0.0
+    stereo_ms: float = 0.0
+    fill_ms: float = 0.0
+    estimate_ms: float = 0.0
+    judge_ms: float = 0.0
+    overlay_ms: float = 0.0
 
     @property
-    def total(self) -> float:
+    def total_ms(self) -> float:
         """Sum."""
-        return self.rectify + self.stereo + self.fill + self.estimate + self.judge + self.overlay
+        measured_ms = self.rectify_ms + self.stereo_ms + self.fill_ms
+        return measured_ms + self.estimate_ms + self.judge_ms + self.overlay_ms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -254,12 +264,12 @@ class TrackedFrame:
     bone: str
     estimate: PoseEstimate | None
     verdict: Verdict
-    timings: StageTimings
+    timings: LineTimings
 
     @property
     def left_from_bone(self) -> RigidTransform | None:
         """The pose, when there is one."""
-        return None if self.estimate is None else self.estimate.left_from_bone
+        return None if self.estimate is None else self.estimate.camera_from_bone
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -364,7 +374,7 @@ def predicted_tre_mm(
     """
     if len(targets_mm) == 0:
         raise ValueError("no targets to predict an error for")
-    rotation = estimate.left_from_bone.rotation
+    rotation = estimate.camera_from_bone.rotation
     bounds = []
     for offset in (targets_mm - centre_mm) @ rotation.T:
         jacobian = np.hstack([np.eye(3), -skew(offset)])

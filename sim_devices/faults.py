@@ -1,12 +1,8 @@
 """Faults of a simulated camera, written down as data."""
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
-from typing import Any
-
-from navapp.errors import ConfigurationError
 
 
 class FaultKind(Enum):
@@ -95,47 +91,3 @@ class FaultScript:
         ]
         first_ns = min(moments_ns, default=None)
         return first_ns if first_ns is not None and first_ns <= until_ns else None
-
-
-def fault_script(entries: Iterable[Mapping[str, Any]]) -> FaultScript:
-    """A script from a list of tables, as a configuration file holds them.
-
-    Args:
-        entries: each with `kind`, `start_s`, `duration_s`, and `delay_s` for a delay.
-
-    Raises:
-        ConfigurationError: an unknown kind or key, a missing or impossible value.
-    """
-    return FaultScript(tuple(_fault(entry, number) for number, entry in enumerate(entries, 1)))
-
-
-def _fault(entry: Mapping[str, Any], number: int) -> Fault:
-    """One entry; `number` counts from 1, for messages."""
-    kinds = {kind.value: kind for kind in FaultKind}
-    kind = kinds.get(str(entry.get("kind")))
-    if kind is None:
-        raise _refusal(number, f"has the kind {entry.get('kind')!r}", f"use {', '.join(kinds)}")
-    known = [field.name for field in fields(Fault)]
-    if kind is not FaultKind.DELAY:
-        known.remove("delay_s")
-    for key in entry:
-        if key not in known:
-            raise _refusal(
-                number, f"({kind.value}) has the unknown key {key!r}", f"use {', '.join(known)}"
-            )
-    times_s: dict[str, float] = {}
-    for key in known[1:]:
-        value = entry.get(key)
-        if value is None and key == "delay_s":
-            continue
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise _refusal(number, f"({kind.value}) needs the number {key}", "give it in seconds")
-        times_s[key] = float(value)
-    try:
-        return Fault(kind, **times_s)
-    except ValueError as error:
-        raise _refusal(number, f"({kind.value}) is impossible", str(error)) from None
-
-
-def _refusal(number: int, problem: str, remedy: str) -> ConfigurationError:
-    return ConfigurationError(f"fault {number} {problem}", subject="faults", remedy=remedy)

@@ -31,7 +31,7 @@ def default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> Stere
         _camera(1398.3, 1398.1, 645.9, 355.7, (-0.098, 0.055, -0.00027, 0.00038, 0.015)),
         _right_from_left(),
         ("SIM-L", "SIM-R"),
-        name="simulated",
+        name="sim:rig",
     )
     return rig if factor == 1.0 else rig.scaled(factor)
 

@@ -1,11 +1,11 @@
 """What a simulated operation looks like."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
-Side = Literal["left", "right"]
-Sex = Literal["female", "male"]
-AgeGroup = Literal["young", "middle", "old"]
+from navapp.errors import UsageError
+from sim_devices.anatomy import AgeGroup, KneeSpec, Sex, Side
+
 MotionKind = Literal["still", "breathing", "patient", "jump"]
 InstrumentKind = Literal["none", "sweep"]
 
@@ -26,7 +26,7 @@ class Scenario:
         blood: 0 is dry, 1 is very bloody.
 
     Raises:
-        ValueError: a value out of its bounds.
+        UsageError: a value out of its bounds, or a knee, motion or instrument that there is not.
     """
 
     seed: int = 1
@@ -41,15 +41,21 @@ class Scenario:
     blood: float = 0.3
 
     def __post_init__(self) -> None:
-        if self.side not in ("left", "right"):
-            raise ValueError(f"the side of a knee is left or right, not {self.side!r}")
-        if self.motion not in ("still", "breathing", "patient", "jump"):
-            raise ValueError(f"there is no motion {self.motion!r}")
-        if self.instrument not in ("none", "sweep"):
-            raise ValueError(f"there is no instrument {self.instrument!r}")
-        if not 0.0 <= self.cartilage_mm <= 2.6:
-            raise ValueError("cartilage_mm must be 0 to 2.6")
-        if not 0.0 <= self.contrast <= 0.2:
-            raise ValueError("contrast must be 0 to 0.2")
-        if not 0.0 <= self.blood <= 1.0:
-            raise ValueError("blood must be 0 to 1")
+        for name, highest in (("cartilage_mm", 2.6), ("contrast", 0.2), ("blood", 1.0)):
+            value = getattr(self, name)
+            if not 0.0 <= value <= highest:
+                raise UsageError(f"{name} is {value:g}", subject=name, remedy=f"use 0 to {highest}")
+        for name, kind in (("motion", MotionKind), ("instrument", InstrumentKind)):
+            value = getattr(self, name)
+            if value not in get_args(kind):
+                known = ", ".join(get_args(kind))
+                raise UsageError(
+                    f"there is no {name} {value!r}", subject=name, remedy=f"use one of {known}"
+                )
+        # The knee's own values are refused where a knee is specified.
+        _ = self.knee
+
+    @property
+    def knee(self) -> KneeSpec:
+        """The patient's knee."""
+        return KneeSpec(self.seed, self.side, self.sex, self.age_group)

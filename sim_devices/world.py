@@ -11,7 +11,7 @@ from navapp.errors import UsageError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
-from sim_devices.anatomy import KneeAnatomy, KneeSpec, make_knee, mirrored
+from sim_devices.anatomy import KneeAnatomy, make_knee, mirrored
 from sim_devices.cartilage import cartilage_thickness_mm, with_cartilage, worn
 from sim_devices.layout import (
     flexed,
@@ -65,9 +65,7 @@ class World:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.rig: StereoRig = default_rig()
-        self.anatomy: KneeAnatomy = make_knee(
-            KneeSpec(scenario.seed, scenario.side, scenario.sex, scenario.age_group)
-        )
+        self.anatomy: KneeAnatomy = make_knee(scenario.knee)
         self._is_left = scenario.side == "left"
         right = {
             name: mirrored(mesh) if self._is_left else mesh for name, mesh in self._surfaces_mm()

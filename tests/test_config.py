@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 
 from navapp.config import FILE_NAME, Configuration, as_toml, find_file, load, parse
 from navapp.errors import ConfigurationError
+from sim_devices.faults import FaultKind
 
 # A value other than the default for every key that there is.
 CHANGED: dict[str, Any] = {
@@ -29,7 +30,10 @@ CHANGED: dict[str, Any] = {
             "stepped": True,
             "skew_ms": -3.5,
             "grey": True,
-            "faults": [{"kind": "freeze", "start_s": 1.5, "duration_s": 2}],
+            "faults": [
+                {"kind": "freeze", "start_s": 1.5, "duration_s": float("inf")},
+                {"kind": "delay", "start_s": 0, "duration_s": 2, "delay_s": 0.1},
+            ],
         },
     },
     "display": {"backend": "simulated", "valid_ms": 100.0},
@@ -128,7 +132,7 @@ def test_any_text_and_number_comes_back(text, positive, number, table):
         "camera": {
             "rig": text,
             "rate_hz": positive,
-            "simulated": {"skew_ms": number, "faults": [table]},
+            "simulated": {"skew_ms": number},
             "oak-d": {"key": text, **table},
         }
     }
@@ -232,7 +236,8 @@ def test_a_wrong_type_names_the_key(key, value):
         ("camera.depth_mm", [700.0, 300.0]),
         ("camera.depth_mm", [300.0, 300.0]),
         ("camera.simulated.cartilage_mm", -0.1),
-        ("camera.simulated.cartilage_mm", 3.1),
+        ("camera.simulated.cartilage_mm", 2.7),
+        ("camera.simulated.seed", -1),
         ("camera.simulated.scale", 0.0),
         ("camera.simulated.scale", 1.01),
         ("camera.simulated.skew_ms", float("nan")),
@@ -248,8 +253,46 @@ def test_a_value_out_of_bounds_names_the_key(key, value):
 
 @pytest.mark.parametrize("key", ["camera.simulated.cartilage_mm", "camera.simulated.scale"])
 def test_the_bounds_themselves_are_allowed(key):
-    value = {"cartilage_mm": 3.0, "scale": 1.0}[key.rsplit(".", 1)[1]]
+    value = {"cartilage_mm": 2.6, "scale": 1.0}[key.rsplit(".", 1)[1]]
     assert value_at(parse(nested(key, value), "x"), key) == value
+
+
+A_FAULT = {"kind": "drop", "start_s": 0.0, "duration_s": 1.0}
+
+
+def test_every_fault_of_the_simulated_camera_can_be_scripted():
+    for kind in FaultKind:
+        content = nested("camera.simulated.faults", [{**A_FAULT, "kind": kind.value}])
+        assert parse(content, "x").camera.simulated.faults[0].kind == kind.value
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"kind": "melt"}, "faults.1.kind: input should be 'unplug'"),
+        ({"start_s": -1.0}, "faults.1.start_s"),
+        ({"start_s": True}, "faults.1.start_s"),
+        ({"start_s": float("inf")}, "faults.1.start_s"),
+        ({"duration_s": 0.0}, "faults.1.duration_s"),
+        ({"duration_s": float("nan")}, "faults.1.duration_s"),
+        ({"duration_s": "1"}, "faults.1.duration_s"),
+        ({"delay_s": 0.1}, "faults.1: value error, delay_s belongs to a delay, not to drop"),
+        ({"kind": "delay", "delay_s": -0.1}, "faults.1.delay_s"),
+        ({"strt_s": 1.0}, "faults.1.strt_s': did you mean 'start_s'?"),
+    ],
+)
+def test_a_wrong_fault_is_refused_with_its_place(change, words):
+    faults = [A_FAULT, {**A_FAULT, **change}]
+    with pytest.raises(ConfigurationError) as caught:
+        parse(nested("camera.simulated.faults", faults), "x")
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("key", list(A_FAULT))
+def test_a_fault_needs_its_kind_and_times(key):
+    fault = {name: value for name, value in A_FAULT.items() if name != key}
+    with pytest.raises(ConfigurationError, match=rf"faults\.0\.{key}: field required"):
+        parse(nested("camera.simulated.faults", [fault]), "x")
 
 
 def test_whole_numbers_are_taken_for_lengths():

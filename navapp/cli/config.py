@@ -27,21 +27,24 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.geometry.ply import write_whole
 
     check_writable(options.json)
+    path: Path | None
     if options.what == "init":
-        target = Path(options.out or FILE_NAME)
-        if target.exists():
-            raise UsageError(f"{target} exists already", remedy="move it away, or choose --out")
-        check_writable(str(target))
-        write_whole(target, as_toml(Configuration(), True).encode("utf-8"))
-        diagnostics.say(f"wrote {target}")
-        path, configuration = target, Configuration()
-    else:
-        found = find_file(options.config)
-        configuration = load(found)
-        path = found or Path()
+        path, configuration = Path(options.out or FILE_NAME), Configuration()
+        if path.exists():
+            raise UsageError(f"{path} exists already", remedy="move it away, or choose --out")
+        check_writable(str(path))
+        write_whole(path, as_toml(configuration, True).encode("utf-8"))
         if options.json != "-":
-            source = str(found) if found else "defaults (no file found)"
+            diagnostics.say(f"wrote {path}")
+    else:
+        path = find_file(options.config)
+        configuration = load(path)
+        if options.json != "-":
+            source = "defaults (no file found)" if path is None else str(path)
             diagnostics.say(f"# from: {source}\n{as_toml(configuration, False)}".rstrip())
-    content = {"path": str(path) or None, "configuration": configuration.model_dump(mode="json")}
+    content = {
+        "path": None if path is None else str(path),
+        "configuration": configuration.model_dump(mode="json"),
+    }
     write_json(options.json, "config", content)
     return 0

@@ -19,7 +19,6 @@ class Diagnostics:
 
     is_verbose: bool = False
     is_quiet: bool = False
-    is_debugging: bool = False
 
     def say(self, text: str) -> None:
         """A result for people, on stdout."""
@@ -31,9 +30,14 @@ class Diagnostics:
         if not self.is_quiet:
             sys.stderr.write(f"navapp: warning: {text}\n")
 
+    def detail(self, text: str) -> None:
+        """What only who asked for more wants to know, on stderr."""
+        if self.is_verbose and not self.is_quiet:
+            sys.stderr.write(f"navapp: {text}\n")
+
     def progress(self, what: str, share: float) -> None:
-        """A bar on stderr, when that is a terminal."""
-        if self.is_quiet or not sys.stderr.isatty():
+        """A bar on stderr, when that is a terminal and details do not run through it."""
+        if self.is_quiet or self.is_verbose or not sys.stderr.isatty():
             return
         n = round(30 * min(max(share, 0.0), 1.0))
         end = "\n" if share >= 1.0 else ""

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+import os
 from collections.abc import Sequence
 
 from navapp import __version__
@@ -20,9 +21,10 @@ def run(arguments: Sequence[str]) -> int:
     except SystemExit as leaving:
         # argparse leaves with 0 for --help and 2 for wrong usage, as we do.
         return int(leaving.code or 0)
-    diagnostics = Diagnostics(
-        is_verbose=options.verbose, is_quiet=options.quiet, is_debugging=options.debug
-    )
+    if options.no_color:
+        # The screen's toolkit asks for it, as many programs do.
+        os.environ["NO_COLOR"] = "1"
+    diagnostics = Diagnostics(is_verbose=options.verbose, is_quiet=options.quiet)
     module = importlib.import_module(f"navapp.cli.{options.verb}")
     try:
         return int(module.run(options, diagnostics))
@@ -53,10 +55,10 @@ def _parser() -> argparse.ArgumentParser:
         epilog="example: navapp run        (the application on the simulated rig)",
     )
     parser.add_argument("--config", metavar="FILE", help="configuration file (TOML)")
-    parser.add_argument("--verbose", action="store_true", help="say more")
+    parser.add_argument("--verbose", action="store_true", help="say more: a line a frame")
     parser.add_argument("--quiet", action="store_true", help="say only errors")
     parser.add_argument("--debug", action="store_true", help="show tracebacks")
-    parser.add_argument("--no-color", action="store_true", help="no colours in the output")
+    parser.add_argument("--no-color", action="store_true", help="no colours on the screen")
     parser.add_argument("--version", action="version", version=f"navapp {__version__}")
     subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     for verb in _VERBS:

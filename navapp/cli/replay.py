@@ -1,22 +1,27 @@
 """`navapp replay`: the same line on a recorded sequence, as fast as it goes."""
 
 import argparse
-import time
+import itertools
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import InputError, ResultError, UsageError
+from navapp.cli.diagnostics import Diagnostics, check_writable
+from navapp.errors import InputError, UsageError
 
 if TYPE_CHECKING:
+    from drivers.replay_camera import ReplaySettings
     from navapp.cli.session_folder import RecordedSession
     from navapp.config import Configuration
+    from navapp.control.controller import SessionController
     from navapp.control.executors import Executor
     from navapp.control.operators import Operator
-    from navapp.control.results import FrameResult
+    from navapp.control.results import FrameListener, FrameResult
+    from navapp.devices import OpenedDevices
     from navapp.geometry.rig import StereoRig
+    from navapp.tracking.line import Method
     from navapp.values import Plan, Prior, StageSpec
 
 _EXAMPLE = """\
@@ -40,7 +45,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--rig", metavar="R", help="rig file (a session brings its own)")
     parser.add_argument("--prior", metavar="FILE", help="rough start pose (JSON)")
     parser.add_argument("--method", choices=("bimcc", "icp"), help="icp is the paper's baseline")
-    parser.add_argument("--bone", metavar="NAME", help="bone to follow (default femur)")
+    parser.add_argument(
+        "--bone", metavar="NAME", help="bone to follow (default: the first stage's)"
+    )
     parser.add_argument(
         "--order",
         choices=("forward", "pingpong", "each"),
@@ -66,30 +73,39 @@ class _Replay:
     plan: "Plan"
     prior: "Prior"
     stage: "StageSpec"
-    method: str
+    method: "Method"
     operator: "Operator"
     executor: "Executor"
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
-    from navapp.cli.run import check_accepted
+    from navapp.cli.headless import FrameLog, check_accepted, finish, follow
+    from navapp.cli.results import frame_to_json
     from navapp.config import find_file, load
+    from navapp.devices import open_recording
 
     _check(options)
     configuration = load(find_file(options.config))
+    settings = _settings(configuration, options)
     replay = _prepare(configuration, options)
     check_accepted(replay.rig, options.allow_unaccepted, diagnostics)
-    frames, seconds = _follow(replay, configuration, options, diagnostics)
-    _finish(frames, seconds, options, diagnostics)
-    return 0
+    opened = open_recording(options.sequence, settings, replay.rig, configuration)
+    log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
+    with ExitStack() as undo:
+        undo.callback(opened.devices.close)
+        listeners: list[FrameListener] = [log]
+        if options.overlay is not None:
+            listeners.append(_overlay_writer(options.overlay))
+        controller = _controller(replay, opened, configuration, listeners)
+        undo.callback(controller.close)
+        seconds = follow(controller, replay.operator, log)
+    frames = [frame_to_json(result, None) for result in log.results]
+    return finish(frames, seconds, options, diagnostics)
 
 
 def _check(options: argparse.Namespace) -> None:
-    if options.frames is not None and options.frames < 1:
-        raise UsageError("--frames must be at least 1")
-    if options.fps is not None and not options.fps > 0.0:
-        raise UsageError("--fps must be positive")
+    """Refuse what is known to be wrong before anything is read."""
     if options.order == "pingpong" and options.frames is None:
         raise UsageError("--order pingpong has no end", remedy="add --frames N")
     check_writable(options.json)
@@ -98,169 +114,114 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError(f"{overlay} is not a folder", remedy="choose another --overlay")
 
 
+def _settings(configuration: "Configuration", options: argparse.Namespace) -> "ReplaySettings":
+    """How the sequence is walked through."""
+    from drivers.replay_camera import ReplaySettings
+
+    return ReplaySettings(
+        # Whether every frame stands for itself is the operator's business, not the camera's.
+        order="pingpong" if options.order == "pingpong" else "forward",
+        n_frames=options.frames,
+        start=options.start,
+        rate_hz=configuration.camera.rate_hz if options.fps is None else options.fps,
+        is_side_by_side=options.split is not None,
+    )
+
+
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
-    """Everything but the pictures; what the command line says wins over the session's own."""
+    """Everything but the pictures: the command line's, else the session's, else configured."""
+    from navapp.cli.prior_files import read_prior
     from navapp.cli.session_folder import is_session, read_session
-    from navapp.cli.sessions import read_prior
-    from navapp.control.executors import InlineExecutor
-    from navapp.control.operators import ReplayOperator
     from navapp.control.stages import stage_by_name
-    from navapp.devices import configured_rig
     from navapp.geometry.rig import read_rig
     from navapp.preop import read_plan
     from navapp.values import Prior
 
     session = read_session(options.sequence) if is_session(options.sequence) else None
-    rig = read_rig(options.rig) if options.rig else None
-    plan_path = options.plan or configuration.plan.path
-    plan = read_plan(plan_path) if plan_path and not (session and not options.plan) else None
-    prior_path = options.prior or (None if session else configuration.plan.prior)
-    prior = read_prior(prior_path) if prior_path else None
-    if session is not None:
-        rig, plan = rig or session.rig, plan or session.plan
-    if plan is None:
+    rig_path = options.rig or (session and session.rig_path) or configuration.camera.rig
+    plan_path = options.plan or (session and session.plan_path) or configuration.plan.path
+    prior_path = options.prior or (session and session.prior_path) or configuration.plan.prior
+    method = options.method or (session and session.method) or configuration.tracking.method
+    stage = (session and session.first_stage) or configuration.stages.first
+    if plan_path is None:
         raise UsageError("no plan is given", remedy="give --plan (make one with `navapp plan`)")
-    rig = rig or configured_rig(configuration)
-    bone = options.bone or "femur"
-    if options.bone is not None and bone not in plan.bones:
-        raise UsageError(f"the plan has no bone '{bone}'", remedy=f"it has {', '.join(plan.bones)}")
-    if session is not None and not _changes_operation(options):
-        return _as_recorded(session, rig, plan, prior or session.prior, options)
-    if prior is None and session is not None:
-        prior = session.prior
+    if rig_path is None:
+        raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
+    plan = read_plan(plan_path)
+    operator, executor = _operation(session, options)
     return _Replay(
-        rig,
+        read_rig(rig_path),
         plan,
-        prior or Prior(),
-        _stage_of(bone) or stage_by_name(configuration.stages.first),
-        options.method or configuration.tracking.method,
-        ReplayOperator(each_frame=options.order == "each"),
-        InlineExecutor(),
+        Prior() if prior_path is None else read_prior(prior_path),
+        stage_by_name(stage) if options.bone is None else _stage_of(options.bone, plan),
+        method,
+        operator,
+        executor,
     )
 
 
-def _changes_operation(options: argparse.Namespace) -> bool:
-    """Whether the recorded operator's commands cannot be given again."""
-    return bool(
-        options.prior or options.bone or options.method or options.start
-        or options.order != "forward"
-    )  # fmt: skip
+def _operation(
+    session: "RecordedSession | None", options: argparse.Namespace
+) -> "tuple[Operator, Executor]":
+    """The recorded operator, so that the same poses come out, or one that only follows."""
+    from navapp.control.executors import InlineExecutor, RecordedExecutor
+    from navapp.control.operators import RecordedOperator, ReplayOperator
+
+    is_changed = bool(options.prior or options.bone or options.method or options.start)
+    if session is None or is_changed or options.order != "forward":
+        return ReplayOperator(each_frame=options.order == "each"), InlineExecutor()
+    events = session.events
+    return RecordedOperator(events.commands), RecordedExecutor(events.take_overs)
 
 
-def _as_recorded(
-    session: "RecordedSession",
-    rig: "StereoRig",
-    plan: "Plan",
-    prior: "Prior",
-    options: argparse.Namespace,
-) -> _Replay:
-    """With the recorded operator: the same poses come out."""
-    from navapp.control.executors import RecordedExecutor
-    from navapp.control.operators import RecordedOperator
-    from navapp.control.stages import stage_by_name
-
-    return _Replay(
-        rig,
-        plan,
-        prior,
-        stage_by_name(session.first_stage),
-        session.method,
-        RecordedOperator(session.events.commands),
-        RecordedExecutor(session.events.take_overs),
-    )
-
-
-def _stage_of(bone: str) -> "StageSpec | None":
+def _stage_of(bone: str, plan: "Plan") -> "StageSpec":
     """The first stage that follows a bone."""
     from navapp.control.stages import STAGES
 
-    return next((stage for stage in STAGES if stage.bone == bone), None)
+    if bone not in plan.bones:
+        raise UsageError(f"the plan has no bone '{bone}'", remedy=f"it has {', '.join(plan.bones)}")
+    for stage in STAGES:
+        if stage.bone == bone:
+            return stage
+    known = ", ".join(sorted({stage.bone for stage in STAGES}))
+    raise UsageError(f"no stage follows the bone '{bone}'", remedy=f"use one of {known}")
 
 
-def _follow(
+def _controller(
     replay: _Replay,
+    opened: "OpenedDevices",
     configuration: "Configuration",
-    options: argparse.Namespace,
-    diagnostics: Diagnostics,
-) -> tuple[list[dict[str, Any]], float]:
-    """Run the line over the sequence."""
-    from navapp.cli.sessions import frame_to_json
-    from navapp.control.controller import SessionController, SessionOptions
-    from navapp.control.runner import run_headless
-    from navapp.devices import Recording, open_recording
+    listeners: "Sequence[FrameListener]",
+) -> "SessionController":
+    from navapp.control.controller import SessionController, SessionHooks, SessionOptions
     from navapp.tracking import LineSettings
 
-    recording = Recording(
-        options.sequence,
-        order="pingpong" if options.order == "pingpong" else "forward",
-        n_frames=options.frames,
-        start=options.start,
-        rate_hz=options.fps or configuration.camera.rate_hz,
-        is_side_by_side=options.split is not None,
+    return SessionController(
+        opened.devices,
+        replay.rig,
+        replay.plan,
+        replay.prior,
+        executor=replay.executor,
+        options=SessionOptions(
+            line=LineSettings(method=replay.method, depth_mm=configuration.camera.depth_mm),
+            first_stage=replay.stage,
+            overlay_valid_ms=configuration.display.valid_ms,
+        ),
+        hooks=SessionHooks(on_frame=tuple(listeners)),
     )
-    opened = open_recording(recording, replay.rig, configuration)
-    n_frames = opened.devices.camera.info.n_frames
-    frames: list[dict[str, Any]] = []
-    overlay = None if options.overlay is None else Path(options.overlay)
-
-    def keep(result: "FrameResult") -> None:
-        frames.append(frame_to_json(result, None))
-        if overlay is not None:
-            _write_overlay(overlay, len(frames) - 1, result)
-        if n_frames:
-            diagnostics.progress("frames", len(frames) / n_frames)
-
-    with ExitStack() as undo:
-        undo.callback(opened.devices.close)
-        controller = SessionController(
-            opened.devices,
-            replay.rig,
-            replay.plan,
-            replay.prior,
-            executor=replay.executor,
-            options=SessionOptions(
-                line=LineSettings(
-                    method="icp" if replay.method == "icp" else "bimcc",
-                    depth_mm=configuration.camera.depth_mm,
-                ),
-                first_stage=replay.stage,
-                rig_name=replay.rig.name,
-            ),
-            hooks=_hooks(keep),
-        )
-        undo.callback(controller.close)
-        started = time.perf_counter()
-        run_headless(controller, replay.operator)
-        return frames, time.perf_counter() - started
 
 
-def _hooks(keep: Any) -> Any:
-    from navapp.control.controller import SessionHooks
+def _overlay_writer(folder: str) -> "FrameListener":
+    """Writes the picture of every frame; the folder is made with the first."""
+    numbers = itertools.count()
 
-    return SessionHooks(on_frame=(keep,))
+    def write(result: "FrameResult") -> None:
+        import cv2
 
+        from navapp.geometry.ply import write_whole
 
-def _write_overlay(folder: Path, number: int, result: "FrameResult") -> None:
-    import cv2
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        _, encoded = cv2.imencode(".jpg", result.picture.image, [cv2.IMWRITE_JPEG_QUALITY, 92])
+        write_whole(Path(folder) / f"overlay_{next(numbers):04d}.jpg", encoded.tobytes())
 
-    from navapp.geometry.ply import write_whole
-
-    folder.mkdir(parents=True, exist_ok=True)
-    _, encoded = cv2.imencode(".jpg", result.picture.image, [cv2.IMWRITE_JPEG_QUALITY, 92])
-    write_whole(folder / f"overlay_{number:04d}.jpg", encoded.tobytes())
-
-
-def _finish(
-    frames: list[dict[str, Any]],
-    seconds: float,
-    options: argparse.Namespace,
-    diagnostics: Diagnostics,
-) -> None:
-    from navapp.cli.sessions import summarise, summary_text
-
-    summary = summarise(frames, seconds)
-    write_json(options.json, "replay", {"frames": frames, "summary": summary})
-    if options.json != "-":
-        diagnostics.say(summary_text(summary))
-    if summary["ok"] == 0:
-        raise ResultError("no frame was OK", remedy="see the reasons in --json")
+    return write

@@ -1,27 +1,23 @@
 """`navapp run`: the application on the configured devices."""
 
 import argparse
-import time
 import tomllib
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import ConfigurationError, InputError, ResultError, RigError, UsageError
+from navapp.cli.diagnostics import Diagnostics, check_writable
+from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
-    from navapp.control.controller import SessionController
+    from navapp.control.controller import SessionController, SessionHooks
     from navapp.control.operators import ScriptStep
-    from navapp.control.results import FrameResult
-    from navapp.devices import OpenedDevices, Simulation
+    from navapp.control.results import FrameListener, FrameResult
+    from navapp.devices import OpenedDevices
     from navapp.values import Plan, Prior, StageSpec
-
-_NOTHING = np.empty((0, 0, 3), dtype=np.uint8)
 
 _EXAMPLE = """\
 examples:
@@ -117,17 +113,19 @@ def _script(path: str | None) -> "tuple[ScriptStep, ...]":
 def _prepare(
     configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> _Session:
-    """Open the devices; everything that can be refused is refused before."""
-    from navapp.cli.sessions import read_prior
+    """Read everything that is given, then open the devices; closed again when that is refused."""
+    from navapp.cli.headless import check_accepted
+    from navapp.cli.prior_files import read_prior
+    from navapp.cli.simulated_patient import built_in_plan, nominal_prior
     from navapp.control.stages import stage_by_name
     from navapp.devices import open_live
     from navapp.preop import read_plan
+    from navapp.values import Prior
 
+    given = configuration.plan
     stage = stage_by_name(options.stage or configuration.stages.first)
-    plan = None if configuration.plan.path is None else read_plan(configuration.plan.path)
-    prior = None if configuration.plan.prior is None else read_prior(configuration.plan.prior)
-    if plan is None and configuration.camera.backend != "simulated":
-        raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
+    plan = None if given.path is None else read_plan(given.path)
+    prior = None if given.prior is None else read_prior(given.prior)
     opened = open_live(configuration, is_headless=options.headless)
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
@@ -135,97 +133,21 @@ def _prepare(
         if opened.simulation is not None:
             plan = plan or built_in_plan(opened.simulation)
             prior = prior or nominal_prior(opened.simulation)
+        if plan is None:
+            raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
         undo.pop_all()
-    from navapp.values import Prior
-
-    if plan is None:
-        raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
     return _Session(configuration, opened, plan, prior or Prior(), stage)
 
 
-def check_accepted(rig: Any, is_allowed: bool, diagnostics: Diagnostics) -> None:
-    """Refuse a rig that its calibration did not accept, unless it is allowed.
-
-    Raises:
-        RigError: not accepted and not allowed.
-    """
-    if rig.quality is None:
-        if not rig.name.startswith("sim:"):
-            diagnostics.warn(f"rig {rig.name} carries no quality record; it is taken as given")
-        return
-    if rig.quality.is_accepted:
-        return
-    why = "; ".join(rig.quality.reasons) or "no reason is recorded"
-    if not is_allowed:
-        raise RigError(
-            f"rig {rig.name} was not accepted by its calibration ({why})",
-            subject=rig.name,
-            remedy="calibrate again, or add --allow-unaccepted: no frame is OK then",
-        )
-    diagnostics.warn(f"rig {rig.name} was not accepted ({why}): no frame will be OK")
-
-
-def built_in_plan(simulation: "Simulation") -> "Plan":
-    """The plan of the simulated patient: the surfaces that a perfect CT would have given."""
-    from navapp.geometry.mesh import TriangleMesh
-    from navapp.values import BoneModel, Plan
-
-    # Normals as any reader of the plan's files computes them, so that a replay finds the same.
-    bones = {
-        name: BoneModel(name, TriangleMesh(mesh.vertices_mm, mesh.faces), simulation.side)
-        for name, mesh in simulation.bones.items()
-    }
-    return Plan(bones, simulation.targets, simulation.curves, name="sim:plan")
-
-
-def nominal_prior(simulation: "Simulation") -> "Prior":
-    """How the simulated knee was meant to lie on the table."""
-    from navapp.values import Prior
-
-    return Prior(
-        {"femur": simulation.nominal_left_from_femur},
-        simulation.approach_axis,
-        simulation.approach_half_angle_deg,
-    )
-
-
 def _controller(
-    session: _Session,
-    *,
-    is_inline: bool,
-    on_frame: "list[Any]",
-    undo: ExitStack,
+    session: _Session, *, is_inline: bool, on_frame: "Sequence[FrameListener]", undo: ExitStack
 ) -> "SessionController":
     """The controller with its listeners and, when asked for, its recorder."""
-    from navapp.cli.session_folder import start_recording
-    from navapp.control.controller import SessionController, SessionHooks, SessionOptions
+    from navapp.control.controller import SessionController, SessionOptions
     from navapp.control.executors import InlineExecutor, ThreadExecutor
     from navapp.tracking import LineSettings
 
     configuration, opened = session.configuration, session.opened
-    simulation = opened.simulation
-    hooks = SessionHooks(
-        on_frame=tuple(on_frame),
-        on_stage=() if simulation is None else (simulation.set_stage,),
-        reopen_camera=opened.reopen_camera,
-    )
-    if configuration.recording.folder is not None:
-        recorder = start_recording(
-            configuration.recording.folder,
-            configuration,
-            opened.rig,
-            session.plan,
-            session.prior,
-            session.stage.name,
-        )
-        undo.callback(recorder.close)
-        hooks = replace(
-            hooks,
-            on_frame=(*hooks.on_frame, recorder.on_frame),
-            on_event=(recorder.on_event,),
-            on_command=(recorder.on_command,),
-            on_take_over=(recorder.on_take_over,),
-        )
     return SessionController(
         opened.devices,
         opened.rig,
@@ -238,9 +160,43 @@ def _controller(
             ),
             first_stage=session.stage,
             overlay_valid_ms=configuration.display.valid_ms,
-            rig_name=opened.rig.name,
+            is_recording=configuration.recording.folder is not None,
         ),
-        hooks=hooks,
+        hooks=_listening(session, on_frame, undo),
+    )
+
+
+def _listening(
+    session: _Session, on_frame: "Sequence[FrameListener]", undo: ExitStack
+) -> "SessionHooks":
+    """Who is told: the caller, the simulated room, and the recorder when there is one."""
+    from navapp.cli.session_folder import start_recording
+    from navapp.control.controller import SessionHooks
+
+    configuration, opened = session.configuration, session.opened
+    hooks = SessionHooks(
+        on_frame=tuple(on_frame),
+        on_stage=() if opened.simulation is None else (opened.simulation.set_stage,),
+        reopen_camera=opened.reopen_camera,
+    )
+    folder = configuration.recording.folder
+    if folder is None:
+        return hooks
+    recorder = start_recording(
+        folder,
+        configuration,
+        opened.rig,
+        session.plan,
+        session.prior,
+        first_stage=session.stage.name,
+    )
+    undo.callback(recorder.close)
+    return replace(
+        hooks,
+        on_frame=(*hooks.on_frame, recorder.on_frame),
+        on_event=(recorder.on_event,),
+        on_command=(recorder.on_command,),
+        on_take_over=(recorder.on_take_over,),
     )
 
 
@@ -250,42 +206,18 @@ def _run_headless(
     options: argparse.Namespace,
     diagnostics: Diagnostics,
 ) -> int:
-    from navapp.cli.sessions import frame_to_json, summarise, summary_text
+    from navapp.cli.headless import FrameLog, finish, follow
+    from navapp.cli.results import frame_to_json
     from navapp.control.operators import ScriptedOperator
-    from navapp.control.runner import run_headless
 
-    results: list[FrameResult] = []
-
-    def keep(result: "FrameResult") -> None:
-        # Pictures are not kept: a long session must not grow.
-        frame = replace(
-            result.frame, left=result.frame.left[:1, :1], right=result.frame.right[:1, :1]
-        )
-        results.append(
-            replace(result, frame=frame, picture=replace(result.picture, image=_NOTHING))
-        )
-        if options.frames:
-            diagnostics.progress("frames", len(results) / options.frames)
-
-    started = time.perf_counter()
+    log = FrameLog(options.frames, diagnostics)
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = _controller(session, is_inline=True, on_frame=[keep], undo=undo)
+        controller = _controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
-        run_headless(
-            controller,
-            ScriptedOperator(script),
-            lambda: options.frames is not None and len(results) >= options.frames,
-        )
-    seconds = time.perf_counter() - started
-    frames = [frame_to_json(result, _tre_mm(result, session)) for result in results]
-    summary = summarise(frames, seconds)
-    write_json(options.json, "run", {"frames": frames, "summary": summary})
-    if options.json != "-":
-        diagnostics.say(summary_text(summary))
-    if summary["ok"] == 0:
-        raise ResultError("no frame was OK", remedy="see the reasons in --json")
-    return 0
+        seconds = follow(controller, ScriptedOperator(script), log)
+    frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
+    return finish(frames, seconds, options, diagnostics)
 
 
 def _tre_mm(result: "FrameResult", session: _Session) -> float | None:

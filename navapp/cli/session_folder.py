@@ -3,30 +3,34 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 from drivers.session_files import SessionWriter
 from navapp import __version__
-from navapp.cli.sessions import prior_to_json, read_prior
+from navapp.cli.prior_files import prior_to_json
 from navapp.config import Configuration, as_toml
 from navapp.control.operators import RecordedEvents, read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
 from navapp.errors import SequenceError
 from navapp.geometry.ply import write_whole
-from navapp.geometry.rig import StereoRig, read_rig, write_rig
-from navapp.preop import read_plan, write_plan
+from navapp.geometry.rig import StereoRig, write_rig
+from navapp.preop import write_plan
+from navapp.tracking.line import Method
 from navapp.values import Plan, Prior
 
 _FILE = "session.json"
+_RIG, _PLAN, _PRIOR = "rig.yml", "plan", "prior.json"
+_METHODS: tuple[Method, ...] = get_args(Method)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedSession:
-    """What a session folder holds besides its frames."""
+    """What a session folder holds besides its frames: where its files are, and what they say."""
 
-    rig: StereoRig
-    plan: Plan
-    prior: Prior
-    method: str
+    rig_path: Path
+    plan_path: Path
+    prior_path: Path
+    method: Method
     first_stage: str
     events: RecordedEvents
 
@@ -37,6 +41,7 @@ def start_recording(
     rig: StereoRig,
     plan: Plan,
     prior: Prior,
+    *,
     first_stage: str,
 ) -> SessionRecorder:
     """Make a session folder and a recorder into it.
@@ -46,9 +51,9 @@ def start_recording(
     """
     folder = Path(folder)
     frames = SessionWriter(folder)
-    write_rig(folder / "rig.yml", rig)
-    write_plan(folder / "plan", plan)
-    write_whole(folder / "prior.json", json.dumps(prior_to_json(prior), indent=1).encode())
+    write_rig(folder / _RIG, rig)
+    write_plan(folder / _PLAN, plan)
+    write_whole(folder / _PRIOR, json.dumps(prior_to_json(prior), indent=1).encode())
     write_whole(folder / "configuration.toml", as_toml(configuration, False).encode())
     content = {
         "navapp": __version__,
@@ -69,7 +74,7 @@ def is_session(folder: str | Path) -> bool:
 
 
 def read_session(folder: str | Path) -> RecordedSession:
-    """Read everything but the frames.
+    """Read how a session was run; its rig, plan and prior are only named.
 
     Raises:
         InputError: damaged or half-written.
@@ -92,10 +97,21 @@ def read_session(folder: str | Path) -> RecordedSession:
             remedy="it was not recorded to its end",
         )
     return RecordedSession(
-        read_rig(folder / "rig.yml"),
-        read_plan(folder / "plan"),
-        read_prior(folder / "prior.json"),
-        method,
+        folder / _RIG,
+        folder / _PLAN,
+        folder / _PRIOR,
+        _known_method(method, folder),
         first_stage,
         read_events(events_path),
+    )
+
+
+def _known_method(name: str, folder: Path) -> Method:
+    for method in _METHODS:
+        if method == name:
+            return method
+    raise SequenceError(
+        f"session {folder} was recorded with the unknown method '{name}'",
+        subject=str(folder),
+        remedy=f"use {' or '.join(_METHODS)} in its {_FILE}",
     )

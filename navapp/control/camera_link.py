@@ -28,6 +28,7 @@ class CameraLink:
         self._clock = clock
         self._reopen = reopen
         self._source: FrameSource | None = open_source(camera)
+        self._lost_source: FrameSource | None = None
         self._last_frame_ns = clock.now_ns()
         self._retry_at_ns = 0
 
@@ -64,8 +65,8 @@ class CameraLink:
         try:
             frame = self._source.take(timeout_s)
         except DeviceError as error:
-            self._source.close()
-            self._source = None
+            # Closing may wait for a reader that hangs: the caller makes the display dark first.
+            self._lost_source, self._source = self._source, None
             self.trouble = str(error)
             self._retry_at_ns = self._clock.now_ns() + _RETRY_EVERY_NS
             raise
@@ -79,6 +80,7 @@ class CameraLink:
 
     def wait_for_return(self, timeout_s: float) -> bool:
         """Wait for the time of the next attempt, or make it; whether the camera is back."""
+        self._release()
         now_ns = self._clock.now_ns()
         if now_ns < self._retry_at_ns:
             # A manual clock only moves when somebody waits.
@@ -99,6 +101,12 @@ class CameraLink:
 
     def close(self) -> None:
         """Stop reading; the camera is closed as well."""
+        self._release()
         if self._source is not None:
             self._source.close()
         self.camera.close()
+
+    def _release(self) -> None:
+        if self._lost_source is not None:
+            self._lost_source.close()
+            self._lost_source = None

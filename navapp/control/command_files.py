@@ -9,6 +9,7 @@ from navapp.control.states import (
     Cancel,
     Command,
     EnterStage,
+    Interrupt,
     Propose,
     Quit,
     Reconnect,
@@ -27,6 +28,7 @@ _PLAIN: dict[str, type] = {
     "blank": Blank,
     "show": Show,
     "reconnect": Reconnect,
+    "interrupt": Interrupt,
     "quit": Quit,
 }
 _NAMES = {kind: name for name, kind in _PLAIN.items()}

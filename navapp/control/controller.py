@@ -15,12 +15,14 @@ from dataclasses import dataclass, field, replace
 from drivers.frames import StereoFrame
 from drivers.interfaces import DeviceSet
 from navapp.control.camera_link import CameraLink, Reopen
-from navapp.control.device_panel import camera_line, display_line, mirror_line, projector_line
+from navapp.control.device_lines import camera_line, display_line, mirror_line, projector_line
+from navapp.control.display_link import DisplayLink
 from navapp.control.executors import Executor
 from navapp.control.interlocks import navigable
-from navapp.control.pictures import Image, compose, fitted
+from navapp.control.pictures import Image, compose
 from navapp.control.pursuit import Pursuit
 from navapp.control.rates import RateMeter
+from navapp.control.recorder import RecordingStopped
 from navapp.control.results import FrameListener, FrameResult
 from navapp.control.stages import STAGES, stage_by_number
 from navapp.control.states import (
@@ -31,6 +33,7 @@ from navapp.control.states import (
     EnterStage,
     Event,
     EventLevel,
+    Interrupt,
     Progress,
     Propose,
     Quit,
@@ -46,12 +49,12 @@ from navapp.geometry.rig import StereoRig
 from navapp.overlay import make_preview
 from navapp.tracking import LineSettings
 from navapp.values import (
+    LineTimings,
     OverlayMode,
     OverlayPicture,
     Plan,
     Prior,
     StageSpec,
-    StageTimings,
     Status,
     TrackedFrame,
 )
@@ -67,13 +70,13 @@ class SessionOptions:
         line: settings of the line.
         first_stage: stage in force at the start.
         overlay_valid_ms: how long a picture may stay on the display without a newer one.
-        rig_name: for the title; begins with `sim:` for simulated rigs.
+        is_recording: the session is kept in a folder.
     """
 
     line: LineSettings = field(default_factory=LineSettings)
     first_stage: StageSpec = STAGES[0]
     overlay_valid_ms: float = 500.0
-    rig_name: str = ""
+    is_recording: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,11 @@ class SessionHooks:
 
 
 class SessionController:
-    """Runs one session on an opened set of devices."""
+    """Runs one session on an opened set of devices.
+
+    Attributes:
+        lost_device: why the session stands in FAULT; None when it does not.
+    """
 
     def __init__(
         self,
@@ -111,7 +118,8 @@ class SessionController:
         self._executor = executor
         self._pursuit = Pursuit(rig, plan, prior, self._options.line, executor)
         self._camera = CameraLink(devices.camera, devices.clock, self._hooks.reopen_camera)
-        self._display_trouble = ""
+        self._display = DisplayLink(devices.display)
+        self.lost_device: DeviceError | None = None
         self._commands: deque[Command] = deque()
         self._lock = threading.Lock()
         self._events: deque[Event] = deque(maxlen=_EVENTS_SHOWN)
@@ -120,8 +128,6 @@ class SessionController:
         self._tracked_at_ns = 0
         self._preview: Image | None = None
         self._last_sequence = -1
-        self._has_guides_shown = False
-        self._is_blanked = False
         self._is_over = False
         self._state = SessionState.STARTING
         self._stage = self._options.first_stage
@@ -139,16 +145,18 @@ class SessionController:
             self._commands.append(command)
         if isinstance(command, Blank):
             # The operator's hand comes before everything else, also before a step that hangs.
-            self._is_blanked = True
-            self._devices.display.blank()
+            self._display.blank()
+
+    def darken(self) -> None:
+        """Turn the display dark, now; callable from any thread, also while a step hangs."""
+        self._display.darken()
 
     def step(self, timeout_s: float = 0.2) -> Snapshot:
         """Handle one command, or one frame; return at the latest after the time given."""
         with self._lock:
             command = self._commands.popleft() if self._commands else None
         if command is not None:
-            for listener in self._hooks.on_command:
-                listener(command, self._last_sequence)
+            self._tell(self._hooks.on_command, command, self._last_sequence)
             self._handle(command)
         else:
             self._take_over(self._last_sequence + 1)
@@ -156,12 +164,13 @@ class SessionController:
             if frame is not None:
                 self._handle_frame(frame)
         self._snapshot = self._decided()
-        self._withdraw_guides()
+        if not (self._snapshot.is_navigable or self._snapshot.is_candidate):
+            self._display.withdraw_guides()
         return self._snapshot
 
     def close(self) -> None:
         """End everything, the display first; safe to call twice."""
-        self._devices.display.blank()
+        self._display.darken()
         self._is_over = True
         self._pursuit.drop()
         self._executor.close()
@@ -175,6 +184,7 @@ class SessionController:
     def _next_frame(self, timeout_s: float) -> StereoFrame | None:
         if self._camera.is_down:
             if self._camera.wait_for_return(timeout_s):
+                self.lost_device = None
                 self._fall_back(f"camera {self._camera.camera.info.name} is back")
             return None
         try:
@@ -183,12 +193,18 @@ class SessionController:
             self._is_over = True
             self._event("end", "the sequence is at its end")
         except DeviceError as error:
-            self._devices.display.blank()
-            self._pursuit.drop()
-            self._tracked = None
+            self._display.darken()
+            self.lost_device = error
+            self._tell(self._hooks.on_command, Interrupt(), self._last_sequence)
+            self._interrupt()
             self._change(SessionState.FAULT, str(error), EventLevel.ALARM)
             self._is_over = not self._camera.can_return
         return None
+
+    def _interrupt(self) -> None:
+        """What the loss of the camera does to what is known of the bone."""
+        self._pursuit.drop()
+        self._tracked = None
 
     def _handle_frame(self, frame: StereoFrame) -> None:
         self._last_sequence = frame.sequence
@@ -199,32 +215,29 @@ class SessionController:
         self._change_with_verdict()
         snapshot = self._decided()
         picture, overlay_ms = self._show(frame, snapshot)
-        timings = StageTimings() if self._tracked is None else self._tracked.timings
+        timings = LineTimings() if self._tracked is None else self._tracked.timings
         result = FrameResult(
             frame,
             self._state,
             self._stage,
             self._tracked,
             picture,
-            replace(timings, overlay=overlay_ms),
+            replace(timings, overlay_ms=overlay_ms),
             snapshot.is_navigable,
         )
         is_stepped = self._camera.camera.info.is_stepped
         self._meter.add(
-            result.timings.total if is_stepped else picture.pose_age_ns / 1e6, frame.skew_ns
+            result.timings.total_ms if is_stepped else picture.pose_age_ns / 1e6, frame.skew_ns
         )
-        for listener in self._hooks.on_frame:
-            listener(result)
+        self._tell(self._hooks.on_frame, result)
 
     def _look_for_bone(self, frame: StereoFrame) -> TrackedFrame | None:
         """Register, review or follow, as the state asks."""
         if self._state is SessionState.REGISTERING:
             # A search that began earlier is taken over before a frame, never within one: its
             # answer belongs to another picture and must be followed into this one first.
-            if self._pursuit.search(self._stage, frame):
-                self._take_over(frame.sequence)
-            candidate = self._pursuit.candidate
-            return None if candidate is None else candidate.tracked
+            is_of_this_frame = self._pursuit.search(self._stage, frame)
+            return self._take_over(frame.sequence) if is_of_this_frame else None
         if self._state is SessionState.REVIEW:
             return self._pursuit.review(self._stage, frame)
         if self._state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
@@ -245,51 +258,34 @@ class SessionController:
     def _show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
         """Compose, show until it expires, keep a preview; also how long composing took."""
         started_ns = time.perf_counter_ns()
-        is_simulated = self._camera.camera.info.is_simulated or self._rig.name.startswith("sim:")
-        mark = "SIMULATED" if is_simulated else ""
+        mark = "SIMULATED" if self._is_simulated else ""
         image = compose(frame.left, snapshot, self._rig, self._plan, mark)
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._options.overlay_valid_ms * 1e6)
-        display = self._devices.display
-        if not self._is_blanked:
-            try:
-                size = display.info.width, display.info.height
-                self._has_guides_shown = snapshot.is_navigable or snapshot.is_candidate
-                display.show(fitted(image, *size), valid_until_ns)
-                self._display_trouble = ""
-            except DeviceError as error:
-                if not self._display_trouble:
-                    self._event("device", str(error), EventLevel.ALARM)
-                self._display_trouble = str(error)
-        if self._is_blanked:
-            # The operator may have blanked while the picture was made.
-            display.blank()
+        has_guides = snapshot.is_navigable or snapshot.is_candidate
+        if self._display.show(image, valid_until_ns, has_guides=has_guides):
+            self._event("device", self._display.trouble, EventLevel.ALARM)
         self._preview = make_preview(image)
         age_ns = self._clock.now_ns() - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
 
-    def _withdraw_guides(self) -> None:
-        """Turn a picture dark whose guides a command or the passing time has made wrong."""
-        may_stay = self._snapshot.is_navigable or self._snapshot.is_candidate
-        if self._has_guides_shown and not may_stay:
-            self._devices.display.blank()
-            self._has_guides_shown = False
-
-    def _take_over(self, next_sequence: int) -> None:
-        """Bring a finished registration under review, when there is one."""
+    def _take_over(self, next_sequence: int) -> TrackedFrame | None:
+        """Bring a finished registration under review; its best answer, when there is one."""
         outcome = self._pursuit.take_over(next_sequence)
         if outcome is None:
-            return
-        for listener in self._hooks.on_take_over:
-            listener(next_sequence)
-        candidate, reason = outcome
-        if candidate is None:
-            why = reason.value if reason else f"no start pose is known for the {self._stage.bone}"
+            return None
+        self._tell(self._hooks.on_take_over, next_sequence)
+        if not outcome.candidates:
+            why = f"no start pose is known for the {self._stage.bone}"
+            if outcome.failure is not None and outcome.failure.verdict.reasons:
+                why = outcome.failure.verdict.reasons[0].value
             self._fall_back(f"registration failed: {why}", EventLevel.WARNING)
-            return
-        bound_mm = candidate.tracked.verdict.predicted_tre_mm
+            return outcome.failure
+        best = outcome.candidates[0].tracked
+        bound_mm = best.verdict.predicted_tre_mm
         error = "" if bound_mm is None else f", predicted error {bound_mm:.2f} mm"
-        self._change(SessionState.REVIEW, f"candidate 1 of {candidate.count}{error}")
+        self._change(SessionState.REVIEW, f"candidate 1 of {len(outcome.candidates)}{error}")
+        return best
 
     # -- commands -------------------------------------------------------------------------------
 
@@ -313,9 +309,12 @@ class SessionController:
                 self._on_enter_stage(command)
             case Reconnect():
                 self._camera.retry_now()
+            case Interrupt():
+                self._interrupt()
+                self._fall_back("the camera was lost here when this was recorded")
             case Quit():
                 self._is_over = True
-                self._devices.display.blank()
+                self._display.darken()
                 self._event("quit", "session ended by the operator")
 
     def _on_register(self) -> None:
@@ -369,13 +368,12 @@ class SessionController:
             self._event("reject", text)
 
     def _on_blank(self) -> None:
-        self._is_blanked = True
-        self._devices.display.blank()
+        self._display.blank()
         self._event("blank", "display blanked by the operator")
 
     def _on_show(self) -> None:
-        if self._is_blanked:
-            self._is_blanked = False
+        if self._display.is_blanked:
+            self._display.show_again()
             self._event("show", "display shown again")
 
     def _on_enter_stage(self, command: EnterStage) -> None:
@@ -390,6 +388,7 @@ class SessionController:
         self._stage = stage
         # What was judged by the old stage's targets and tolerance says nothing in the new one.
         self._tracked = None
+        self._pursuit.forget_verdict()
         self._announce_stage()
         if is_other_bone and self._state not in (SessionState.STARTING, SessionState.FAULT):
             self._pursuit.drop()
@@ -404,6 +403,11 @@ class SessionController:
                 listener(stage.name)
             except UsageError as error:
                 self._event("stage", str(error), EventLevel.WARNING)
+
+    @property
+    def _is_simulated(self) -> bool:
+        """The pictures are not of this world; a replayed rig still says so by its name."""
+        return self._camera.camera.info.is_simulated or self._rig.name.startswith("sim:")
 
     def _can_look(self, what: str) -> bool:
         if self._state is SessionState.FAULT:
@@ -428,11 +432,18 @@ class SessionController:
     def _refuse(self, what: str, why: str) -> None:
         self._event("refused", f"{what} refused: {why}", EventLevel.WARNING)
 
+    def _tell(self, listeners: tuple[Callable[..., None], ...], *words: object) -> None:
+        """Tell all; a recording that cannot go on is an event, not the end of the session."""
+        for listener in listeners:
+            try:
+                listener(*words)
+            except RecordingStopped as error:
+                self._event("recording", str(error), EventLevel.ALARM)
+
     def _event(self, kind: str, text: str, level: EventLevel = EventLevel.INFO) -> None:
         event = Event(self._clock.now_ns(), kind, text, level, self._last_sequence)
         self._events.append(event)
-        for listener in self._hooks.on_event:
-            listener(event)
+        self._tell(self._hooks.on_event, event)
 
     def _decided(self) -> Snapshot:
         """The snapshot with the interlocks' answer in it."""
@@ -445,7 +456,7 @@ class SessionController:
             stage=self._stage,
             stages=STAGES,
             reasons=(),
-            is_blanked=self._is_blanked,
+            is_blanked=self._display.is_blanked,
             verdict=None if tracked is None else tracked.verdict,
             left_from_bone=None if tracked is None else tracked.left_from_bone,
             is_candidate=self._state is SessionState.REVIEW and tracked is not None,
@@ -454,13 +465,15 @@ class SessionController:
             rates=self._meter.rates(self._camera.n_dropped),
             devices=(
                 camera_line(self._camera.camera.info, self._camera.trouble),
-                display_line(self._devices.display.info, self._display_trouble),
+                display_line(self._display.display.info, self._display.trouble),
                 projector_line(self._devices.projector),
                 mirror_line(self._devices.mirror),
             ),
             events=tuple(self._events),
             progress=self._progress(),
-            rig_name=self._options.rig_name,
+            rig_name=self._rig.name,
+            is_simulated=self._is_simulated,
+            is_recording=self._options.is_recording,
             plan_name=self._plan.name,
             plan_digest=self._plan.digest,
             side="" if bone is None or bone.side is None else bone.side,

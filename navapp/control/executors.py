@@ -57,7 +57,7 @@ class Executor(Protocol):
         """Begin."""
         ...
 
-    def is_due(self, job: Job[T], sequence: int) -> bool:
+    def take_due(self, job: Job[T], sequence: int) -> bool:
         """Whether the result may be taken over after that frame."""
         ...
 
@@ -73,7 +73,7 @@ class InlineExecutor:
         """Run it to its end."""
         job.run()
 
-    def is_due(self, job: Job[T], sequence: int) -> bool:
+    def take_due(self, job: Job[T], sequence: int) -> bool:
         """Always."""
         return job.is_finished
 
@@ -93,7 +93,7 @@ class ThreadExecutor:
         self._threads = [other for other in self._threads if other.is_alive()] + [thread]
         thread.start()
 
-    def is_due(self, job: Job[T], sequence: int) -> bool:
+    def take_due(self, job: Job[T], sequence: int) -> bool:
         """When it has finished."""
         return job.is_finished
 
@@ -113,7 +113,7 @@ class RecordedExecutor:
         """Run it to its end."""
         job.run()
 
-    def is_due(self, job: Job[T], sequence: int) -> bool:
+    def take_due(self, job: Job[T], sequence: int) -> bool:
         """After the frame that the recording names; never when it names none.
 
         A job that was cancelled before it ended was not taken over, and must not be here.

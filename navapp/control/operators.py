@@ -158,10 +158,12 @@ class RecordedEvents:
     Attributes:
         commands: (after which frame, command).
         take_overs: before which frames a registration's result was used.
+        is_complete: the recording ran to its end.
     """
 
     commands: list[tuple[int, Command]]
     take_overs: list[int]
+    is_complete: bool
 
 
 def read_events(path: str | Path) -> RecordedEvents:
@@ -172,6 +174,7 @@ def read_events(path: str | Path) -> RecordedEvents:
     """
     commands: list[tuple[int, Command]] = []
     take_overs: list[int] = []
+    is_complete = False
     for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), start=1):
         try:
             value: dict[str, Any] = json.loads(line)
@@ -186,7 +189,8 @@ def read_events(path: str | Path) -> RecordedEvents:
             commands.append((sequence, command_from_json(value)))
         elif value.get("type") == "take_over":
             take_overs.append(sequence)
-    return RecordedEvents(commands, take_overs)
+        is_complete = value.get("type") == "end"
+    return RecordedEvents(commands, take_overs, is_complete)
 
 
 def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]:

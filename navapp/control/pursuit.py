@@ -8,11 +8,10 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Goal, Line, LineSettings, TrackState
 from navapp.values import (
+    LineTimings,
     Plan,
     Prior,
-    Reason,
     StageSpec,
-    StageTimings,
     Status,
     TrackedFrame,
     Verdict,
@@ -44,6 +43,19 @@ class _Search:
 
     job: Job[list[TrackedFrame]]
     frame: StereoFrame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchOutcome:
+    """What a first registration found.
+
+    Attributes:
+        candidates: best first; may be empty.
+        failure: the best answer when all were lost; None when no start was known.
+    """
+
+    candidates: tuple[Candidate, ...]
+    failure: TrackedFrame | None = None
 
 
 class Pursuit:
@@ -97,15 +109,10 @@ class Pursuit:
         self._executor.start(job)
         return True
 
-    def take_over(self, next_sequence: int) -> "tuple[Candidate | None, Reason | None] | None":
-        """Bring the answers of a finished search under review.
-
-        Returns:
-            None while nothing is due; the best candidate; or no candidate and why (no reason: no
-            start was known).
-        """
+    def take_over(self, next_sequence: int) -> SearchOutcome | None:
+        """Bring the answers of a finished search under review; None while nothing is due."""
         search = self._search
-        if search is None or not self._executor.is_due(search.job, next_sequence):
+        if search is None or not self._executor.take_due(search.job, next_sequence):
             return None
         self._search = None
         if isinstance(search.job.error, JobCancelled):
@@ -124,10 +131,8 @@ class Pursuit:
             for number, (answer, pose) in enumerate(found, start=1)
             if pose is not None
         ]
-        if self._candidates:
-            return self._candidates[0], None
-        reasons = answers[0].verdict.reasons if answers else ()
-        return None, reasons[0] if reasons else None
+        best_lost = answers[0] if answers and not self._candidates else None
+        return SearchOutcome(tuple(self._candidates), best_lost)
 
     def drop(self) -> None:
         """Stop the search and forget the candidates; accepted tracks stay."""
@@ -139,9 +144,15 @@ class Pursuit:
     def propose(self, stage: StageSpec, pose: RigidTransform, now_ns: int) -> None:
         """Put a pose under review that will be judged as it stands."""
         self.drop()
-        # Until a frame has judged it, it is lost: it cannot be accepted.
-        unjudged = TrackedFrame(stage.bone, None, Verdict(Status.LOST), StageTimings())
-        self._candidates = [Candidate(TrackState.at_rest(pose, now_ns), unjudged, is_held=True)]
+        track = TrackState.at_rest(pose, now_ns)
+        self._candidates = [Candidate(track, _unjudged(stage.bone), is_held=True)]
+
+    def forget_verdict(self) -> None:
+        """The candidates must be judged anew before one can be accepted."""
+        self._candidates = [
+            replace(candidate, tracked=_unjudged(candidate.tracked.bone))
+            for candidate in self._candidates
+        ]
 
     def accept(self, stage: StageSpec) -> None:
         """The candidate is the bone's pose from now on."""
@@ -182,3 +193,8 @@ class Pursuit:
 
     def _goal(self, stage: StageSpec) -> Goal:
         return Goal(self._plan.targets_of(stage.targets), stage.tolerance_mm)
+
+
+def _unjudged(bone: str) -> TrackedFrame:
+    """Of a pose that no frame has judged: it counts as lost and cannot be accepted."""
+    return TrackedFrame(bone, None, Verdict(Status.LOST), LineTimings())

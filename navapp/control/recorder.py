@@ -8,6 +8,8 @@ poses.jsonl    pose and verdict of every frame
 
 import json
 import threading
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from queue import Queue
 from typing import Any, Protocol, TextIO
@@ -16,6 +18,7 @@ from drivers.frames import StereoFrame
 from navapp.control.command_files import command_to_json
 from navapp.control.results import FrameResult
 from navapp.control.states import Command, Event
+from navapp.errors import InputError, NavappError
 
 
 class FrameSink(Protocol):
@@ -72,22 +75,33 @@ class BackgroundSink:
                     self._error = error
 
 
+class RecordingStopped(InputError):  # noqa: N818 (an outcome for the session's events)
+    """A session is no longer recorded; raised once, the session itself goes on."""
+
+
 class SessionRecorder:
-    """Listens to a controller and writes the session folder; every line is flushed."""
+    """Listens to a controller and writes the session folder; every line is flushed.
+
+    A folder that cannot be written any more (a full disk) ends the recording, not the session: the
+    first failing call raises `RecordingStopped`, later ones do nothing.
+    """
 
     def __init__(self, folder: Path, frames: FrameSink, *, with_pictures: bool = True) -> None:
         self._frames = frames
+        self._has_stopped = False
+        self._last_sequence = -1
         self._with_pictures = with_pictures
         self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
         self._poses: TextIO = (folder / "poses.jsonl").open("w", encoding="utf-8")
 
     def on_frame(self, result: FrameResult) -> None:
         """A frame was handled."""
-        self._frames.add(result.frame, self._with_pictures)
         tracked = result.tracked
         pose = None if tracked is None else tracked.left_from_bone
         verdict = None if tracked is None else tracked.verdict
-        _write(
+        self._attempt(lambda: self._frames.add(result.frame, self._with_pictures))
+        self._last_sequence = result.frame.sequence
+        self._write(
             self._poses,
             {
                 "sequence": result.frame.sequence,
@@ -100,18 +114,18 @@ class SessionRecorder:
 
     def on_command(self, command: Command, after_sequence: int) -> None:
         """A command is about to be handled."""
-        _write(
+        self._write(
             self._events,
             {"type": "command", "sequence": after_sequence, **command_to_json(command)},
         )
 
     def on_take_over(self, before_sequence: int) -> None:
         """A registration's result is used from that frame on."""
-        _write(self._events, {"type": "take_over", "sequence": before_sequence})
+        self._write(self._events, {"type": "take_over", "sequence": before_sequence})
 
     def on_event(self, event: Event) -> None:
         """Something happened."""
-        _write(
+        self._write(
             self._events,
             {
                 "type": "event",
@@ -124,12 +138,22 @@ class SessionRecorder:
         )
 
     def close(self) -> None:
-        """End the files."""
-        self._frames.close()
-        self._events.close()
-        self._poses.close()
+        """End the files; a recording that ran to its end says so in its last line."""
+        with ExitStack() as closing:
+            closing.callback(self._poses.close)
+            closing.callback(self._events.close)
+            self._attempt(self._frames.close)
+            self._write(self._events, {"type": "end", "sequence": self._last_sequence})
 
+    def _attempt(self, action: Callable[[], object]) -> None:
+        if self._has_stopped:
+            return
+        try:
+            action()
+        except (OSError, NavappError) as error:
+            self._has_stopped = True
+            raise RecordingStopped(f"recording stopped: {error}") from error
 
-def _write(stream: TextIO, value: dict[str, Any]) -> None:
-    stream.write(json.dumps(value) + "\n")
-    stream.flush()
+    def _write(self, stream: TextIO, value: dict[str, Any]) -> None:
+        line = json.dumps(value) + "\n"
+        self._attempt(lambda: (stream.write(line), stream.flush()))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from drivers.frames import StereoFrame
 from navapp.control.states import SessionState
-from navapp.values import OverlayPicture, StageSpec, StageTimings, TrackedFrame
+from navapp.values import LineTimings, OverlayPicture, StageSpec, TrackedFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +27,7 @@ class FrameResult:
     stage: StageSpec
     tracked: TrackedFrame | None
     picture: OverlayPicture
-    timings: StageTimings
+    timings: LineTimings
     is_navigable: bool
 
 

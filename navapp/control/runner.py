@@ -5,7 +5,9 @@ from collections.abc import Callable
 
 from navapp.control.controller import SessionController
 from navapp.control.operators import Operator
-from navapp.control.states import Command, Snapshot
+from navapp.control.states import Command, SessionState, Snapshot
+
+_PATIENCE_NS = 10_000_000_000
 
 
 def run_headless(
@@ -13,9 +15,18 @@ def run_headless(
     operator: Operator,
     is_done: Callable[[], bool] = lambda: False,
 ) -> Snapshot:
-    """Step until the source ends or `is_done`; the operator answers every snapshot."""
+    """Step until the source ends or `is_done`; the operator answers every snapshot.
+
+    A camera that stays away for `_PATIENCE_NS` ends it as well: nobody is there to mend it. The
+    controller's `lost_device` then says why.
+    """
     snapshot = controller.snapshot
+    last_well_ns = snapshot.time_ns
     while not (snapshot.is_over or is_done()):
+        if snapshot.state is not SessionState.FAULT:
+            last_well_ns = snapshot.time_ns
+        elif snapshot.time_ns - last_well_ns > _PATIENCE_NS:
+            break
         commands = operator.commands(snapshot)
         for command in commands:
             controller.submit(command)
@@ -50,6 +61,8 @@ class SessionRunner:
     def stop(self) -> None:
         """End the loop and close the devices; safe to call twice."""
         self._stopping.set()
+        # A step that hangs must not leave its picture on the display.
+        self._controller.darken()
         if self._thread.ident is not None:
             self._thread.join(10.0)
         else:

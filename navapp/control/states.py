@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import RigidTransform
-from navapp.values import Reason, StageSpec, Status, Verdict
+from navapp.values import Reason, StageSpec, Verdict
 
 
 class SessionState(Enum):
@@ -73,12 +73,27 @@ class Reconnect:
 
 
 @dataclass(frozen=True, slots=True)
+class Interrupt:
+    """The camera was lost at this point of a recorded session: forget what it was looking at."""
+
+
+@dataclass(frozen=True, slots=True)
 class Quit:
     """End the session."""
 
 
 Command = (
-    Register | Cancel | Propose | Accept | Reject | Blank | Show | EnterStage | Reconnect | Quit
+    Register
+    | Cancel
+    | Propose
+    | Accept
+    | Reject
+    | Blank
+    | Show
+    | EnterStage
+    | Reconnect
+    | Interrupt
+    | Quit
 )
 
 
@@ -168,7 +183,9 @@ class Snapshot:
         reasons: why guides are not shown; empty means navigable.
         verdict: on the newest pose, None before there is one.
         left_from_bone: the newest pose, None when there is none.
-        is_candidate: the pose waits for the operator's decision.
+        is_candidate: a pose waits for the operator's decision.
+        is_simulated: the pictures are not of this world.
+        is_recording: the session is kept in a folder.
         pose_age_ms: of that pose, now.
         preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
             the first frame.
@@ -199,6 +216,7 @@ class Snapshot:
     sequence: int = -1
     is_bone_planned: bool = True
     is_camera_silent: bool = False
+    is_simulated: bool = False
     is_recording: bool = False
     is_over: bool = False
 
@@ -206,8 +224,3 @@ class Snapshot:
     def is_navigable(self) -> bool:
         """Guides may be shown."""
         return not self.reasons
-
-    @property
-    def is_ok(self) -> bool:
-        """The judge says OK."""
-        return self.verdict is not None and self.verdict.status is Status.OK

@@ -15,7 +15,6 @@ def fit_icp(
     cloud: SurfaceCloud,
     model: RegistrationModel,
     rectified_from_bone: RigidTransform,
-    stride_px: int = 1,
 ) -> PoseEstimate:
     """Plain ICP: every point pairs with its nearest model point, all weigh the same.
 
@@ -38,7 +37,7 @@ def fit_icp(
         if shift + turn < _STEP_MM:
             is_converged = True
             break
-    return estimate_at(cloud, model, pose, iterations, is_converged, stride_px=stride_px)
+    return estimate_at(cloud, model, pose, iterations, is_converged)
 
 
 def kabsch(scene_mm: np.ndarray, model_mm: np.ndarray, frames: RigidTransform) -> RigidTransform:

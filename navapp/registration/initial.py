@@ -67,8 +67,8 @@ def distinct(estimates: Sequence[PoseEstimate], centre_mm: FloatArray) -> list[P
     """Without those that repeat an earlier answer."""
     kept: list[PoseEstimate] = []
     for estimate in estimates:
-        pose = estimate.left_from_bone
-        if not any(is_same_pose(pose, other.left_from_bone, centre_mm) for other in kept):
+        pose = estimate.camera_from_bone
+        if not any(is_same_pose(pose, other.camera_from_bone, centre_mm) for other in kept):
             kept.append(estimate)
     return kept
 

@@ -50,6 +50,7 @@ class _Pairs(NamedTuple):
     residual_mm: FloatArray
     variance_mm2: FloatArray
     vertex: np.ndarray
+    stride_px: int
 
 
 def fit_point_to_plane(
@@ -57,7 +58,6 @@ def fit_point_to_plane(
     model: RegistrationModel,
     rectified_from_bone: RigidTransform,
     settings: PointToPlaneSettings | None = None,
-    stride_px: int = 1,
 ) -> PoseEstimate:
     """Fit the model to a measured surface from a start.
 
@@ -66,7 +66,6 @@ def fit_point_to_plane(
         model: prepared bone.
         rectified_from_bone: start.
         settings: of the estimator.
-        stride_px: distance of neighbouring points of the cloud, for the covariance.
 
     Returns:
         The pose `rectified_from_bone` with covariance and reasons; never the start in disguise:
@@ -82,14 +81,14 @@ def fit_point_to_plane(
         for _ in range(settings.max_iterations):
             pairs = _pair(cloud, model, pose, radius_mm)
             if len(pairs.vertex) < MIN_POINTS:
-                return estimate_at(cloud, model, pose, iterations, False, settings, stride_px)
+                return estimate_at(cloud, model, pose, iterations, False, settings)
             iterations += 1
             weight = _weights(pairs, radius_mm)
             pose, turn_rad, shift_mm = _step(pairs, weight, pose)
             if shift_mm < settings.step_mm and turn_rad < settings.step_rad:
                 is_converged = True
                 break
-    return estimate_at(cloud, model, pose, iterations, is_converged, settings, stride_px)
+    return estimate_at(cloud, model, pose, iterations, is_converged, settings)
 
 
 def estimate_at(
@@ -99,7 +98,6 @@ def estimate_at(
     iterations: int = 0,
     is_converged: bool = True,
     settings: PointToPlaneSettings | None = None,
-    stride_px: int = 1,
 ) -> PoseEstimate:
     """How well a pose fits a measured surface, without moving it."""
     settings = settings or PointToPlaneSettings()
@@ -114,7 +112,7 @@ def estimate_at(
     total = weight.sum()
     inlier_share = float((np.abs(pairs.residual_mm) < 3.0 * np.sqrt(pairs.variance_mm2)).mean())
     covariance, is_degenerate = _covariance(
-        pairs, weight, rectified_from_bone, model, settings, stride_px
+        pairs, weight, rectified_from_bone, model.centre_mm, settings
     )
     if is_degenerate:
         reasons.append(Reason.DEGENERATE)
@@ -149,7 +147,7 @@ def _pair(
     along = np.einsum("ij,ij->i", normals, rays)
     variance = (along * cloud.sigma_ray_mm[kept]) ** 2 + model.sigma_mm[index] ** 2
     residual = np.einsum("ij,ij->i", normals, points - surface[kept])
-    return _Pairs(points, normals, residual, variance, index)
+    return _Pairs(points, normals, residual, variance, index, cloud.stride_px)
 
 
 def _width_mm2(pairs: _Pairs, radius_mm: float) -> FloatArray:
@@ -196,22 +194,21 @@ def _covariance(
     pairs: _Pairs,
     weight: FloatArray,
     pose: RigidTransform,
-    model: RegistrationModel,
+    centre_mm: FloatArray,
     settings: PointToPlaneSettings,
-    stride_px: int,
 ) -> tuple[FloatArray, bool]:
     """Covariance of the public twist, and whether a direction is free.
 
     The twist of the points about the model's centre becomes the pose's own by a change of sign and
     the rotation into the camera's frame.
     """
-    jacobian = _jacobian(pairs, model.centre_mm)
+    jacobian = _jacobian(pairs, centre_mm)
     scaled = jacobian * (weight / pairs.variance_mm2)[:, None]
     information = jacobian.T @ scaled
     eigenvalues = np.linalg.eigvalsh(information)
     if eigenvalues[0] <= 1e-9 * eigenvalues[-1]:
         return np.diag([np.inf] * 6), True
-    shared = max(1.0, (settings.correlation_px / stride_px) ** 2)
+    shared = max(1.0, (settings.correlation_px / pairs.stride_px) ** 2)
     covariance = shared * np.linalg.inv(information)
     # From (rotation / lever, translation) in the bone's frame to the public order and frame.
     change = np.zeros((6, 6))

@@ -9,15 +9,15 @@ from navapp.values import DisparityMap, Origin, SurfaceCloud
 def reproject(
     disparity_map: DisparityMap,
     geometry: RectifiedGeometry,
-    stride: int = 1,
+    stride_px: int = 1,
     origins: tuple[Origin, ...] = (Origin.MATCHED,),
 ) -> SurfaceCloud:
-    """Points of the rectified left camera, every `stride`-th pixel each way.
+    """Points of the rectified left camera, every `stride_px`-th pixel each way.
 
     Args:
         disparity_map: of the rectified left view.
         geometry: of the rectified pair.
-        stride: 1 takes all pixels.
+        stride_px: 1 takes all pixels.
         origins: which pixels; by default the measured ones only.
 
     Source: z = f B / d; sigma_z = z^2 / (f B) * sigma_d.
@@ -25,7 +25,7 @@ def reproject(
     wanted = np.isin(disparity_map.origin, [int(origin) for origin in origins])
     wanted &= np.isfinite(disparity_map.disparity_px) & (disparity_map.disparity_px > 0.0)
     thinned = np.zeros_like(wanted)
-    thinned[::stride, ::stride] = wanted[::stride, ::stride]
+    thinned[::stride_px, ::stride_px] = wanted[::stride_px, ::stride_px]
     rows, columns = np.nonzero(thinned)
     disparity = disparity_map.disparity_px[rows, columns].astype(np.float64)
     sigma_px = disparity_map.sigma_px[rows, columns].astype(np.float64)
@@ -41,4 +41,5 @@ def reproject(
         sigma_z * ray_length,
         np.column_stack([u, v]).astype(np.int32),
         disparity_map.origin[rows, columns],
+        stride_px,
     )

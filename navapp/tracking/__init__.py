@@ -1,6 +1,7 @@
 """From a sequence of stereo pictures to judged poses."""
 
-from navapp.tracking.line import Goal, Line, LineSettings
+from navapp.tracking.judge import Goal
+from navapp.tracking.line import Line, LineSettings
 from navapp.tracking.motion import TrackState
 
 __all__ = ["Goal", "Line", "LineSettings", "TrackState"]

@@ -53,6 +53,14 @@ class JudgeLimits:
     max_bound_targets: int = 200
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Goal:
+    """What the judge measures a pose against: the stage's targets and tolerance."""
+
+    targets_mm: FloatArray
+    tolerance_mm: float
+
+
 @dataclass(frozen=True, slots=True)
 class Agreement:
     """Two-way comparison of the rendered model and the measured disparity."""
@@ -85,47 +93,30 @@ class Judge:
         model: RegistrationModel,
         estimate: PoseEstimate,
         measured: DisparityMap,
-        targets_mm: FloatArray,
-        tolerance_mm: float,
+        goal: Goal,
         predicted: RigidTransform | None = None,
     ) -> Verdict:
         """Status, reasons and predicted error of a pose.
 
         Args:
             model: prepared bone.
-            estimate: its `left_from_bone` must here be `rectified_from_bone`.
+            estimate: in the rectified left camera.
             measured: disparity over the bone's box.
-            targets_mm: (N, 3) of the stage; empty: the visible vertices.
-            tolerance_mm: of the stage.
+            goal: of the stage.
             predicted: pose expected by the motion model, for the jump test.
         """
-        limits = self._limits
-        pose = estimate.left_from_bone
         if not np.isfinite(estimate.covariance).all():
             return Verdict(Status.LOST, None, estimate.reasons or (Reason.DEGENERATE,))
-        agreement = self.agreement(model, pose, measured)
+        agreement = self.agreement(model, estimate.camera_from_bone, measured)
         if agreement.n_visible == 0:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
-        bound_mm = self._bound_mm(model, estimate, targets_mm)
-        ratio = estimate.rms_mm / estimate.expected_rms_mm
-        doubts = list(estimate.reasons)
-        doubts += [Reason.COVERAGE_LOW] * (agreement.coverage < limits.coverage_ok)
-        doubts += [Reason.OUTLIERS] * (agreement.inlier_share < limits.inlier_ok)
-        doubts += [Reason.SURFACE_MISFIT] * (ratio > limits.rms_ratio_ok)
-        doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > tolerance_mm)
-        doubts += [Reason.RIG_NOT_ACCEPTED] * (not self._is_rig_accepted)
-        if predicted is not None:
-            jump = np.linalg.norm(predicted.apply(model.centre_mm) - pose.apply(model.centre_mm))
-            doubts += [Reason.JUMPED] * bool(jump > limits.jump_mm)
-        is_lost = (
-            agreement.coverage < limits.coverage_lost
-            or agreement.inlier_share < limits.inlier_lost
-            or ratio > limits.rms_ratio_lost
-            or Reason.TOO_FEW_POINTS in doubts
-        )
-        status = Status.LOST if is_lost else (Status.DEGRADED if doubts else Status.OK)
+        bound_mm = self._bound_mm(model, estimate, goal.targets_mm)
+        doubts = self._doubts(estimate, agreement)
+        doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > goal.tolerance_mm)
+        doubts += [Reason.JUMPED] * self._has_jumped(model, estimate, predicted)
+        is_lost = self._is_lost(estimate, agreement)
         return Verdict(
-            status,
+            Status.LOST if is_lost else (Status.DEGRADED if doubts else Status.OK),
             bound_mm,
             tuple(doubts),
             agreement.coverage,
@@ -134,6 +125,37 @@ class Judge:
             estimate.rms_mm,
             estimate.expected_rms_mm,
         )
+
+    def _doubts(self, estimate: PoseEstimate, agreement: Agreement) -> list[Reason]:
+        """What keeps a pose from being OK, apart from the stage's own limits."""
+        limits = self._limits
+        ratio = estimate.rms_mm / estimate.expected_rms_mm
+        doubts = list(estimate.reasons)
+        doubts += [Reason.COVERAGE_LOW] * (agreement.coverage < limits.coverage_ok)
+        doubts += [Reason.OUTLIERS] * (agreement.inlier_share < limits.inlier_ok)
+        doubts += [Reason.SURFACE_MISFIT] * (ratio > limits.rms_ratio_ok)
+        doubts += [Reason.RIG_NOT_ACCEPTED] * (not self._is_rig_accepted)
+        return doubts
+
+    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+        limits = self._limits
+        return (
+            agreement.coverage < limits.coverage_lost
+            or agreement.inlier_share < limits.inlier_lost
+            or estimate.rms_mm / estimate.expected_rms_mm > limits.rms_ratio_lost
+            or Reason.TOO_FEW_POINTS in estimate.reasons
+        )
+
+    def _has_jumped(
+        self,
+        model: RegistrationModel,
+        estimate: PoseEstimate,
+        predicted: RigidTransform | None,
+    ) -> bool:
+        if predicted is None:
+            return False
+        moved = estimate.camera_from_bone.apply(model.centre_mm) - predicted.apply(model.centre_mm)
+        return bool(np.linalg.norm(moved) > self._limits.jump_mm)
 
     def _render(
         self, model: RegistrationModel, pose: RigidTransform, measured: DisparityMap
@@ -173,7 +195,7 @@ class Judge:
     ) -> float:
         if len(targets_mm) == 0:
             targets_mm = model.bone.mesh.vertices_mm[
-                visible_vertices(model.bone.mesh, estimate.left_from_bone)
+                visible_vertices(model.bone.mesh, estimate.camera_from_bone)
             ]
         step = max(1, len(targets_mm) // self._limits.max_bound_targets)
         if len(targets_mm) == 0:

@@ -27,15 +27,15 @@ from navapp.registration import (
 )
 from navapp.registration.point_to_plane import estimate_at
 from navapp.stereo import SgbmSettings, fill_occlusions, match_sgbm, reproject
-from navapp.tracking.judge import Judge
+from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.motion import TrackState
 from navapp.values import (
     BoneModel,
     DisparityMap,
+    LineTimings,
     PoseEstimate,
     Prior,
     Reason,
-    StageTimings,
     Status,
     SurfaceCloud,
     TrackedFrame,
@@ -78,21 +78,12 @@ class LineSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Goal:
-    """What the judge measures a pose against: the stage's targets and tolerance."""
-
-    targets_mm: FloatArray
-    tolerance_mm: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
     """The surface in the bone's box, and how long it took."""
 
     disparity: DisparityMap
     cloud: SurfaceCloud
-    stride_px: int
-    timings: StageTimings
+    timings: LineTimings
 
 
 class Line:
@@ -130,7 +121,7 @@ class Line:
             return tracked, state.updated(tracked, captured_ns, self.centre_mm)
         started = time.perf_counter_ns()
         estimate = self._estimate(measured, predicted, self._wide if is_lost else self._near)
-        timings = replace(measured.timings, estimate=_ms_since(started))
+        timings = replace(measured.timings, estimate_ms=_ms_since(started))
         tracked = self._judged(estimate, measured.disparity, goal, timings, predicted)
         return tracked, state.updated(tracked, captured_ns, self.centre_mm)
 
@@ -160,7 +151,7 @@ class Line:
             return [self._lost(Reason.NO_SURFACE)]
 
         def score(estimate: PoseEstimate) -> float:
-            found = self._judge.agreement(self.model, estimate.left_from_bone, measured.disparity)
+            found = self._judge.agreement(self.model, estimate.camera_from_bone, measured.disparity)
             return found.coverage * found.inlier_share
 
         starts = tilted_starts(rough, self.centre_mm, self.settings.tilt_deg)
@@ -168,7 +159,7 @@ class Line:
             starts = [rough]
         coarse = find_candidates(measured.cloud, self.model, starts, score, on_progress)
         refined = [
-            self._estimate(measured, estimate.left_from_bone, self._wide)
+            self._estimate(measured, estimate.camera_from_bone, self._wide)
             for estimate in coarse[: self.settings.n_refined]
         ]
         refined.sort(key=score, reverse=True)
@@ -186,7 +177,7 @@ class Line:
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
         estimate = estimate_at(
-            measured.cloud, self.model, pose, settings=self._near, stride_px=measured.stride_px
+            measured.cloud, self.model, pose, settings=self._near
         )  # fmt: skip
         return self._judged(estimate, measured.disparity, goal, measured.timings)
 
@@ -212,32 +203,30 @@ class Line:
         n_matched = filled.matched_share * filled.origin.size
         stride_px = max(1, round((n_matched / self.settings.max_points) ** 0.5))
         cloud = reproject(filled, self._geometry, stride_px)
-        timings = StageTimings(
-            rectify=(t1 - t0) / 1e6, stereo=(t2 - t1) / 1e6, fill=(t3 - t2) / 1e6
+        timings = LineTimings(
+            rectify_ms=(t1 - t0) / 1e6, stereo_ms=(t2 - t1) / 1e6, fill_ms=(t3 - t2) / 1e6
         )
-        return Measurement(filled, cloud, stride_px, timings)
+        return Measurement(filled, cloud, timings)
 
     def _estimate(
         self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
     ) -> PoseEstimate:
         if self.settings.method == "icp":
-            return fit_icp(measured.cloud, self.model, start, measured.stride_px)
-        return fit_point_to_plane(measured.cloud, self.model, start, settings, measured.stride_px)
+            return fit_icp(measured.cloud, self.model, start)
+        return fit_point_to_plane(measured.cloud, self.model, start, settings)
 
     def _judged(
         self,
         estimate: PoseEstimate,
         measured: DisparityMap,
         goal: Goal,
-        timings: StageTimings,
+        timings: LineTimings,
         predicted: RigidTransform | None = None,
     ) -> TrackedFrame:
         """Judge, and hand the pose out in the unrectified left camera."""
         started = time.perf_counter_ns()
-        verdict = self._judge.judge(
-            self.model, estimate, measured, goal.targets_mm, goal.tolerance_mm, predicted
-        )
-        timings = replace(timings, judge=_ms_since(started))
+        verdict = self._judge.judge(self.model, estimate, measured, goal, predicted)
+        timings = replace(timings, judge_ms=_ms_since(started))
         name = self.model.bone.name
         if verdict.predicted_tre_mm is None:
             return TrackedFrame(name, None, verdict, timings)
@@ -245,7 +234,7 @@ class Line:
 
     def _lost(self, reason: Reason) -> TrackedFrame:
         verdict = Verdict(Status.LOST, None, (reason,))
-        return TrackedFrame(self.model.bone.name, None, verdict, StageTimings())
+        return TrackedFrame(self.model.bone.name, None, verdict, LineTimings())
 
     def _region(
         self, pose: RigidTransform, margins: Margins
@@ -271,7 +260,7 @@ class Line:
         turn = np.kron(np.eye(2), left_from_rectified.rotation)
         return replace(
             estimate,
-            left_from_bone=left_from_rectified @ estimate.left_from_bone,
+            camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
             covariance=turn @ estimate.covariance @ turn.T,
         )
 

@@ -70,14 +70,10 @@ def _in_states(*states: SessionState) -> Callable[[Snapshot], bool]:
     return lambda snapshot: snapshot.state in states
 
 
-def _is_review(snapshot: Snapshot) -> bool:
-    return snapshot.state is SessionState.REVIEW and snapshot.is_candidate
-
-
 def is_acceptable(snapshot: Snapshot) -> bool:
     """A candidate waits that the judge does not call lost; another one is refused anyway."""
     verdict = snapshot.verdict
-    return _is_review(snapshot) and verdict is not None and verdict.status is not Status.LOST
+    return snapshot.is_candidate and verdict is not None and verdict.status is not Status.LOST
 
 
 def _can_change_stage(snapshot: Snapshot) -> bool:
@@ -150,7 +146,7 @@ ACTIONS: tuple[Action, ...] = (
         "r",
         "reject",
         "reject the candidate under review",
-        _is_review,
+        lambda snapshot: snapshot.is_candidate,
         lambda _: Reject(),
         slot="reject",
     ),

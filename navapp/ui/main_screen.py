@@ -4,18 +4,18 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.content import Content
 
-from navapp.ui.devices import DevicesPanel
+from navapp.ui.devices_panel import DevicesPanel
 from navapp.ui.event_list import EventList
 from navapp.ui.footer import KeyFooter
 from navapp.ui.line_panel import LinePanel
-from navapp.ui.picture import NOTICE, PictureView
-from navapp.ui.pose import PosePanel, navigable_line, reason_lines
+from navapp.ui.picture_view import NOTICE, PictureView
+from navapp.ui.pose_panel import PosePanel, navigable_line, reason_lines
 from navapp.ui.screens import ViewScreen
 from navapp.ui.stepper import StageStepper
 from navapp.ui.text_view import TextView
-from navapp.ui.title import TitleLine
+from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
-from navapp.ui.work import WorkLine
+from navapp.ui.work_line import WorkLine
 
 
 class SmallNotice(TextView):
@@ -29,7 +29,7 @@ class SmallNotice(TextView):
         return [
             navigable_line(view, width),
             *reason_lines(view, width),
-            Content(f"{'sim, ' if view.is_simulated else ''}{_stage_and_state(view)}"),
+            Content(f"{'sim, ' if view.snapshot.is_simulated else ''}{_stage_and_state(view)}"),
             Content.assemble(("SPACE", "bold $primary"), " blank"),
             Content.styled("make the terminal 80 x 24", "$text-muted"),
             Content.styled(NOTICE, "$text-muted"),

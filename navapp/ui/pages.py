@@ -12,12 +12,12 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
-from navapp.ui.devices import device_line
+from navapp.ui.devices_panel import device_line
 from navapp.ui.event_list import event_line
-from navapp.ui.picture import NOTICE
+from navapp.ui.picture_view import NOTICE
 from navapp.ui.screens import PageScreen, ViewScreen
 from navapp.ui.text_view import TextView
-from navapp.ui.title import TitleLine
+from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 
 

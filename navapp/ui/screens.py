@@ -6,7 +6,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
 
-from navapp.ui.picture import PictureView
+from navapp.ui.picture_view import PictureView
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
 

@@ -85,16 +85,6 @@ class View:
         return self.snapshot.is_navigable and not self.is_silent
 
     @property
-    def is_review(self) -> bool:
-        """A candidate waits for the operator."""
-        return self.snapshot.state is SessionState.REVIEW and self.snapshot.is_candidate
-
-    @property
-    def is_simulated(self) -> bool:
-        """The rig is a simulation."""
-        return self.snapshot.rig_name.lower().startswith("sim")
-
-    @property
     def is_picture_old(self) -> bool:
         """The preview is the last one before the camera fell silent."""
         is_stopped = self.snapshot.is_camera_silent or self.snapshot.state is SessionState.FAULT
@@ -145,7 +135,7 @@ class View:
             return f"left view {dot} OLD PICTURE, no new one comes"
         if self.snapshot.is_blanked:
             return f"left view {dot} BLANKED, the display is dark"
-        if self.is_review:
+        if self.snapshot.is_candidate:
             return f"left view {dot} CANDIDATE, not accepted"
         return "left view" if self.is_navigable else f"left view {dot} NO GUIDES"
 

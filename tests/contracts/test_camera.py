@@ -10,7 +10,7 @@ import pytest
 
 from drivers.clock import ManualClock, SystemClock
 from drivers.contracts import CAMERA_CHECKS, CameraUnderTest, ContractViolation
-from drivers.replay_camera import ReplayCamera
+from drivers.replay_camera import ReplayCamera, ReplaySettings
 from drivers.session_files import SessionWriter
 from navapp.errors import DeviceTimeout
 from sim_devices.camera import SimulatedCamera
@@ -54,10 +54,10 @@ def rendered(_: Path) -> Make:
     return make
 
 
-def replayed(source: str | Path, **options: bool) -> Make:
+def replayed(source: str | Path, settings: ReplaySettings | None = None) -> Make:
     def make() -> CameraUnderTest:
         clock = ManualClock()
-        return CameraUnderTest(ReplayCamera(source, clock, **options), clock)
+        return CameraUnderTest(ReplayCamera(source, clock, settings or ReplaySettings()), clock)
 
     return make
 
@@ -80,7 +80,7 @@ def two_videos(path: Path) -> Make:
 
 def one_video(path: Path) -> Make:
     video = write_video(path / "both.avi", ("left", "right"), 4)
-    return replayed(video, split_side_by_side=True)
+    return replayed(video, ReplaySettings(is_side_by_side=True))
 
 
 BACKENDS = (stepped, free_running, rendered, folder, session, two_videos, one_video)

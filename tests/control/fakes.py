@@ -22,11 +22,11 @@ from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import TrackState
 from navapp.values import (
     BoneModel,
+    LineTimings,
     Plan,
     PoseEstimate,
     Prior,
     Reason,
-    StageTimings,
     Status,
     TrackedFrame,
     Verdict,
@@ -68,7 +68,7 @@ def answer(
     estimate = PoseEstimate(pose, 0.01 * np.eye(6), 500, 0.9, 0.2, 0.2, 3, True)
     bound = 0.8 if has_pose else None
     verdict = Verdict(status, bound, reasons, 0.7, 0.0, 0.9, 0.2, 0.2)
-    return TrackedFrame(pose.source, estimate if has_pose else None, verdict, StageTimings())
+    return TrackedFrame(pose.source, estimate if has_pose else None, verdict, LineTimings())
 
 
 @dataclass
@@ -113,7 +113,7 @@ class FakeLine:
         tracked = self.script.assessed
         if tracked.estimate is None:
             return tracked
-        return replace(tracked, estimate=replace(tracked.estimate, left_from_bone=left_from_bone))
+        return replace(tracked, estimate=replace(tracked.estimate, camera_from_bone=left_from_bone))
 
 
 class FakeCamera:

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 
 from drivers.interfaces import PowerState
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionOptions
+from navapp.control.controller import SessionHooks, SessionOptions
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.interlocks import navigable
+from navapp.control.recorder import RecordingStopped
 from navapp.control.states import (
     Accept,
     Blank,
@@ -17,6 +18,7 @@ from navapp.control.states import (
     DeviceHealth,
     EnterStage,
     EventLevel,
+    Interrupt,
     Propose,
     Quit,
     Reconnect,
@@ -232,7 +234,7 @@ def test_a_worker_that_ends_between_two_frames_is_used_from_the_next_one(monkeyp
 
         n_asked = 0
 
-        def is_due(self, job, sequence: int) -> bool:
+        def take_due(self, job, sequence: int) -> bool:
             self.n_asked += 1
             return self.n_asked >= 3
 
@@ -715,3 +717,69 @@ def test_the_same_session_on_another_plan_knows_its_bones(monkeypatch) -> None:
     assert not bench.snapshot.is_bone_planned
     bench.do(EnterStage(5))
     assert bench.snapshot.is_bone_planned
+
+
+# -- what must not outlive its reason -------------------------------------------------------------
+
+
+def test_a_new_stage_does_not_inherit_the_old_stages_verdict(bench: Bench) -> None:
+    navigating(bench)
+    after = bench.do(EnterStage(2))
+    assert not after.is_navigable
+    assert not bench.shows_guides
+    assert bench.frames(1).is_navigable
+
+
+def test_a_candidate_judged_in_another_stage_cannot_be_accepted(bench: Bench) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(1)
+    bench.do(EnterStage(2))
+    assert bench.do(Accept()).state.value == "review"
+    assert "lost" in bench.refused()
+    bench.frames(1)
+    assert bench.do(Accept()).state.value == "navigating"
+
+
+def test_an_interruption_in_a_recording_forgets_what_the_camera_looked_at(bench: Bench) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(1)
+    assert bench.do(Interrupt()).state.value == "ready"
+    assert bench.controller.step().left_from_bone is None
+    navigating(bench)
+    assert bench.do(Interrupt()).state.value == "suspended"
+
+
+def test_a_loss_of_the_camera_is_told_as_a_command_that_a_replay_can_give(monkeypatch) -> None:
+    told = []
+    hooks = SessionHooks(on_command=(lambda command, sequence: told.append((command, sequence)),))
+    bench = navigating(Bench(monkeypatch, hooks=hooks))
+    bench.camera.error = DeviceLost("unplugged")
+    bench.frames(1)
+    assert told[-1] == (Interrupt(), bench.snapshot.sequence)
+    assert isinstance(bench.controller.lost_device, DeviceLost)
+    bench.camera.error = None
+    bench.frames(10)
+    assert bench.controller.lost_device is None
+
+
+def test_a_failed_registration_hands_out_the_judges_reasons(bench: Bench) -> None:
+    bench.script.found = [LOST]
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(1)
+    assert bench.state == "ready"
+    assert bench.results[-1].tracked.verdict.reasons == (Reason.COVERAGE_LOW,)
+    assert not bench.shows_guides
+
+
+def test_a_recording_that_stops_is_an_alarm_and_not_the_end(monkeypatch) -> None:
+    def stop(result) -> None:
+        raise RecordingStopped("recording stopped: the disk is full")
+
+    bench = Bench(monkeypatch)
+    bench.controller._hooks = replace(bench.controller._hooks, on_frame=(stop,))
+    bench.frames(2)
+    assert bench.state == "ready"
+    assert [e.level for e in bench.events if e.kind == "recording"] == [EventLevel.ALARM] * 2

@@ -16,7 +16,7 @@ def test_an_inline_job_is_done_when_it_was_started() -> None:
     job: Job[int] = Job(lambda report: 7)
     executor = InlineExecutor()
     executor.start(job)
-    assert executor.is_due(job, 0)
+    assert executor.take_due(job, 0)
     assert job.result == 7
 
 
@@ -36,9 +36,9 @@ def test_a_worker_is_due_when_it_has_finished() -> None:
     job: Job[bool] = Job(lambda report: gate.wait(10.0))
     executor = ThreadExecutor()
     executor.start(job)
-    assert not executor.is_due(job, 10**6)
+    assert not executor.take_due(job, 10**6)
     gate.set()
-    wait_for(lambda: executor.is_due(job, 0), "the worker")
+    wait_for(lambda: executor.take_due(job, 0), "the worker")
     assert job.result is True
     executor.close()
     assert not any(thread.name == "registration" for thread in threading.enumerate())
@@ -69,7 +69,7 @@ def test_a_recorded_job_is_handed_over_when_the_recording_did(due, first) -> Non
     executor = RecordedExecutor(due)
     job: Job[int] = Job(lambda report: 1)
     executor.start(job)
-    assert [n for n in range(10) if executor.is_due(job, n)] == [first]
+    assert [n for n in range(10) if executor.take_due(job, n)] == [first]
 
 
 def test_recorded_jobs_are_handed_over_one_after_the_other() -> None:
@@ -77,10 +77,10 @@ def test_recorded_jobs_are_handed_over_one_after_the_other() -> None:
     jobs = [Job(lambda report: 1) for _ in range(2)]
     for job in jobs:
         executor.start(job)
-    assert not executor.is_due(jobs[0], 2)
-    assert executor.is_due(jobs[0], 3)
-    assert not executor.is_due(jobs[1], 7)
-    assert executor.is_due(jobs[1], 9)
+    assert not executor.take_due(jobs[0], 2)
+    assert executor.take_due(jobs[0], 3)
+    assert not executor.take_due(jobs[1], 7)
+    assert executor.take_due(jobs[1], 9)
 
 
 def test_a_job_whose_result_the_recording_never_used_is_never_due() -> None:
@@ -88,4 +88,4 @@ def test_a_job_whose_result_the_recording_never_used_is_never_due() -> None:
     executor = RecordedExecutor([])
     job: Job[int] = Job(lambda report: 1)
     executor.start(job)
-    assert not any(executor.is_due(job, n) for n in range(100))
+    assert not any(executor.take_due(job, n) for n in range(100))

@@ -110,3 +110,24 @@ def test_what_goes_wrong_in_the_background_is_raised_at_the_latest_at_the_end(mo
     with pytest.raises(InputError, match="disk is full"):
         background.close()
     assert sink.is_closed
+
+
+def test_a_full_disk_stops_the_recording_once_and_the_rest_is_ignored(
+    monkeypatch, tmp_path: Path
+) -> None:
+    bench, recorder = recorded(monkeypatch, tmp_path, Sink(error_at=2))
+    bench.frames(5)
+    told = [event for event in bench.snapshot.events if event.kind == "recording"]
+    assert bench.state == "ready"
+    assert len(lines(tmp_path / "poses.jsonl")) == 2
+    assert [event.text for event in told] == ["recording stopped: the disk is full"]
+    recorder.close()
+    assert not read_events(tmp_path / "events.jsonl").is_complete
+
+
+def test_a_recording_that_ran_to_its_end_says_so(monkeypatch, tmp_path: Path) -> None:
+    bench, recorder = recorded(monkeypatch, tmp_path, Sink())
+    bench.frames(2)
+    assert not read_events(tmp_path / "events.jsonl").is_complete
+    recorder.close()
+    assert read_events(tmp_path / "events.jsonl").is_complete

@@ -1,7 +1,9 @@
 import threading
 
-from navapp.control.runner import SessionRunner
+from navapp.control.operators import ScriptedOperator
+from navapp.control.runner import SessionRunner, run_headless
 from navapp.control.states import Accept, Quit, Register
+from navapp.errors import DeviceLost, DeviceNotFound
 from tests.control.fakes import Bench, wait_for
 
 
@@ -56,3 +58,24 @@ def test_a_runner_that_never_started_closes_the_devices(monkeypatch) -> None:
     SessionRunner(bench.controller).stop()
     assert bench.is_dark
     assert not bench.camera.is_open
+
+
+def test_a_headless_run_ends_when_the_camera_stays_away(monkeypatch) -> None:
+    bench = Bench(monkeypatch)
+    bench.frames(1)
+    bench.camera.error = DeviceLost("unplugged")
+    bench.camera.opening_error = DeviceNotFound("still unplugged")
+    last = run_headless(bench.controller, ScriptedOperator())
+    assert last.state.value == "fault"
+    assert isinstance(bench.controller.lost_device, DeviceLost)
+    assert 9.0 < (last.time_ns - bench.results[-1].frame.captured_ns) / 1e9 < 14.0
+
+
+def test_stopping_a_runner_darkens_the_display_before_it_waits(monkeypatch) -> None:
+    bench = Bench(monkeypatch)
+    runner = SessionRunner(bench.controller)
+    order = []
+    monkeypatch.setattr(bench.controller, "darken", lambda: order.append("dark"))
+    monkeypatch.setattr(bench.controller, "close", lambda: order.append("closed"))
+    runner.stop()
+    assert order == ["dark", "closed"]

@@ -18,7 +18,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.values import BoneModel, Plan, Prior, Status
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
-from sim_devices.faults import FaultScript, fault_script
+from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
@@ -113,11 +113,8 @@ def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right
 
 @pytest.mark.slow
 def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
-    faults = fault_script(
-        [
-            {"kind": "unplug", "start_s": 0.3, "duration_s": 2.0},
-            {"kind": "wrong_serial", "start_s": 2.3, "duration_s": 1.2},
-        ]
+    faults = FaultScript(
+        (Fault(FaultKind.UNPLUG, 0.3, 2.0), Fault(FaultKind.WRONG_SERIAL, 2.3, 1.2))
     )
     room = SimulatedRoom(undo, faults=faults)
     room.frames(1)
@@ -145,7 +142,7 @@ def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
 
 @pytest.mark.slow
 def test_a_blackout_suspends_and_light_resumes(undo) -> None:
-    faults = fault_script([{"kind": "blackout_right", "start_s": 0.25, "duration_s": 0.2}])
+    faults = FaultScript((Fault(FaultKind.BLACKOUT_RIGHT, 0.25, 0.2),))
     room = SimulatedRoom(undo, faults=faults, n_frames=9)
     room.frames(1)
     room.controller.submit(Register())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.clock import ManualClock
-from drivers.replay_camera import ReplayCamera
+from drivers.replay_camera import ReplayCamera, ReplaySettings
 from drivers.session_files import SessionWriter
 from navapp.errors import (
     DeviceLost,
@@ -26,8 +26,8 @@ from tests.drivers.recordings import (
 )
 
 
-def opened(source, clock=None, **options):
-    camera = ReplayCamera(source, clock or ManualClock(), **options)
+def opened(source, clock=None, rig_id="", **settings):
+    camera = ReplayCamera(source, clock or ManualClock(), ReplaySettings(**settings), rig_id=rig_id)
     camera.open()
     return camera
 
@@ -304,13 +304,13 @@ def test_two_videos_are_a_pair_in_any_order(tmp_path):
 
 def test_rate_of_a_video_is_its_own(tmp_path):
     video = write_video(tmp_path / "both.avi", ("left", "right"), 3, rate_hz=25.0)
-    camera = opened(video, split_side_by_side=True, rate_hz=15.0)
+    camera = opened(video, is_side_by_side=True, rate_hz=15.0)
     assert [one.captured_ns for one in read_all(camera)] == [0, 40_000_000, 80_000_000]
 
 
 def test_one_video_is_split_down_the_middle(tmp_path):
     video = write_video(tmp_path / "both.avi", ("left", "right"), 4)
-    frames = read_all(opened(video, split_side_by_side=True))
+    frames = read_all(opened(video, is_side_by_side=True))
     assert frames[0].left.shape == (HEIGHT, WIDTH, 3)
     assert [(number_of(one.left), number_of(one.right)) for one in frames] == [
         (0.0, 0.5),
@@ -333,7 +333,7 @@ def test_truncated_video_is_noticed(tmp_path):
     data = video.read_bytes()
     video.write_bytes(data[: len(data) * 3 // 4])
     with pytest.raises(SequenceError, match=r"truncated: \d+ of 20 frames"):
-        opened(video, split_side_by_side=True)
+        opened(video, is_side_by_side=True)
 
 
 def test_unreadable_and_missing_videos_are_named(tmp_path):
@@ -351,16 +351,25 @@ def test_video_without_partner_and_split_of_a_folder_are_wrong_usage(tmp_path, f
     with pytest.raises(UsageError, match="one video for two eyes: give LEFT,RIGHT"):
         opened(video)
     with pytest.raises(UsageError, match="cannot be split"):
-        opened(folder, split_side_by_side=True)
+        opened(folder, is_side_by_side=True)
 
 
 # The rest
 
 
-def test_wrong_settings_are_refused(folder):
-    for options in ({"order": "sideways"}, {"n_frames": 0}, {"rate_hz": 0.0}):
-        with pytest.raises(UsageError):
-            ReplayCamera(folder, ManualClock(), **options)
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"order": "sideways"}, "unknown order 'sideways'"),
+        ({"n_frames": 0}, "0 frames"),
+        ({"rate_hz": 0.0}, "a rate of 0 Hz"),
+        ({"rate_hz": float("nan")}, "a rate of nan Hz"),
+        ({"rate_hz": float("inf")}, "a rate of inf Hz"),
+    ],
+)
+def test_wrong_settings_are_refused(settings, words):
+    with pytest.raises(UsageError, match=words):
+        ReplaySettings(**settings)
 
 
 def test_recording_has_no_controls_and_must_be_open(folder):

@@ -1,6 +1,7 @@
 """Bad input: one clear sentence, the right exit code, nothing half-written."""
 
 import json
+import os
 from pathlib import Path
 
 import cv2
@@ -12,17 +13,15 @@ from navapp.geometry import RigQuality, StereoRig, write_rig
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import write_ply
 from navapp.preop import write_plan
-from navapp.values import BoneModel, Plan
-from sim_devices.anatomy import make_knee
+from navapp.values import Plan
 from sim_devices.rigs import default_rig
+from tests.bones import femur_model
 
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("plans") / "plan"
-    mesh = make_knee().bones["femur"]
-    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "right")
-    write_plan(folder, Plan({"femur": bone}))
+    write_plan(folder, Plan({"femur": femur_model()}))
     return folder
 
 
@@ -145,6 +144,24 @@ def test_an_unknown_key_in_the_configuration(tmp_path, capsys) -> None:
     )  # fmt: skip
 
 
+def test_a_misspelt_fault_in_the_configuration(tmp_path, capsys) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(
+        '[camera.simulated]\nfaults = [{ kind = "melt", start_s = 0, duration_s = 1 }]\n',
+        encoding="utf-8",
+    )
+    refused(["--config", str(path), "config", "show"], capsys, 2, "faults.0.kind", "unplug")
+
+
+def test_more_cartilage_than_the_simulator_has(tmp_path, capsys) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text("[camera.simulated]\ncartilage_mm = 2.7\n", encoding="utf-8")
+    refused(
+        ["--config", str(path), "run", "--headless", "--frames", "2"],
+        capsys, 2, "camera.simulated.cartilage_mm", "2.6",
+    )  # fmt: skip
+
+
 def test_a_missing_configuration(tmp_path, capsys) -> None:
     refused(
         ["--config", str(tmp_path / "c.toml"), "config", "show"], capsys, 2, "c.toml", "config init"
@@ -162,6 +179,11 @@ def test_no_rig_at_all(pairs, plan, prior, capsys) -> None:
 
 def test_a_bone_that_the_plan_does_not_have(pairs, rig, plan, prior, capsys) -> None:
     refused([*replay(pairs, rig, plan, prior), "--bone", "tibia"], capsys, 2, "tibia", "femur")
+
+
+@pytest.mark.parametrize(("option", "word"), [("--frames", "0 frames"), ("--fps", "a rate of 0")])
+def test_a_replay_of_nothing(pairs, rig, plan, prior, capsys, option, word) -> None:
+    refused([*replay(pairs, rig, plan, prior), option, "0"], capsys, 2, word)
 
 
 def test_pingpong_without_an_end(pairs, rig, plan, prior, capsys) -> None:
@@ -184,15 +206,14 @@ def test_a_surface_that_is_no_surface(tmp_path, capsys) -> None:
 
 
 def test_a_surface_in_metres(tmp_path, capsys) -> None:
-    mesh = make_knee().bones["femur"]
+    mesh = femur_model().mesh
     write_ply(tmp_path / "f.ply", TriangleMesh(mesh.vertices_mm / 1000.0, mesh.faces))
     arguments = ["plan", "--surface", f"femur={tmp_path / 'f.ply'}", "--out", str(tmp_path / "p")]
     refused(arguments, capsys, 3, "1000")
 
 
 def test_a_plan_over_something_else(tmp_path, capsys) -> None:
-    mesh = make_knee().bones["femur"]
-    write_ply(tmp_path / "f.ply", mesh)
+    write_ply(tmp_path / "f.ply", femur_model().mesh)
     precious = tmp_path / "precious"
     precious.mkdir()
     (precious / "thesis.txt").write_text("years of work", encoding="utf-8")
@@ -212,3 +233,17 @@ def test_wrong_usage_is_exit_code_2(capsys) -> None:
 def test_every_verb_has_help_with_an_example(verb: str, capsys) -> None:
     assert run([verb, "--help"]) == 0
     assert "example" in capsys.readouterr().out
+
+
+def test_no_color_reaches_the_screen_by_its_usual_name(monkeypatch, capsys) -> None:
+    monkeypatch.setenv("NO_COLOR", "")
+    assert run(["--no-color", "config", "show"]) == 0
+    assert os.environ["NO_COLOR"] == "1"
+
+
+def test_the_configurations_path_is_null_without_a_file(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["config", "show", "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["path"] is None
+    assert run(["config", "init", "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["path"] == "navapp.toml"

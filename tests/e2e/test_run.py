@@ -7,6 +7,10 @@ from typing import Any
 import pytest
 
 from navapp.cli.main import run
+from navapp.preop import write_plan
+from navapp.values import Plan
+from sim_devices.anatomy import KneeSpec
+from tests.bones import femur_model
 
 MOVING = """
 [camera.simulated]
@@ -69,6 +73,49 @@ def test_a_session_is_never_recorded_over_another(
     assert {path: path.read_bytes() for path in session.rglob("*") if path.is_file()} == before
 
 
+def test_a_session_recorded_with_an_unknown_method_is_refused(
+    tmp_path: Path, moving: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session = tmp_path / "session"
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "2"]
+    run([*options, "--record", str(session)])
+    path = session / "session.json"
+    path.write_text(path.read_text(encoding="utf-8").replace("bimcc", "magic"), encoding="utf-8")
+    capsys.readouterr()
+    assert run(["--quiet", "replay", str(session)]) == 3
+    assert "unknown method 'magic'" in capsys.readouterr().err
+
+
+def test_the_command_lines_words_go_before_the_recorded_sessions(
+    tmp_path: Path, moving: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    session = tmp_path / "session"
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "2"]
+    run([*options, "--record", str(session)])
+    capsys.readouterr()
+    missing = tmp_path / "other.yml"
+    assert run(["--quiet", "replay", str(session), "--rig", str(missing)]) == 3
+    assert str(missing) in capsys.readouterr().err
+    # What is replaced is not even looked at.
+    (session / "prior.json").write_text("{", encoding="utf-8")
+    prior = tmp_path / "prior.json"
+    prior.write_text("{}", encoding="utf-8")
+    assert run(["--quiet", "replay", str(session), "--prior", str(prior)]) == 4
+    assert run(["--quiet", "replay", str(session)]) == 3
+    assert str(session / "prior.json") in capsys.readouterr().err
+
+
+def test_verbose_tells_every_frame(
+    tmp_path: Path, moving: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--config", str(moving), "run", "--headless", "--frames", "3"]
+    run(["--verbose", *options])
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("navapp: f")]
+    assert [line.split()[2] for line in lines] == ["0", "1", "2"]
+    run(options)
+    assert "navapp: frame" not in capsys.readouterr().err
+
+
 def test_the_operators_script_is_followed(tmp_path: Path, moving: Path) -> None:
     script, out = tmp_path / "script.toml", tmp_path / "out.json"
     script.write_text(
@@ -94,12 +141,6 @@ def test_nothing_found_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def make_foreign_plan(folder: Path) -> Path:
-    from navapp.geometry.mesh import TriangleMesh
-    from navapp.preop import write_plan
-    from navapp.values import BoneModel, Plan
-    from sim_devices.anatomy import KneeSpec, make_knee
-
-    mesh = make_knee(KneeSpec(seed=7, side="left", sex="male")).bones["femur"]
-    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "left")
+    bone = femur_model(KneeSpec(seed=7, side="left", sex="male"))
     write_plan(folder / "foreign", Plan({"femur": bone}))
     return folder / "foreign"

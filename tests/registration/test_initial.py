@@ -34,9 +34,9 @@ def test_the_tilts_go_in_all_directions() -> None:
 
 def test_the_same_answer_is_kept_once_and_the_first_stays() -> None:
     first = estimate_at(CLOUD, MODEL, TRUE)
-    near = replace(first, left_from_bone=disturbed(MODEL, 0.5, 0.5, 1))
-    shifted = replace(first, left_from_bone=disturbed(MODEL, 0.0, 3.0, 1))
-    turned = replace(first, left_from_bone=disturbed(MODEL, 4.0, 0.0, 1))
+    near = replace(first, camera_from_bone=disturbed(MODEL, 0.5, 0.5, 1))
+    shifted = replace(first, camera_from_bone=disturbed(MODEL, 0.0, 3.0, 1))
+    turned = replace(first, camera_from_bone=disturbed(MODEL, 4.0, 0.0, 1))
     kept = distinct([first, near, shifted, turned, near], MODEL.centre_mm)
     assert [id(k) for k in kept] == [id(first), id(shifted), id(turned)]
 
@@ -49,7 +49,7 @@ def test_sameness_has_its_bounds() -> None:
 
 
 def score(estimate) -> float:
-    return -mean_error_mm(estimate.left_from_bone, BONE)
+    return -mean_error_mm(estimate.camera_from_bone, BONE)
 
 
 def test_candidates_are_distinct_and_the_best_comes_first() -> None:
@@ -57,7 +57,7 @@ def test_candidates_are_distinct_and_the_best_comes_first() -> None:
     found = find_candidates(CLOUD, MODEL, starts, score)
     scores = [score(estimate) for estimate in found]
     assert scores == sorted(scores, reverse=True)
-    assert mean_error_mm(found[0].left_from_bone, BONE) < 1.0
+    assert mean_error_mm(found[0].camera_from_bone, BONE) < 1.0
     assert len(distinct(found, MODEL.centre_mm)) == len(found) < len(starts)
 
 

@@ -2,8 +2,7 @@ import math
 
 import pytest
 
-from navapp.errors import ConfigurationError
-from sim_devices.faults import Fault, FaultKind, FaultScript, fault_script
+from sim_devices.faults import Fault, FaultKind, FaultScript
 
 S = 1_000_000_000
 
@@ -44,42 +43,15 @@ def test_first_moment_finds_faults_that_began_earlier_or_in_between():
     assert find(FaultKind.UNPLUG, 6 * S, 9 * S) is None
 
 
-def test_script_is_read_from_tables():
-    script = fault_script(
-        [
-            {"kind": "unplug", "start_s": 3, "duration_s": 1.5},
-            {"kind": "delay", "start_s": 0, "duration_s": math.inf, "delay_s": 0.2},
-        ]
-    )
-    assert script.faults == (
-        Fault(FaultKind.UNPLUG, 3.0, 1.5),
-        Fault(FaultKind.DELAY, 0.0, math.inf, 0.2),
-    )
-    assert fault_script([]) == FaultScript()
-
-
 @pytest.mark.parametrize(
-    ("entry", "message"),
+    ("times_s", "message"),
     [
-        (
-            {"kind": "melt", "start_s": 0, "duration_s": 1},
-            "fault 2 has the kind 'melt': use unplug",
-        ),
-        ({"start_s": 0, "duration_s": 1}, "fault 2 has the kind None"),
-        ({"kind": "drop", "start_s": 0}, "needs the number duration_s: give it in seconds"),
-        ({"kind": "drop", "start_s": "0", "duration_s": 1}, "needs the number start_s"),
-        ({"kind": "drop", "start_s": True, "duration_s": 1}, "needs the number start_s"),
-        ({"kind": "drop", "start_s": 0, "duration_s": 1, "end_s": 2}, "unknown key 'end_s'"),
-        ({"kind": "drop", "start_s": 0, "duration_s": 1, "delay_s": 2}, "unknown key 'delay_s'"),
-        ({"kind": "drop", "start_s": -1, "duration_s": 1}, "start_s must not be negative"),
-        ({"kind": "drop", "start_s": 0, "duration_s": 0}, "duration_s must be positive"),
-        ({"kind": "drop", "start_s": math.nan, "duration_s": 1}, "start_s must not be negative"),
-        ({"kind": "delay", "start_s": 0, "duration_s": 1, "delay_s": -1}, "delay_s must not be"),
+        ((-1.0, 1.0), "start_s must not be negative"),
+        ((math.nan, 1.0), "start_s must not be negative"),
+        ((0.0, 0.0), "duration_s must be positive"),
+        ((0.0, 1.0, -1.0), "delay_s must not be negative"),
     ],
 )
-def test_wrong_tables_are_refused_with_their_number(entry, message):
-    good = {"kind": "freeze", "start_s": 0, "duration_s": 1}
-    with pytest.raises(ConfigurationError) as caught:
-        fault_script([good, entry])
-    assert message in str(caught.value)
-    assert str(caught.value).startswith("fault 2")
+def test_impossible_times_are_refused(times_s, message):
+    with pytest.raises(ValueError, match=message):
+        Fault(FaultKind.DELAY, *times_s)

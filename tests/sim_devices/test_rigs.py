@@ -12,6 +12,7 @@ def test_the_rig_has_the_promised_size_baseline_and_focal_length():
     assert rig.baseline_mm == pytest.approx(BASELINE_MM)
     assert rig.left.focal_px == pytest.approx(1400.0, rel=0.01)
     assert rig.serials == ("SIM-L", "SIM-R")
+    assert rig.name.startswith("sim:")
     assert rig.left.is_distorted
     assert rig.right.is_distorted
     turned = rotation_angle_deg(rig.right_from_left, RigidTransform.identity("right", "left"))

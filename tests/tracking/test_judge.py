@@ -6,7 +6,7 @@ import pytest
 from navapp.registration import RegistrationModel, fit_point_to_plane
 from navapp.registration.point_to_plane import estimate_at
 from navapp.stereo import reproject
-from navapp.tracking.judge import Judge
+from navapp.tracking.judge import Goal, Judge
 from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.registration.shapes import GEOMETRY, TRUE, disturbed, femur
@@ -23,9 +23,9 @@ def verdict_on(
     tolerance_mm: float = 3.0, predicted=None,
 ) -> Verdict:  # fmt: skip
     cloud = reproject(measured, GEOMETRY, 3)
-    estimate = estimate_at(cloud, model, pose, stride_px=3)
+    estimate = estimate_at(cloud, model, pose)
     judge = Judge(GEOMETRY, is_accepted)
-    return judge.judge(model, estimate, measured, NO_TARGETS, tolerance_mm, predicted)
+    return judge.judge(model, estimate, measured, Goal(NO_TARGETS, tolerance_mm), predicted)
 
 
 def test_the_truth_is_ok() -> None:
@@ -52,8 +52,8 @@ def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeS
     """The other side's, and one of another size."""
     mesh = make_knee(spec).bones["femur"]
     other = RegistrationModel(BoneModel("femur", mesh, spec.side))
-    fitted = fit_point_to_plane(reproject(MAP, GEOMETRY, 3), other, TRUE, stride_px=3)
-    verdict = verdict_on(fitted.left_from_bone, model=other)
+    fitted = fit_point_to_plane(reproject(MAP, GEOMETRY, 3), other, TRUE)
+    verdict = verdict_on(fitted.camera_from_bone, model=other)
     assert verdict.status is not Status.OK
     assert {Reason.SURFACE_MISFIT, Reason.OUTLIERS} & set(verdict.reasons)
 
@@ -61,8 +61,8 @@ def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeS
 def test_another_bone_is_lost() -> None:
     mesh = make_knee(KneeSpec(1)).bones["tibia"]
     other = RegistrationModel(BoneModel("femur", mesh, "right"))
-    fitted = fit_point_to_plane(reproject(MAP, GEOMETRY, 3), other, TRUE, stride_px=3)
-    assert verdict_on(fitted.left_from_bone, model=other).status is Status.LOST
+    fitted = fit_point_to_plane(reproject(MAP, GEOMETRY, 3), other, TRUE)
+    assert verdict_on(fitted.camera_from_bone, model=other).status is Status.LOST
 
 
 def with_blob(share: float) -> DisparityMap:
@@ -114,11 +114,13 @@ def test_the_bound_is_held_against_the_stages_tolerance() -> None:
 
 
 def test_targets_far_from_the_seen_surface_are_less_certain() -> None:
-    estimate = estimate_at(reproject(MAP, GEOMETRY, 3), MODEL, TRUE, stride_px=3)
+    estimate = estimate_at(reproject(MAP, GEOMETRY, 3), MODEL, TRUE)
     judge = Judge(GEOMETRY, True)
     near = BONE.mesh.vertices_mm[BONE.mesh.vertices_mm[:, 2].argmin()][None]
     bounds = [
-        judge.judge(MODEL, estimate, MAP, near + np.array([0.0, 0.0, away]), 99.0).predicted_tre_mm
+        judge.judge(
+            MODEL, estimate, MAP, Goal(near + np.array([0.0, 0.0, away]), 99.0)
+        ).predicted_tre_mm
         for away in (0.0, 300.0)
     ]
     assert bounds[1] > 2.0 * bounds[0]

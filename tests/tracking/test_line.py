@@ -158,9 +158,8 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
         frame.left, frame.right, rectified_from_left @ truth, line.settings.tracking
     )
     inside = estimate_at(
-        measured.cloud, line.model, rectified_from_left @ truth, settings=line._near,
-        stride_px=measured.stride_px,
-    )  # fmt: skip
+        measured.cloud, line.model, rectified_from_left @ truth, settings=line._near
+    )
     turn = np.kron(np.eye(2), rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15

@@ -4,7 +4,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import TrackState
 from navapp.tracking.motion import twist_between
-from navapp.values import PoseEstimate, StageTimings, Status, TrackedFrame, Verdict
+from navapp.values import LineTimings, PoseEstimate, Status, TrackedFrame, Verdict
 
 CENTRE = np.array([3.0, -20.0, 15.0])
 START = RigidTransform.from_parts(
@@ -17,7 +17,7 @@ def frame(pose: RigidTransform | None, status: Status = Status.OK) -> TrackedFra
     estimate = None
     if pose is not None:
         estimate = PoseEstimate(pose, np.eye(6), 500, 1.0, 0.2, 0.2, 3, True)
-    return TrackedFrame("femur", estimate, Verdict(status), StageTimings())
+    return TrackedFrame("femur", estimate, Verdict(status), LineTimings())
 
 
 def moved(pose: RigidTransform, twist) -> RigidTransform:

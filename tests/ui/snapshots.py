@@ -95,6 +95,7 @@ def navigating(**changes: Any) -> Snapshot:
         devices=DEVICES,
         events=EVENTS,
         rig_name="simulated rig",
+        is_simulated=True,
         plan_name="knee phantom",
         plan_digest="7f3a09c1d2e4",
         side="right",

@@ -26,16 +26,11 @@ def test_nothing_is_accepted_on_an_old_word() -> None:
     assert not is_possible(ACTION_OF_NAME["accept"], snapshots.review(), is_silent=True)
 
 
-@pytest.mark.parametrize("state", [s for s in SessionState if s is not SessionState.REVIEW])
-def test_accept_and_reject_need_a_review(state: SessionState) -> None:
-    snapshot = snapshots.review(state=state)
+@pytest.mark.parametrize("state", list(SessionState))
+def test_accept_and_reject_need_a_candidate(state: SessionState) -> None:
+    snapshot = snapshots.review(state=state, is_candidate=False)
     assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
     assert not is_possible(ACTION_OF_NAME["reject"], snapshot, is_silent=False)
-
-
-def test_a_review_without_candidate_accepts_nothing() -> None:
-    snapshot = snapshots.review(is_candidate=False)
-    assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
 
 
 def test_stages_end_at_the_first_and_the_last() -> None:

@@ -27,8 +27,8 @@ from navapp.control.states import (
 from navapp.ui.app import NavigationApp
 from navapp.ui.main_screen import MainScreen, SmallNotice
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
-from navapp.ui.picture import PictureView
-from navapp.ui.pose import PosePanel
+from navapp.ui.picture_view import PictureView
+from navapp.ui.pose_panel import PosePanel
 from tests.ui import snapshots
 
 Script = Callable[["BellCounter", Pilot[Any]], Awaitable[None]]

@@ -13,14 +13,14 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
-from navapp.ui.devices import DevicesPanel
+from navapp.ui.devices_panel import DevicesPanel
 from navapp.ui.event_list import event_line
 from navapp.ui.footer import KeyFooter
-from navapp.ui.pose import PosePanel, reason_lines
+from navapp.ui.pose_panel import PosePanel, reason_lines
 from navapp.ui.stepper import StageStepper
 from navapp.ui.symbols import ASCII, UNICODE, Symbols
 from navapp.ui.text_view import TextView
-from navapp.ui.title import TitleLine
+from navapp.ui.title_line import TitleLine
 from navapp.ui.view import Level, View
 from navapp.values import Reason, Status, Verdict
 from tests.ui import snapshots
@@ -134,11 +134,14 @@ def test_no_devices_are_no_lines() -> None:
     assert lines_of(DevicesPanel(), view_of(snapshots.navigating(devices=())), WIDTH, 2) == []
 
 
-def test_the_title_says_sim_only_of_a_simulated_rig() -> None:
-    (line,) = lines_of(TitleLine(), view_of(snapshots.navigating()), 80, 1)
-    assert " sim " in line
-    (line,) = lines_of(TitleLine(), view_of(snapshots.navigating(rig_name="oak 7")), 80, 1)
-    assert " sim " not in line
+@pytest.mark.parametrize("rig_name", ["sim:rig", "oak 7"])
+@pytest.mark.parametrize("is_simulated", [True, False])
+def test_the_title_says_sim_when_the_session_is_simulated_whatever_the_rigs_name(
+    rig_name: str, is_simulated: bool
+) -> None:
+    snapshot = snapshots.navigating(rig_name=rig_name, is_simulated=is_simulated)
+    (line,) = lines_of(TitleLine(), view_of(snapshot), 80, 1)
+    assert (" sim " in line) == is_simulated
 
 
 @pytest.mark.parametrize("width", [80, 100, 160])

@@ -8,8 +8,8 @@ from textual.pilot import Pilot
 
 from navapp.control.states import Snapshot
 from navapp.ui.app import NavigationApp
-from navapp.ui.picture import PictureView
-from navapp.ui.pose import PosePanel
+from navapp.ui.picture_view import PictureView
+from navapp.ui.pose_panel import PosePanel
 from navapp.ui.symbols import ASCII
 from tests.ui import snapshots
 

@@ -1,70 +1,12 @@
-"""What `run` and `replay` share: priors, results, summaries."""
+"""What `run` and `replay` answer: frames, their summary, and both for people."""
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from navapp.control.results import FrameResult
-from navapp.errors import PriorError
-from navapp.geometry.transform import RigidTransform
-from navapp.values import Prior, Reason, Status
-
-_POSE_KEY = "camera_from_model"
-
-
-def read_prior(path: str | Path) -> Prior:
-    """Read a prior file.
-
-    Raises:
-        PriorError: missing, no JSON, or values that are none.
-    """
-    path = Path(path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        poses = {
-            key.removeprefix(_POSE_KEY).lstrip("_") or "femur": value
-            for key, value in content.items()
-            if key == _POSE_KEY or key.startswith(f"{_POSE_KEY}_")
-        }
-        cone = content.get("approach_cone") or {}
-        axis = cone.get("axis")
-        box = content.get("box")
-        return Prior(
-            {bone: RigidTransform("left", bone, value) for bone, value in poses.items()},
-            None if axis is None else _unit(axis),
-            float(cone.get("half_angle_deg", 180.0)),
-            None if box is None else (int(box[0]), int(box[1]), int(box[2]), int(box[3])),
-        )
-    except OSError as error:
-        raise PriorError(
-            f"prior {path} cannot be read ({error.strerror})",
-            subject=str(path),
-            remedy="give the JSON file with the rough start pose",
-        ) from error
-    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
-        raise PriorError(
-            f"prior {path} is damaged ({error})",
-            subject=str(path),
-            remedy="it holds camera_from_model (4x4), approach_cone and box",
-        ) from error
-
-
-def prior_to_json(prior: Prior) -> dict[str, Any]:
-    """The content of a prior file."""
-    content: dict[str, Any] = {}
-    for bone, pose in prior.left_from_bone.items():
-        content[_POSE_KEY if bone == "femur" else f"{_POSE_KEY}_{bone}"] = pose.to_list()
-    if prior.approach_axis is not None:
-        content["approach_cone"] = {
-            "axis": prior.approach_axis.tolist(),
-            "half_angle_deg": prior.approach_half_angle_deg,
-        }
-    if prior.box is not None:
-        content["box"] = list(prior.box)
-    return content
+from navapp.values import Reason, Status
 
 
 def frame_to_json(result: FrameResult, tre_mm: float | None) -> dict[str, Any]:
@@ -84,21 +26,33 @@ def frame_to_json(result: FrameResult, tre_mm: float | None) -> dict[str, Any]:
         "state": result.state.value,
         "stage": result.stage.name,
         "bone": result.stage.bone,
-        _POSE_KEY: None if pose is None else pose.to_list(),
+        "camera_from_model": None if pose is None else pose.to_list(),
         "covariance": None if estimate is None else estimate.covariance.tolist(),
         "predicted_tre_mm": None if tracked is None else tracked.verdict.predicted_tre_mm,
         "tre_mm": tre_mm,
         "bodies": {},
         "timing_ms": {
-            "rectify": timings.rectify,
-            "stereo": timings.stereo,
-            "fill": timings.fill,
-            "estimate": timings.estimate,
-            "judge": timings.judge,
-            "overlay": timings.overlay,
-            "total": timings.total,
+            "rectify": timings.rectify_ms,
+            "stereo": timings.stereo_ms,
+            "fill": timings.fill_ms,
+            "estimate": timings.estimate_ms,
+            "judge": timings.judge_ms,
+            "overlay": timings.overlay_ms,
+            "total": timings.total_ms,
         },
     }
+
+
+def frame_text(result: FrameResult) -> str:
+    """One frame for people: number, state, verdict, time, and what is wrong with it."""
+    verdict = None if result.tracked is None else result.tracked.verdict
+    word = "-" if verdict is None else verdict.status.value
+    reasons = () if verdict is None else verdict.reasons
+    why = "".join(f"; {reason.value}" for reason in reasons)
+    return (
+        f"frame {result.frame.index} {result.state.value} {word} "
+        f"{result.timings.total_ms:.0f} ms{why}"
+    )
 
 
 def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any]:
@@ -152,12 +106,3 @@ def summary_text(summary: dict[str, Any]) -> str:
             f"95 % {tre['p95']:.2f} mm, worst {tre['max']:.2f} mm"
         )
     return "\n".join(lines)
-
-
-def _unit(axis: Sequence[float]) -> np.ndarray:
-    values = np.asarray(axis, dtype=np.float64).reshape(3)
-    length = float(np.linalg.norm(values))
-    if not length > 0.0:
-        raise ValueError("the cone's axis has no length")
-    unit: np.ndarray = values / length
-    return unit

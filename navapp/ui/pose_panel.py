@@ -30,14 +30,14 @@ class PosePanel(TextView):
 
     def show(self, view: View) -> None:
         """Say in the frame whose figures these are."""
-        title = "candidate" if view.is_review else "pose"
+        title = "candidate" if view.snapshot.is_candidate else "pose"
         if self.border_title != title:
             self.border_title = title
         super().show(view)
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """All lines, the gauge at the bottom."""
-        middle = _candidate(view, width) if view.is_review else _middle(view, width)
+        middle = _candidate(view, width) if view.snapshot.is_candidate else _middle(view, width)
         room = max(height - 1 - _GAUGE_LINES, 0)
         middle = (middle + [Content("")] * room)[:room]
         return [navigable_line(view, width), *middle, *_error(view, width)]
@@ -47,7 +47,11 @@ def navigable_line(view: View, width: int) -> Content:
     """The filled line that says yes or no."""
     word = "yes" if view.is_navigable else "NO"
     more = len(view.snapshot.reasons) - 1
-    hint = f"+{more} more" if more > 0 and not view.is_silent and not view.is_review else ""
+    hint = (
+        f"+{more} more"
+        if more > 0 and not view.is_silent and not view.snapshot.is_candidate
+        else ""
+    )
     text = f" {view.mark(view.level)} NAVIGABLE  {word}"
     return Content.styled(f"{text}{hint.rjust(width - len(text) - 1)} "[:width], view.level.band)
 

@@ -21,7 +21,7 @@ class TitleLine(TextView):
         right = _state(view)
         room = max(width - right.cell_length - 1, 0)
         name = f" {view.title} "
-        badge = " sim " if view.is_simulated else ""
+        badge = " sim " if view.snapshot.is_simulated else ""
         rest = cut(_identity(view, width), max(room - len(name) - len(badge) - 1, 0), view.symbols)
         left = Content.assemble(
             (name, "bold $primary"), (badge, "bold $background on $warning"), " ", rest

@@ -1,0 +1,98 @@
+"""A session without a screen: what `run --headless` and `replay` share."""
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from navapp.cli.diagnostics import Diagnostics, write_json
+from navapp.cli.results import frame_text, summarise, summary_text
+from navapp.control.controller import SessionController
+from navapp.control.operators import Operator
+from navapp.control.results import FrameResult
+from navapp.control.runner import run_headless
+from navapp.errors import ResultError, RigError
+from navapp.geometry.rig import StereoRig
+
+_NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
+
+
+def check_accepted(rig: StereoRig, is_allowed: bool, diagnostics: Diagnostics) -> None:
+    """Refuse a rig that its calibration did not accept, unless it is allowed.
+
+    Raises:
+        RigError: not accepted and not allowed.
+    """
+    if rig.quality is None:
+        if not rig.name.startswith("sim:"):
+            diagnostics.warn(f"rig {rig.name} carries no quality record; it is taken as given")
+        return
+    if rig.quality.is_accepted:
+        return
+    why = "; ".join(rig.quality.reasons) or "no reason is recorded"
+    if not is_allowed:
+        raise RigError(
+            f"rig {rig.name} was not accepted by its calibration ({why})",
+            subject=rig.name,
+            remedy="calibrate again, or add --allow-unaccepted: no frame is OK then",
+        )
+    diagnostics.warn(f"rig {rig.name} was not accepted ({why}): no frame will be OK")
+
+
+class FrameLog:
+    """Listens to a controller: keeps every result without its pictures, and tells how far it is.
+
+    Args:
+        n_expected: so many frames, None when that is not known.
+        diagnostics: takes the progress and, when verbose, a line a frame.
+    """
+
+    def __init__(self, n_expected: int | None, diagnostics: Diagnostics) -> None:
+        self.results: list[FrameResult] = []
+        self._n_expected = n_expected
+        self._diagnostics = diagnostics
+
+    def __call__(self, result: FrameResult) -> None:
+        """A frame was handled."""
+        # A long session must not grow by its pictures, nor by views into them.
+        frame = replace(result.frame, left=_NO_PICTURE, right=_NO_PICTURE)
+        picture = replace(result.picture, image=_NO_PICTURE)
+        self.results.append(replace(result, frame=frame, picture=picture))
+        self._diagnostics.detail(frame_text(result))
+        if self._n_expected:
+            self._diagnostics.progress("frames", len(self.results) / self._n_expected)
+
+    @property
+    def is_full(self) -> bool:
+        """All frames that are expected have come."""
+        return self._n_expected is not None and len(self.results) >= self._n_expected
+
+
+def follow(controller: SessionController, operator: Operator, log: FrameLog) -> float:
+    """Run to the end of the source, or until the log is full; answers with the seconds it took."""
+    started = time.perf_counter()
+    run_headless(controller, operator, lambda: log.is_full)
+    return time.perf_counter() - started
+
+
+def finish(
+    frames: Sequence[dict[str, Any]],
+    seconds: float,
+    options: argparse.Namespace,
+    diagnostics: Diagnostics,
+) -> int:
+    """Write the result, tell its summary, and answer with the exit code.
+
+    Raises:
+        ResultError: no frame was OK.
+    """
+    summary = summarise(frames, seconds)
+    write_json(options.json, options.verb, {"frames": frames, "summary": summary})
+    if options.json != "-":
+        diagnostics.say(summary_text(summary))
+    if summary["ok"] == 0:
+        raise ResultError("no frame was OK", remedy="see the reasons in --json")
+    return 0

@@ -1,0 +1,75 @@
+"""The rough start pose as a JSON file."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from navapp.errors import PriorError
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.values import Prior
+
+_POSE_KEY = "camera_from_model"
+
+
+def read_prior(path: str | Path) -> Prior:
+    """Read a prior file.
+
+    Raises:
+        PriorError: missing, no JSON, or values that are none.
+    """
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        poses = {
+            key.removeprefix(_POSE_KEY).lstrip("_") or "femur": value
+            for key, value in content.items()
+            if key == _POSE_KEY or key.startswith(f"{_POSE_KEY}_")
+        }
+        cone = content.get("approach_cone") or {}
+        axis = cone.get("axis")
+        box = content.get("box")
+        return Prior(
+            {bone: RigidTransform("left", bone, value) for bone, value in poses.items()},
+            None if axis is None else _unit(axis),
+            float(cone.get("half_angle_deg", 180.0)),
+            None if box is None else (int(box[0]), int(box[1]), int(box[2]), int(box[3])),
+        )
+    except OSError as error:
+        raise PriorError(
+            f"prior {path} cannot be read ({error.strerror})",
+            subject=str(path),
+            remedy="give the JSON file with the rough start pose",
+        ) from error
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+        raise PriorError(
+            f"prior {path} is damaged ({error})",
+            subject=str(path),
+            remedy="it holds camera_from_model (4x4), approach_cone and box",
+        ) from error
+
+
+def prior_to_json(prior: Prior) -> dict[str, Any]:
+    """The content of a prior file."""
+    content: dict[str, Any] = {}
+    for bone, pose in prior.left_from_bone.items():
+        content[_POSE_KEY if bone == "femur" else f"{_POSE_KEY}_{bone}"] = pose.to_list()
+    if prior.approach_axis is not None:
+        content["approach_cone"] = {
+            "axis": prior.approach_axis.tolist(),
+            "half_angle_deg": prior.approach_half_angle_deg,
+        }
+    if prior.box is not None:
+        content["box"] = list(prior.box)
+    return content
+
+
+def _unit(axis: Sequence[float]) -> FloatArray:
+    values = np.asarray(axis, dtype=np.float64).reshape(3)
+    length = float(np.linalg.norm(values))
+    if not length > 0.0:
+        raise ValueError("the cone's axis has no length")
+    unit: FloatArray = values / length
+    return unit

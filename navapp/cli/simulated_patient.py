@@ -1,0 +1,24 @@
+"""What the simulated patient brings along when nothing else is given: a plan and a prior."""
+
+from navapp.devices import Simulation
+from navapp.geometry.mesh import TriangleMesh
+from navapp.values import BoneModel, Plan, Prior
+
+
+def built_in_plan(simulation: Simulation) -> Plan:
+    """The plan of the simulated patient: the surfaces that a perfect CT would have given."""
+    # Normals as any reader of the plan's files computes them, so that a replay finds the same.
+    bones = {
+        name: BoneModel(name, TriangleMesh(mesh.vertices_mm, mesh.faces), simulation.side)
+        for name, mesh in simulation.bones.items()
+    }
+    return Plan(bones, simulation.targets, simulation.curves, name="sim:plan")
+
+
+def nominal_prior(simulation: Simulation) -> Prior:
+    """How the simulated knee was meant to lie on the table."""
+    return Prior(
+        {"femur": simulation.nominal_left_from_femur},
+        simulation.approach_axis,
+        simulation.approach_half_angle_deg,
+    )

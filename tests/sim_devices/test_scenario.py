@@ -1,0 +1,38 @@
+from typing import get_args
+
+import pytest
+
+from navapp.config import SimulationSection
+from navapp.errors import UsageError
+from sim_devices.scenario import Scenario
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"seed": -1},
+        {"side": "middle"},
+        {"sex": "other"},
+        {"age_group": "ancient"},
+        {"cartilage_mm": -0.1},
+        {"cartilage_mm": 2.7},
+        {"cartilage_mm": float("nan")},
+        {"motion": "dance"},
+        {"instrument": "saw"},
+        {"contrast": 0.3},
+        {"blood": 1.1},
+    ],
+)
+def test_an_impossible_scenario_is_refused_in_our_words(values):
+    (value,) = values.values()
+    with pytest.raises(UsageError, match=f"{value}|negative"):
+        Scenario(**values)
+
+
+def test_what_the_configuration_allows_the_simulator_can_do():
+    fields = SimulationSection.model_fields
+    for name in ("side", "sex", "age_group", "motion", "instrument"):
+        for value in get_args(fields[name].annotation):
+            Scenario(**{name: value})
+    highest = next(limit.le for limit in fields["cartilage_mm"].metadata if hasattr(limit, "le"))
+    assert Scenario(cartilage_mm=highest).cartilage_mm == 2.6

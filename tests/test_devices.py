@@ -1,0 +1,121 @@
+"""The composition root: what it opens, refuses and closes again."""
+
+import importlib.metadata
+from collections.abc import Callable
+
+import pytest
+
+from drivers.clock import Clock, ManualClock
+from drivers.replay_camera import ReplaySettings
+from navapp.config import Configuration, parse
+from navapp.devices import open_live, open_recording
+from navapp.errors import ConfigurationError, DeviceLost, RigError, WrongDevice
+from navapp.geometry import write_rig
+from sim_devices.camera import SimulatedCamera
+from sim_devices.faults import Fault, FaultKind, FaultScript
+from tests.drivers.recordings import write_pairs
+from tests.sim_devices.plain_world import PlainWorld, plain_rig
+
+SMALL = {"camera": {"simulated": {"scale": 0.2}}}
+
+
+class Entry:
+    """An installed camera, as its package announces it."""
+
+    name = "camera.acme"
+
+    def __init__(self) -> None:
+        self.camera = SimulatedCamera(
+            PlainWorld(), ManualClock(), is_stepped=True,
+            faults=FaultScript((Fault(FaultKind.WRONG_SERIAL, 0.1, 9.0),)),
+        )  # fmt: skip
+
+    def load(self) -> Callable[[object, Clock], SimulatedCamera]:
+        return lambda settings, clock: self.camera
+
+
+def announce(monkeypatch: pytest.MonkeyPatch, entries: list[Entry]) -> None:
+    real = importlib.metadata.entry_points
+
+    def entry_points(**selection: str) -> object:
+        return entries if selection.get("group") == "navapp.devices" else real(**selection)
+
+    monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
+
+
+@pytest.fixture
+def camera(monkeypatch) -> SimulatedCamera:
+    """Of an installed package; after 0.1 s another one stands in its place."""
+    entry = Entry()
+    announce(monkeypatch, [entry])
+    return entry.camera
+
+
+def acme(tmp_path, width: int = 64, height: int = 48) -> Configuration:
+    write_rig(tmp_path / "rig.yml", plain_rig(width, height))
+    return parse({"camera": {"backend": "acme", "rig": str(tmp_path / "rig.yml")}}, "x")
+
+
+def is_closed(camera: SimulatedCamera) -> bool:
+    try:
+        camera.read(0.0)
+    except DeviceLost:
+        return True
+    return False
+
+
+def test_an_installed_camera_is_opened_and_reopened(camera, tmp_path) -> None:
+    opened = open_live(acme(tmp_path), is_headless=True)
+    assert opened.devices.camera is camera
+    assert opened.simulation is None
+    camera.close()
+    assert opened.reopen_camera() is camera
+    assert not is_closed(camera)
+    opened.devices.close()
+
+
+def test_an_installed_camera_of_another_size_is_refused_and_closed(camera, tmp_path) -> None:
+    with pytest.raises(RigError, match="64x48, the rig was calibrated at 128x96"):
+        open_live(acme(tmp_path, 128, 96), is_headless=True)
+    assert is_closed(camera)
+
+
+def test_another_camera_in_its_place_is_refused_and_closed(camera, tmp_path) -> None:
+    opened = open_live(acme(tmp_path), is_headless=True)
+    for _ in range(3):
+        camera.read(1.0)
+    camera.close()
+    with pytest.raises(WrongDevice, match="-other"):
+        opened.reopen_camera()
+    assert is_closed(camera)
+    opened.devices.close()
+
+
+def test_a_simulated_camera_that_comes_back_as_another_is_refused() -> None:
+    faults = [{"kind": "wrong_serial", "start_s": 0.1, "duration_s": 9.0}]
+    content = {"camera": {"simulated": {"scale": 0.2, "faults": faults}}}
+    opened = open_live(parse(content, "x"), is_headless=True)
+    for _ in range(3):
+        opened.devices.camera.read(1.0)
+    opened.devices.camera.close()
+    with pytest.raises(WrongDevice, match="-other"):
+        opened.reopen_camera()
+    opened.devices.close()
+
+
+def test_a_simulated_rig_says_so_by_its_name() -> None:
+    opened = open_live(parse(SMALL, "x"), is_headless=True)
+    assert opened.rig.name.startswith("sim:")
+    opened.devices.close()
+
+
+def test_a_recording_of_another_size_is_refused(tmp_path) -> None:
+    pairs = write_pairs(tmp_path / "pairs", range(2))
+    with pytest.raises(RigError, match="48x32"):
+        open_recording(str(pairs), ReplaySettings(), plain_rig(), Configuration())
+
+
+def test_an_unknown_backend_is_refused(tmp_path, monkeypatch) -> None:
+    announce(monkeypatch, [])
+    with pytest.raises(ConfigurationError, match="no camera backend 'acme'"):
+        open_live(acme(tmp_path), is_headless=True)
