@@ -89,6 +89,7 @@ class ReplayCamera:
         self._length: int | None = None
         self._last: StereoFrame | None = None
         self._last_place = 0
+        self._n_read = 0
         self._meter = FrameMeter()
 
     @property
@@ -125,7 +126,7 @@ class ReplayCamera:
         self._size = (left.shape[1], left.shape[0])
         self._length = self._length_of(len(places))
         self._places = itertools.islice(_walk(places, self._settings.order), self._length)
-        self._last, self._meter = None, FrameMeter()
+        self._last, self._n_read, self._meter = None, 0, FrameMeter()
         self._source = source
 
     def read(self, timeout_s: float) -> StereoFrame:
@@ -161,11 +162,12 @@ class ReplayCamera:
             captured_ns,
             max(captured_ns, self._clock.now_ns()),
             skew_ns,
-            sequence=0 if self._last is None else self._last.sequence + 1,
+            sequence=self._sequence(self._source.numbers[place]),
             rig_id=self._rig_id,
             source_index=self._source.numbers[place],
         )
         self._last_place = place
+        self._n_read += 1
         self._meter.add(self._last)
         return self._last
 
@@ -182,6 +184,13 @@ class ReplayCamera:
         if self._source is not None:
             self._source.close()
             self._source = None
+
+    def _sequence(self, number: int) -> int:
+        """The picture's own number, so that a session's events still name the right frames.
+
+        Walking to and fro numbers repeat: then the frames are counted.
+        """
+        return number if self._settings.order == "forward" else self._n_read
 
     def _places_of(self, source: RecordedSource) -> list[int]:
         """Where the frames from the start on are."""
@@ -218,8 +227,7 @@ class ReplayCamera:
         """Capture time and skew in ns of the pair that is read next."""
         period_s = 1.0 / (source.rate_hz or self._settings.rate_hz)
         if source.times is None:
-            n_before = 0 if self._last is None else self._last.sequence + 1
-            return round(n_before * period_s * 1e9), 0
+            return round(self._n_read * period_s * 1e9), 0
         times = source.times[place]
         if self._last is None:
             return times.captured_ns, times.skew_ns

@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -30,6 +30,9 @@ def _rising(values: tuple[float, float]) -> tuple[float, float]:
     if values[0] >= values[1]:
         raise ValueError("the first must be smaller than the second")
     return values
+
+
+M = TypeVar("M", bound=BaseModel)
 
 
 class Section(BaseModel):
@@ -247,15 +250,24 @@ def load(path: Path | None) -> Configuration:
 
 
 def parse(content: Mapping[str, Any], name: str) -> Configuration:
-    """Check the content of a file."""
-    try:
-        configuration = Configuration.model_validate(_tuples(content))
-    except ValidationError as error:
-        raise _one_sentence(error, name) from error
+    """Check the content of a configuration file."""
+    configuration = checked(Configuration, content, name)
     for key, value in (configuration.camera.model_extra or {}).items():
         if not isinstance(value, Mapping):
-            raise _unknown_key(["camera", key], name)
+            raise _unknown_key(Configuration, ["camera", key], name)
     return configuration
+
+
+def checked(model: type[M], content: Mapping[str, Any], name: str) -> M:
+    """What a TOML file holds, as a model.
+
+    Raises:
+        ConfigurationError: one sentence with the file's name, the key and the nearest known key.
+    """
+    try:
+        return model.model_validate(_tuples(content))
+    except ValidationError as error:
+        raise _one_sentence(model, error, name) from error
 
 
 def _tuples(value: Any) -> Any:
@@ -265,7 +277,7 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-def _one_sentence(error: ValidationError, name: str) -> ConfigurationError:
+def _one_sentence(model: type[BaseModel], error: ValidationError, name: str) -> ConfigurationError:
     """The first problem, with the key's path and, for a typing error, the nearest known key."""
     problem = error.errors()[0]
     path = [str(part) for part in problem["loc"]]
@@ -274,12 +286,12 @@ def _one_sentence(error: ValidationError, name: str) -> ConfigurationError:
         return ConfigurationError(
             f"{name}: {key}: {problem['msg'].lower()}", subject=key, remedy="correct the value"
         )
-    return _unknown_key(path, name)
+    return _unknown_key(model, path, name)
 
 
-def _unknown_key(path: list[str], name: str) -> ConfigurationError:
+def _unknown_key(model: type[BaseModel], path: list[str], name: str) -> ConfigurationError:
     key = ".".join(path)
-    known = _known_keys(path[:-1])
+    known = _known_keys(model, path[:-1])
     near = difflib.get_close_matches(path[-1], known, 1)
     remedy = (
         f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known) or 'nothing'}"
@@ -287,8 +299,7 @@ def _unknown_key(path: list[str], name: str) -> ConfigurationError:
     return ConfigurationError(f"{name}: unknown key '{key}'", subject=key, remedy=remedy)
 
 
-def _known_keys(path: list[str]) -> list[str]:
-    model: type[BaseModel] = Configuration
+def _known_keys(model: type[BaseModel], path: list[str]) -> list[str]:
     for part in path:
         if part.isdigit():  # the place in a list of tables
             continue

@@ -13,7 +13,7 @@ from drivers.no_projector import NoProjector
 from drivers.replay_camera import ReplayCamera, ReplaySettings
 from navapp.config import Configuration, FaultSection, SimulationSection
 from navapp.errors import ConfigurationError, DeviceError, RigError, WrongDevice
-from navapp.geometry import RigidTransform, StereoRig, TriangleMesh, read_rig
+from navapp.geometry import Rectifier, RigidTransform, StereoRig, TriangleMesh, read_rig
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
@@ -124,7 +124,7 @@ def _open_simulated(configuration: Configuration, *, is_headless: bool) -> Opene
     else:
         rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
     _open_fitting(camera, rig)
-    reopen = _reopener(camera, camera.info.serials)
+    reopen = _reopener(camera, rig)
     devices = _device_set(configuration, camera, clock, rig)
     return OpenedDevices(devices, rig, reopen, _simulation(world, camera))
 
@@ -185,7 +185,7 @@ def _open_third_party(configuration: Configuration) -> OpenedDevices:
     except (ImportError, AttributeError, TypeError) as error:
         raise DeviceError(f"camera backend '{name}' cannot be loaded: {error}") from error
     _open_fitting(camera, rig)
-    reopen = _reopener(camera, camera.info.serials)
+    reopen = _reopener(camera, rig)
     return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
 
 
@@ -201,7 +201,8 @@ def _device_set(
 
 
 def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
-    """Open a camera; it is closed again when its pictures do not fit the rig."""
+    """Open a camera; it is closed again when it is not the one that the rig was made with."""
+    Rectifier(rig)  # refuses cameras that do not stand side by side, before anything is opened
     camera.open()
     info = camera.info
     if (info.width, info.height) != (rig.width, rig.height):
@@ -212,13 +213,22 @@ def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
             subject=info.name,
             remedy="use the rig file that belongs to these pictures",
         )
+    if any(rig.serials) and any(info.serials) and info.serials != rig.serials:
+        camera.close()
+        raise WrongDevice(
+            f"camera {info.name} has serial numbers {' and '.join(info.serials)}, "
+            f"the rig was calibrated with {' and '.join(rig.serials)}",
+            subject=info.name,
+            remedy="connect the cameras of the rig, left and right as calibrated",
+        )
 
 
-def _reopener(camera: StereoCamera, serials: tuple[str, str]) -> Callable[[], StereoCamera]:
+def _reopener(camera: StereoCamera, rig: StereoRig) -> Callable[[], StereoCamera]:
     """Opens the camera again, and refuses another one that was put in its place."""
+    serials = camera.info.serials
 
     def reopen() -> StereoCamera:
-        camera.open()
+        _open_fitting(camera, rig)
         found = camera.info.serials
         if found != serials:
             camera.close()

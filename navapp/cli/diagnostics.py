@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -54,7 +55,14 @@ def check_writable(path: str | None) -> None:
     """Refuse a JSON target that cannot be written before the work begins."""
     if path in (None, "-"):
         return
-    parent = Path(str(path)).resolve().parent
+    target = Path(str(path)).resolve()
+    parent = target.parent
+    if target.is_dir() or (parent.is_dir() and not os.access(parent, os.W_OK)):
+        raise InputError(
+            f"{path} cannot be written",
+            subject=str(path),
+            remedy="name a file in a folder that you may write to",
+        )
     if not parent.is_dir():
         raise InputError(
             f"folder {parent} for {path} does not exist",

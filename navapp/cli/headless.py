@@ -14,8 +14,9 @@ from navapp.control.controller import SessionController
 from navapp.control.operators import Operator
 from navapp.control.results import FrameResult
 from navapp.control.runner import run_headless
-from navapp.errors import ResultError, RigError
+from navapp.errors import DeviceError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
+from navapp.values import Prior, StageSpec
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -40,6 +41,20 @@ def check_accepted(rig: StereoRig, is_allowed: bool, diagnostics: Diagnostics) -
             remedy="calibrate again, or add --allow-unaccepted: no frame is OK then",
         )
     diagnostics.warn(f"rig {rig.name} was not accepted ({why}): no frame will be OK")
+
+
+def check_start(prior: Prior, stage: StageSpec) -> None:
+    """Refuse a session in which nothing could ever be found.
+
+    Raises:
+        PriorError: no rough pose of the stage's bone is known.
+    """
+    if stage.bone not in prior.left_from_bone:
+        raise PriorError(
+            f"no rough pose of the {stage.bone} is known",
+            remedy="give --prior FILE with camera_from_model"
+            + ("" if stage.bone == "femur" else f"_{stage.bone}"),
+        )
 
 
 class FrameLog:
@@ -81,18 +96,29 @@ def follow(controller: SessionController, operator: Operator, log: FrameLog) -> 
 def finish(
     frames: Sequence[dict[str, Any]],
     seconds: float,
+    lost_device: DeviceError | None,
     options: argparse.Namespace,
     diagnostics: Diagnostics,
 ) -> int:
     """Write the result, tell its summary, and answer with the exit code.
 
+    Args:
+        frames: entries of the result.
+        seconds: that they took.
+        lost_device: why the session ended early, or None.
+        options: of the verb.
+        diagnostics: takes the summary.
+
     Raises:
+        DeviceError: the one that ended the session.
         ResultError: no frame was OK.
     """
     summary = summarise(frames, seconds)
     write_json(options.json, options.verb, {"frames": frames, "summary": summary})
     if options.json != "-":
         diagnostics.say(summary_text(summary))
+    if lost_device is not None:
+        raise lost_device
     if summary["ok"] == 0:
         raise ResultError("no frame was OK", remedy="see the reasons in --json")
     return 0

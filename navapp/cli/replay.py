@@ -1,15 +1,13 @@
 """`navapp replay`: the same line on a recorded sequence, as fast as it goes."""
 
 import argparse
-import itertools
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
-from navapp.errors import InputError, UsageError
+from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from drivers.replay_camera import ReplaySettings
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from navapp.control.controller import SessionController
     from navapp.control.executors import Executor
     from navapp.control.operators import Operator
-    from navapp.control.results import FrameListener, FrameResult
+    from navapp.control.results import FrameListener
     from navapp.devices import OpenedDevices
     from navapp.geometry.rig import StereoRig
     from navapp.tracking.line import Method
@@ -76,11 +74,14 @@ class _Replay:
     method: "Method"
     operator: "Operator"
     executor: "Executor"
+    is_as_recorded: bool = False
+    warnings: tuple[str, ...] = ()
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
-    from navapp.cli.headless import FrameLog, check_accepted, finish, follow
+    from navapp.cli.headless import FrameLog, check_accepted, check_start, finish, follow
+    from navapp.cli.overlay_folder import OverlayFolder
     from navapp.cli.results import frame_to_json
     from navapp.config import find_file, load
     from navapp.devices import open_recording
@@ -89,19 +90,23 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     configuration = load(find_file(options.config))
     settings = _settings(configuration, options)
     replay = _prepare(configuration, options)
+    for warning in replay.warnings:
+        diagnostics.warn(warning)
     check_accepted(replay.rig, options.allow_unaccepted, diagnostics)
+    if not replay.is_as_recorded:
+        check_start(replay.prior, replay.stage)
     opened = open_recording(options.sequence, settings, replay.rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         listeners: list[FrameListener] = [log]
         if options.overlay is not None:
-            listeners.append(_overlay_writer(options.overlay))
+            listeners.append(undo.enter_context(OverlayFolder(options.overlay)).add)
         controller = _controller(replay, opened, configuration, listeners)
         undo.callback(controller.close)
         seconds = follow(controller, replay.operator, log)
     frames = [frame_to_json(result, None) for result in log.results]
-    return finish(frames, seconds, options, diagnostics)
+    return finish(frames, seconds, controller.lost_device, options, diagnostics)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -109,9 +114,6 @@ def _check(options: argparse.Namespace) -> None:
     if options.order == "pingpong" and options.frames is None:
         raise UsageError("--order pingpong has no end", remedy="add --frames N")
     check_writable(options.json)
-    overlay = options.overlay
-    if overlay is not None and Path(overlay).exists() and not Path(overlay).is_dir():
-        raise InputError(f"{overlay} is not a folder", remedy="choose another --overlay")
 
 
 def _settings(configuration: "Configuration", options: argparse.Namespace) -> "ReplaySettings":
@@ -132,6 +134,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.prior_files import read_prior
     from navapp.cli.session_folder import is_session, read_session
+    from navapp.control.operators import RecordedOperator
     from navapp.control.stages import stage_by_name
     from navapp.geometry.rig import read_rig
     from navapp.preop import read_plan
@@ -157,7 +160,15 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         method,
         operator,
         executor,
+        isinstance(operator, RecordedOperator),
+        _warnings(session),
     )
+
+
+def _warnings(session: "RecordedSession | None") -> tuple[str, ...]:
+    if session is None or session.events.is_complete:
+        return ()
+    return ("the session was not recorded to its end; what there is will be replayed",)
 
 
 def _operation(
@@ -209,19 +220,3 @@ def _controller(
         ),
         hooks=SessionHooks(on_frame=tuple(listeners)),
     )
-
-
-def _overlay_writer(folder: str) -> "FrameListener":
-    """Writes the picture of every frame; the folder is made with the first."""
-    numbers = itertools.count()
-
-    def write(result: "FrameResult") -> None:
-        import cv2
-
-        from navapp.geometry.ply import write_whole
-
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        _, encoded = cv2.imencode(".jpg", result.picture.image, [cv2.IMWRITE_JPEG_QUALITY, 92])
-        write_whole(Path(folder) / f"overlay_{next(numbers):04d}.jpg", encoded.tobytes())
-
-    return write

@@ -1,6 +1,7 @@
 """`navapp run`: the application on the configured devices."""
 
 import argparse
+import tempfile
 import tomllib
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -104,7 +105,7 @@ def _script(path: str | None) -> "tuple[ScriptStep, ...]":
             subject=path,
             remedy="give an existing TOML file",
         ) from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigurationError(
             f"operator's script {path} is not valid TOML", subject=path, remedy=str(error)
         ) from error
@@ -114,7 +115,7 @@ def _prepare(
     configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> _Session:
     """Read everything that is given, then open the devices; closed again when that is refused."""
-    from navapp.cli.headless import check_accepted
+    from navapp.cli.headless import check_accepted, check_start
     from navapp.cli.prior_files import read_prior
     from navapp.cli.simulated_patient import built_in_plan, nominal_prior
     from navapp.control.stages import stage_by_name
@@ -135,8 +136,11 @@ def _prepare(
             prior = prior or nominal_prior(opened.simulation)
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
+        prior = prior or Prior()
+        if options.headless:
+            check_start(prior, stage)
         undo.pop_all()
-    return _Session(configuration, opened, plan, prior or Prior(), stage)
+    return _Session(configuration, opened, plan, prior, stage)
 
 
 def _controller(
@@ -170,7 +174,7 @@ def _listening(
     session: _Session, on_frame: "Sequence[FrameListener]", undo: ExitStack
 ) -> "SessionHooks":
     """Who is told: the caller, the simulated room, and the recorder when there is one."""
-    from navapp.cli.session_folder import start_recording
+    from navapp.cli.session_folder import discard_if_empty, start_recording
     from navapp.control.controller import SessionHooks
 
     configuration, opened = session.configuration, session.opened
@@ -190,6 +194,7 @@ def _listening(
         session.prior,
         first_stage=session.stage.name,
     )
+    undo.callback(discard_if_empty, folder)
     undo.callback(recorder.close)
     return replace(
         hooks,
@@ -217,7 +222,7 @@ def _run_headless(
         undo.callback(controller.close)
         seconds = follow(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
-    return finish(frames, seconds, options, diagnostics)
+    return finish(frames, seconds, controller.lost_device, options, diagnostics)
 
 
 def _tre_mm(result: "FrameResult", session: _Session) -> float | None:
@@ -235,14 +240,10 @@ def _tre_mm(result: "FrameResult", session: _Session) -> float | None:
 
 
 def _run_screen(session: _Session, options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    import platformdirs
-
     from navapp.control.runner import SessionRunner
     from navapp.control.states import Quit
     from navapp.ui.app import run_app
 
-    log_folder = Path(platformdirs.user_log_dir("navapp", appauthor=False))
-    log_folder.mkdir(parents=True, exist_ok=True)
     n_frames = 0
 
     def count(result: "FrameResult") -> None:
@@ -257,7 +258,19 @@ def _run_screen(session: _Session, options: argparse.Namespace, diagnostics: Dia
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()
-        code = run_app(runner, log_folder / "navapp.log")
+        code = run_app(runner, _log_folder() / "navapp.log")
     if runner.error is not None:
         raise runner.error
     return code
+
+
+def _log_folder() -> Path:
+    """Where the screen's log goes: the user's log folder, else the one for temporary files."""
+    import platformdirs
+
+    folder = Path(platformdirs.user_log_dir("navapp", appauthor=False))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return Path(tempfile.gettempdir())
+    return folder

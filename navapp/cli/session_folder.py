@@ -1,6 +1,7 @@
 """A session's folder as `run --record` writes it and `replay` reads it."""
 
 import json
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
@@ -66,6 +67,19 @@ def start_recording(
     return SessionRecorder(
         folder, BackgroundSink(frames), with_pictures=configuration.recording.pictures
     )
+
+
+def discard_if_empty(folder: str | Path) -> None:
+    """Remove a session folder in which no frame was kept, so that its name is free again."""
+    folder = Path(folder)
+    if is_session(folder) and not any(folder.glob("left_*")) and not _has_frames(folder):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _has_frames(folder: Path) -> bool:
+    """Whether the table has a line beside its head (a session may be kept without pictures)."""
+    table = folder / "frames.csv"
+    return table.is_file() and len(table.read_text(encoding="utf-8").splitlines()) > 1
 
 
 def is_session(folder: str | Path) -> bool:

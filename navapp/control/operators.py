@@ -8,10 +8,12 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
+from pydantic import Field
 
+from navapp.config import Section, checked
 from navapp.control.command_files import command_from_json
 from navapp.control.stages import stage_by_name
 from navapp.control.states import (
@@ -26,7 +28,7 @@ from navapp.control.states import (
     Show,
     Snapshot,
 )
-from navapp.errors import ConfigurationError, SequenceError
+from navapp.errors import SequenceError
 from navapp.values import Status
 
 _MAX_ATTEMPTS = 8
@@ -58,26 +60,28 @@ class ReplayOperator:
         return []
 
 
-@dataclass(frozen=True, slots=True)
-class ScriptStep:
-    """One line of an operator's script.
-
-    Attributes:
-        do: `register`; `propose` (offer the found pose, turned, to see the judge refuse it);
-            `stage`, `blank`, `show`.
-        turn_deg: of a proposed pose.
-        stage: of a `stage` step.
-        at_frame: not before this frame.
-    """
+class ScriptStep(Section):
+    """One line of an operator's script."""
 
     do: Literal["register", "propose", "stage", "blank", "show"]
+    """propose offers the found pose, turned, to see the judge refuse it."""
     turn_deg: float = 15.0
+    """Of a proposed pose."""
     stage: str = ""
-    at_frame: int = 0
+    """Of a stage step: name or number."""
+    at_frame: Annotated[int, Field(ge=0)] = 0
+    """Not before this frame."""
+
+
+class Script(Section):
+    """An operator's script as a TOML file holds it."""
+
+    step: Annotated[tuple[ScriptStep, ...], Field(min_length=1)]
+    """[[step]] tables, in order."""
 
 
 # Offers a wrong pose first: a judge that takes it is worth nothing.
-DEFAULT_SCRIPT = (ScriptStep("propose"), ScriptStep("register"))
+DEFAULT_SCRIPT = (ScriptStep(do="propose"), ScriptStep(do="register"))
 
 
 class ScriptedOperator:
@@ -116,7 +120,7 @@ class ScriptedOperator:
         """On a candidate: turn it, accept it or reject it."""
         if snapshot.verdict is None:
             return []
-        step = self._steps[0] if self._steps else ScriptStep("register")
+        step = self._steps[0] if self._steps else ScriptStep(do="register")
         pose = snapshot.left_from_bone
         if step.do == "propose" and self._phase == "registering" and pose is not None:
             self._phase = "proposed"
@@ -175,7 +179,15 @@ def read_events(path: str | Path) -> RecordedEvents:
     commands: list[tuple[int, Command]] = []
     take_overs: list[int] = []
     is_complete = False
-    for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), start=1):
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise SequenceError(
+            f"the session's events {path} cannot be read",
+            subject=str(path),
+            remedy="replay its pictures as a plain folder with --rig and --plan",
+        ) from error
+    for number, line in enumerate(text.splitlines(), start=1):
         try:
             value: dict[str, Any] = json.loads(line)
             sequence = int(value["sequence"])
@@ -199,27 +211,8 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
     Raises:
         ConfigurationError: an unknown key, action or stage.
     """
-    steps = []
-    for number, entry in enumerate(content.get("step", []), start=1):
-        try:
-            step = ScriptStep(**entry)
-        except TypeError as error:
-            raise ConfigurationError(
-                f"{name}: step {number} has an unknown key",
-                subject=name,
-                remedy="known are do, turn_deg, stage, at_frame",
-            ) from error
-        if step.do not in ("register", "propose", "stage", "blank", "show"):
-            raise ConfigurationError(
-                f"{name}: step {number} does '{step.do}', which is unknown",
-                subject=name,
-                remedy="known are register, propose, stage, blank, show",
-            )
+    steps = checked(Script, content, name).step
+    for step in steps:
         if step.do == "stage":
             stage_by_name(step.stage)
-        steps.append(step)
-    if not steps or set(content) - {"step"}:
-        raise ConfigurationError(
-            f"{name} is no operator's script", subject=name, remedy="it holds [[step]] tables only"
-        )
-    return tuple(steps)
+    return steps

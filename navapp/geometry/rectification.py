@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.errors import RigError
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -146,8 +147,10 @@ class Rectifier:
             alpha=-1,
         )
         if p2[0, 3] >= 0.0 or abs(p2[1, 3]) > 1e-9:
-            raise ValueError(
-                "the right camera must stand to the right of the left one (are they swapped?)"
+            raise RigError(
+                f"rig {rig.name}: the right camera must stand to the right of the left one",
+                subject=rig.name,
+                remedy="swap the cameras, or calibrate them again",
             )
         object.__setattr__(self, "_solved", (r1, r2, p1, p2))
 

@@ -2,8 +2,8 @@
 
 usage: python -m tests.bench.recorded_accuracy [FOLDER] [--method bimcc|icp]
 
-FOLDER (default: NAVAPP_DATA) holds `phantom_*` folders with femur.ply, rig.yml and sequences that have
-prior.json and truth.json.
+FOLDER (default: NAVAPP_DATA) holds `phantom_*` folders with femur.ply, rig.yml and sequences that
+have prior.json and truth.json.
 """
 
 import argparse

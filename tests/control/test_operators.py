@@ -59,13 +59,13 @@ def test_a_judge_that_takes_the_wrong_pose_is_found_out(bench: Bench) -> None:
 
 def test_the_script_accepts_only_what_is_ok_and_gives_up_some_time(bench: Bench) -> None:
     bench.script.found = [answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)]
-    given = commands_of(bench, ScriptedOperator((ScriptStep("register"),)))
+    given = commands_of(bench, ScriptedOperator((ScriptStep(do="register"),)))
     assert "Accept" not in kinds(given)
     assert kinds(given).count("Register") == 8
 
 
 def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) -> None:
-    operator = ScriptedOperator((ScriptStep("register"),))
+    operator = ScriptedOperator((ScriptStep(do="register"),))
     bench.frames(1)
     assert operator.commands(bench.snapshot) == [Register()]
     bench.do(Register())
@@ -77,10 +77,10 @@ def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) 
 
 def test_steps_wait_for_their_frame(bench: Bench) -> None:
     steps = (
-        ScriptStep("register"),
-        ScriptStep("blank", at_frame=8),
-        ScriptStep("show", at_frame=12),
-        ScriptStep("stage", stage="drilling", at_frame=15),
+        ScriptStep(do="register"),
+        ScriptStep(do="blank", at_frame=8),
+        ScriptStep(do="show", at_frame=12),
+        ScriptStep(do="stage", stage="drilling", at_frame=15),
     )
     dark = []
     bench.controller._hooks = replace(
@@ -189,8 +189,8 @@ def test_damaged_events_name_their_line(tmp_path: Path, damage: str) -> None:
 def test_a_script_file_is_read(tmp_path: Path) -> None:
     content = {"step": [{"do": "propose", "turn_deg": 9.0}, {"do": "stage", "stage": "implant"}]}
     assert read_script(content, "s") == (
-        ScriptStep("propose", turn_deg=9.0),
-        ScriptStep("stage", stage="implant"),
+        ScriptStep(do="propose", turn_deg=9.0),
+        ScriptStep(do="stage", stage="implant"),
     )
 
 

@@ -67,7 +67,7 @@ def test_folder_is_read_in_order_of_its_numbers(folder):
     frames = read_all(camera)
     assert [one.source_index for one in frames] == [2, 3, 5]
     assert [one.index for one in frames] == [2, 3, 5]
-    assert [one.sequence for one in frames] == [0, 1, 2]
+    assert [one.sequence for one in frames] == [2, 3, 5]
     assert [number_of(one.left) for one in frames] == [2.0, 3.0, 5.0]
     assert [number_of(one.right) for one in frames] == [2.5, 3.5, 5.5]
     assert {one.rig_id for one in frames} == {"abc"}

@@ -247,3 +247,85 @@ def test_the_configurations_path_is_null_without_a_file(tmp_path, monkeypatch, c
     assert json.loads(capsys.readouterr().out)["path"] is None
     assert run(["config", "init", "--json", "-"]) == 0
     assert json.loads(capsys.readouterr().out)["path"] == "navapp.toml"
+
+
+def test_a_rig_with_its_cameras_swapped(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    good = default_rig(320, 180)
+    swapped = StereoRig(
+        good.right,
+        good.left,
+        good.right_from_left.inverse().renamed("right", "left"),
+        name="swapped",
+    )
+    write_rig(rig, swapped)
+    refused(replay(pairs, rig, plan, prior), capsys, 3, "swapped", "right of the left")
+
+
+def test_a_corrupt_picture_leaves_no_half_of_an_overlay(pairs, rig, plan, prior, tmp_path, capsys):
+    picture = pairs / "right_0002.jpg"
+    picture.write_bytes(picture.read_bytes()[:2000])
+    before = set(tmp_path.iterdir())
+    arguments = [*replay(pairs, rig, plan, prior), "--overlay", str(tmp_path / "o")]
+    refused(arguments, capsys, 3, "right_0002.jpg")
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_an_overlay_that_cannot_be_a_folder(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    for target in ("file", "file/inside"):
+        arguments = [*replay(pairs, rig, plan, prior), "--overlay", str(tmp_path / target)]
+        refused(arguments, capsys, 3, target)
+
+
+def test_json_into_a_folder_instead_of_a_file(pairs, rig, plan, prior, tmp_path, capsys) -> None:
+    arguments = [*replay(pairs, rig, plan, prior), "--json", str(tmp_path)]
+    refused(arguments, capsys, 3, str(tmp_path))
+
+
+def test_no_start_pose(pairs, rig, plan, prior, capsys) -> None:
+    arguments = ["replay", str(pairs), "--rig", str(rig), "--plan", str(plan)]
+    refused(arguments, capsys, 3, "femur", "--prior")
+    prior.write_text(json.dumps({"box": [1, 2, 3, 4]}), encoding="utf-8")
+    refused([*arguments, "--prior", str(prior)], capsys, 3, "camera_from_model")
+
+
+@pytest.mark.parametrize(
+    ("script", "word"),
+    [
+        ('[[step]]\ndo = "stage"\nstage = 2\n', "stage"),
+        ('[[step]]\ndo = "register"\nat_frame = "x"\n', "at_frame"),
+        ('[[step]]\ndo = "sew"\n', "do"),
+        ('[[step]]\ndo = "register"\nat_fram = 3\n', "at_frame"),
+        ('[[step]]\ndo = "stage"\nstage = "sewing"\n', "sewing"),
+        ("step = 5\n", "step"),
+        ("[[step]\n", "TOML"),
+        ("", "step"),
+    ],
+)
+def test_an_operators_script_that_is_none(script, word, tmp_path, capsys) -> None:
+    path = tmp_path / "script.toml"
+    path.write_text(script, encoding="utf-8")
+    refused(["run", "--headless", "--operator", str(path)], capsys, 2, word)
+
+
+def test_another_camera_than_the_rigs(tmp_path, capsys) -> None:
+    path = tmp_path / "c.toml"
+    path.write_text(
+        "[camera.simulated]\nscale = 0.25\n"
+        'faults = [{ kind = "wrong_serial", start_s = 0.0, duration_s = 100.0 }]\n',
+        encoding="utf-8",
+    )
+    arguments = ["--config", str(path), "run", "--headless", "--frames", "3"]
+    refused(arguments, capsys, 5, "serial", "SIM-L")
+
+
+def test_a_camera_that_stays_away_ends_the_session(tmp_path, capsys) -> None:
+    path, out = tmp_path / "c.toml", tmp_path / "o.json"
+    path.write_text(
+        "[camera.simulated]\nscale = 0.25\n"
+        'faults = [{ kind = "unplug", start_s = 0.3, duration_s = 1000.0 }]\n',
+        encoding="utf-8",
+    )
+    arguments = ["--config", str(path), "run", "--headless", "--frames", "40", "--json", str(out)]
+    refused(arguments, capsys, 5, "camera")
+    assert 1 < len(json.loads(out.read_text(encoding="utf-8"))["frames"]) < 10

@@ -100,7 +100,7 @@ def test_the_command_lines_words_go_before_the_recorded_sessions(
     (session / "prior.json").write_text("{", encoding="utf-8")
     prior = tmp_path / "prior.json"
     prior.write_text("{}", encoding="utf-8")
-    assert run(["--quiet", "replay", str(session), "--prior", str(prior)]) == 4
+    assert run(["--quiet", "replay", str(session), "--prior", str(prior)]) == 3
     assert run(["--quiet", "replay", str(session)]) == 3
     assert str(session / "prior.json") in capsys.readouterr().err
 
@@ -144,3 +144,43 @@ def make_foreign_plan(folder: Path) -> Path:
     bone = femur_model(KneeSpec(seed=7, side="left", sex="male"))
     write_plan(folder / "foreign", Plan({"femur": bone}))
     return folder / "foreign"
+
+
+@pytest.mark.slow
+def test_a_recording_with_dropped_frames_replays_to_the_same_poses(
+    tmp_path: Path, moving: Path
+) -> None:
+    """A live session numbers its frames with gaps: what the line did not take is not recorded."""
+    session, first, second = tmp_path / "session", tmp_path / "a.json", tmp_path / "b.json"
+    options = ["--quiet", "--config", str(moving)]
+    recording = ["run", "--headless", "--frames", "10", "--record", str(session)]
+    assert run([*options, *recording, "--json", str(first)]) == 0
+    renumber(session)
+    assert run(["--quiet", "replay", str(session), "--json", str(second)]) == 0
+    for a, b in zip(result(first)["frames"], result(second)["frames"], strict=True):
+        assert b["index"] == with_gaps(a["index"])
+        assert a["state"] == b["state"]
+        assert a["camera_from_model"] == b["camera_from_model"]
+
+
+def with_gaps(number: int) -> int:
+    """The number that a frame would have had, if the line had missed some before it."""
+    return number if number < 2 else 3 * number + 7
+
+
+def renumber(session: Path) -> None:
+    """Make a session look as if frames had been dropped while it was recorded."""
+    head, *rows = (session / "frames.csv").read_text(encoding="utf-8").splitlines()
+    table = [head]
+    for row in rows:
+        number, *rest = row.split(",")
+        table.append(",".join([str(with_gaps(int(number))), *rest]))
+    (session / "frames.csv").write_text("\n".join(table) + "\n", encoding="utf-8")
+    lines = []
+    for line in (session / "events.jsonl").read_text(encoding="utf-8").splitlines():
+        entry = json.loads(line)
+        # A take-over names the frame before which it happened, everything else the one after.
+        offset = 1 if entry["type"] == "take_over" else 0
+        entry["sequence"] = with_gaps(entry["sequence"] - offset) + offset
+        lines.append(json.dumps(entry))
+    (session / "events.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from navapp.errors import RigError
 from navapp.geometry.rectification import Box, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
@@ -164,13 +165,13 @@ def test_a_grey_and_a_coloured_picture_are_no_pair(rectifier):
 def test_swapped_cameras_are_refused():
     rig = toed_in_rig()
     swapped = StereoRig(rig.right, rig.left, rig.right_from_left.inverse().renamed("right", "left"))
-    with pytest.raises(ValueError, match="swapped"):
+    with pytest.raises(RigError, match="right of the left"):
         Rectifier(swapped)
 
 
 def test_cameras_above_each_other_are_refused():
     pose = RigidTransform.from_parts("right", "left", np.eye(3), [0.0, -60.0, 0.0])
-    with pytest.raises(ValueError, match="right of the left"):
+    with pytest.raises(RigError, match="right of the left"):
         Rectifier(dataclasses.replace(toed_in_rig(), right_from_left=pose))
 
 
