@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from navapp.control.results import FrameResult
+from navapp.control.states import SessionState
 from navapp.values import Reason, Status
 
 
@@ -59,11 +60,12 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
     """The `summary` object."""
     statuses = [frame["status"] for frame in frames]
     totals = [frame["timing_ms"]["total"] for frame in frames if frame["timing_ms"]["total"] > 0]
-    # A wrong pose that was offered on purpose and refused is not a result of tracking.
+    # Every pose that was accepted and followed, OK or not: leaving out the doubtful ones would
+    # flatter. What was offered for review and refused is no result of tracking.
     errors = [
         frame["tre_mm"]
         for frame in frames
-        if frame["tre_mm"] is not None and frame["status"] == Status.OK.value
+        if frame["tre_mm"] is not None and frame["state"] == SessionState.NAVIGATING.value
     ]
     return {
         "frames": len(frames),
@@ -102,7 +104,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         )
     if tre is not None:
         lines.append(
-            f"simulated TRE of the OK frames: median {tre['median']:.2f} mm, "
+            f"simulated TRE while navigating: median {tre['median']:.2f} mm, "
             f"95 % {tre['p95']:.2f} mm, worst {tre['max']:.2f} mm"
         )
     return "\n".join(lines)
