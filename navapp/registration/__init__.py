@@ -3,12 +3,17 @@
 from navapp.registration.icp import fit_icp
 from navapp.registration.initial import distinct, find_candidates, tilted_starts
 from navapp.registration.model import RegistrationModel
-from navapp.registration.point_to_plane import PointToPlaneSettings, fit_point_to_plane
+from navapp.registration.point_to_plane import (
+    PointToPlaneSettings,
+    estimate_at,
+    fit_point_to_plane,
+)
 
 __all__ = [
     "PointToPlaneSettings",
     "RegistrationModel",
     "distinct",
+    "estimate_at",
     "find_candidates",
     "fit_icp",
     "fit_point_to_plane",

@@ -6,52 +6,41 @@ terminal; what is remembered between frames is handed in and out as a `TrackStat
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, Rectifier
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.geometry.zbuffer import projected_box
 from navapp.registration import (
     PointToPlaneSettings,
     RegistrationModel,
     distinct,
+    estimate_at,
     find_candidates,
     fit_icp,
     fit_point_to_plane,
     tilted_starts,
 )
-from navapp.registration.point_to_plane import estimate_at
-from navapp.stereo import SgbmSettings, fill_occlusions, match_sgbm, reproject
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.motion import TrackState
+from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import (
     BoneModel,
-    DisparityMap,
     LineTimings,
     PoseEstimate,
     Prior,
     Reason,
     Status,
-    SurfaceCloud,
     TrackedFrame,
     Verdict,
 )
 
 Image = NDArray[np.uint8]
 Method = Literal["bimcc", "icp"]
-
-
-@dataclass(frozen=True, slots=True)
-class Margins:
-    """How far around the predicted bone is looked: in the picture, and in depth."""
-
-    box_px: int
-    band_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,23 +55,27 @@ class LineSettings:
         max_points: about so many measured points enter an estimate.
         tilt_deg: of the starts of a first registration.
         n_refined: so many of its answers are refined.
+        max_rounds: matching on the model and fitting are repeated at most so often ...
+        settled_mm: ... until the bone's centre moves by less.
     """
 
     method: Method = "bimcc"
     depth_mm: tuple[float, float] = (300.0, 700.0)
-    tracking: Margins = Margins(box_px=16, band_mm=15.0)
-    search: Margins = Margins(box_px=60, band_mm=35.0)
+    tracking: Margins = field(default_factory=lambda: Margins(box_px=16, band_mm=15.0))
+    search: Margins = field(default_factory=lambda: Margins(box_px=60, band_mm=35.0))
     max_points: int = 2500
     tilt_deg: float = 15.0
     n_refined: int = 3
+    max_rounds: int = 3
+    settled_mm: float = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measurement:
-    """The surface in the bone's box, and how long it took."""
+class _Fit:
+    """A pose in the rectified camera, what it was fitted to, and how long both took."""
 
-    disparity: DisparityMap
-    cloud: SurfaceCloud
+    estimate: PoseEstimate
+    measured: Measurement
     timings: LineTimings
 
 
@@ -95,13 +88,16 @@ class Line:
         self.settings = settings or LineSettings()
         self.rig = rig
         self.model = RegistrationModel(bone)
-        self._rectifier = Rectifier(rig)
-        self._geometry = self._rectifier.geometry
+        self._meter = SurfaceMeter(
+            rig, self.model, self.settings.depth_mm, self.settings.max_points
+        )
+        self._geometry = self._meter.geometry
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
-        self._matcher = SgbmSettings()
         self._wide = PointToPlaneSettings()
         self._near = PointToPlaneSettings(radii_mm=self._wide.radii_mm[1:])
+        # On the model's own surface errors go together over a window, not over a staircase.
+        self._fine = replace(self._near, correlation_px=11.0)
 
     @property
     def centre_mm(self) -> FloatArray:
@@ -112,17 +108,14 @@ class Line:
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame (the paper's intra-operative loop)."""
-        is_lost = state.n_lost > 0
-        margins = self.settings.search if is_lost else self.settings.tracking
         predicted = self._rectified(state.predicted(captured_ns, self.centre_mm))
-        measured = self._measure(left, right, predicted, margins)
-        if measured is None:
-            tracked = self._lost(Reason.OUT_OF_VIEW)
-            return tracked, state.updated(tracked, captured_ns, self.centre_mm)
-        started = time.perf_counter_ns()
-        estimate = self._estimate(measured, predicted, self._wide if is_lost else self._near)
-        timings = replace(measured.timings, estimate_ms=_ms_since(started))
-        tracked = self._judged(estimate, measured.disparity, goal, timings, predicted)
+        pair, timings = self._meter.rectified(left, right)
+        fit = self._follow(pair, predicted) if state.n_lost == 0 else None
+        tracked = self._judged(fit, goal, timings, predicted)
+        if tracked.verdict.status is Status.LOST:
+            # The prediction was too far off for the model's own surface: look around it first.
+            fit = self._search(pair, predicted)
+            tracked = self._judged(fit, goal, _sum(timings, tracked.timings), predicted)
         return tracked, state.updated(tracked, captured_ns, self.centre_mm)
 
     def register(
@@ -146,110 +139,118 @@ class Line:
         if start is None:
             return []
         rough = self._rectified(start)
-        measured = self._measure(left, right, rough, self.settings.search)
+        pair, timings = self._meter.rectified(left, right)
+        measured = self._meter.freely(pair, rough, self.settings.search)
         if measured is None or len(measured.cloud) == 0:
             return [self._lost(Reason.NO_SURFACE)]
-
-        def score(estimate: PoseEstimate) -> float:
-            found = self._judge.agreement(self.model, estimate.camera_from_bone, measured.disparity)
-            return found.coverage * found.inlier_share
-
         starts = tilted_starts(rough, self.centre_mm, self.settings.tilt_deg)
         if self.settings.method == "icp":
             starts = [rough]
-        coarse = find_candidates(measured.cloud, self.model, starts, score, on_progress)
-        refined = [
-            self._estimate(measured, estimate.camera_from_bone, self._wide)
+        coarse = find_candidates(
+            measured.cloud,
+            self.model,
+            starts,
+            lambda estimate: self._score(estimate, measured),
+            on_progress,
+        )
+        fits = [
+            self._settled(pair, self._fitted(measured, estimate.camera_from_bone, self._wide))
             for estimate in coarse[: self.settings.n_refined]
         ]
-        refined.sort(key=score, reverse=True)
-        return [
-            self._judged(estimate, measured.disparity, goal, measured.timings)
-            for estimate in distinct(refined, self.centre_mm)
-        ]
+        fits.sort(key=lambda fit: self._score(fit.estimate, fit.measured), reverse=True)
+        kept = distinct([fit.estimate for fit in fits], self.centre_mm)
+        return [self._judged(fit, goal, timings) for fit in fits if fit.estimate in kept]
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
     ) -> TrackedFrame:
-        """Judge a pose as it stands, without moving it."""
+        """Judge a pose as it stands, without moving it, by the surface that is seen there."""
         pose = self._rectified(left_from_bone)
-        measured = self._measure(left, right, pose, self.settings.tracking)
+        pair, timings = self._meter.rectified(left, right)
+        measured = self._meter.freely(pair, pose, self.settings.tracking)
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
-        estimate = estimate_at(
-            measured.cloud, self.model, pose, settings=self._near
-        )  # fmt: skip
-        return self._judged(estimate, measured.disparity, goal, measured.timings)
+        estimate = estimate_at(measured.cloud, self.model, pose, settings=self._near)
+        return self._judged(_Fit(estimate, measured, measured.timings), goal, timings)
 
-    def _measure(
-        self,
-        left: Image,
-        right: Image,
-        rectified_from_bone: RigidTransform,
-        margins: Margins,
-    ) -> Measurement | None:
-        """Rectify, match in the box and band around a pose, fill, reproject; None out of view."""
-        region = self._region(rectified_from_bone, margins)
-        if region is None:
-            return None
-        box, band_px = region
-        t0 = time.perf_counter_ns()
-        pair = self._rectifier.rectify(_luma(left), _luma(right), box)
-        t1 = time.perf_counter_ns()
-        matched = match_sgbm(pair, band_px, self._matcher)
-        t2 = time.perf_counter_ns()
-        filled = matched if self.settings.method == "icp" else fill_occlusions(matched)
-        t3 = time.perf_counter_ns()
-        n_matched = filled.matched_share * filled.origin.size
-        stride_px = max(1, round((n_matched / self.settings.max_points) ** 0.5))
-        cloud = reproject(filled, self._geometry, stride_px)
-        timings = LineTimings(
-            rectify_ms=(t1 - t0) / 1e6, stereo_ms=(t2 - t1) / 1e6, fill_ms=(t3 - t2) / 1e6
-        )
-        return Measurement(filled, cloud, timings)
-
-    def _estimate(
-        self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
-    ) -> PoseEstimate:
+    def _follow(self, pair: RectifiedPair, pose: RigidTransform) -> _Fit | None:
+        """Match on the model and fit, until it settles; None out of view."""
         if self.settings.method == "icp":
-            return fit_icp(measured.cloud, self.model, start)
-        return fit_point_to_plane(measured.cloud, self.model, start, settings)
+            return self._search(pair, pose)
+        fit: _Fit | None = None
+        timings = LineTimings()
+        for _ in range(self.settings.max_rounds):
+            measured = self._meter.on_model(pair, pose, self.settings.tracking)
+            if measured is None:
+                return None
+            fit = self._fitted(measured, pose, self._fine)
+            timings = _sum(timings, fit.timings)
+            moved = fit.estimate.camera_from_bone.apply(self.centre_mm) - pose.apply(self.centre_mm)
+            pose = fit.estimate.camera_from_bone
+            if np.linalg.norm(moved) < self.settings.settled_mm:
+                break
+        return None if fit is None else replace(fit, timings=timings)
+
+    def _search(self, pair: RectifiedPair, pose: RigidTransform) -> _Fit | None:
+        """Match freely around a pose and fit from far, then settle; None out of view."""
+        is_baseline = self.settings.method == "icp"
+        margins = self.settings.tracking if is_baseline else self.settings.search
+        measured = self._meter.freely(pair, pose, margins, fills=not is_baseline)
+        if measured is None:
+            return None
+        return self._settled(pair, self._fitted(measured, pose, self._wide))
+
+    def _settled(self, pair: RectifiedPair, fit: _Fit) -> _Fit:
+        """A free fit, followed onto the model's own surface when it is found there."""
+        if self.settings.method == "icp":
+            return fit
+        finer = self._follow(pair, fit.estimate.camera_from_bone)
+        if finer is None or Reason.TOO_FEW_POINTS in finer.estimate.reasons:
+            return fit
+        return replace(finer, timings=_sum(fit.timings, finer.timings))
+
+    def _fitted(
+        self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
+    ) -> _Fit:
+        started = time.perf_counter_ns()
+        if self.settings.method == "icp":
+            estimate = fit_icp(measured.cloud, self.model, start)
+        else:
+            estimate = fit_point_to_plane(measured.cloud, self.model, start, settings)
+        estimate_ms = (time.perf_counter_ns() - started) / 1e6
+        return _Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
+
+    def _score(self, estimate: PoseEstimate, measured: Measurement) -> float:
+        """How much of the model a measurement explains; 0 without a covariance."""
+        if not np.isfinite(estimate.covariance).all():
+            return 0.0
+        found = self._judge.agreement(self.model, estimate.camera_from_bone, measured.disparity)
+        return found.coverage * found.inlier_share
 
     def _judged(
         self,
-        estimate: PoseEstimate,
-        measured: DisparityMap,
+        fit: _Fit | None,
         goal: Goal,
         timings: LineTimings,
         predicted: RigidTransform | None = None,
     ) -> TrackedFrame:
         """Judge, and hand the pose out in the unrectified left camera."""
+        if fit is None:
+            return self._lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
-        verdict = self._judge.judge(self.model, estimate, measured, goal, predicted)
-        timings = replace(timings, judge_ms=_ms_since(started))
+        verdict = self._judge.judge(
+            self.model, fit.estimate, fit.measured.disparity, goal, predicted
+        )
+        judge_ms = (time.perf_counter_ns() - started) / 1e6
+        timings = replace(_sum(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         name = self.model.bone.name
         if verdict.predicted_tre_mm is None:
             return TrackedFrame(name, None, verdict, timings)
-        return TrackedFrame(name, self._unrectified(estimate), verdict, timings)
+        return TrackedFrame(name, self._unrectified(fit.estimate), verdict, timings)
 
-    def _lost(self, reason: Reason) -> TrackedFrame:
+    def _lost(self, reason: Reason, timings: LineTimings | None = None) -> TrackedFrame:
         verdict = Verdict(Status.LOST, None, (reason,))
-        return TrackedFrame(self.model.bone.name, None, verdict, LineTimings())
-
-    def _region(
-        self, pose: RigidTransform, margins: Margins
-    ) -> tuple[Box, tuple[float, float]] | None:
-        """Box and disparity band around the model at a pose; None out of view or out of depth."""
-        box = projected_box(self.model.bone.mesh, pose, self._geometry)
-        if box is None:
-            return None
-        depths = pose.apply(self.model.points_mm)[:, 2]
-        near = max(float(depths.min()) - margins.band_mm, self.settings.depth_mm[0])
-        far = min(float(depths.max()) + margins.band_mm, self.settings.depth_mm[1])
-        if near >= far:
-            return None
-        grown = box.grown(margins.box_px).clipped(self._geometry.width, self._geometry.height)
-        return grown, (self._geometry.disparity_px(far), self._geometry.disparity_px(near))
+        return TrackedFrame(self.model.bone.name, None, verdict, timings or LineTimings())
 
     def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
         return self._geometry.rectified_from_left @ left_from_bone
@@ -265,14 +266,7 @@ class Line:
         )
 
 
-def _luma(image: Image) -> Image:
-    """Grey picture: colour adds cost and, with JPEG, halved chroma, but no disparity."""
-    import cv2
-
-    if image.ndim == 2:
-        return image
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-
-
-def _ms_since(started_ns: int) -> float:
-    return (time.perf_counter_ns() - started_ns) / 1e6
+def _sum(a: LineTimings, b: LineTimings) -> LineTimings:
+    """Both, part by part."""
+    parts = {part.name: getattr(a, part.name) + getattr(b, part.name) for part in fields(a)}
+    return LineTimings(**parts)

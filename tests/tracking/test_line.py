@@ -154,12 +154,10 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     line, truth = a.line, a.truth(frame)
     estimate = line.assess(frame.left, frame.right, truth, GOAL).estimate
     rectified_from_left = line._geometry.rectified_from_left
-    measured = line._measure(
-        frame.left, frame.right, rectified_from_left @ truth, line.settings.tracking
-    )
-    inside = estimate_at(
-        measured.cloud, line.model, rectified_from_left @ truth, settings=line._near
-    )
+    pair, _ = line._meter.rectified(frame.left, frame.right)
+    pose = rectified_from_left @ truth
+    measured = line._meter.freely(pair, pose, line.settings.tracking)
+    inside = estimate_at(measured.cloud, line.model, pose, settings=line._near)
     turn = np.kron(np.eye(2), rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15
