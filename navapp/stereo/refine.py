@@ -34,7 +34,7 @@ class RefineSettings:
     """
 
     radius_px: int = 5
-    n_steps: int = 3
+    n_steps: int = 2
     min_filled: float = 0.6
     min_correlation: float = 0.6
     last_step_px: float = 0.1

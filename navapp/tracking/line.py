@@ -66,8 +66,8 @@ class LineSettings:
     max_points: int = 2500
     tilt_deg: float = 15.0
     n_refined: int = 3
-    max_rounds: int = 3
-    settled_mm: float = 0.1
+    max_rounds: int = 4
+    settled_mm: float = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -44,8 +44,8 @@ def test_the_scripted_operator_refuses_a_wrong_pose_then_accepts_and_tracks(tmp_
     assert all(f["status"] != "OK" and f["state"] == "review" for f in wrong)
     tracked = [f for f in frames if f["state"] == "navigating"]
     assert len(tracked) >= 15
-    assert all(f["status"] == "OK" and f["tre_mm"] < 1.5 for f in tracked)
-    assert content["summary"]["tre_mm"]["max"] < 1.5
+    assert all(f["status"] == "OK" and f["tre_mm"] < 0.4 for f in tracked)
+    assert content["summary"]["tre_mm"]["max"] < 0.4
 
 
 @pytest.mark.slow
