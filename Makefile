@@ -8,7 +8,9 @@ STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cu
 
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration/test_model.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py \
-    tests/sim_devices/test_sensor.py
+    tests/sim_devices/test_sensor.py tests/stereo/test_refine.py tests/stereo/test_census_sgm.py \
+    tests/stereo/test_gradient.py tests/stereo/test_occlusion.py tests/stereo/test_wls_fill.py \
+    tests/stereo/test_wls_smooth.py
 
 SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 libx11-6 tmux
 

@@ -31,18 +31,18 @@ def _nothing_left_behind() -> Iterator[None]:
     threads = set(threading.enumerate())
     children = {child.pid for child in psutil.Process().children(recursive=True)}
     yield
-    left = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
+    left = [t for t in threading.enumerate() if t not in threads and not _lives_on(t)]
     for thread in left:
         thread.join(2.0)
-    still = [t.name for t in left if t.is_alive() and not _is_of_a_library(t)]
+    still = [t.name for t in left if t.is_alive()]
     new = [c for c in psutil.Process().children(recursive=True) if c.pid not in children]
     _, alive = psutil.wait_procs(new, timeout=2.0)
     assert not still, f"threads left behind: {still}"
     assert not alive, f"processes left behind: {alive}"
 
 
-def _is_of_a_library(thread: threading.Thread) -> bool:
-    # asyncio keeps its pool for the life of the loop, xdist its reader for the life of the worker.
+def _lives_on(thread: threading.Thread) -> bool:
+    # asyncio keeps its pool for the life of the loop, stereo its two threads for the process.
     return thread.name.startswith(("asyncio_", "ThreadPoolExecutor", "Dummy"))
 
 

@@ -168,6 +168,12 @@ class Rectifier:
             rectified_from_left=RigidTransform.from_parts("left_rect", "left", r1, np.zeros(3)),
         )
 
+    @property
+    def matrices(self) -> tuple[Any, Any, Any, Any]:
+        """R1, R2 (3, 3) and P1, P2 (3, 4), as OpenCV names them."""
+        r1, r2, p1, p2 = self._solved
+        return r1, r2, p1, p2
+
     @cached_property
     def maps(self) -> tuple[Any, Any, Any, Any]:
         """Float maps: left x, left y, right x, right y.

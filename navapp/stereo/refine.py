@@ -50,7 +50,7 @@ def refine(
     Args:
         pair: rectified grey pictures; `pair.box` is measured.
         support_px: (h, w) float32 disparity over the box, NaN where nothing is expected; within
-            about 1.5 px of the truth.
+            about half a pixel a step of the truth.
         settings: of the refinement.
 
     Returns:

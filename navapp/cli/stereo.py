@@ -1,0 +1,285 @@
+"""`navapp stereo`: the disparity of one pair."""
+
+import argparse
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import InputError, PriorError, ResultError, UsageError
+
+if TYPE_CHECKING:
+    from navapp.geometry.rectification import RectifiedPair, Rectifier
+    from navapp.stereo.production import StereoAnswer
+
+Image = NDArray[np.uint8]
+
+_METRIC_GAP_PX = 40
+
+_EXAMPLE = """\
+examples:
+  navapp stereo left.png right.png --disparities 64 --out disparity.npy --picture disparity.png
+  navapp stereo left.jpg right.jpg --rig rig.yml --cloud cloud.ply
+  navapp stereo left.jpg right.jpg --rig rig.yml --model femur.ply --pose pose.json --out d.npy
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the verb."""
+    parser = subparsers.add_parser(
+        "stereo",
+        help="the disparity of one pair of pictures",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("left", metavar="LEFT", help="left picture")
+    parser.add_argument("right", metavar="RIGHT", help="right picture")
+    parser.add_argument("--rig", metavar="R", help="rig file; without it the pair is rectified")
+    parser.add_argument("--model", metavar="M.ply", help="expected surface (with --pose and --rig)")
+    parser.add_argument("--pose", metavar="T.json", help="camera_from_model of that surface")
+    parser.add_argument("--disparities", type=int, metavar="N", help="how many are searched")
+    parser.add_argument("--min-disparity", type=int, metavar="M", help="the smallest (default 0)")
+    parser.add_argument(
+        "--matcher",
+        choices=("gradient", "production"),
+        default="production",
+        help="gradient is the paper's baseline",
+    )
+    parser.add_argument("--fill", choices=("none", "wls"), default="wls", help="of occlusions")
+    parser.add_argument("--out", metavar="D.npy", help="float32 disparity px, NaN unknown")
+    parser.add_argument("--sigma", metavar="S.npy", help="float32 standard deviation px")
+    parser.add_argument("--origin", metavar="O.png", help="where each disparity comes from")
+    parser.add_argument("--picture", metavar="D.png", help="disparity in colours, filled hatched")
+    parser.add_argument("--cloud", metavar="C.ply", help="points in the left camera, mm")
+    parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """A pair ready to be matched."""
+
+    rectified: "RectifiedPair"
+    rectifier: "Rectifier | None"
+    rectify_ms: float
+
+
+def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Do it."""
+    _check(options)
+    pair = _rectified(_read(options.left), _read(options.right), options)
+    answer = _match(pair, options)
+    answer = replace(answer, timings=replace(answer.timings, rectify_ms=pair.rectify_ms))
+    _write(pair, answer, options)
+    content = _content(pair, answer)
+    write_json(options.json, "stereo", content)
+    if options.json != "-":
+        diagnostics.say(
+            f"{content['width']}x{content['height']}: {100 * content['density_matched']:.1f} % "
+            f"matched, {100 * content['density_filled']:.1f} % with the fill, "
+            f"{answer.timings.total_ms:.0f} ms"
+        )
+    for reason in answer.reasons:
+        diagnostics.warn(reason)
+    if content["density_matched"] == 0.0:
+        why = answer.reasons[0] if answer.reasons else "nothing was matched"
+        raise ResultError(why, remedy="check the pictures, their order and the disparity range")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    if bool(options.model) != bool(options.pose):
+        raise UsageError("--model and --pose belong together", remedy="give both or neither")
+    if options.model and not options.rig:
+        raise UsageError("--model needs --rig", remedy="add the rig that took the pictures")
+    if options.cloud and not options.rig:
+        raise UsageError("--cloud needs --rig", remedy="a pair without a rig has no lengths")
+    if options.disparities is None and not options.rig:
+        raise UsageError("no disparity range is known", remedy="give --disparities or --rig")
+    if options.disparities is not None and options.disparities < 1:
+        raise UsageError("--disparities must be at least 1")
+    for path in (options.out, options.sigma, options.origin, options.picture, options.cloud):
+        check_writable(path)
+    check_writable(options.json)
+
+
+def _read(path: str) -> Image:
+    """A picture, grey or colour; decoded from memory, which notices files that are cut short."""
+    import cv2
+
+    try:
+        content = np.frombuffer(Path(path).read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise InputError(
+            f"picture {path} cannot be read ({error.strerror})",
+            subject=path,
+            remedy="give an existing picture",
+        ) from error
+    picture = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
+    if picture is None or picture.dtype != np.uint8:
+        raise InputError(
+            f"picture {path} is damaged or not an 8-bit picture",
+            subject=path,
+            remedy="export it again as 8-bit PNG or JPEG",
+        )
+    return np.asarray(picture[..., :3] if picture.ndim == 3 else picture, dtype=np.uint8)
+
+
+def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
+    """Both pictures grey and rectified; without a rig they are taken as they are."""
+    import time
+
+    from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair, Rectifier
+    from navapp.geometry.rig import read_rig
+    from navapp.geometry.transform import RigidTransform
+
+    if left.shape != right.shape:
+        raise InputError(
+            f"the pictures differ: {left.shape[1]}x{left.shape[0]} with {_channels(left)} channels "
+            f"against {right.shape[1]}x{right.shape[0]} with {_channels(right)}",
+            subject=options.right,
+            remedy="give two pictures of one camera pair",
+        )
+    grey = _grey(left), _grey(right)
+    height, width = grey[0].shape
+    if options.rig is None:
+        nowhere = RigidTransform.identity("left_rect", "left")
+        geometry = RectifiedGeometry(1.0, 0.0, 0.0, 1.0, width, height, nowhere)
+        pair = RectifiedPair(*grey, geometry, Box(0, 0, width, height))
+        return _Pair(pair, None, 0.0)
+    rig = read_rig(options.rig)
+    if (rig.width, rig.height) != (width, height):
+        raise InputError(
+            f"the pictures are {width}x{height}, rig {options.rig} is {rig.width}x{rig.height}",
+            subject=options.rig,
+            remedy="use the rig file that belongs to these pictures",
+        )
+    rectifier = Rectifier(rig)
+    started = time.perf_counter()
+    pair = rectifier.rectify(*grey)
+    return _Pair(pair, rectifier, (time.perf_counter() - started) * 1e3)
+
+
+def _match(pair: _Pair, options: argparse.Namespace) -> "StereoAnswer":
+    from navapp.stereo.production import match_baseline, match_on_support, match_without_pose
+
+    if options.model:
+        return match_on_support(pair.rectified, _support(pair, options))
+    band = _band(pair, options)
+    if options.matcher == "gradient":
+        return match_baseline(pair.rectified, band)
+    # Of a rig's pictures lengths are taken: what is far from anything measured stays unknown.
+    max_gap_px = None if options.rig is None else _METRIC_GAP_PX
+    return match_without_pose(
+        pair.rectified, band, fills=options.fill == "wls", max_gap_px=max_gap_px
+    )
+
+
+def _band(pair: _Pair, options: argparse.Namespace) -> tuple[float, float]:
+    """Disparities that are searched: as asked for, else the configured depth range."""
+    from navapp.config import find_file, load
+
+    geometry = pair.rectified.geometry
+    if options.disparities is not None:
+        low = float(options.min_disparity or 0)
+        band = (low, low + options.disparities - 1.0)
+    else:
+        near, far = load(find_file(options.config)).camera.depth_mm
+        band = (geometry.disparity_px(far), geometry.disparity_px(near))
+    if band[1] >= geometry.width:
+        raise UsageError(
+            f"disparities up to {band[1]:.0f} px do not fit into pictures {geometry.width} px wide",
+            remedy="ask for fewer --disparities",
+        )
+    return band
+
+
+def _support(pair: _Pair, options: argparse.Namespace) -> NDArray[np.float32]:
+    """Disparity of the expected surface over the whole rectified left view."""
+    from navapp.geometry.ply import read_ply
+    from navapp.geometry.transform import RigidTransform
+    from navapp.geometry.zbuffer import render_rectified
+
+    try:
+        content = json.loads(Path(options.pose).read_text(encoding="utf-8"))
+        pose = RigidTransform("left", "model", content["matrix"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise PriorError(
+            f"pose {options.pose} cannot be understood",
+            subject=options.pose,
+            remedy='it holds {"matrix": [[4x4]]}',
+        ) from error
+    geometry = pair.rectified.geometry
+    mesh, _ = read_ply(options.model)
+    rectified_from_model = geometry.rectified_from_left @ pose
+    view = render_rectified(mesh, rectified_from_model, geometry, pair.rectified.box)
+    scale = geometry.focal_px * geometry.baseline_mm
+    support: NDArray[np.float32] = (scale / view.depth_mm).astype(np.float32)
+    return support
+
+
+def _write(pair: _Pair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
+    """Every file that was asked for."""
+    import io
+
+    import cv2
+
+    from navapp.cli.stereo_files import cloud_ply, coloured
+    from navapp.geometry.ply import write_whole
+
+    found = answer.disparity
+    for path, values in ((options.out, found.disparity_px), (options.sigma, found.sigma_px)):
+        if path:
+            buffer = io.BytesIO()
+            np.save(buffer, values.astype(np.float32))
+            write_whole(path, buffer.getvalue())
+    for path, image in ((options.origin, found.origin), (options.picture, None)):
+        if path:
+            shown = coloured(found) if image is None else image
+            write_whole(path, cv2.imencode(".png", shown)[1].tobytes())
+    if options.cloud:
+        write_whole(options.cloud, cloud_ply(found, pair.rectified.geometry))
+
+
+def _content(pair: _Pair, answer: "StereoAnswer") -> dict[str, Any]:
+    from navapp.values import Origin
+
+    origin = answer.disparity.origin
+    sigma = answer.disparity.sigma_px[origin == Origin.MATCHED]
+    rectified = None
+    if pair.rectifier is not None:
+        r1, _, p1, p2 = pair.rectifier.matrices
+        rectified = {"R1": r1.tolist(), "P1": p1.tolist(), "P2": p2.tolist()}
+    timings = answer.timings
+    return {
+        "width": origin.shape[1],
+        "height": origin.shape[0],
+        "rectified": rectified,
+        "density_matched": float((origin == Origin.MATCHED).mean()),
+        "density_filled": float((origin != Origin.UNKNOWN).mean()),
+        "filled_border": int((origin == Origin.FILLED_BORDER).sum()),
+        "filled_interior": int((origin == Origin.FILLED_INTERIOR).sum()),
+        "median_sigma_px": float(np.median(sigma)) if sigma.size else None,
+        "timing_ms": {
+            "rectify": timings.rectify_ms,
+            "stereo": timings.stereo_ms,
+            "fill": timings.fill_ms,
+            "total": timings.total_ms,
+        },
+        "reasons": list(answer.reasons),
+    }
+
+
+def _grey(picture: Image) -> Image:
+    import cv2
+
+    if picture.ndim == 2:
+        return picture
+    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def _channels(picture: Image) -> int:
+    return 1 if picture.ndim == 2 else picture.shape[2]

@@ -1,0 +1,102 @@
+"""What a matcher has to search: pixels, disparities and the right columns that they reach."""
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import Box, Image, RectifiedPair
+
+MAX_DISPARITIES = 1024
+
+T = TypeVar("T", bound=np.generic)
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """The search of one box over whole disparities.
+
+    Attributes:
+        box: as asked for; may reach beyond the picture.
+        inside: its part inside the picture.
+        lowest: first disparity, px.
+        count: number of disparities. One more than the band needs stands on either side: a best
+            match at the end of the search is no minimum.
+        right: the columns of the right picture that are partners of some pixel; rows of `inside`.
+    """
+
+    box: Box
+    inside: Box
+    lowest: int
+    count: int
+    right: Box
+
+    @property
+    def shift(self) -> int:
+        """Column of `inside`'s first pixel, counted from `right`'s first; may be negative."""
+        return self.inside.x - self.right.x
+
+    @property
+    def is_empty(self) -> bool:
+        """No pixel has a partner."""
+        return self.inside.is_empty or self.right.is_empty
+
+    def over_box(self, values: NDArray[T], outside: T) -> NDArray[T]:
+        """(h, w) values of `inside` laid into the whole box."""
+        out = np.full((self.box.height, self.box.width), outside, dtype=values.dtype)
+        x, y = self.inside.x - self.box.x, self.inside.y - self.box.y
+        out[y : y + self.inside.height, x : x + self.inside.width] = values
+        return out
+
+
+def plan_search(pair: RectifiedPair, band_px: tuple[float, float]) -> Search:
+    """The search of `pair.box` for disparities in a band.
+
+    Raises:
+        ValueError: pictures that are not grey or differ in size; a band that is none or too wide.
+    """
+    for picture in (pair.left, pair.right):
+        if picture.ndim != 2 or picture.dtype != np.uint8:
+            raise ValueError(f"grey pictures of 8 bits are needed, not {picture.shape}")
+    if pair.left.shape != pair.right.shape:
+        raise ValueError(f"pictures differ in size: {pair.left.shape} and {pair.right.shape}")
+    low, high = band_px
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise ValueError(f"a disparity band needs two growing numbers, not {band_px}")
+    lowest = int(np.floor(low)) - 1
+    count = int(np.ceil(high)) + 2 - lowest
+    if count > MAX_DISPARITIES:
+        raise ValueError(
+            f"the band {low:g} to {high:g} px needs {count} disparities; "
+            f"at most {MAX_DISPARITIES} are searched: narrow the range of depths"
+        )
+    height, width = pair.left.shape
+    box = Box(pair.box.x, pair.box.y, max(pair.box.width, 0), max(pair.box.height, 0))
+    inside = box.clipped(width, height)
+    reached = Box(
+        inside.x - (lowest + count - 1), inside.y, inside.width + count - 1, inside.height
+    )
+    right = Box(0, 0, 0, 0) if inside.is_empty else reached.clipped(width, height)
+    return Search(box, inside, lowest, count, right)
+
+
+def crop(image: NDArray[T], box: Box, margin_px: tuple[int, int]) -> NDArray[T]:
+    """A box with a margin (columns, rows) around it; the picture's edge is repeated outside."""
+    margin_x, margin_y = margin_px
+    rows = np.arange(box.y - margin_y, box.y + box.height + margin_y)
+    columns = np.arange(box.x - margin_x, box.x + box.width + margin_x)
+    height, width = image.shape
+    return image[np.ix_(np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1))]
+
+
+def contrast_grey(image: Image, radius_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """(h, w) range of grey levels in each window of a crop with a margin of `radius_px`."""
+    import cv2
+
+    radius_x, radius_y = radius_px
+    window = np.ones((2 * radius_y + 1, 2 * radius_x + 1), dtype=np.uint8)
+    spread = np.asarray(cv2.subtract(cv2.dilate(image, window), cv2.erode(image, window)))
+    height, width = image.shape
+    inner = spread[radius_y : height - radius_y, radius_x : width - radius_x]
+    return inner.astype(np.uint8)
