@@ -1,7 +1,7 @@
 """The contract of a stereo camera."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -14,6 +14,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
+    opened,
     require,
     require_raises,
 )
@@ -245,15 +246,8 @@ CAMERA_CHECKS: tuple[Callable[[MakeCamera], None], ...] = (
 )
 
 
-@contextmanager
-def _opened(make: MakeCamera) -> Iterator[CameraUnderTest]:
-    subject = make()
-    try:
-        with must_work("opening a camera"):
-            subject.camera.open()
-        yield subject
-    finally:
-        subject.camera.close()
+def _opened(make: MakeCamera) -> AbstractContextManager[CameraUnderTest]:
+    return opened(make, lambda subject: subject.camera, "a camera")
 
 
 def _read(subject: CameraUnderTest) -> StereoFrame:

@@ -1,7 +1,7 @@
 """The contract of a display."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -14,6 +14,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
+    opened,
     require,
     require_raises,
 )
@@ -203,15 +204,8 @@ DISPLAY_CHECKS: tuple[Callable[[MakeDisplay], None], ...] = (
 )
 
 
-@contextmanager
-def _opened(make: MakeDisplay) -> Iterator[DisplayUnderTest]:
-    subject = make()
-    try:
-        with must_work("opening a display"):
-            subject.display.open()
-        yield subject
-    finally:
-        subject.display.close()
+def _opened(make: MakeDisplay) -> AbstractContextManager[DisplayUnderTest]:
+    return opened(make, lambda subject: subject.display, "a display")
 
 
 def _test_image(subject: DisplayUnderTest) -> Image:

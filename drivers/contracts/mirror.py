@@ -1,7 +1,7 @@
 """The contract of a mirror mount."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,6 +9,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
+    opened,
     require,
     require_raises,
 )
@@ -171,15 +172,8 @@ MIRROR_CHECKS: tuple[Callable[[MakeMirror], None], ...] = (
 )
 
 
-@contextmanager
-def _opened(make: MakeMirror) -> Iterator[MirrorUnderTest]:
-    subject = make()
-    try:
-        with must_work("opening a mirror mount"):
-            subject.mirror.open()
-        yield subject
-    finally:
-        subject.mirror.close()
+def _opened(make: MakeMirror) -> AbstractContextManager[MirrorUnderTest]:
+    return opened(make, lambda subject: subject.mirror, "a mirror mount")
 
 
 def _home(subject: MirrorUnderTest) -> None:

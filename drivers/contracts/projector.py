@@ -10,6 +10,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
+    opened,
     require,
     require_raises,
 )
@@ -160,14 +161,9 @@ PROJECTOR_CHECKS: tuple[Callable[[MakeProjector], None], ...] = (
 
 @contextmanager
 def _opened(make: MakeProjector) -> Iterator[ProjectorUnderTest]:
-    subject = make()
-    try:
-        with must_work("opening a projector"):
-            subject.projector.open()
+    with opened(make, lambda subject: subject.projector, "a projector") as subject:
         require(bool(subject.projector.name), "a projector needs a name")
         yield subject
-    finally:
-        subject.projector.close()
 
 
 def _commands(subject: ProjectorUnderTest) -> tuple[tuple[str, Callable[[], CommandResult]], ...]:

@@ -6,6 +6,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Protocol, TypeVar
+
+S = TypeVar("S")
 
 _LEAST_PATIENCE_S = 2.0
 
@@ -44,6 +47,30 @@ def must_work(what: str) -> Iterator[None]:
         raise
     except Exception as error:
         raise ContractViolation(f"{what} must never fail, but raised {error!r}") from error
+
+
+class Openable(Protocol):
+    """What every device of a contract has."""
+
+    def open(self) -> None:
+        """Start."""
+        ...
+
+    def close(self) -> None:
+        """Stop."""
+        ...
+
+
+@contextmanager
+def opened(make: Callable[[], S], device_of: Callable[[S], Openable], what: str) -> Iterator[S]:
+    """A fresh subject whose device is open inside, and closed afterwards whatever happens."""
+    subject = make()
+    try:
+        with must_work(f"opening {what}"):
+            device_of(subject).open()
+        yield subject
+    finally:
+        device_of(subject).close()
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform
 from navapp.values import BoneModel
 
-# Block matching alone ends at 0.5 to 0.8 mm: this fails when the fine matching stops working.
+# Block matching alone does not reach it: this fails when the fine matching stops working.
 WORST_OK_MM = 0.4
 
 

@@ -124,7 +124,12 @@ def test_the_operators_script_is_followed(tmp_path: Path, moving: Path) -> None:
         encoding="utf-8",
     )
     options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "10"]
-    assert run([*options, "--operator", str(script), "--json", str(out)]) == 0
+    session = tmp_path / "session"
+    options += ["--operator", str(script), "--record", str(session)]
+    assert run([*options, "--json", str(out)]) == 0
+    lines = (session / "events.jsonl").read_text(encoding="utf-8").splitlines()
+    blanks = [e for e in map(json.loads, lines) if e.get("command") == "blank"]
+    assert [entry["sequence"] for entry in blanks] == [8]
     stages = [frame["stage"] for frame in result(out)["frames"]]
     assert stages[0] == "opening"
     assert stages[-1] == "drilling"
