@@ -4,17 +4,17 @@ PYTHON ?= python3
 UV     ?= $(shell command -v uv 2>/dev/null)
 VENV   := .venv
 BIN    := $(VENV)/bin
+PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration/test_model.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py \
-    tests/sim_devices/test_sensor.py tests/stereo/test_refine.py tests/stereo/test_census_sgm.py \
-    tests/stereo/test_gradient.py tests/stereo/test_occlusion.py tests/stereo/test_wls_fill.py \
-    tests/stereo/test_wls_smooth.py
+    tests/sim_devices/test_sensor.py tests/geometry/test_resample.py \
+    tests/stereo
 
 SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 libx11-6 tmux
 
-.PHONY: run test check setup bench system-deps clean help
+.PHONY: run test check setup bench bench-peers system-deps clean help
 
 help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -58,9 +58,17 @@ endif
 bench: setup    ## accuracy on recorded operations (data in NAVAPP_DATA)
 	@$(BIN)/python -m tests.bench.recorded_accuracy
 
+# The peers' wheel excludes the plain OpenCV: it has an environment of its own.
+bench-peers: setup  ## speed of the stereo chain beside OpenCV's contributed filters
+	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
+	    opencv-contrib-python-headless==5.0.0.93 numpy numba scipy pydantic platformdirs
+	@$(PEERS)/bin/python -m tests.bench.stereo_speed
+	@$(PEERS)/bin/python -m tests.bench.occlusion_speed
+
 system-deps:    ## Debian packages for everything beyond the simulated session
 	apt-get update -qq
 	apt-get install -y --no-install-recommends $(SYSTEM_DEPS)
 
 clean:          ## remove what was installed and built here
-	rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	rm -rf $(VENV) $(PEERS) build *.egg-info .mypy_cache .ruff_cache .pytest_cache

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from navapp.control.results import FrameListener
     from navapp.devices import OpenedDevices
     from navapp.geometry.rig import StereoRig
-    from navapp.tracking.line import Method
+    from navapp.tracking import Method
     from navapp.values import Plan, Prior, StageSpec
 
 _EXAMPLE = """\
@@ -205,7 +205,7 @@ def _controller(
     listeners: "Sequence[FrameListener]",
 ) -> "SessionController":
     from navapp.control.controller import SessionController, SessionHooks, SessionOptions
-    from navapp.tracking import LineSettings
+    from navapp.tracking import LineSettings, LocatorSettings
 
     return SessionController(
         opened.devices,
@@ -214,7 +214,9 @@ def _controller(
         replay.prior,
         executor=replay.executor,
         options=SessionOptions(
-            line=LineSettings(method=replay.method, depth_mm=configuration.camera.depth_mm),
+            line=LineSettings(
+                LocatorSettings(method=replay.method), depth_mm=configuration.camera.depth_mm
+            ),
             first_stage=replay.stage,
             overlay_valid_ms=configuration.display.valid_ms,
         ),

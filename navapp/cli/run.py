@@ -149,7 +149,7 @@ def _controller(
     """The controller with its listeners and, when asked for, its recorder."""
     from navapp.control.controller import SessionController, SessionOptions
     from navapp.control.executors import InlineExecutor, ThreadExecutor
-    from navapp.tracking import LineSettings
+    from navapp.tracking import LineSettings, LocatorSettings
 
     configuration, opened = session.configuration, session.opened
     return SessionController(
@@ -160,7 +160,8 @@ def _controller(
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
         options=SessionOptions(
             line=LineSettings(
-                method=configuration.tracking.method, depth_mm=configuration.camera.depth_mm
+                LocatorSettings(method=configuration.tracking.method),
+                depth_mm=configuration.camera.depth_mm,
             ),
             first_stage=session.stage,
             overlay_valid_ms=configuration.display.valid_ms,

@@ -16,7 +16,7 @@ from navapp.errors import SequenceError
 from navapp.geometry.ply import write_whole
 from navapp.geometry.rig import StereoRig, write_rig
 from navapp.preop import write_plan
-from navapp.tracking.line import Method
+from navapp.tracking import Method
 from navapp.values import Plan, Prior
 
 _FILE = "session.json"

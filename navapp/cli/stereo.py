@@ -14,7 +14,7 @@ from navapp.errors import InputError, PriorError, ResultError, UsageError
 
 if TYPE_CHECKING:
     from navapp.geometry.rectification import RectifiedPair, Rectifier
-    from navapp.stereo.production import StereoAnswer
+    from navapp.stereo.chains import StereoAnswer
 
 Image = NDArray[np.uint8]
 
@@ -50,6 +50,12 @@ def add_parser(subparsers: Any) -> None:
         help="gradient is the paper's baseline",
     )
     parser.add_argument("--fill", choices=("none", "wls"), default="wls", help="of occlusions")
+    parser.add_argument(
+        "--smooth",
+        choices=("none", "gaussian", "wls"),
+        default="none",
+        help="to look at: wls keeps matched pixels within their sigma, gaussian is the paper's",
+    )
     parser.add_argument("--out", metavar="D.npy", help="float32 disparity px, NaN unknown")
     parser.add_argument("--sigma", metavar="S.npy", help="float32 standard deviation px")
     parser.add_argument("--origin", metavar="O.png", help="where each disparity comes from")
@@ -68,10 +74,16 @@ class _Pair:
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    """Do it."""
+    """Match the pair, write what was asked for; the exit code."""
+    from navapp.stereo.chains import smoothed
+
     _check(options)
     pair = _rectified(_read(options.left), _read(options.right), options)
+    shape = pair.rectified.left.shape
+    if options.json != "-":
+        diagnostics.say(f"matching {shape[1]}x{shape[0]} (compiles first, once on a machine)")
     answer = _match(pair, options)
+    answer = smoothed(answer, pair.rectified, options.smooth)
     answer = replace(answer, timings=replace(answer.timings, rectify_ms=pair.rectify_ms))
     _write(pair, answer, options)
     content = _content(pair, answer)
@@ -95,12 +107,24 @@ def _check(options: argparse.Namespace) -> None:
         raise UsageError("--model and --pose belong together", remedy="give both or neither")
     if options.model and not options.rig:
         raise UsageError("--model needs --rig", remedy="add the rig that took the pictures")
+    if options.model and (options.matcher == "gradient" or options.disparities is not None):
+        raise UsageError(
+            "--model says where to match and how",
+            remedy="leave --matcher gradient and --disparities away, or --model and --pose",
+        )
+    if options.min_disparity is not None and options.disparities is None:
+        raise UsageError("--min-disparity needs --disparities", remedy="give both or neither")
+    if options.cloud and options.smooth != "none":
+        raise UsageError(
+            "a smoothed map is to look at, not to measure with",
+            remedy="leave --smooth or --cloud away",
+        )
     if options.cloud and not options.rig:
         raise UsageError("--cloud needs --rig", remedy="a pair without a rig has no lengths")
     if options.disparities is None and not options.rig:
         raise UsageError("no disparity range is known", remedy="give --disparities or --rig")
-    if options.disparities is not None and options.disparities < 1:
-        raise UsageError("--disparities must be at least 1")
+    if options.disparities is not None and options.disparities < 2:
+        raise UsageError("--disparities must be at least 2", remedy="64 suits many pairs")
     for path in (options.out, options.sigma, options.origin, options.picture, options.cloud):
         check_writable(path)
     check_writable(options.json)
@@ -164,18 +188,29 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
 
 
 def _match(pair: _Pair, options: argparse.Namespace) -> "StereoAnswer":
-    from navapp.stereo.production import match_baseline, match_on_support, match_without_pose
-
-    if options.model:
-        return match_on_support(pair.rectified, _support(pair, options))
-    band = _band(pair, options)
-    if options.matcher == "gradient":
-        return match_baseline(pair.rectified, band)
-    # Of a rig's pictures lengths are taken: what is far from anything measured stays unknown.
-    max_gap_px = None if options.rig is None else _METRIC_GAP_PX
-    return match_without_pose(
-        pair.rectified, band, fills=options.fill == "wls", max_gap_px=max_gap_px
+    from navapp.stereo.chains import (
+        match_baseline,
+        match_on_support,
+        match_scene,
+        match_surface,
     )
+
+    fills = options.fill == "wls"
+    if options.model:
+        return match_on_support(
+            pair.rectified, _support(pair, options), fills=fills, max_gap_px=_METRIC_GAP_PX
+        )
+    band = _band(pair, options)
+    try:
+        if options.matcher == "gradient":
+            return match_baseline(pair.rectified, band)
+        if options.rig is None:
+            return match_scene(pair.rectified, band, fills=fills)
+        # Of a rig's pictures lengths are taken: what is far from anything measured stays unknown.
+        return match_surface(pair.rectified, band, fills=fills, max_gap_px=_METRIC_GAP_PX)
+    except ValueError as error:
+        # The matchers' own limits: too many disparities, or too much memory.
+        raise UsageError(str(error), remedy="ask for fewer --disparities") from error
 
 
 def _band(pair: _Pair, options: argparse.Namespace) -> tuple[float, float]:
@@ -189,10 +224,11 @@ def _band(pair: _Pair, options: argparse.Namespace) -> tuple[float, float]:
     else:
         near, far = load(find_file(options.config)).camera.depth_mm
         band = (geometry.disparity_px(far), geometry.disparity_px(near))
-    if band[1] >= geometry.width:
+    if max(-band[0], band[1]) >= geometry.width:
         raise UsageError(
-            f"disparities up to {band[1]:.0f} px do not fit into pictures {geometry.width} px wide",
-            remedy="ask for fewer --disparities",
+            f"disparities {band[0]:.0f} to {band[1]:.0f} px do not fit into pictures "
+            f"{geometry.width} px wide",
+            remedy="ask for other --disparities or --min-disparity",
         )
     return band
 

@@ -28,8 +28,8 @@ class PointToPlaneSettings:
         max_iterations: of one stage.
         step_mm, step_rad: a smaller step ends a stage.
         correlation_px: distance over which the matcher's errors go together; neighbouring points
-            within it count as one measurement. The default is block matching's, with a
-            margin for smooth bone and for tissue that lies flush with it.
+            within it count as one measurement. The default is for surfaces measured without a
+            model: with a margin for smooth bone and for tissue that lies flush with it.
         degenerate_share: smallest over largest eigenvalue of the information below which a
             direction counts as free.
     """

@@ -1,15 +1,23 @@
 """From a rectified pair to a surface: matching, occlusion filling, reprojection."""
 
-from navapp.stereo.fill import fill_occlusions
-from navapp.stereo.refine import RefineSettings, refine
-from navapp.stereo.sgbm import SgbmSettings, match_sgbm
+from navapp.stereo.chains import (
+    StereoAnswer,
+    match_baseline,
+    match_on_support,
+    match_scene,
+    match_surface,
+)
+from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.surface import reproject
 
 __all__ = [
     "RefineSettings",
-    "SgbmSettings",
-    "fill_occlusions",
-    "match_sgbm",
+    "StereoAnswer",
+    "match_baseline",
+    "match_on_support",
+    "match_scene",
+    "match_surface",
     "refine",
+    "refine_samples",
     "reproject",
 ]

@@ -11,10 +11,23 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import projected_box, render_rectified
 from navapp.registration import RegistrationModel
-from navapp.stereo import SgbmSettings, fill_occlusions, match_sgbm, refine, reproject
+from navapp.stereo import (
+    RefineSettings,
+    StereoAnswer,
+    match_baseline,
+    match_on_support,
+    match_surface,
+    refine_samples,
+    reproject,
+)
 from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
 Image = NDArray[np.uint8]
+
+# How far the bone may turn out to be from where it was expected, and its box with it.
+_SPARE_PX, _SPARE_MM = 60, 30.0
+_PROBE = RefineSettings(n_steps=1, last_step_px=0.3)
+_PROBE_STRIDE_PX = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +40,19 @@ class Margins:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """The surface in the bone's box, and how long it took."""
+    """The surface in the bone's box.
+
+    Attributes:
+        disparity: over the box.
+        cloud: of the measured pixels, thinned.
+        timings: how long it took.
+        answered_share: of the pixels that were asked for: the box's, or the model's.
+    """
 
     disparity: DisparityMap
     cloud: SurfaceCloud
     timings: LineTimings
+    answered_share: float
 
 
 class SurfaceMeter:
@@ -48,55 +69,94 @@ class SurfaceMeter:
         self._model = model
         self._depth_mm = depth_mm
         self._max_points = max_points
-        self._matcher = SgbmSettings()
         self.geometry = self._rectifier.geometry
 
-    def rectified(self, left: Image, right: Image) -> tuple[RectifiedPair, LineTimings]:
-        """Both pictures, grey and rectified."""
+    def rectified(
+        self, left: Image, right: Image, around: RigidTransform, margins: Margins
+    ) -> tuple[RectifiedPair, LineTimings]:
+        """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         started = time.perf_counter_ns()
-        pair = self._rectifier.rectify(_luma(left), _luma(right))
+        wide = Margins(margins.box_px + _SPARE_PX, margins.band_mm + _SPARE_MM)
+        box, band_px = self._region(around, wide) or (None, None)
+        pair = self._rectifier.rectify(_luma(left), _luma(right), box, band_px)
         return pair, LineTimings(rectify_ms=_ms_since(started))
 
     def freely(
-        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins, *, fills: bool = True
+        self,
+        pair: RectifiedPair,
+        pose: RigidTransform,
+        margins: Margins,
+        *,
+        is_baseline: bool = False,
     ) -> Measurement | None:
-        """Block matching in the box and depth band around a pose; None out of view.
+        """Whatever surface is in the box and depth band around a pose; None out of view.
 
-        It sees whatever is there, also where the bone is not.
+        It sees whatever is there, also where the bone is not. The baseline is the paper's matcher.
         """
         region = self._region(pose, margins)
         if region is None:
             return None
         box, band_px = region
-        started = time.perf_counter_ns()
-        matched = match_sgbm(replace(pair, box=box), band_px, self._matcher)
-        timings = LineTimings(stereo_ms=_ms_since(started))
-        started = time.perf_counter_ns()
-        filled = fill_occlusions(matched) if fills else matched
-        return self._measurement(filled, replace(timings, fill_ms=_ms_since(started)))
+        inside = replace(pair, box=box)
+        if is_baseline:
+            return self._measurement(match_baseline(inside, band_px), box.width * box.height)
+        answer = match_surface(inside, band_px, fills=False)
+        return self._measurement(answer, box.width * box.height)
 
     def on_model(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
     ) -> Measurement | None:
         """Sub-pixel matching on the model's own surface at a pose; None out of view.
 
-        Exact, but only where the surface lies within 1 to 2 px of the model's: elsewhere it answers
-        nothing.
+        Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
+        it answers nothing.
         """
+        started = time.perf_counter_ns()
+        expected = self._expected(pair, pose, margins)
+        if expected is None:
+            return None
+        inside, support_px = expected
+        render_ms = _ms_since(started)
+        answer = match_on_support(inside, support_px, fills=False)
+        stereo_ms = answer.timings.stereo_ms + render_ms
+        answer = replace(answer, timings=replace(answer.timings, stereo_ms=stereo_ms))
+        return self._measurement(answer, int(np.isfinite(support_px).sum()))
+
+    def probed_share(
+        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
+    ) -> tuple[float | None, float]:
+        """Share of thinned samples of the model that answer at a pose; None out of view. And ms.
+
+        One quick step: it tells whether the bone is there, not where else it is.
+        """
+        started = time.perf_counter_ns()
+        expected = self._expected(pair, pose, margins)
+        if expected is None:
+            return None, _ms_since(started)
+        inside, support_px = expected
+        samples = refine_samples(inside, support_px, _PROBE, _PROBE_STRIDE_PX)
+        n_asked = np.isfinite(support_px[::_PROBE_STRIDE_PX, ::_PROBE_STRIDE_PX]).sum()
+        share = float((samples.origin > 0).sum() / max(n_asked, 1))
+        return share, _ms_since(started)
+
+    def _expected(
+        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
+    ) -> tuple[RectifiedPair, NDArray[np.float32]] | None:
+        """The model's box in the pair, and its disparity there; None out of view."""
         region = self._region(pose, margins)
         if region is None:
             return None
-        started = time.perf_counter_ns()
         view = render_rectified(self._model.seen_mesh, pose, self.geometry, region[0])
         scale = self.geometry.focal_px * self.geometry.baseline_mm
-        support_px = (scale / view.depth_mm).astype(np.float32)
-        matched = refine(replace(pair, box=region[0]), support_px)
-        return self._measurement(matched, LineTimings(stereo_ms=_ms_since(started)))
+        support_px: NDArray[np.float32] = (scale / view.depth_mm).astype(np.float32)
+        return replace(pair, box=region[0]), support_px
 
-    def _measurement(self, disparity: DisparityMap, timings: LineTimings) -> Measurement:
-        n_matched = disparity.matched_share * disparity.origin.size
+    def _measurement(self, answer: StereoAnswer, n_asked: int) -> Measurement:
+        found = answer.disparity
+        n_matched = found.matched_share * found.origin.size
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
-        return Measurement(disparity, reproject(disparity, self.geometry, stride_px), timings)
+        cloud = reproject(found, self.geometry, stride_px)
+        return Measurement(found, cloud, answer.timings, n_matched / max(n_asked, 1))
 
     def _region(
         self, pose: RigidTransform, margins: Margins

@@ -1,43 +1,40 @@
-"""Stereo on recorded bone: the error of a plain fit of the true model to the measured points.
+"""Stereo on bone: how far the measured surface is from the true one, beside OpenCV's SGBM.
 
-usage: python -m tests.bench.stereo_on_bone [FOLDER] [--seeds N]
+usage: python -m tests.bench.stereo_on_bone [FOLDER] [--seeds N] [--only NAME] [--skip free|guided]
 
-Points of the left bone mask (nearest neighbour into the rectified view, eroded 6 px), unweighted
-point-to-plane fit started at the truth, nothing beyond 3 mm. Without a pose: our chain beside
-OpenCV's SGBM on the same pictures. With a pose: the truth disturbed about the bone's centre, then
-matched on the model and fitted, as in the line.
+Without a pose: the whole frame, within the depths that a rig is used for; then a plain fit of the
+true model to every second measured point each way, started at the truth (it shows a tilt of the
+disparity). With a pose: the truth disturbed about the bone's centre, then located as in the line.
 """
 
 import argparse
-import json
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
-from scipy.spatial import cKDTree
 
-from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
-from navapp.geometry.ply import read_ply
-from navapp.geometry.zbuffer import projected_box
-from navapp.stereo import match_sgbm, reproject
-from navapp.stereo.production import match_without_pose
-from navapp.tracking import Line
-from navapp.values import BoneModel, DisparityMap, visible_vertices
+from navapp.geometry import Box
+from navapp.geometry.zbuffer import render_rectified
+from navapp.stereo import match_surface
+from navapp.stereo.chains import smoothed
+from navapp.tracking import Goal, Line
+from navapp.values import BoneModel, DisparityMap, LineTimings, Status
+from tests.bench.bone_scenes import (
+    Scene,
+    Sequence,
+    disturbed,
+    fit_error_mm,
+    on_bone,
+    sequences,
+    tre_mm,
+)
+from tests.bench.sgbm import match_sgbm
 
-_SEQUENCES = ("registration", "patient", "instrument")
-_DISTURBANCES = ((1.0, 0.6), (2.0, 2.0), (5.0, 5.0))
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One recorded pair with its truth, rectified."""
-
-    pair: RectifiedPair
-    mask: np.ndarray
-    pose: RigidTransform
+_DISTURBANCES = ((1.0, 0.6), (2.0, 2.0), (5.0, 5.0), (8.0, 8.0))
+_GOAL = Goal(np.empty((0, 3)), 2.0)
+_DEPTH_MM = (300.0, 700.0)
+_CAUGHT_MM = 0.5
 
 
 def main() -> None:
@@ -46,114 +43,114 @@ def main() -> None:
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("NAVAPP_DATA", "../shared/data")
     )
-    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--only", default="", help="sequences whose name contains this")
+    parser.add_argument("--skip", choices=("free", "guided"), help="one of the two parts")
     options = parser.parse_args()
-    for phantom in sorted(Path(options.folder).glob("phantom_*")):
-        mesh = read_ply(phantom / "femur.ply")[0]
-        for sequence in _SEQUENCES:
-            free(f"{phantom.name}/{sequence}", list(scenes(phantom, sequence, mesh)), mesh)
-        line = Line(read_rig(phantom / "rig.yml"), BoneModel("femur", mesh))
-        guided(phantom.name, list(scenes(phantom, "registration", mesh)), line, options.seeds)
+    chosen = [s for s in sequences(Path(options.folder)) if options.only in s.name]
+    if options.skip != "free":
+        print("without a pose: fit TRE median / worst mm, density, depth MAD, signed mm | worse "
+              "by at most: after the fill, after WLS smoothing | SGBM median / worst")  # fmt: skip
+        for sequence in chosen:
+            free(sequence)
+    if options.skip != "guided":
+        print(f"with a pose off by: TRE median / 98 % / worst mm, share below {_CAUGHT_MM} mm, "
+              "slope of those, signed depth mm")  # fmt: skip
+        for sequence in chosen:
+            guided(sequence, options.seeds)
 
 
-def scenes(phantom: Path, sequence: str, mesh: TriangleMesh) -> Iterator[Scene]:
-    """Every frame of a sequence."""
-    rectifier = Rectifier(read_rig(phantom / "rig.yml"))
-    folder = phantom / sequence
-    for entry in json.loads((folder / "truth.json").read_text())["frames"]:
-        number = f"{entry['index']:04d}"
-        left, right, mask = (
-            cv2.imread(str(next(folder.glob(f"{name}_{number}.*"))), cv2.IMREAD_GRAYSCALE)
-            for name in ("left", "right", "bone_mask_left")
+@dataclass(frozen=True)
+class Quality:
+    """Of one disparity map on the bone."""
+
+    fit_mm: float
+    density: float
+    mad_mm: float
+    signed_mm: float
+
+    @classmethod
+    def of(cls, scene: Scene, found: DisparityMap, sequence: Sequence) -> "Quality":
+        """Compare with the truth."""
+        error_mm = depth_error_mm(scene, found, sequence)
+        signed = float(np.median(error_mm))
+        return cls(
+            fit_error_mm(scene, found, sequence.mesh),
+            error_mm.size / scene.is_bone.sum(),
+            float(np.median(np.abs(error_mm - signed))),
+            signed,
         )
-        true = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        pose = rectifier.geometry.rectified_from_left @ true
-        box = projected_box(mesh, pose, rectifier.geometry)
-        x, y, *_ = rectifier.maps
-        warped = cv2.remap(mask, x, y, cv2.INTER_NEAREST)
-        eroded = cv2.erode(warped, np.ones((13, 13), np.uint8)) > 0
-        yield Scene(rectifier.rectify(left, right, box.grown(40)), eroded, pose)
 
 
-def free(name: str, frames: list[Scene], mesh: TriangleMesh) -> None:
+def depth_error_mm(scene: Scene, found: DisparityMap, sequence: Sequence) -> np.ndarray:
+    """Measured minus true depth of the matched pixels on the bone."""
+    geometry = scene.pair.geometry
+    true = render_rectified(sequence.mesh, scene.pose, geometry, scene.pair.box).depth_mm
+    scale = geometry.focal_px * geometry.baseline_mm
+    error = scale / on_bone(scene, found).disparity_px - true
+    return error[np.isfinite(error)]
+
+
+def free(sequence: Sequence) -> None:
     """Without a pose, beside SGBM."""
-    ours, theirs, density = [], [], []
-    for scene in frames:
-        depths = scene.pose.apply(mesh.vertices_mm)[:, 2]
+    ours, filled, calmed, theirs = [], [], [], []
+    for scene in sequence.scenes:
         geometry = scene.pair.geometry
-        band = (geometry.disparity_px(depths.max() + 60), geometry.disparity_px(depths.min() - 60))
-        matched = match_without_pose(scene.pair, band, fills=False).matched
-        ours.append(fit_error_mm(scene, matched, mesh))
-        theirs.append(fit_error_mm(scene, match_sgbm(scene.pair, band), mesh))
-        density.append((on_bone(scene, matched).origin > 0).sum() / in_box(scene).sum())
+        pair = replace(scene.pair, box=Box(0, 0, geometry.width, geometry.height))
+        band = geometry.disparity_px(_DEPTH_MM[1]), geometry.disparity_px(_DEPTH_MM[0])
+        answer = match_surface(pair, band, fills=True)
+        smooth = smoothed(answer, pair, "wls").disparity
+        ours.append(Quality.of(scene, answer.matched, sequence))
+        filled.append(Quality.of(scene, answer.disparity, sequence))
+        calmed.append(Quality.of(scene, smooth, sequence))
+        theirs.append(fit_error_mm(scene, match_sgbm(pair, band), sequence.mesh))
+    fits = [q.fit_mm for q in ours]
+    worse = [
+        max(after.fit_mm - before.fit_mm for before, after in zip(ours, maps, strict=True))
+        for maps in (filled, calmed)
+    ]
     print(
-        f"{name} without a pose: {np.median(ours):.3f} median {max(ours):.3f} worst mm, density "
-        f"{min(density):.2f}; SGBM {np.median(theirs):.3f} {max(theirs):.3f}",
+        f"{sequence.name}: {np.median(fits):.3f} / {max(fits):.3f}, "
+        f"{min(q.density for q in ours):.2f}, {max(q.mad_mm for q in ours):.2f}, "
+        f"{max((q.signed_mm for q in ours), key=abs):+.3f} | {worse[0]:+.3f}, {worse[1]:+.3f} | "
+        f"{np.median(theirs):.3f} / {max(theirs):.3f}",
         flush=True,
     )
 
 
-def guided(name: str, frames: list[Scene], line: Line, n_seeds: int) -> None:
+def guided(sequence: Sequence, n_seeds: int) -> None:
     """With a pose that is disturbed by an angle and a length."""
+    line = Line(sequence.rig, BoneModel("femur", sequence.mesh))
     for angle_deg, length_mm in _DISTURBANCES:
-        errors = []
-        for scene in frames:
+        before, after, signed, n_silent = [], [], [], 0
+        for scene in sequence.scenes:
             for seed in range(n_seeds):
                 start = disturbed(scene.pose, line.centre_mm, angle_deg, length_mm, seed)
-                fit = line._follow(scene.pair, start)
-                found = fit.estimate.camera_from_bone
-                errors.append(tre_mm(found, scene.pose, line.model.bone.mesh))
-        print(
-            f"{name} from {angle_deg:g} deg {length_mm:g} mm: {np.median(errors):.3f} median "
-            f"{max(errors):.3f} worst mm",
-            flush=True,
-        )
+                fit = line.locator.locate(scene.pair, start)
+                before.append(tre_mm(start, scene.pose, sequence.mesh))
+                if fit is None:
+                    after.append(np.inf)
+                    continue
+                after.append(tre_mm(fit.pose, scene.pose, sequence.mesh))
+                if after[-1] > _CAUGHT_MM:
+                    verdict = line._judged(fit, _GOAL, LineTimings()).verdict
+                    n_silent += verdict.status is not Status.LOST
+                signed.append(np.median(depth_error_mm(scene, fit.measured.disparity, sequence)))
+        report_guided(f"{sequence.name} {angle_deg:g} deg {length_mm:g} mm", before, after, signed)
+        if n_silent:
+            print(f"  wrong, but not called LOST: {n_silent}")
 
 
-def disturbed(
-    pose: RigidTransform, centre_mm: np.ndarray, angle_deg: float, length_mm: float, seed: int
-) -> RigidTransform:
-    """The pose turned and shifted by exactly that much, in random directions."""
-    axis, direction = np.random.default_rng(seed).normal(size=(2, 3))
-    shift = length_mm * direction / np.linalg.norm(direction)
-    turn = np.radians(angle_deg) * axis / np.linalg.norm(axis)
-    return pose.moved(np.concatenate([shift, turn]), pose.apply(centre_mm))
-
-
-def fit_error_mm(scene: Scene, found: DisparityMap, mesh: TriangleMesh) -> float:
-    """TRE of the plain fit to the points on the bone."""
-    points = reproject(on_bone(scene, found), scene.pair.geometry, 2).points_mm
-    tree = cKDTree(mesh.vertices_mm)
-    pose = scene.pose
-    for _ in range(60):
-        moved = pose.inverse().apply(points)
-        distance, nearest = tree.query(moved)
-        near, index = moved[distance < 3.0], nearest[distance < 3.0]
-        normals, centre = mesh.normals[index], near.mean(axis=0)
-        residual = np.einsum("ij,ij->i", normals, near - mesh.vertices_mm[index])
-        jacobian = np.hstack([normals, np.cross(near - centre, normals)])
-        step = -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-        pose = pose.inverse().moved(step, centre).inverse()
-        if np.linalg.norm(step[:3]) < 1e-4:
-            break
-    return tre_mm(pose, scene.pose, mesh)
-
-
-def tre_mm(pose: RigidTransform, true: RigidTransform, mesh: TriangleMesh) -> float:
-    """Mean over the vertices that face the camera at the true pose."""
-    seen = mesh.vertices_mm[visible_vertices(mesh, true)]
-    return float(np.linalg.norm(pose.apply(seen) - true.apply(seen), axis=1).mean())
-
-
-def in_box(scene: Scene) -> np.ndarray:
-    """The eroded bone mask over the pair's box."""
-    box = scene.pair.box
-    return scene.mask[box.y : box.y + box.height, box.x : box.x + box.width]
-
-
-def on_bone(scene: Scene, found: DisparityMap) -> DisparityMap:
-    """Only what lies on the bone."""
-    return replace(found, origin=np.where(in_box(scene), found.origin, 0).astype(np.uint8))
+def report_guided(name: str, before: list[float], after: list[float], signed: list[float]) -> None:
+    """One line of the table; the slope is of those that were caught."""
+    start, end = np.array(before), np.array(after)
+    caught = end < _CAUGHT_MM
+    slope = np.polyfit(start[caught], end[caught], 1)[0] if caught.sum() > 2 else np.nan
+    print(
+        f"{name}: {np.median(end):.3f} / {np.quantile(end, 0.98):.3f} / {end.max():.3f}, "
+        f"{caught.mean():.3f}, {slope:+.3f}, {np.median(signed):+.3f}",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

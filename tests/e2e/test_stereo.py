@@ -133,9 +133,31 @@ def test_black_pictures_give_nothing_and_say_so(matcher: str, tmp_path: Path, ca
     refused(options, capsys, 4, "pictures")
 
 
-def test_swapped_pictures_are_found(small, capsys) -> None:
+@pytest.mark.parametrize("matcher", ["gradient", "production"])
+def test_swapped_pictures_are_found(matcher: str, small, capsys) -> None:
     options = ["--quiet", "stereo", small[1], small[0], "--disparities", "16"]
-    refused(options, capsys, 4, "swapped")
+    refused([*options, "--matcher", matcher], capsys, 4, "swapped")
+
+
+@pytest.mark.slow
+def test_with_a_pose_swapped_pictures_are_found(scene: Path, capsys) -> None:
+    options = ["--quiet", "stereo", str(scene / "right.png"), str(scene / "left.png")]
+    options += ["--rig", str(scene / "rig.yml"), "--model", str(scene / "femur.ply")]
+    refused([*options, "--pose", str(scene / "pose.json")], capsys, 4, "swapped")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nearer_mm", [4.0, 8.0, 16.0])
+def test_a_pose_that_is_wrong_gives_no_surface(
+    nearer_mm: float, scene: Path, tmp_path: Path, capsys
+) -> None:
+    """Chance confirms a few windows of any support; the fill must not spread them."""
+    matrix = np.array(json.loads((scene / "pose.json").read_text(encoding="utf-8"))["matrix"])
+    matrix[2, 3] -= nearer_mm
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(json.dumps({"matrix": matrix.tolist()}), encoding="utf-8")
+    options = arguments(scene, "--model", str(scene / "femur.ply"), "--pose", str(wrong))
+    refused(options, capsys, 4, "pose")
 
 
 def test_pictures_of_different_sizes_and_kinds_are_refused(small, tmp_path, capsys) -> None:
@@ -149,6 +171,10 @@ def test_pictures_of_different_sizes_and_kinds_are_refused(small, tmp_path, caps
 def test_impossible_requests_are_refused(small, tmp_path, capsys) -> None:
     refused(["stereo", *small], capsys, 2, "--disparities")
     refused(["stereo", *small, "--disparities", "500"], capsys, 2, "120 px")
+    refused(["stereo", *small, "--disparities", "1"], capsys, 2, "--disparities")
+    refused(["stereo", *small, "--min-disparity", "3"], capsys, 2, "--disparities")
+    far = ["--disparities", "16", "--min-disparity", "-500"]
+    refused(["stereo", *small, *far], capsys, 2, "120 px")
     refused(["stereo", *small, "--disparities", "9", "--cloud", "c.ply"], capsys, 2, "--rig")
     refused(["stereo", *small, "--disparities", "9", "--model", "m.ply"], capsys, 2, "--pose")
     refused(

@@ -217,3 +217,17 @@ def test_a_box_around_pixels_holds_them_and_no_more():
     assert Box.around(np.array([[4.0, 5.0]])) == Box(4, 5, 1, 1)
     assert Box.around(np.full((2, 2), np.nan)) is None
     assert Box.around(np.empty((0, 2))) is None
+
+
+def test_with_a_band_only_what_the_box_reaches_is_rectified(rectifier):
+    picture = np.random.default_rng(4).integers(1, 256, (480, 640), dtype=np.uint8)
+    box, band = Box(300, 100, 120, 80), (40.0, 90.0)
+    whole = rectifier.rectify(picture, picture, box)
+    part = rectifier.rectify(picture, picture, box, band)
+    rows = slice(100, 180)
+    np.testing.assert_array_equal(part.left[rows, 300:420], whole.left[rows, 300:420])
+    reached = slice(300 - 90, 420 - 40)
+    np.testing.assert_array_equal(part.right[rows, reached], whole.right[rows, reached])
+    assert part.box == whole.box
+    assert (part.left[:100] == 0).all()
+    assert (part.right[:, :190] == 0).all()

@@ -23,12 +23,13 @@ def catmull_rom(row, u):
 
 
 def refine_step(left, right, support, offset, right_column, radius, min_filled):
-    """(h, w) new offset, step, sigma px and correlation; NaN, NaN and 0 where it cannot tell."""
+    """(h, w) new offset, and (h, w, 4) step, sigma, correlation and roughness px of each window.
+
+    Where a window cannot tell, the correlation is 0 and the others are NaN.
+    """
     height, width = left.shape
     refined = np.zeros((height, width))
-    step = np.full((height, width), np.nan)
-    sigma = np.full((height, width), np.nan)
-    correlation = np.zeros((height, width))
+    quality = np.tile([np.nan, np.nan, 0.0, np.nan], (height, width, 1))
     for y in range(height):
         for x in range(width):
             samples, offsets = [], []
@@ -47,9 +48,10 @@ def refine_step(left, right, support, offset, right_column, radius, min_filled):
                 continue
             solved = solve(np.array(samples))
             if solved is not None:
-                step[y, x], sigma[y, x], correlation[y, x] = solved
-                refined[y, x] += np.clip(step[y, x], -0.5, 0.5)
-    return refined, step, sigma, correlation
+                spread = np.average((offsets - refined[y, x]) ** 2, weights=weights) ** 0.5
+                quality[y, x] = *solved, spread
+                refined[y, x] += np.clip(solved[0], -0.5, 0.5)
+    return refined, quality
 
 
 def solve(samples):

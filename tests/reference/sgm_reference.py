@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 
-DIRECTIONS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if (dy, dx) != (0, 0)]
+# (dy, dx) along which a scan from the first pixel to the last can follow paths, and the other one.
+DOWN = [(1, -1), (1, 0), (1, 1), (0, 1)]
+UP = [(-dy, -dx) for dy, dx in DOWN]
 
 
 def census(image, radius_x, radius_y):
@@ -35,11 +37,11 @@ def matching_cost(left, right, first_partner, n, no_partner):
     return cost
 
 
-def aggregate(cost, grey, p1, p2, edge_grey):
-    """(h, w, n) sum over eight directions of the path costs (Hirschmueller 2008, equation 13)."""
+def surplus(cost, grey, directions, p1, p2, edge_grey):
+    """(h, w, n) what paths along some directions add to the cost (Hirschmueller 2008, eq. 13)."""
     height, width, n = cost.shape
     total = np.zeros_like(cost)
-    for dy, dx in DIRECTIONS:
+    for dy, dx in directions:
         path = cost.copy()
         for y in range(height)[:: -1 if dy < 0 else 1]:
             for x in range(width)[:: -1 if dx < 0 else 1]:
@@ -53,8 +55,13 @@ def aggregate(cost, grey, p1, p2, edge_grey):
                     ways = [before[k], before.min() + jump]
                     ways += [before[m] + p1 for m in (k - 1, k + 1) if 0 <= m < n]
                     path[y, x, k] = cost[y, x, k] + min(ways) - before.min()
-        total += path
+        total += path - cost
     return total
+
+
+def aggregate(cost, grey, p1, p2, edge_grey):
+    """(h, w, n) sum of the path costs over eight directions."""
+    return 8 * cost + surplus(cost, grey, DOWN + UP, p1, p2, edge_grey)
 
 
 def choose(total, first_partner, lowest_px, right_width):

@@ -8,70 +8,146 @@ from numpy.typing import NDArray
 from navapp.values import Origin
 
 
-def filled_slowly(disparity, support, picture, confidence, classes, settings, radius):
-    """Value, lowest and highest permitted value, (3, h, w); NaN where nothing may speak."""
-    told = np.full((3, *disparity.shape), np.nan)
-    for y, x in zip(*np.nonzero(classes), strict=True):
-        sides = _permitted(support[y], x, classes[y, x], settings.max_gap_px)
-        if sides:
-            layer = min(disparity[y, u] for u in sides)
-            told[:, y, x] = _fit(
-                disparity, support, picture, confidence, settings, radius, (y, x), sides, layer
-            )
-    return told
+class SlowFill:
+    """One map to fill; `disparity` is matched where `support` says so."""
 
+    def __init__(self, disparity, support, picture, confidence, classes, settings, radius):
+        self.disparity, self.support, self.classes = disparity, support, classes
+        self.picture, self.confidence = picture.astype(float), confidence
+        self.settings, self.radius = settings, radius
+        self.stride = max(2, round(radius / 13))
+        self.asked = [
+            (v, u)
+            for v in range(0, len(support), self.stride)
+            for u in asked_columns(support[v], self.stride)
+        ]
 
-def _permitted(support: NDArray, x: int, label: int, max_gap: int | None) -> list[int]:
-    """Columns of the nearest support on the sides that may speak."""
-    columns = np.flatnonzero(support)
-    found = []
-    if label != Origin.FILLED_BORDER and (columns < x).any():
-        found.append(columns[columns < x].max())
-    if label != Origin.FILLED_INTERIOR and (columns > x).any():
-        found.append(columns[columns > x].min())
-    return [int(u) for u in found if max_gap is None or abs(u - x) <= max_gap]
+    def told(self) -> NDArray:
+        """(h, w) the disparity, and what is told where it is classified; NaN: nothing may speak."""
+        told = np.where(self.classes == 0, self.disparity, np.nan)
+        for y in range(0, len(told), 2):
+            self._fill_runs(y, told[y], self._speakers(y))
+        for y in range(1, len(told), 2):
+            speakers = self._speakers(y)
+            for x, who in enumerate(speakers):
+                if who:
+                    told[y, x] = self._from_beside(y, x, told)
+                    speakers[x] = [] if np.isfinite(told[y, x]) else who
+            self._fill_runs(y, told[y], speakers)
+        return told
 
+    def _speakers(self, y: int) -> list[list[int]]:
+        """Columns of the nearest support on the sides that may speak, for every pixel of a row."""
+        columns, max_gap = np.flatnonzero(self.support[y]), self.settings.max_gap_px
+        found = []
+        for x, label in enumerate(self.classes[y]):
+            who = []
+            if label in (Origin.FILLED_INTERIOR, Origin.MISMATCH_FILLED):
+                who += list(columns[columns < x][-1:])
+            if label in (Origin.FILLED_BORDER, Origin.MISMATCH_FILLED):
+                who += list(columns[columns > x][:1])
+            found.append([int(u) for u in who if max_gap is None or abs(u - x) <= max_gap])
+        return found
 
-def _fit(disparity, support, picture, confidence, settings, radius, place, sides, layer):
-    y, x = place
-    height, width = disparity.shape
-    rows, stride = round(0.3 * radius), max(2, round(radius / 13))
-    begin = min([x] + [u - radius for u in sides if u < x])
-    end = max([x] + [u + radius for u in sides if u > x])
-    equations = []
-    for v in range(y - rows, y + rows + 1, stride):
-        for u in range(max(begin, 0), min(end, width - 1) + 1, stride):
-            if not 0 <= v < height or not support[v, u]:
+    def _fill_runs(self, y: int, row: NDArray, speakers: list[list[int]]) -> None:
+        begin = 0
+        while begin < len(row):
+            end = begin + 1
+            while end < len(row) and speakers[end] == speakers[begin]:
+                end += 1
+            if speakers[begin]:
+                fitted = fitted_columns(begin, end - 1, speakers[begin])
+                values = [self._fit(y, x, speakers[begin]) for x in fitted]
+                row[begin:end] = np.interp(np.arange(begin, end), fitted, values)
+            begin = end
+
+    def _from_beside(self, y: int, x: int, told: NDArray) -> float:
+        beside = [
+            (abs(self.picture[v, x] - self.picture[y, x]).sum(), told[v, x])
+            for v in (y + 1, y - 1)
+            if v < len(told)
+            and self.classes[v, x] == self.classes[y, x]
+            and told[v, x] == told[v, x]
+        ]
+        if len(beside) == 2 and abs(beside[0][1] - beside[1][1]) < 1.0:
+            return (beside[0][1] + beside[1][1]) / 2.0
+        return min(beside, key=lambda told_there: told_there[0])[1] if beside else math.nan
+
+    def _fit(self, y: int, x: int, who: list[int]) -> float:
+        layer = min(self.disparity[y, u] for u in who)
+        nearest = min(abs(u - x) for u in who)
+        begin = min([x] + [u - self.radius for u in who if u < x])
+        end = max([x] + [u + self.radius for u in who if u > x])
+        equations = []
+        for v, u in self.asked:
+            dx, dy, d = u - x, v - y, float(self.disparity[v, u])
+            if not begin <= u <= end or abs(dy) > round(0.3 * self.radius):
                 continue
-            dx, dy, d = u - x, v - y, float(disparity[v, u])
-            if abs(d - layer) >= settings.layer_px + settings.layer_growth * abs(dx):
+            if abs(d - layer) >= self.settings.layer_px + self.settings.layer_growth * abs(dx):
                 continue
-            colour = np.abs(picture[v, u].astype(float) - picture[y, x]).sum()
-            weight = (0.05 + confidence[v, u]) * math.exp(
-                -colour / settings.colour_scale - math.hypot(dx, dy) / (0.4 * radius)
-            )
+            colour = abs(self.picture[v, u] - self.picture[y, x]).sum()
+            far = (math.hypot(dx, dy) - nearest) / (0.4 * self.radius)
+            far += colour / self.settings.colour_scale
+            weight = (0.05 + self.confidence[v, u]) * max(1.0 - far / 64.0, 0.3) ** 64
             equations.append((weight, dx, dy, d))
-    if not equations:
-        return math.nan, math.nan, math.nan
-    weight, dx, dy, d = np.array(equations).T
+        if sum(weight for weight, *_ in equations) <= 0.0:
+            return float(layer)
+        return plane_at_origin(np.array(equations), self.settings.slope_penalty_px2)
+
+
+def asked_columns(support: NDArray, stride: int) -> list[int]:
+    """Every stride-th pixel of each run of support."""
+    asked, run = [], 0
+    for x, is_support in enumerate(support):
+        run = run + 1 if is_support else 0
+        if is_support and (run - 1) % stride == 0:
+            asked.append(x)
+    return asked
+
+
+def fitted_columns(first: int, last: int, who: list[int]) -> list[int]:
+    """Both ends, and between them the sparser the further from those who speak."""
+    fitted = [first]
+    while fitted[-1] < last:
+        near = min(abs(u - fitted[-1]) for u in who)
+        fitted.append(min(fitted[-1] + min(1 + near // 2, 8), last))
+    return fitted
+
+
+def plane_at_origin(equations: NDArray, slope_penalty: float) -> float:
+    """Value of the weighted plane at the origin, at most 1 px beyond what was measured."""
+    weight, dx, dy, d = equations.T
     # The slopes' penalty as two more equations: a measured zero of either slope.
-    pull = weight.sum() * settings.slope_penalty_px2
+    pull = weight.sum() * slope_penalty
     root = np.sqrt(np.append(weight, [pull, pull]))
     design = np.column_stack([np.ones_like(dx), dx, dy])
     design = np.vstack([design, [[0, 1, 0], [0, 0, 1]]])
     target = np.append(d, [0.0, 0.0])
     value = np.linalg.lstsq(root[:, None] * design, root * target, rcond=None)[0][0]
-    low, high = d.min() - 1.0, d.max() + 1.0
-    return min(max(value, low), high), low, high
+    return min(max(value, d.min() - 1.0), d.max() + 1.0)
 
 
-def calmed_slowly(disparity, told, classes):
-    """Upper median of the known 5 x 5 neighbours, within the permitted values."""
-    calmed = disparity.copy()
-    for y, x in zip(*np.nonzero(classes), strict=True):
-        if math.isnan(disparity[y, x]):
-            continue
-        around = disparity[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].ravel()
-        known = np.sort(around[np.isfinite(around)])
-        calmed[y, x] = np.clip(known[len(known) // 2], told[1, y, x], told[2, y, x])
-    return calmed
+def calmed_slowly(told: NDArray, classes: NDArray) -> NDArray:
+    """Median of five rows, then of five columns, of the pixel's own class.
+
+    An unknown neighbour, and one of another class, counts as the pixel itself.
+    """
+    upright = medians_along(told, classes, 0)
+    return np.where(classes > 0, medians_along(upright, classes, 1), told)
+
+
+def medians_along(values: NDArray, classes: NDArray, axis: int) -> NDArray:
+    steps = (-2, -1, 0, 1, 2)
+    around = np.stack([shifted(values, k, axis) for k in steps])
+    is_alike = np.stack([shifted(classes.astype(float), k, axis) == classes for k in steps])
+    return np.median(np.where(np.isnan(around) | ~is_alike, values, around), axis=0)
+
+
+def shifted(values: NDArray, by: int, axis: int) -> NDArray:
+    """The values `by` further along the axis; the last ones again beyond the rows' end."""
+    places = np.arange(values.shape[axis]) + by
+    inside = np.clip(places, 0, values.shape[axis] - 1)
+    taken = np.take(values, inside, axis=axis)
+    if axis == 1:
+        taken[:, places != inside] = np.nan
+    return taken

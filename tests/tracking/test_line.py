@@ -5,7 +5,7 @@ import pytest
 
 from navapp.geometry.rig import RigQuality
 from navapp.registration.point_to_plane import estimate_at
-from navapp.tracking import Line, LineSettings, TrackState
+from navapp.tracking import Line, LineSettings, LocatorSettings, TrackState
 from navapp.values import Prior, Reason, Status
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -57,7 +57,9 @@ def test_grey_pictures_do_as_well() -> None:
 def test_pictures_without_content_are_lost(method: str, shape, level: int) -> None:
     a = room()
     line = (
-        Line(a.rig, a.line.model.bone, LineSettings(method=method)) if method == "icp" else a.line
+        Line(a.rig, a.line.model.bone, LineSettings(LocatorSettings(method=method)))
+        if method == "icp"
+        else a.line
     )
     flat = np.full(shape, level, dtype=np.uint8)
     state = TrackState.at_rest(a.truth(a.frames[0]), 0)
@@ -154,10 +156,10 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     line, truth = a.line, a.truth(frame)
     estimate = line.assess(frame.left, frame.right, truth, GOAL).estimate
     rectified_from_left = line._geometry.rectified_from_left
-    pair, _ = line._meter.rectified(frame.left, frame.right)
+    pair, _ = line._rectified_pair(frame.left, frame.right, line._rectified(truth))
     pose = rectified_from_left @ truth
-    measured = line._meter.freely(pair, pose, line.settings.tracking)
-    inside = estimate_at(measured.cloud, line.model, pose, settings=line._near)
+    measured = line._meter.freely(pair, pose, line.settings.locator.tracking)
+    inside = estimate_at(measured.cloud, line.model, pose, settings=line._as_it_stands)
     turn = np.kron(np.eye(2), rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15

@@ -1,0 +1,35 @@
+"""Two halves of one matching, on the two threads of one shared pool."""
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+_N_THREADS = 2
+_lock = threading.Lock()
+_pools: list[ThreadPoolExecutor] = []
+
+
+def pool() -> ThreadPoolExecutor:
+    """The pool of two threads, made at first use; its jobs must not wait for other jobs of it."""
+    with _lock:
+        if not _pools:
+            _pools.append(ThreadPoolExecutor(_N_THREADS))
+        return _pools[0]
+
+
+def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
+    """Run two jobs side by side and wait for both; the first error is raised."""
+    jobs = [pool().submit(first), pool().submit(second)]
+    errors = [job.exception() for job in jobs]
+    for error in errors:
+        if error is not None:
+            raise error
+
+
+def in_row_bands(height: int, job: Callable[[int, int], object]) -> None:
+    """Run `job(first_row, last_row)` for the upper and the lower half of the rows.
+
+    The lower half begins at a multiple of 8: a job for every 2nd, 4th or 8th row meets its rows.
+    """
+    middle = height // 16 * 8
+    run_both(lambda: job(0, middle), lambda: job(middle, height))

@@ -1,0 +1,307 @@
+"""The stereo chains: match, then fill what one camera cannot see."""
+
+import time
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo.matching.census_sgm import CensusSettings, match_census
+from navapp.stereo.matching.consistency import speckle_free
+from navapp.stereo.matching.gradient import GradientSettings, match_gradient, smooth_known
+from navapp.stereo.occlusion.classify import classify, seen_from_right
+from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
+from navapp.stereo.occlusion.wls_smooth import smooth_wls
+from navapp.stereo.subpixel.coarse_to_fine import refine_surface, without_steps
+from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
+from navapp.stereo.subpixel.refine import refine
+from navapp.values import DisparityMap, LineTimings, Origin
+
+Smoothing = Literal["none", "gaussian", "wls"]
+
+# Below this share of left-right agreement the two pictures do not show the same scene that way
+# round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
+_LEAST_AGREEMENT = 0.15
+_DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
+_NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
+# Chance and repeated texture confirm a few per cent of any support, in specks.
+_LEAST_CONFIRMED = 0.1
+_SPECKLE_PX, _SPECKLE_STEP_PX = 60, 1.0
+_LEAST_IN_PATCHES = 0.5
+_NOT_CONFIRMED = (
+    "the surface is not where the pose says: is the pose right, are the pictures swapped?"
+)
+
+_SUPPORT_SIGMA_PX = 2.0
+# Further away than this, a refined value is not the same surface's any more.
+_CLOSE_PX = 1.0
+# A window over an edge mixes two surfaces: there the coarse value stands.
+_WINDOW_PX = 11
+_SAME_SURFACE_PX = 3.0
+_WIDE_SEARCH_PX = 160
+
+# A claimed sigma below this says no more.
+_BEST_SIGMA_PX = np.float32(0.1)
+
+_SURFACE_CENSUS = CensusSettings(radius_x=4, radius_y=3, p1=10, p2=60)
+# So few are soon matched as they are; at half resolution too little of the picture is left.
+_FEW_CELLS = 3_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StereoAnswer:
+    """A disparity map, what was measured before the fill, and what is to be said about it."""
+
+    disparity: DisparityMap
+    matched: DisparityMap
+    reasons: tuple[str, ...]
+    timings: LineTimings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Evidence:
+    """What the fill asks besides the left map, at full resolution: the other view, and trust."""
+
+    right_px: NDArray[np.float32]
+    right_x0: int
+    confidence: NDArray[np.float32]
+
+
+def match_scene(
+    pair: RectifiedPair,
+    band_px: tuple[float, float],
+    *,
+    fills: bool,
+    max_gap_px: int | None = None,
+) -> StereoAnswer:
+    """The whole scene, edges and all: every match is kept, refined where the texture allows.
+
+    Census and semi-global matching at full resolution.
+
+    Args:
+        pair: rectified grey pictures; the part of `pair.box` inside them is matched.
+        band_px: smallest and largest disparity expected.
+        fills: weighted least squares fill, in the paper's directions.
+        max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
+    """
+    started = time.perf_counter_ns()
+    pair = _clipped(pair)
+    found = match_census(pair, band_px, _settings_for(band_px))
+    if not found.agreement >= _LEAST_AGREEMENT:
+        return _nothing(pair, _why(found.agreement), started)
+    left = _refined(pair, found.left)
+    evidence = _Evidence(found.right_px, found.right_x0, found.confidence)
+    fill = FillSettings(max_gap_px=max_gap_px) if fills else None
+    return _answer(pair, left, evidence, fill, started)
+
+
+def match_surface(
+    pair: RectifiedPair,
+    band_px: tuple[float, float],
+    *,
+    fills: bool,
+    max_gap_px: int | None = None,
+) -> StereoAnswer:
+    """Smooth surfaces for measuring: to a part of a pixel, or unknown.
+
+    Census and semi-global matching, at half resolution where that leaves enough of the picture,
+    tell where; `refine_surface` measures. Arguments as for `match_scene`.
+    """
+    started = time.perf_counter_ns()
+    pair = _clipped(pair)
+    n_cells = pair.box.width * pair.box.height * (band_px[1] - band_px[0])
+    coarse = (_coarse_at_half if n_cells > _FEW_CELLS else _coarse_at_full)(pair, band_px)
+    if not coarse.agreement >= _LEAST_AGREEMENT:
+        return _nothing(pair, _why(coarse.agreement), started)
+    left = refine_surface(pair, coarse.surface_px)
+    fill = FillSettings(max_gap_px=max_gap_px) if fills else None
+    return _answer(pair, left, coarse.evidence, fill, started)
+
+
+def match_on_support(
+    pair: RectifiedPair,
+    support_px: NDArray[np.float32],
+    *,
+    fills: bool,
+    max_gap_px: int | None = None,
+) -> StereoAnswer:
+    """Sub-pixel matching where a predicted surface says what to expect.
+
+    Args:
+        pair: rectified grey pictures; `pair.box` is matched.
+        support_px: (h, w) float32 expected disparity; NaN where none is expected, nor filled.
+        fills: from what was measured, never from the support.
+        max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
+    """
+    started = time.perf_counter_ns()
+    left = _without_specks(refine(pair, support_px))
+    n_expected = int(np.isfinite(support_px).sum())
+    if left.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
+        return _nothing(pair, _NOT_CONFIRMED, started)
+    # What the right camera sees of the support is all that is known of its view.
+    right_px = seen_from_right(support_px, left.x, pair.geometry.width)
+    evidence = _Evidence(right_px, 0, _by_sigma(left))
+    fill = FillSettings(max_gap_px=max_gap_px) if fills else None
+    return _answer(pair, left, evidence, fill, started, np.isfinite(support_px))
+
+
+def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoAnswer:
+    """The paper's state of the art: gradient magnitudes, winner takes all, Gaussian; no fill."""
+    started = time.perf_counter_ns()
+    pair = _clipped(pair)
+    matched = match_gradient(pair, band_px)
+    # Matches of chance stand alone.
+    in_patches = _without_specks(matched).matched_share
+    if matched.matched_share == 0.0:
+        return _nothing(pair, _NO_CONTRAST, started)
+    if in_patches < _LEAST_IN_PATCHES * matched.matched_share:
+        return _nothing(pair, _DISAGREEMENT, started)
+    return StereoAnswer(matched, matched, (), LineTimings(stereo_ms=_ms(started)))
+
+
+def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) -> StereoAnswer:
+    """The answer with a smoother map: to look at, not to measure with, since smoothing tilts it.
+
+    Args:
+        answer: of the pair.
+        pair: it was matched in.
+        smoothing: "gaussian" is the paper's noise filter and moves every pixel; "wls" keeps matched
+            pixels within their sigma; "none" changes nothing.
+    """
+    started = time.perf_counter_ns()
+    before = answer.disparity
+    if smoothing == "none":
+        return answer
+    if smoothing == "wls":
+        after = smooth_wls(before, _box_of(pair), _by_sigma(before))
+    else:
+        smooth_px = smooth_known(before.disparity_px, GradientSettings().gaussian_sigma_px)
+        after = replace(before, disparity_px=smooth_px)
+    timings = answer.timings
+    timings = replace(timings, fill_ms=timings.fill_ms + _ms(started))
+    return replace(answer, disparity=after, timings=timings)
+
+
+def _answer(
+    pair: RectifiedPair,
+    left: DisparityMap,
+    evidence: _Evidence,
+    fill: FillSettings | None,
+    started_ns: int,
+    is_expected: NDArray[np.bool_] | None = None,
+) -> StereoAnswer:
+    """The answer, its occlusions filled where that is wanted and a surface is expected."""
+    timings = LineTimings(stereo_ms=_ms(started_ns))
+    if fill is None:
+        return StereoAnswer(left, left, (), timings)
+    started_ns = time.perf_counter_ns()
+    picture = _box_of(pair)
+    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width, picture)
+    if is_expected is not None:
+        classes[~is_expected] = 0
+    filled = fill_wls(left, picture, evidence.confidence, classes, fill)
+    return StereoAnswer(filled, left, (), replace(timings, fill_ms=_ms(started_ns)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Coarse:
+    """A matched surface without steps, at full resolution, and what else the matcher saw."""
+
+    surface_px: NDArray[np.float32]
+    evidence: _Evidence
+    agreement: float
+
+
+def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
+    found = match_census(pair, band_px, _SURFACE_CENSUS)
+    evidence = _Evidence(found.right_px, found.right_x0, found.confidence)
+    return _Coarse(without_steps(found.left.disparity_px), evidence, found.agreement)
+
+
+def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
+    low, high = band_px
+    found = match_census(halved(pair), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
+    surface_px = doubled_disparity(without_steps(found.left.disparity_px), pair.box)
+    right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
+    right_px = np.float32(2.0) * doubled(found.right_px, right)
+    evidence = _Evidence(right_px, right.x, doubled(found.confidence, pair.box))
+    return _Coarse(surface_px, evidence, found.agreement)
+
+
+def _by_sigma(left: DisparityMap) -> NDArray[np.float32]:
+    """(h, w) confidence, 0 to 1: the smaller the claimed sigma, the larger; 0 where unmatched."""
+    sigma_px = np.maximum(left.sigma_px, _BEST_SIGMA_PX)
+    return np.nan_to_num(_BEST_SIGMA_PX / sigma_px).astype(np.float32)
+
+
+def _refined(pair: RectifiedPair, coarse: DisparityMap) -> DisparityMap:
+    """Sub-pixel values where they settle close to the coarse ones, the coarse ones elsewhere."""
+    # Smoothed only to make a support: a map that was smoothed itself would be tilted.
+    finer = refine(pair, smooth_known(coarse.disparity_px, _SUPPORT_SIGMA_PX))
+    with np.errstate(invalid="ignore"):
+        is_finer = np.abs(finer.disparity_px - coarse.disparity_px) < _CLOSE_PX
+    is_finer &= _local_range_px(coarse.disparity_px) < _SAME_SURFACE_PX
+    return replace(
+        coarse,
+        disparity_px=np.where(is_finer, finer.disparity_px, coarse.disparity_px),
+        sigma_px=np.where(is_finer, finer.sigma_px, coarse.sigma_px),
+    )
+
+
+def _local_range_px(disparity_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Largest minus smallest known disparity in each pixel's window."""
+    import cv2
+
+    window = np.ones((_WINDOW_PX, _WINDOW_PX), dtype=np.uint8)
+    known = np.isfinite(disparity_px)
+    largest = cv2.dilate(np.where(known, disparity_px, np.float32(-1e6)), window)
+    smallest = cv2.erode(np.where(known, disparity_px, np.float32(1e6)), window)
+    return np.asarray(largest - smallest, dtype=np.float32)
+
+
+def _settings_for(band_px: tuple[float, float]) -> CensusSettings:
+    """Larger windows and penalties for a wide search: the same scene in more pixels."""
+    if band_px[1] - band_px[0] < _WIDE_SEARCH_PX:
+        return CensusSettings()
+    return CensusSettings(radius_x=4, radius_y=3, p1=20, p2=120)
+
+
+def _clipped(pair: RectifiedPair) -> RectifiedPair:
+    """The pair with the part of its box that lies in the pictures."""
+    height, width = pair.left.shape[:2]
+    return replace(pair, box=pair.box.clipped(width, height))
+
+
+def _without_specks(found: DisparityMap) -> DisparityMap:
+    """The map without small patches that stand alone."""
+    stays = speckle_free(found.disparity_px, _SPECKLE_PX, _SPECKLE_STEP_PX)
+    unknown = np.float32(np.nan)
+    return replace(
+        found,
+        disparity_px=np.where(stays, found.disparity_px, unknown),
+        sigma_px=np.where(stays, found.sigma_px, unknown),
+        origin=np.where(stays, found.origin, np.uint8(Origin.UNKNOWN)),
+    )
+
+
+def _why(agreement: float) -> str:
+    return _NO_CONTRAST if np.isnan(agreement) else _DISAGREEMENT
+
+
+def _nothing(pair: RectifiedPair, why: str, started_ns: int) -> StereoAnswer:
+    """An empty map, and the reason."""
+    box = pair.box
+    unknown = np.full((box.height, box.width), np.nan, dtype=np.float32)
+    nothing = DisparityMap(unknown, unknown, np.zeros(unknown.shape, np.uint8), box.x, box.y)
+    return StereoAnswer(nothing, nothing, (why,), LineTimings(stereo_ms=_ms(started_ns)))
+
+
+def _box_of(pair: RectifiedPair) -> NDArray[np.uint8]:
+    box = pair.box
+    return pair.left[box.y : box.y + box.height, box.x : box.x + box.width]
+
+
+def _ms(started_ns: int) -> float:
+    return (time.perf_counter_ns() - started_ns) / 1e6

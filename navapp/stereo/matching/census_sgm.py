@@ -1,0 +1,275 @@
+"""Disparity of both views without a pose: census distances, semi-global aggregation.
+
+Sub-pixel places come from a parabola through whole disparities, which leans towards whole pixels:
+good as a support, to be refined for geometry.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.bands import in_row_bands, run_both
+from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.stereo.matching.byte_lane_kernels import lanes_for
+from navapp.stereo.matching.census_kernels import census_rows
+from navapp.stereo.matching.choice_kernels import Choice, choose_rows
+from navapp.stereo.matching.consistency import agreement_share, speckle_free
+from navapp.stereo.matching.consistency_kernels import Demands, Evidence, judge_rows
+from navapp.stereo.matching.search import Search, contrast_grey, crop, plan_search
+from navapp.stereo.matching.sgm_kernels import (
+    MAX_PENALTY,
+    NONE,
+    Views,
+    jump_penalties,
+    keep_rows,
+    mirrored_codes,
+    new_paths,
+    surplus_dtype,
+)
+from navapp.values import DisparityMap, Origin
+
+_MAX_VOLUME_BYTES = 2 * 1024**3
+_MAX_CODE_BITS = 64
+
+
+@dataclass(frozen=True, slots=True)
+class CensusSettings:
+    """How the matcher works.
+
+    Attributes:
+        radius_x, radius_y: of the census window, px; at most 65 pixels in it.
+        p1: penalty of a step of one disparity between neighbours.
+        p2: penalty of a larger step, divided by 1 + (grey step) / `edge_grey`. Above 63, twice the
+            memory is needed.
+        edge_grey: grey step that halves `p2`.
+        max_difference_px: between the two views, and between neighbours of one patch.
+        min_uniqueness: how much worse than the best, as a share of it, the best disparity that is
+            no neighbour must be.
+        speckle_px: smaller patches of similar disparity are removed.
+        contrast_grey: a window with a smaller range of grey levels (no light, glare) matches
+            everything, so it matches nothing.
+        full_contrast_grey: range of grey levels from which texture no longer lowers the confidence.
+        sigma_px: standard deviation that is claimed for every match.
+    """
+
+    radius_x: int = 2
+    radius_y: int = 2
+    p1: int = 6
+    p2: int = 40
+    edge_grey: int = 8
+    max_difference_px: float = 1.0
+    min_uniqueness: float = 0.05
+    speckle_px: int = 60
+    contrast_grey: int = 3
+    full_contrast_grey: int = 16
+    sigma_px: float = 0.2
+
+    def __post_init__(self) -> None:
+        if min(self.radius_x, self.radius_y) < 0 or not 0 < self.code_bits <= _MAX_CODE_BITS:
+            raise ValueError(f"a census window needs 2 to {_MAX_CODE_BITS + 1} pixels")
+        if not 0 < self.p1 < self.p2 <= MAX_PENALTY or self.edge_grey < 1:
+            raise ValueError(f"penalties must be 0 < p1 < p2 <= {MAX_PENALTY}, edge_grey >= 1")
+
+    @property
+    def code_bits(self) -> int:
+        """Neighbours in the window."""
+        return (2 * self.radius_x + 1) * (2 * self.radius_y + 1) - 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoViewDisparity:
+    """What one aggregated cost says about both views.
+
+    Attributes:
+        left: over the pair's box; only consistent pixels are matched, nothing is filled.
+        right_px: (h, W) float32 disparity of the right view, whole pixels, NaN unknown; rows of the
+            box. Unchecked: what the right view prefers among the box's pixels.
+        right_x0: right column of `right_px`'s first column.
+        confidence: (h, w) float32, 0 to 1, from uniqueness, texture and the agreement of the views;
+            0 where unmatched.
+        agreement: share of the pixels with contrast that are matched; tiny when the pictures are
+            exchanged, NaN when no pixel of either view has contrast.
+    """
+
+    left: DisparityMap
+    right_px: NDArray[np.float32]
+    right_x0: int
+    confidence: NDArray[np.float32]
+    agreement: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """One picture's crop as the matcher sees it.
+
+    Attributes:
+        grey: (h, w).
+        codes: (h, bytes, w) of the census.
+        contrast_grey: (h, w) range of grey levels around each pixel.
+    """
+
+    grey: Image
+    codes: NDArray[np.uint8]
+    contrast_grey: NDArray[np.uint8]
+
+
+def match_census(
+    pair: RectifiedPair, band_px: tuple[float, float], settings: CensusSettings | None = None
+) -> TwoViewDisparity:
+    """Match the box of a rectified pair within a band of disparities.
+
+    Args:
+        pair: rectified grey pictures; `pair.box` is matched and may reach beyond them.
+        band_px: smallest and largest disparity expected.
+        settings: of the matcher.
+
+    Raises:
+        ValueError: pictures that are not grey or differ in size, a band that is none or of more
+            than 1024 disparities, a cost volume of more than 2 GiB.
+
+    Source: census transform, Zabih and Woodfill 1994; aggregation along eight paths, Hirschmueller
+    2008.
+    """
+    settings = settings or CensusSettings()
+    search = plan_search(pair, band_px)
+    _check_volume(search, settings)
+    if search.is_empty:
+        return _nothing(search)
+    left = _view(pair.left, search.inside, settings)
+    right = _view(pair.right, search.right, settings)
+    left_px, right_px, uniqueness = _aggregate_and_choose(left, right, search, settings)
+    is_judged = np.empty(left_px.shape, dtype=np.bool_)
+    confidence = np.empty_like(left_px)
+    evidence = Evidence(
+        left_px, right_px, uniqueness, left.contrast_grey, right.contrast_grey, search.shift
+    )
+    demands = _demands(settings)
+    in_row_bands(
+        left_px.shape[0],
+        lambda first, last: judge_rows(evidence, demands, (first, last), is_judged, confidence),
+    )
+    # Smooth paths agree by chance too, but in specks.
+    is_matched = speckle_free(left_px, settings.speckle_px, settings.max_difference_px)
+    np.copyto(left_px, np.nan, where=~is_matched)
+    np.copyto(confidence, 0.0, where=~is_matched)
+    agreement = agreement_share(is_matched, is_judged)
+    return _result(search, settings, left_px, right_px, confidence, agreement)
+
+
+def _demands(settings: CensusSettings) -> Demands:
+    return Demands(
+        settings.contrast_grey,
+        np.float32(settings.full_contrast_grey),
+        np.float32(settings.max_difference_px),
+        np.float32(settings.min_uniqueness),
+    )
+
+
+def _check_volume(search: Search, settings: CensusSettings) -> None:
+    cells = search.inside.width * search.inside.height * lanes_for(search.count)
+    n_bytes = cells * np.dtype(surplus_dtype(settings.p2)).itemsize
+    if n_bytes > _MAX_VOLUME_BYTES:
+        raise ValueError(
+            f"a box of {search.inside.width}x{search.inside.height} px with {search.count} "
+            f"disparities needs {n_bytes / 1024**3:.1f} GiB, at most "
+            f"{_MAX_VOLUME_BYTES // 1024**3} are used: take a smaller box or band"
+        )
+
+
+def _view(image: Image, box: Box, settings: CensusSettings) -> _View:
+    radius_x, radius_y = radius = (settings.radius_x, settings.radius_y)
+    grown = crop(image, box, radius)
+    grey = grown[radius_y : radius_y + box.height, radius_x : radius_x + box.width]
+    codes = np.empty((box.height, -(-settings.code_bits // 8), box.width), dtype=np.uint8)
+    in_row_bands(box.height, lambda first, last: census_rows(grown, *radius, (first, last), codes))
+    return _View(np.ascontiguousarray(grey), codes, contrast_grey(grown, radius))
+
+
+def _aggregate_and_choose(
+    left: _View, right: _View, search: Search, settings: CensusSettings
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Disparity of the left and of the right view, uniqueness of the left.
+
+    Each scan begins at its end of the picture and keeps what it finds in the first half. From where
+    they meet, each finds what the other has kept and chooses the disparities on its way: half of
+    the memory, and no third pass over it.
+    """
+    height, width = left.grey.shape
+    n = lanes_for(search.count)
+    views = _views(left, right, search, settings)
+    kept = np.empty((height, width, n), dtype=surplus_dtype(settings.p2))
+    choice = Choice(
+        np.empty((height, width), dtype=np.float32),
+        np.empty(right.grey.shape, dtype=np.float32),
+        np.empty((height, width), dtype=np.float32),
+        search.lowest,
+        search.count,
+    )
+    down, up = new_paths(width, n), new_paths(width, n)
+    middle = height // 2
+    run_both(
+        lambda: keep_rows(views, down, (0, middle), 1, kept),
+        lambda: keep_rows(views, up, (height - 1, middle - 1), -1, kept),
+    )
+    run_both(
+        lambda: choose_rows(views, down, (middle, height), 1, kept, choice),
+        lambda: choose_rows(views, up, (middle - 1, -1), -1, kept, choice),
+    )
+    return choice.left_px, choice.right_px, choice.uniqueness
+
+
+def _views(left: _View, right: _View, search: Search, settings: CensusSettings) -> Views:
+    n = lanes_for(search.count)
+    return Views(
+        left.codes,
+        mirrored_codes(right.codes, n),
+        left.grey,
+        search.shift - search.lowest,
+        np.uint8(settings.p1),
+        jump_penalties(settings.p1, settings.p2, settings.edge_grey),
+        # Neither cheap nor dear: the path decides about a pixel whose partner is outside.
+        np.uint8(settings.code_bits // 2),
+        np.pad(np.zeros(right.grey.shape[1], dtype=np.uint8), n, constant_values=NONE),
+        np.where(np.arange(n) < search.count, 0, NONE).astype(np.uint8),
+    )
+
+
+def _nothing(search: Search) -> TwoViewDisparity:
+    unknown = np.full((search.inside.height, search.inside.width), np.nan, dtype=np.float32)
+    right_px = np.empty((search.inside.height, 0), dtype=np.float32)
+    return _result(search, CensusSettings(), unknown, right_px, np.zeros_like(unknown), np.nan)
+
+
+def _result(
+    search: Search,
+    settings: CensusSettings,
+    left_px: NDArray[np.float32],
+    right_px: NDArray[np.float32],
+    confidence: NDArray[np.float32],
+    agreement: float,
+) -> TwoViewDisparity:
+    box, inside = search.box, search.inside
+    right_rows = np.full((box.height, right_px.shape[1]), np.nan, dtype=np.float32)
+    top = inside.y - box.y
+    right_rows[top : top + inside.height] = right_px
+    return TwoViewDisparity(
+        matched_map(search, left_px, settings.sigma_px),
+        right_rows,
+        search.right.x,
+        search.over_box(confidence, np.float32(0.0)),
+        agreement,
+    )
+
+
+def matched_map(search: Search, disparity_px: NDArray[np.float32], sigma_px: float) -> DisparityMap:
+    """The map over the whole box; (h, w) of its inside part, NaN where unmatched."""
+    whole = search.over_box(disparity_px.astype(np.float32, copy=False), np.float32(np.nan))
+    is_matched = np.isfinite(whole)
+    return DisparityMap(
+        whole,
+        np.where(is_matched, np.float32(sigma_px), np.float32(np.nan)),
+        np.where(is_matched, np.uint8(Origin.MATCHED), np.uint8(Origin.UNKNOWN)),
+        search.box.x,
+        search.box.y,
+    )

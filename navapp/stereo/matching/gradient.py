@@ -1,0 +1,137 @@
+"""The paper's state of the art, kept for comparison: sum of gradient magnitudes over a window.
+
+Algorithm 1 of its state-of-the-art section: cost (equation 2), aggregation, winner takes all
+(equation 3), left-right check, Gaussian filter. Disparities are whole pixels; only the filter puts
+them in between.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.bands import in_row_bands
+from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.stereo.matching.census_sgm import matched_map
+from navapp.stereo.matching.consistency import at_partner, view_difference_px
+from navapp.stereo.matching.gradient_kernels import match_rows
+from navapp.stereo.matching.search import Search, contrast_grey, crop, plan_search
+from navapp.values import DisparityMap
+
+_PER_GREY = 16.0
+
+
+@dataclass(frozen=True, slots=True)
+class GradientSettings:
+    """How the baseline works.
+
+    Attributes:
+        window_px: side of the window, odd.
+        gaussian_sigma_px: of the filter over the disparity; 0 leaves it out.
+        max_difference_px: between the two views.
+        contrast_grey: a window with a smaller range of grey levels matches nothing.
+        sigma_px: standard deviation that is claimed for every match.
+    """
+
+    window_px: int = 11
+    gaussian_sigma_px: float = 1.0
+    max_difference_px: float = 1.0
+    contrast_grey: int = 3
+    sigma_px: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.window_px < 1 or self.window_px % 2 == 0:
+            raise ValueError(f"the window's side must be odd and positive, not {self.window_px}")
+
+
+def match_gradient(
+    pair: RectifiedPair, band_px: tuple[float, float], settings: GradientSettings | None = None
+) -> DisparityMap:
+    """Match the box of a rectified pair as the paper's state of the art does.
+
+    Args:
+        pair: rectified grey pictures; `pair.box` is matched and may reach beyond them.
+        band_px: smallest and largest disparity expected.
+        settings: of the baseline.
+
+    Returns:
+        The map over `pair.box`; inconsistent pixels are unknown, nothing is filled.
+
+    Raises:
+        ValueError: pictures that are not grey or differ in size, a band that is none or of more
+            than 1024 disparities.
+
+    Source: Algorithm 1, equations (2) and (3). The printed m_r(x, y, d) is read as the right
+    magnitude shifted by d, m_r(x - d, y).
+    """
+    settings = settings or GradientSettings()
+    search = plan_search(pair, band_px)
+    if search.is_empty:
+        shape = (search.inside.height, search.inside.width)
+        return matched_map(search, np.full(shape, np.nan, dtype=np.float32), settings.sigma_px)
+    left_px, right_px, shift = _winners(pair, search, settings)
+    # Left-right consistency check: the right view's winners come from the same cost.
+    difference = view_difference_px(left_px, right_px, shift)
+    is_matched = difference <= settings.max_difference_px
+    radius = settings.window_px // 2
+    left_spread, right_spread = (
+        contrast_grey(crop(image, box, (radius, radius)), (radius, radius))
+        for image, box in ((pair.left, search.inside), (pair.right, search.right))
+    )
+    partner_spread = at_partner(right_spread, left_px, search.shift, np.uint8(0))
+    is_matched &= np.minimum(left_spread, partner_spread) >= settings.contrast_grey
+    matched_px = np.where(is_matched, left_px, np.float32(np.nan))
+    smooth = smooth_known(matched_px, settings.gaussian_sigma_px)
+    return matched_map(search, smooth, settings.sigma_px)
+
+
+def smooth_known(values: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
+    """Gaussian filter over the known pixels; unknown ones (NaN) stay unknown and weigh nothing."""
+    import cv2
+
+    if sigma_px <= 0.0:
+        return values
+    is_known = np.isfinite(values)
+    weight = cv2.GaussianBlur(is_known.astype(np.float32), (0, 0), sigma_px)
+    blurred = cv2.GaussianBlur(np.where(is_known, values, 0.0), (0, 0), sigma_px)
+    # A known pixel weighs at least its own tap, so the divisor is never small where it counts.
+    smooth = np.asarray(blurred) / np.where(is_known, weight, 1.0)
+    return np.where(is_known, smooth, np.nan).astype(np.float32)
+
+
+def magnitude(image: Image) -> NDArray[np.int32]:
+    """(h, w) m = sqrt(gx^2 + gy^2) in 1/16 grey per px, from central differences."""
+    padded = np.pad(image.astype(np.float32), 1, mode="edge")
+    gx = 0.5 * (padded[1:-1, 2:] - padded[1:-1, :-2])
+    gy = 0.5 * (padded[2:, 1:-1] - padded[:-2, 1:-1])
+    return np.asarray(np.rint(_PER_GREY * np.sqrt(gx * gx + gy * gy)), dtype=np.int32)
+
+
+def _winners(
+    pair: RectifiedPair, search: Search, settings: GradientSettings
+) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+    """Disparity of the left view, of the right view, and the shift between their columns."""
+    inside, n = search.inside, search.count
+    radius = settings.window_px // 2
+    first = inside.x - (search.lowest + n - 1)
+    reached = Box(first, inside.y, inside.width + n - 1, inside.height)
+    left = crop(magnitude(pair.left), inside, (radius, radius))
+    mirrored = np.ascontiguousarray(crop(magnitude(pair.right), reached, (radius, radius))[:, ::-1])
+    left_best = np.empty((inside.height, inside.width), dtype=np.int32)
+    right_best = np.empty((reached.height, reached.width), dtype=np.int32)
+    # Only partners inside the picture compete.
+    past = first + reached.width
+    columns = (past - search.right.x - search.right.width, past - search.right.x)
+    # SG(x, y, d) = 1 / w^2 sum over the window |m_l(x, y) - m_r(x - d, y)|         (equation 2)
+    # is the cost and, over the whole window, its aggregation CA; w^2 moves no minimum.
+    # d = arg min over D of CA(p, d)                                                (equation 3)
+    in_row_bands(
+        inside.height,
+        lambda top, end: match_rows(left, mirrored, columns, (top, end), left_best, right_best),
+    )
+    # The best at the end of the search is no minimum.
+    is_minimum = (left_best > 0) & (left_best < n - 1)
+    left_px = np.where(is_minimum, left_best + search.lowest, np.nan).astype(np.float32)
+    right_best = right_best[:, ::-1]
+    right_px = np.where(right_best >= 0, right_best + search.lowest, np.nan).astype(np.float32)
+    return left_px, right_px, inside.x - first

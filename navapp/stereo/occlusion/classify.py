@@ -1,0 +1,123 @@
+"""Which pixels have no partner in the other view, and why.
+
+In the left view a border occlusion is the strip that the right camera does not see; an interior
+occlusion stands left of something nearer, and no right pixel maps to it; the rest of the unmatched
+pixels are mismatches. The class decides from which side a pixel may be filled.
+"""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.bands import run_both
+from navapp.stereo.occlusion.classify_kernels import (
+    agreed_ends,
+    class_rows,
+    edge_splits,
+    mark_seen,
+    project_rows,
+    strip_ends,
+)
+from navapp.values import DisparityMap
+
+
+def classify(
+    left: DisparityMap,
+    right_px: NDArray[np.float32],
+    right_x0: int,
+    picture_width: int,
+    picture: NDArray[np.uint8] | None = None,
+) -> NDArray[np.uint8]:
+    """Class of every pixel that is not, or not believably, matched.
+
+    Args:
+        left: of the left view; for the right view see `mirrored`.
+        right_px: (h, W) float32 disparity of the right view in the same rows, NaN where unknown.
+        right_x0: column of its first pixel in the rectified right picture.
+        picture_width: of the rectified pictures.
+        picture: (h, w) or (h, w, 3) rectified left picture over the map. With it, matches at the
+            left edge of near objects that look like the background are withdrawn: a matching
+            window hangs over the edge and gives the background the object's disparity.
+
+    Returns:
+        (h, w) 0 where the match stands and outside the picture, else the `Origin` that a filled
+        pixel gets. A class on a matched pixel withdraws that match.
+
+    Raises:
+        ValueError: another number of rows, or a picture of another size.
+
+    Source: the paper, section 3.2 (border and non-border occlusions).
+    """
+    shape = left.disparity_px.shape
+    if right_px.shape[0] != shape[0]:
+        raise ValueError("classify needs both views over the same rows")
+    disparity = np.ascontiguousarray(left.disparity_px, dtype=np.float32)
+    origin = np.ascontiguousarray(left.origin)
+    right_px = np.ascontiguousarray(right_px, dtype=np.float32)
+    seen, ends = np.empty(shape, dtype=bool), np.empty(shape[0])
+    in_two_shares(lambda *rows: mark_seen(right_px, right_x0 - left.x, *rows, seen))
+    strip_ends(disparity, origin, left.x, ends)
+    begins = np.empty(shape[0], dtype=np.int64)
+    agreed_ends(ends, begins)
+    splits = np.empty((0, 0), dtype=np.int8)
+    if picture is not None:
+        channels = with_channels(picture, left)
+        splits = np.empty(shape, dtype=np.int8)
+        in_two_shares(lambda *rows: edge_splits(disparity, origin, begins, channels, *rows, splits))
+    classes = np.empty(shape, dtype=np.uint8)
+    in_two_shares(lambda *rows: class_rows(disparity, origin, begins, seen, splits, *rows, classes))
+    classes[:, : max(-left.x, 0)] = 0
+    classes[:, max(picture_width - left.x, 0) :] = 0
+    return classes
+
+
+def seen_from_right(
+    left_px: NDArray[np.float32], left_x: int, picture_width: int
+) -> NDArray[np.float32]:
+    """(h, W) disparity of the right view of a surface known in the left one; NaN where unseen.
+
+    Args:
+        left_px: (h, w) float32 disparity of the left view, NaN where there is no surface.
+        left_x: its first column in the left picture.
+        picture_width: W.
+    """
+    left_px = np.ascontiguousarray(left_px, dtype=np.float32)
+    right_px = np.empty((left_px.shape[0], picture_width), dtype=np.float32)
+    in_two_shares(lambda *rows: project_rows(left_px, left_x, *rows, right_px))
+    return right_px
+
+
+def mirrored(disparity_map: DisparityMap, picture_width: int) -> DisparityMap:
+    """The map seen in a mirror; a mirrored right view obeys the rules of a left one.
+
+    To treat the right view, mirror its map and flip its picture; the left view's disparity,
+    flipped, takes the part of `right_px`, with `picture_width - x - width` as its first column.
+    Mirroring twice gives the map back.
+    """
+    width = disparity_map.disparity_px.shape[1]
+    return DisparityMap(
+        np.ascontiguousarray(disparity_map.disparity_px[:, ::-1]),
+        np.ascontiguousarray(disparity_map.sigma_px[:, ::-1]),
+        np.ascontiguousarray(disparity_map.origin[:, ::-1]),
+        picture_width - disparity_map.x - width,
+        disparity_map.y,
+    )
+
+
+def with_channels(picture: NDArray[np.uint8], over: DisparityMap) -> NDArray[np.uint8]:
+    """The picture as (h, w, 1) or (h, w, 3), contiguous.
+
+    Raises:
+        ValueError: another size than the map's.
+    """
+    shape = over.disparity_px.shape
+    if picture.shape[:2] != shape or picture.shape[2:] not in ((), (3,)):
+        raise ValueError("the picture must be grey or have three channels over the map's box")
+    return np.ascontiguousarray(picture).reshape(*shape, -1)
+
+
+def in_two_shares(job: Callable[[int, int], object]) -> None:
+    """Run `job(first_row, step)` for the even and for the odd rows: both have as much to do."""
+    run_both(partial(job, 0, 2), partial(job, 1, 2))

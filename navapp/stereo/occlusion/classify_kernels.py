@@ -1,0 +1,286 @@
+"""Compiled parts of the classification of unmatched pixels.
+
+Every kernel works on rows `first`, `first + step`, ... and reads of other rows only what an
+earlier kernel wrote.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Of `values.Origin`, as numbers for compiled code.
+_MATCHED, _BORDER, _INTERIOR, _MISMATCH = 1, 2, 3, 4
+
+# A right pixel speaks for the left pixels this near to where it points.
+_REACH_PX = 0.6
+# The border strip ends where this many pixels in a row are matched.
+_RUN_PX = 6
+# The strip may end this far inside the right picture: its edge columns are matched badly.
+_STRIP_SLACK_PX = 8.0
+# The strip's end is agreed over this many rows above and below.
+_STRIP_ROWS = 4
+
+# Left edges of near objects: the smallest jump, how many pixels right of it may belong to the
+# background, and how many on either side show what background and object look like.
+_JUMP_PX = 2.0
+_ZONE_PX = 3
+_SAMPLE_PX = 6
+_MIN_SAMPLES = 3
+# Colours differ enough at this sum of three channels; moving the edge costs this per pixel.
+_LARGEST_COLOUR = 90
+_STAY = 20
+
+
+@njit(cache=True, nogil=True)
+def mark_seen(
+    right: NDArray[np.float32], right_offset: int, first: int, step: int, seen: NDArray[np.bool_]
+) -> None:
+    """Which left pixels some right pixel maps to.
+
+    Args:
+        right: (h, W) disparity of the right view, NaN where unknown.
+        right_offset: column of its first pixel minus that of the left map's first pixel.
+        first: row.
+        step: between rows.
+        seen: (h, w) in place.
+    """
+    height, width = seen.shape
+    for y in range(first, height, step):
+        seen[y] = False
+        for u in range(right.shape[1]):
+            d = right[y, u]
+            if np.isnan(d):
+                continue
+            x = u + right_offset + d
+            begin, end = int(np.ceil(x - _REACH_PX)), int(np.floor(x + _REACH_PX))
+            for column in range(max(begin, 0), min(end, width - 1) + 1):
+                seen[y, column] = True
+
+
+@njit(cache=True, nogil=True)
+def strip_ends(
+    disparity: NDArray[np.float32],
+    origin: NDArray[np.uint8],
+    x0: int,
+    ends: NDArray[np.float64],
+) -> None:
+    """Column where the strip without a right partner ends; NaN in rows without a run of matches.
+
+    Args:
+        disparity: (h, w) px; read where matched.
+        origin: (h, w) of the matches.
+        x0: column of the map's first pixel in the rectified picture.
+        ends: (h,) in place.
+    """
+    height, width = disparity.shape
+    for y in range(height):
+        ends[y] = np.nan
+        run = 0
+        for x in range(width):
+            run = run + 1 if origin[y, x] == _MATCHED else 0
+            if run == _RUN_PX:
+                end = x + 1 - _RUN_PX
+                limit = disparity[y, end] + _STRIP_SLACK_PX - x0
+                ends[y] = max(min(float(end), limit), 0.0)
+                break
+
+
+@njit(cache=True, nogil=True)
+def agreed_ends(ends: NDArray[np.float64], agreed: NDArray[np.int64]) -> None:
+    """Whole column below the median of the known ends around each row; 0 without any."""
+    height = len(ends)
+    near = np.empty(2 * _STRIP_ROWS + 1)
+    for y in range(height):
+        n = 0
+        for v in range(max(y - _STRIP_ROWS, 0), min(y + _STRIP_ROWS + 1, height)):
+            if not np.isnan(ends[v]):
+                near[n] = ends[v]
+                n += 1
+        agreed[y] = int(np.median(near[:n])) if n > 0 else 0
+
+
+@njit(cache=True, nogil=True)
+def edge_splits(
+    disparity: NDArray[np.float32],
+    origin: NDArray[np.uint8],
+    begins: NDArray[np.int64],
+    picture: NDArray[np.uint8],
+    first: int,
+    step: int,
+    splits: NDArray[np.int8],
+) -> None:
+    """How many pixels right of each jump to something nearer look like the background.
+
+    Args:
+        disparity: (h, w) px; read where matched.
+        origin: (h, w) of the matches.
+        begins: (h,) first column whose matches count.
+        picture: (h, w, 1 or 3).
+        first: row.
+        step: between rows.
+        splits: (h, w) in place: at the first pixel right of a jump; -1 elsewhere.
+    """
+    height, width = disparity.shape
+    samples = np.empty(_SAMPLE_PX, np.int64)
+    for y in range(first, height, step):
+        splits[y] = -1
+        previous = -1
+        for x in range(begins[y], width):
+            if origin[y, x] != _MATCHED:
+                continue
+            is_jump = previous >= 0 and disparity[y, x] - disparity[y, previous] >= _JUMP_PX
+            previous = x
+            if not is_jump or x < _MIN_SAMPLES:
+                continue
+            n = 0
+            for u in range(x + _ZONE_PX, min(x + _ZONE_PX + _SAMPLE_PX, width)):
+                is_matched = origin[y, u] == _MATCHED
+                if is_matched and abs(disparity[y, u] - disparity[y, x]) < _JUMP_PX:
+                    samples[n] = u
+                    n += 1
+            if n >= _MIN_SAMPLES:
+                splits[y, x] = _best_split(picture[y], x, samples[:n])
+
+
+@njit(cache=True, nogil=True)
+def _best_split(row: NDArray[np.uint8], x: int, samples: NDArray[np.int64]) -> int:
+    """Number of pixels from x on that resemble what is left of x more than the samples."""
+    best, best_cost, cost = 0, 0, 0
+    for k in range(_ZONE_PX):
+        to_object = to_background = _LARGEST_COLOUR
+        for i in range(len(samples)):
+            to_object = min(to_object, _difference(row, x + k, samples[i]))
+        for u in range(max(x - _SAMPLE_PX, 0), x):
+            to_background = min(to_background, _difference(row, x + k, u))
+        cost += to_background - to_object + _STAY
+        if cost < best_cost:
+            best, best_cost = k + 1, cost
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _difference(row: NDArray[np.uint8], u: int, v: int) -> int:
+    """Sum of three absolute colour differences; grey counts three times."""
+    total = np.int64(0)
+    for c in range(row.shape[1]):
+        total += abs(np.int64(row[u, c]) - np.int64(row[v, c]))
+    return int(total if row.shape[1] == 3 else 3 * total)
+
+
+@njit(cache=True, nogil=True)
+def class_rows(
+    disparity: NDArray[np.float32],
+    origin: NDArray[np.uint8],
+    begins: NDArray[np.int64],
+    seen: NDArray[np.bool_],
+    splits: NDArray[np.int8],
+    first: int,
+    step: int,
+    classes: NDArray[np.uint8],
+) -> None:
+    """The class of every pixel, from what the other kernels found.
+
+    Args:
+        disparity: (h, w) px; read where matched.
+        origin: (h, w) of the matches.
+        begins: (h,) where the border strip ends.
+        seen: (h, w) of `mark_seen`.
+        splits: (h, w) of `edge_splits`, or (0, 0): no match is withdrawn.
+        first: row.
+        step: between rows.
+        classes: (h, w) in place; 0 where a match stands.
+    """
+    height, width = classes.shape
+    for y in range(first, height, step):
+        row = classes[y]
+        for x in range(width):
+            if x < begins[y]:
+                row[x] = _BORDER
+            elif origin[y, x] == _MATCHED:
+                row[x] = 0
+            else:
+                row[x] = _MISMATCH if seen[y, x] else _INTERIOR
+        for x in range(begins[y], splits.shape[1]):
+            if splits[y, x] >= 0:
+                for u in range(x, min(x + _agreed_split(splits, y, x), width)):
+                    row[u] = _INTERIOR if row[u] == 0 else row[u]
+        _keep_possible(disparity[y], row)
+
+
+@njit(cache=True, nogil=True)
+def _agreed_split(splits: NDArray[np.int8], y: int, x: int) -> int:
+    """Median of the splits beside one (two columns, two rows to every side), rounded down.
+
+    One row alone is moved by noise: without another nearby nothing is split off.
+    """
+    height, width = splits.shape
+    n_of = np.zeros(_ZONE_PX + 1, np.int64)
+    n = 0
+    for v in range(max(y - 2, 0), min(y + 3, height)):
+        for u in range(max(x - 2, 0), min(x + 3, width)):
+            if splits[v, u] >= 0:
+                n_of[splits[v, u]] += 1
+                n += 1
+    if n == 1:
+        return 0
+    lower = upper = -1
+    up_to = 0
+    for split in range(_ZONE_PX + 1):
+        up_to += n_of[split]
+        if lower < 0 and 2 * up_to >= n:
+            lower = split
+        if upper < 0 and 2 * up_to > n:
+            upper = split
+    return (lower + upper) // 2
+
+
+@njit(cache=True, nogil=True)
+def _keep_possible(disparity: NDArray[np.float32], row: NDArray[np.uint8]) -> None:
+    """Interior occlusions left of something that is not nearer become mismatches.
+
+    What hides an interior occlusion stands right of it, what was hidden left and farther.
+    """
+    x = 0
+    before = -1
+    while x < len(row):
+        if row[x] == 0:
+            before = x
+            x += 1
+            continue
+        after = x
+        while after < len(row) and row[after] != 0:
+            after += 1
+        is_possible = before >= 0 and (after == len(row) or disparity[before] <= disparity[after])
+        if not is_possible:
+            for u in range(x, after):
+                row[u] = _MISMATCH if row[u] == _INTERIOR else row[u]
+        x = after
+
+
+@njit(cache=True, nogil=True)
+def project_rows(
+    left_px: NDArray[np.float32],
+    left_x: int,
+    first: int,
+    step: int,
+    right_px: NDArray[np.float32],
+) -> None:
+    """Carry the left view's disparities to the right columns that see them; the nearest wins.
+
+    Args:
+        left_px: (h, w), NaN where there is no surface.
+        left_x: column of the first pixel.
+        first: row; every `step`-th from there.
+        step: of the rows.
+        right_px: (h, W) in place, NaN where no surface is seen.
+    """
+    height, width = left_px.shape
+    for y in range(first, height, step):
+        right_px[y] = np.nan
+        for x in range(width):
+            d = left_px[y, x]
+            if np.isnan(d):
+                continue
+            u = int(np.floor(np.float32(x + left_x) - d + np.float32(0.5)))
+            if 0 <= u < right_px.shape[1] and not right_px[y, u] > d:
+                right_px[y, u] = d

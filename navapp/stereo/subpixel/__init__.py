@@ -1,0 +1,1 @@
+"""Disparity to a part of a pixel, on a support."""

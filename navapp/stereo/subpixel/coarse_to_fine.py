@@ -1,0 +1,69 @@
+"""Sub-pixel disparity of a smooth surface from a coarse map: support and measurement in turns.
+
+A coarse map is stepped, and follows highlights and half-hidden rims where it should not. What is
+refined on it tells the surface's true slant; a robust smooth surface through that is a better
+support, on which more windows agree and the others fall out. Only the last measurement is handed
+out: a support is never a measurement.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
+from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
+from navapp.values import DisparityMap
+
+# Steps of a coarse map are about half a pixel of it.
+_COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.5, 0.75, 0.4))
+_SURFACES = (RegionalSettings(radius_px=12), RegionalSettings(radius_px=12))
+# For a support, many fair points are better than few good ones.
+_FAIR = RefineSettings(n_steps=1, min_correlation=0.5, last_step_px=0.5, max_sigma_px=0.5)
+_GOOD = RefineSettings(last_step_px=0.25, max_roughness_px=0.35)
+# A surface that is further from the coarse map belongs to another thing: edges keep their place.
+_FAR_PX = 3.0
+_FAR_FROM_MATCH_PX = 1.5
+# Noise below this is as good as none: other errors are larger.
+_SMALL_NOISE_PX = 0.05
+
+
+def refine_surface(pair: RectifiedPair, coarse_px: NDArray[np.float32]) -> DisparityMap:
+    """Measure the surface that a coarse map shows.
+
+    Args:
+        pair: rectified grey pictures; `pair.box` is measured.
+        coarse_px: (h, w) float32 disparity over the box, without steps, NaN where unknown.
+
+    Returns:
+        The map over `pair.box`: measured to a part of a pixel, or unknown.
+    """
+    support = coarse_px
+    for settings in _SURFACES:
+        samples = refine_samples(pair, support, _FAIR, settings.thin)
+        surface = regional_support(samples.disparity_px, _weights(samples), support.shape, settings)
+        with np.errstate(invalid="ignore"):
+            is_same = np.abs(surface - coarse_px) < _FAR_PX
+        support = np.where(is_same, surface, coarse_px)
+    return refine(pair, support, _GOOD)
+
+
+def without_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A matched map (h, w) of whole disparities as a smooth surface, single holes closed."""
+    import cv2
+
+    known = np.isfinite(coarse_px)
+    weights = known.astype(np.float32)
+    surface = regional_support(coarse_px, weights, coarse_px.shape, _COARSE_SURFACE)
+    around = cv2.dilate(known.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    with np.errstate(invalid="ignore"):
+        is_same = np.abs(surface - coarse_px) < _FAR_FROM_MATCH_PX
+    smooth = np.where(known & ~is_same, coarse_px, surface)
+    return np.where(around, smooth, np.float32(np.nan)).astype(np.float32)
+
+
+def _weights(samples: DisparityMap) -> NDArray[np.float32]:
+    """(h, w) by the noise of each measurement."""
+    noise_squared = samples.sigma_px**2 - np.float32(_FAIR.systematic_px) ** 2
+    weights = np.minimum(_SMALL_NOISE_PX**2 / np.maximum(noise_squared, 1e-9), 1.0)
+    found: NDArray[np.float32] = np.nan_to_num(weights).astype(np.float32)
+    return found

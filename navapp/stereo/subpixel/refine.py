@@ -1,0 +1,162 @@
+"""Sub-pixel disparity on a given support, by local least squares.
+
+The support is a disparity that follows the surface's slant, from a rendered model or a coarse map.
+Each pixel's window is warped by it as a whole, so slant and curvature cost nothing, and there is no
+cost curve whose parabola could lock to whole pixels. A window without texture answers nothing: the
+support is never handed back as a measurement.
+"""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.bands import in_row_bands
+from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo.subpixel.refine_kernels import N_QUALITIES, accept_rows, refine_rows
+from navapp.values import DisparityMap
+
+# What the steps and the interpolation need on either side.
+_SPARE_COLUMNS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class RefineSettings:
+    """How the refinement works.
+
+    Attributes:
+        radius_px: of the square window.
+        n_steps: Gauss-Newton steps.
+        min_filled: share of a window that must have support.
+        min_correlation: of the two windows after the last step.
+        last_step_px: a larger last step has not settled.
+        max_sigma_px: a window with a larger noise has too little texture.
+        max_roughness_px: a window over which the offsets of the step before differ by more
+            (standard deviation) lies over more than one surface, or over a mismatch.
+        systematic_px: error that the residual does not show; enters the claimed sigma.
+    """
+
+    radius_px: int = 5
+    n_steps: int = 2
+    min_filled: float = 0.6
+    min_correlation: float = 0.6
+    last_step_px: float = 0.1
+    max_sigma_px: float = 0.3
+    max_roughness_px: float = np.inf
+    systematic_px: float = 0.1
+
+
+def refine(
+    pair: RectifiedPair, support_px: NDArray[np.float32], settings: RefineSettings | None = None
+) -> DisparityMap:
+    """Measure the disparity near a support.
+
+    Args:
+        pair: rectified grey pictures; `pair.box` is measured.
+        support_px: (h, w) float32 disparity over the box, NaN where nothing is expected; within
+            about half a pixel a step of the truth.
+        settings: of the refinement.
+
+    Returns:
+        The map over `pair.box`; pixels that did not settle, correlate or show texture are unknown.
+
+    Raises:
+        ValueError: colour pictures, a support of another size than the box, or a box that reaches
+            beyond the pictures.
+
+    Source: inverse-compositional image correlation (Pan et al. 2013) with gain and offset, on the
+    model's own surface instead of a plane.
+    """
+    return _accepted(pair, support_px, settings or RefineSettings(), 1)
+
+
+def refine_samples(
+    pair: RectifiedPair,
+    support_px: NDArray[np.float32],
+    settings: RefineSettings,
+    stride_px: int,
+) -> DisparityMap:
+    """As `refine`, but only every `stride_px`-th pixel each way; the map holds only those."""
+    return _accepted(pair, support_px, settings, stride_px)
+
+
+def _accepted(
+    pair: RectifiedPair,
+    support_px: NDArray[np.float32],
+    settings: RefineSettings,
+    stride_px: int,
+) -> DisparityMap:
+    """Every window that is good enough."""
+    box = pair.box
+    if pair.left.ndim != 2 or support_px.shape != (box.height, box.width):
+        raise ValueError("refine needs grey pictures and a support of the box's size")
+    height, width = pair.left.shape
+    if box.clipped(width, height) != box:
+        raise ValueError(f"the box {box} reaches beyond the picture of {width}x{height}")
+    support = np.ascontiguousarray(support_px, dtype=np.float32)
+    offset, quality = _steps(pair, support, settings, stride_px)
+    thinned = [np.ascontiguousarray(a[::stride_px, ::stride_px]) for a in (support, offset)]
+    disparity, sigma = (np.empty_like(thinned[0]) for _ in range(2))
+    origin = np.empty(disparity.shape, dtype=np.uint8)
+    limits = (
+        settings.last_step_px,
+        settings.max_sigma_px,
+        settings.min_correlation,
+        settings.max_roughness_px,
+    )
+    fixed = (*thinned, quality, limits, settings.systematic_px)
+    in_row_bands(
+        len(disparity),
+        lambda first, last: accept_rows(*fixed, (first, last), disparity, sigma, origin),
+    )
+    return DisparityMap(disparity, sigma, origin, box.x, box.y)
+
+
+def _steps(
+    pair: RectifiedPair,
+    support: NDArray[np.float32],
+    settings: RefineSettings,
+    stride_px: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """(h, w) offset px from the support, and (h, w, 4) / stride what the last step says of it."""
+    box = pair.box
+    rows = slice(box.y, box.y + box.height)
+    columns = _reached(support, box.x, pair.right.shape[1])
+    left = pair.left[rows, box.x : box.x + box.width].astype(np.float32)
+    right = pair.right[rows, columns].astype(np.float32)
+    # About the middle, the products of float32 keep their digits.
+    centre = left.sum() / max(left.size, 1)
+    left -= centre
+    right -= centre
+    radius = settings.radius_px
+    window = (radius, stride_px, settings.min_filled * (2 * radius + 1) ** 2)
+    offset, refined = np.zeros_like(support), np.empty_like(support)
+    height, width = (-(-length // stride_px) for length in support.shape)
+    quality = np.empty((height, width, N_QUALITIES), dtype=np.float32)
+    for _ in range(settings.n_steps):
+        fixed = (left, right, support, offset, box.x - columns.start, window)
+        in_row_bands(box.height, partial(_band, fixed, refined, quality))
+        offset, refined = refined, offset
+    return offset, quality
+
+
+def _reached(support: NDArray[np.float32], first_column: int, picture_width: int) -> slice:
+    """Columns of the right picture that some pixel's window can ask for."""
+    if not np.isfinite(support).any():
+        return slice(0, 0)
+    nearest, farthest = np.nanmax(support), np.nanmin(support)
+    first = int(first_column - nearest) - _SPARE_COLUMNS
+    last = int(first_column + support.shape[1] - farthest) + _SPARE_COLUMNS
+    return slice(min(max(first, 0), picture_width), max(min(last, picture_width), 0))
+
+
+def _band(
+    fixed: tuple[Any, ...],
+    refined: NDArray[np.float32],
+    quality: NDArray[np.float32],
+    first: int,
+    last: int,
+) -> None:
+    refine_rows(*fixed, (first, last), refined, quality)

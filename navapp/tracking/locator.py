@@ -1,0 +1,191 @@
+"""Matching and fitting in turns: from an expected pose to the pose that the pictures show."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from typing import Literal
+
+import numpy as np
+
+from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import (
+    PointToPlaneSettings,
+    RegistrationModel,
+    fit_icp,
+    fit_point_to_plane,
+)
+from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
+from navapp.values import LineTimings, PoseEstimate, Reason
+
+Method = Literal["bimcc", "icp"]
+
+
+@dataclass(frozen=True, slots=True)
+class LocatorSettings:
+    """How the bone is located around an expected pose.
+
+    Attributes:
+        method: `bimcc` is the production chain, `icp` the paper's baseline.
+        tracking: margins from frame to frame.
+        search: margins of a first registration, and after a loss.
+        max_rounds: matchings, each with a fit, at most so many in a row ...
+        settled_mm: ... until the bone moves by less.
+        near_share: when so much of the model's pixels answers, the bone is where it was expected.
+        hidden_share: when only so much answers, something may hide the rest of the bone: it is
+            where it was expected if the fit moved it by no more than `stay_mm`.
+        stay_mm: see `hidden_share`.
+    """
+
+    method: Method = "bimcc"
+    tracking: Margins = field(default_factory=lambda: Margins(box_px=16, band_mm=15.0))
+    search: Margins = field(default_factory=lambda: Margins(box_px=60, band_mm=35.0))
+    max_rounds: int = 4
+    settled_mm: float = 0.03
+    near_share: float = 0.45
+    hidden_share: float = 0.3
+    stay_mm: float = 0.7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A pose in the rectified camera, what it was fitted to, and how long both took.
+
+    Attributes:
+        estimate: of the pose.
+        measured: the surface it was fitted to.
+        timings: of all matchings and fits that led to it.
+        n_rounds: so many they were.
+    """
+
+    estimate: PoseEstimate
+    measured: Measurement
+    timings: LineTimings
+    n_rounds: int = 1
+
+    @property
+    def pose(self) -> RigidTransform:
+        """The rectified camera from the bone."""
+        return self.estimate.camera_from_bone
+
+
+class Locator:
+    """Locates one bone in rectified pairs; holds only what is constant."""
+
+    def __init__(
+        self,
+        meter: SurfaceMeter,
+        model: RegistrationModel,
+        score: Callable[[Fit], float],
+        settings: LocatorSettings,
+    ) -> None:
+        """Join what measures and what is looked for.
+
+        Args:
+            meter: measures surfaces.
+            model: of the bone.
+            score: how much of the model a fit explains; decides between two.
+            settings: of the search.
+        """
+        self.settings = settings
+        self._meter = meter
+        self._model = model
+        self._score = score
+        self._wide = PointToPlaneSettings()
+        near = PointToPlaneSettings(radii_mm=self._wide.radii_mm[1:])
+        # On the model's own surface errors go together over a window, not over a staircase.
+        self._fine = replace(near, correlation_px=11.0)
+
+    @property
+    def is_baseline(self) -> bool:
+        """The paper's chain: one matching, one fit."""
+        return self.settings.method == "icp"
+
+    def locate(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
+        """The bone near an expected pose; None out of view.
+
+        Matching on the model itself is exact but sees only what is close. When a quick probe says
+        that the bone is elsewhere, the surface is measured freely before it goes on. When the bone
+        is half hidden, or moved, both are tried, and what explains more of the model stands.
+        """
+        if self.is_baseline:
+            return self.search(pair, pose, self.settings.tracking)
+        share, probe_ms = self._meter.probed_share(pair, pose, self.settings.tracking)
+        if share is None:
+            return None
+        stayed: Fit | None = None
+        if share >= self.settings.hidden_share:
+            first = self._on_model(pair, pose)
+            stayed = None if first is None else self._settled(pair, first)
+        fits = [] if stayed is None else [stayed]
+        if stayed is None or not self._is_here(stayed, pose):
+            found = self.search(pair, pose, self.settings.tracking)
+            fits += [] if found is None else [found]
+        timings = LineTimings(stereo_ms=probe_ms)
+        for fit in fits:
+            timings = sum_timings(timings, fit.timings)
+        best = max(fits, key=self._score, default=None)
+        return None if best is None else replace(best, timings=timings)
+
+    def _is_here(self, fit: Fit, expected: RigidTransform) -> bool:
+        """Enough of the model answers, or what answers is where it was expected."""
+        share = fit.measured.answered_share
+        if share >= self.settings.near_share:
+            return True
+        is_seen = share >= self.settings.hidden_share
+        return is_seen and self._moved_mm(expected, fit.pose) <= self.settings.stay_mm
+
+    def search(self, pair: RectifiedPair, pose: RigidTransform, margins: Margins) -> Fit | None:
+        """Measure freely around a pose, fit from far, then settle; None out of view."""
+        measured = self._meter.freely(pair, pose, margins, is_baseline=self.is_baseline)
+        if measured is None:
+            return None
+        return self.settle(pair, measured, pose)
+
+    def settle(self, pair: RectifiedPair, measured: Measurement, pose: RigidTransform) -> Fit:
+        """Fit to a free measurement, then follow onto the model's own surface if it is there."""
+        free = self._fitted(measured, pose, self._wide)
+        return free if self.is_baseline else self._settled(pair, free)
+
+    def _settled(self, pair: RectifiedPair, fit: Fit) -> Fit:
+        """Match on the model and fit until the bone rests; the last fit that had enough points."""
+        while fit.n_rounds < self.settings.max_rounds:
+            finer = self._on_model(pair, fit.pose)
+            if finer is None:
+                break
+            timings = sum_timings(fit.timings, finer.timings)
+            if Reason.TOO_FEW_POINTS in finer.estimate.reasons:
+                return replace(fit, timings=timings)
+            moved_mm = self._moved_mm(fit.pose, finer.pose)
+            fit = replace(finer, timings=timings, n_rounds=fit.n_rounds + 1)
+            if moved_mm < self.settings.settled_mm:
+                break
+        return fit
+
+    def _on_model(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
+        """One matching on the model at a pose, and the fit to it; None out of view."""
+        measured = self._meter.on_model(pair, pose, self.settings.tracking)
+        return None if measured is None else self._fitted(measured, pose, self._fine)
+
+    def _fitted(
+        self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
+    ) -> Fit:
+        started = time.perf_counter_ns()
+        if self.is_baseline:
+            estimate = fit_icp(measured.cloud, self._model, start)
+        else:
+            estimate = fit_point_to_plane(measured.cloud, self._model, start, settings)
+        estimate_ms = (time.perf_counter_ns() - started) / 1e6
+        return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
+
+    def _moved_mm(self, before: RigidTransform, after: RigidTransform) -> float:
+        """Mean displacement of the bone's surface."""
+        points_mm = self._model.points_mm
+        moved = after.apply(points_mm) - before.apply(points_mm)
+        return float(np.linalg.norm(moved, axis=1).mean())
+
+
+def sum_timings(a: LineTimings, b: LineTimings) -> LineTimings:
+    """Both, part by part."""
+    parts = {part.name: getattr(a, part.name) + getattr(b, part.name) for part in fields(a)}
+    return LineTimings(**parts)

@@ -1,0 +1,128 @@
+"""The paper's baseline."""
+
+import numpy as np
+import pytest
+
+from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.stereo.matching.gradient import (
+    GradientSettings,
+    magnitude,
+    match_gradient,
+    smooth_known,
+)
+from navapp.stereo.matching.gradient_kernels import match_rows
+from navapp.values import Origin
+from tests.reference.gradient_reference import match
+from tests.stereo.pairs import HEIGHT, WIDTH, geometry, shifted_pair
+
+INNER = Box(90, 20, 180, 80)
+
+
+@pytest.mark.parametrize("inside", [(0, 21), (4, 17)])
+def test_the_kernel_agrees_with_the_equations(inside) -> None:
+    rng = np.random.default_rng(3)
+    radius, n, height, width = 2, 6, 9, 16
+    left = rng.integers(0, 900, (height + 2 * radius, width + 2 * radius), dtype=np.int32)
+    right = rng.integers(0, 900, (height + 2 * radius, width + 2 * radius + n - 1), dtype=np.int32)
+    right[:, 3 : 3 + left.shape[1]] = left
+    expected_left, expected_right = match(left, right, radius, n, inside)
+    found_left = np.full((height, width), -9, dtype=np.int32)
+    found_right = np.full((height, width + n - 1), -9, dtype=np.int32)
+    mirrored = np.ascontiguousarray(right[:, ::-1])
+    mirrored_inside = (width + n - 1 - inside[1], width + n - 1 - inside[0])
+    for rows in ((0, 4), (4, height)):
+        match_rows(left, mirrored, mirrored_inside, rows, found_left, found_right)
+    assert (found_left == expected_left).all()
+    assert (found_right[:, ::-1] == expected_right).all()
+    assert (found_left[:, 4:12] == 2).all()
+
+
+def test_the_magnitude_is_that_of_the_slope() -> None:
+    rows, columns = np.mgrid[:8, :9]
+    found = magnitude((3 * columns + 4 * rows).astype(np.uint8))
+    assert (found[1:-1, 1:-1] == 5 * 16).all()
+
+
+@pytest.mark.parametrize("band", [(10.0, 30.0), (19.0, 21.0), (-8.0, 25.0), (19.6, 60.0)])
+def test_a_constant_shift_is_found_wherever_the_band_begins(band) -> None:
+    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER), band)
+    assert found.matched_share > 0.98
+    matched = found.disparity_px[found.origin == Origin.MATCHED]
+    assert np.percentile(np.abs(matched - 20.0), 99) < 0.05
+    assert (found.sigma_px[found.origin == Origin.MATCHED] == np.float32(0.5)).all()
+
+
+def test_a_slant_is_followed_in_whole_pixels_that_the_filter_smooths() -> None:
+    truth = np.broadcast_to(25.0 + 0.06 * np.arange(WIDTH), (HEIGHT, WIDTH)).copy()
+    pair = shifted_pair(truth, INNER)
+    inside = truth[INNER.y : INNER.y + INNER.height, INNER.x : INNER.x + INNER.width]
+    raw = match_gradient(pair, (15.0, 60.0), GradientSettings(gaussian_sigma_px=0.0))
+    smooth = match_gradient(pair, (15.0, 60.0))
+    known = np.isfinite(raw.disparity_px)
+    assert (raw.disparity_px[known] == np.rint(raw.disparity_px[known])).all()
+    assert (np.isfinite(smooth.disparity_px) == known).all()
+    assert known.mean() > 0.9
+    rms = [np.sqrt(np.nanmean((m.disparity_px - inside) ** 2)) for m in (raw, smooth)]
+    assert rms[1] < rms[0] < 0.5
+
+
+def test_partners_outside_the_picture_are_never_matched() -> None:
+    whole = Box(-10, -5, WIDTH + 30, HEIGHT + 10)
+    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 30.0), whole), (10.0, 50.0))
+    assert found.disparity_px.shape == (whole.height, whole.width)
+    is_matched = found.origin == Origin.MATCHED
+    columns = np.arange(whole.x, whole.x + whole.width)
+    assert not is_matched[:, (columns < 11) | (columns >= WIDTH)].any()
+    assert not is_matched[:5].any()
+    assert not is_matched[-5:].any()
+    assert is_matched[5:-5, (columns > 36) & (columns < WIDTH - 6)].mean() > 0.97
+
+
+@pytest.mark.parametrize("dark", ["both", "left", "right"])
+@pytest.mark.parametrize("grey", [0, 255])
+def test_a_picture_without_contrast_matches_nowhere(grey, dark) -> None:
+    pair = shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER)
+    for name in ("left", "right"):
+        if dark in (name, "both"):
+            getattr(pair, name)[:] = grey
+    assert match_gradient(pair, (10.0, 40.0)).matched_share == 0.0
+
+
+def test_the_filter_keeps_unknown_pixels_unknown_and_gives_them_no_weight() -> None:
+    values = np.full((20, 20), np.nan, dtype=np.float32)
+    values[:, :9] = 7.0
+    values[4, 15] = 100.0
+    smooth = smooth_known(values, 1.5)
+    assert (np.isfinite(smooth) == np.isfinite(values)).all()
+    np.testing.assert_allclose(smooth[:, :9], 7.0, rtol=1e-5)
+    assert smooth[4, 15] == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("box", [Box(10, 10, 0, 20), Box(WIDTH + 5, 0, 40, 20)])
+def test_a_box_without_pixels_gives_an_unknown_map(box) -> None:
+    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), box), (10.0, 40.0))
+    assert found.disparity_px.shape == (box.height, box.width)
+    assert found.matched_share == 0.0
+
+
+def test_bad_input_is_refused() -> None:
+    pair = shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER, is_colour=True)
+    with pytest.raises(ValueError, match="grey"):
+        match_gradient(pair, (10.0, 40.0))
+    with pytest.raises(ValueError, match="odd"):
+        GradientSettings(window_px=10)
+
+
+@pytest.mark.data
+def test_the_baseline_on_a_real_scene_is_what_the_paper_builds_on(data) -> None:
+    import cv2
+
+    folder = data / "stereo" / "cones"
+    left, right = (cv2.imread(str(folder / name), 0) for name in ("im2.png", "im6.png"))
+    truth = cv2.imread(str(folder / "disp2.png"), 0) / 4.0
+    height, width = left.shape
+    pair = RectifiedPair(left, right, geometry(width, height), Box(0, 0, width, height))
+    found = match_gradient(pair, (0.0, 63.0), GradientSettings(window_px=9))
+    is_known = (truth > 0.0) & np.isfinite(found.disparity_px)
+    assert is_known.sum() > 0.8 * (truth > 0.0).sum()
+    assert (np.abs(found.disparity_px - truth)[is_known] > 1.0).mean() < 0.12

@@ -1,0 +1,286 @@
+"""Classes of unmatched pixels, in both views."""
+
+import numpy as np
+import pytest
+
+from navapp.stereo.occlusion.classify import classify, mirrored, seen_from_right, with_channels
+from navapp.stereo.occlusion.classify_kernels import class_rows
+from navapp.values import DisparityMap, Origin
+from tests.reference.occlusion_reference import seen_from_right_reference
+
+HEIGHT, WIDTH = 50, 160
+NEAR = 30.0
+# The square in the left view, and in the right one.
+ROWS, LEFT_COLUMNS, RIGHT_COLUMNS = slice(12, 40), slice(80, 115), slice(50, 85)
+
+
+def as_map(disparity: np.ndarray, x: int = 0) -> DisparityMap:
+    disparity = np.asarray(disparity, dtype=np.float32)
+    known = np.isfinite(disparity)
+    return DisparityMap(
+        disparity,
+        np.where(known, 0.25, np.nan).astype(np.float32),
+        np.where(known, Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8),
+        x,
+        3,
+    )
+
+
+def true_views() -> tuple[np.ndarray, np.ndarray]:
+    """True disparity of a near square before a slanted wall, in the left and the right view."""
+    rows, columns = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    left = 12.0 + 0.04 * columns + 0.02 * rows
+    # Right column u shows the wall's left column x with u = x - d(x).
+    right = (columns + 12.0 + 0.02 * rows) / 0.96 - columns
+    left[ROWS, LEFT_COLUMNS] = NEAR
+    right[ROWS, RIGHT_COLUMNS] = NEAR
+    return left, right
+
+
+def hidden_places() -> tuple[np.ndarray, np.ndarray]:
+    """Wall pixels whose place in the other view is taken by the square."""
+    left, right = true_views()
+    columns = np.arange(WIDTH)
+    in_rows = np.zeros((HEIGHT, 1), dtype=bool)
+    in_rows[ROWS] = True
+    partner = columns - left
+    of_left = in_rows & (left != NEAR) & (partner > 49.5) & (partner < 84.5)
+    partner = columns + right
+    of_right = in_rows & (right != NEAR) & (partner > 79.5) & (partner < 114.5)
+    return of_left, of_right
+
+
+def found_views() -> tuple[np.ndarray, np.ndarray]:
+    """What a perfect matcher finds: nothing where the other view shows something else."""
+    left, right = true_views()
+    of_left, of_right = hidden_places()
+    columns = np.arange(WIDTH)
+    left = np.where(of_left | (columns - left < 0), np.nan, left)
+    right = np.where(of_right | (columns + right > WIDTH - 1), np.nan, right)
+    return left, right
+
+
+def right_view_as_seen() -> np.ndarray:
+    """An unchecked right view: it has an answer everywhere."""
+    return true_views()[1].astype(np.float32)
+
+
+def test_the_strip_that_the_right_camera_does_not_see_is_a_border_occlusion() -> None:
+    left, _ = found_views()
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    is_strip = np.arange(WIDTH) - true_views()[0] < 0
+    # The agreed end of a slanted strip is good to a pixel.
+    assert (classes == Origin.FILLED_BORDER)[is_strip].mean() > 0.97
+    assert (classes == Origin.FILLED_BORDER)[~is_strip].mean() < 0.001
+
+
+def test_what_the_square_hides_is_an_interior_occlusion() -> None:
+    left, _ = found_views()
+    hidden, _ = hidden_places()
+    assert hidden.sum() > 200
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    is_interior = classes == Origin.FILLED_INTERIOR
+    # A pixel at either end may still be within reach of a right pixel.
+    assert is_interior[hidden].mean() > 0.9
+    assert not is_interior[~hidden].any()
+
+
+def test_matches_stand() -> None:
+    left, _ = found_views()
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    inside = np.isfinite(left) & (np.arange(WIDTH) > 20)
+    assert (classes[inside] == 0).all()
+
+
+def test_the_rest_is_a_mismatch() -> None:
+    left, _ = found_views()
+    left[20:24, 130:136] = np.nan
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    assert (classes[20:24, 130:136] == Origin.MISMATCH_FILLED).all()
+
+
+@pytest.mark.parametrize(
+    ("on_left", "on_right", "expected"),
+    [(20.0, 30.0, Origin.FILLED_INTERIOR), (30.0, 20.0, Origin.MISMATCH_FILLED)],
+)
+def test_only_left_of_something_nearer_is_an_interior_occlusion(
+    on_left: float, on_right: float, expected: Origin
+) -> None:
+    line = np.full((5, 60), on_left)
+    line[:, 30:] = on_right
+    line[:, 25:30] = np.nan
+    nobody = np.full((5, 60), np.nan, dtype=np.float32)
+    classes = classify(as_map(line, x=60), nobody, 60, 200)
+    assert (classes[:, 25:30] == expected).all()
+
+
+def test_accidental_matches_in_the_strip_are_withdrawn() -> None:
+    left, _ = found_views()
+    left[30:33, 4:8] = 3.0
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    assert (classes[30:33, 4:8] == Origin.FILLED_BORDER).all()
+
+
+def test_a_box_inside_the_picture_has_no_border_strip() -> None:
+    left, _ = found_views()
+    box = as_map(left[:, 30:], x=30)
+    box.disparity_px[:, :10] = np.nan
+    box.origin[:, :10] = Origin.UNKNOWN
+    classes = classify(box, right_view_as_seen(), 0, WIDTH)
+    assert not (classes == Origin.FILLED_BORDER).any()
+    assert (classes[:10, :10] != 0).all()
+
+
+@pytest.mark.parametrize("first", [0, 10])
+def test_boxes_of_both_views_meet_where_their_columns_say(first: int) -> None:
+    left, _ = found_views()
+    whole = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    box = classify(as_map(left[:, 40:], x=40), right_view_as_seen()[:, first:], first, WIDTH)
+    np.testing.assert_array_equal(box, whole[:, 40:])
+
+
+def test_the_mirrored_right_view_obeys_the_same_rules() -> None:
+    _, right = found_views()
+    left_as_seen = true_views()[0].astype(np.float32)
+    _, hidden = hidden_places()
+    classes = classify(
+        mirrored(as_map(right), WIDTH), np.ascontiguousarray(left_as_seen[:, ::-1]), 0, WIDTH
+    )[:, ::-1]
+    is_strip = np.arange(WIDTH) + true_views()[1] > WIDTH - 1
+    assert (classes == Origin.FILLED_BORDER)[is_strip].mean() > 0.9
+    assert (classes == Origin.FILLED_INTERIOR)[hidden].mean() > 0.9
+    # The square hides what is right of it in the right view, left of it in the left one.
+    assert np.nonzero(classes == Origin.FILLED_INTERIOR)[1].min() >= RIGHT_COLUMNS.stop - 1
+
+
+def test_mirroring_twice_gives_the_map_back() -> None:
+    left, _ = found_views()
+    before = as_map(left[:, 30:90], x=30)
+    once, twice = mirrored(before, WIDTH), mirrored(mirrored(before, WIDTH), WIDTH)
+    assert once.x == WIDTH - 90
+    np.testing.assert_array_equal(twice.disparity_px, before.disparity_px)
+    np.testing.assert_array_equal(twice.origin, before.origin)
+    assert (twice.x, twice.y) == (before.x, before.y)
+
+
+def test_fattened_edges_that_look_like_the_background_are_withdrawn() -> None:
+    left, _ = found_views()
+    picture = np.full((HEIGHT, WIDTH, 3), 60, dtype=np.uint8)
+    picture[ROWS, LEFT_COLUMNS] = 200
+    left[ROWS, LEFT_COLUMNS.start - 2 : LEFT_COLUMNS.start] = NEAR
+    without = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    with_picture = classify(as_map(left), right_view_as_seen(), 0, WIDTH, picture)
+    fattened = (ROWS, slice(LEFT_COLUMNS.start - 2, LEFT_COLUMNS.start))
+    assert (without[fattened] == 0).all()
+    assert (with_picture[fattened] == Origin.FILLED_INTERIOR).all()
+    # The square itself, and everything else, stands.
+    without[fattened] = with_picture[fattened]
+    np.testing.assert_array_equal(with_picture, without)
+
+
+def test_one_colour_withdraws_nothing() -> None:
+    left, _ = found_views()
+    grey = np.full((HEIGHT, WIDTH), 90, dtype=np.uint8)
+    without = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    with_picture = classify(as_map(left), right_view_as_seen(), 0, WIDTH, grey)
+    np.testing.assert_array_equal(with_picture, without)
+
+
+def test_an_edge_moves_by_the_median_of_the_splits_beside_it() -> None:
+    splits = np.full((5, 8), -1, dtype=np.int8)
+    matched = np.full((5, 8), Origin.MATCHED, dtype=np.uint8)
+    disparity = np.where(np.arange(8) < 3, 10.0, 15.0).astype(np.float32)
+    disparity = np.repeat(disparity[None], 5, axis=0)
+    splits[:, 3] = (2, 2, 3, 0, 1)
+    classes = np.empty((5, 8), dtype=np.uint8)
+    begins, seen = np.zeros(5, dtype=np.int64), np.ones((5, 8), dtype=bool)
+    class_rows(disparity, matched, begins, seen, splits, 0, 1, classes)
+    assert [int((row != 0).sum()) for row in classes] == [2, 2, 2, 1, 1]
+    lonely = np.full((5, 8), -1, dtype=np.int8)
+    lonely[2, 3] = 3
+    class_rows(disparity, matched, begins, seen, lonely, 0, 1, classes)
+    assert (classes == 0).all()
+
+
+def test_a_map_without_matches_is_all_unmatched() -> None:
+    nothing = np.full((8, 20), np.nan, dtype=np.float32)
+    classes = classify(as_map(nothing), nothing, 0, 20)
+    assert (classes == Origin.MISMATCH_FILLED).all()
+
+
+def test_what_lies_outside_the_picture_has_no_class() -> None:
+    nothing = np.full((8, 40), np.nan)
+    classes = classify(as_map(nothing, x=-10), np.empty((8, 0), dtype=np.float32), 0, 20)
+    assert (classes[:, :10] == 0).all()
+    assert (classes[:, 10:30] != 0).all()
+    assert (classes[:, 30:] == 0).all()
+
+
+def test_views_of_different_rows_are_refused() -> None:
+    left, _ = found_views()
+    with pytest.raises(ValueError, match="same rows"):
+        classify(as_map(left), right_view_as_seen()[1:], 0, WIDTH)
+
+
+@pytest.mark.parametrize("shape", [(50, 159), (50, 160, 4)])
+def test_a_picture_that_does_not_fit_is_refused(shape: tuple[int, ...]) -> None:
+    left, _ = found_views()
+    with pytest.raises(ValueError, match="picture"):
+        with_channels(np.zeros(shape, dtype=np.uint8), as_map(left))
+
+
+@pytest.mark.parametrize("left_x", [0, 37, 150, -20])
+def test_what_the_right_camera_sees_is_what_the_reference_says(left_x: int) -> None:
+    rng = np.random.default_rng(7)
+    rough = rng.uniform(0.0, 60.0, (9, 70))
+    smooth = 20.0 + 0.3 * np.arange(70) + rng.normal(0.0, 0.05, (9, 70))
+    whole = rng.integers(5, 25, (9, 70)).astype(float)
+    for surface in (rough, smooth, whole, 0.5 + whole):
+        left = np.where(rng.random(surface.shape) < 0.2, np.nan, surface).astype(np.float32)
+        found = seen_from_right(left, left_x, 130)
+        assert found.shape == (9, 130)
+        assert found.dtype == np.float32
+        np.testing.assert_array_equal(found, seen_from_right_reference(left, left_x, 130))
+
+
+def test_the_right_camera_sees_the_square_where_it_stands_and_the_wall_beside_it() -> None:
+    left, right = true_views()
+    found = seen_from_right(left.astype(np.float32), 0, WIDTH)
+    assert (found[ROWS, RIGHT_COLUMNS] == NEAR).all()
+    is_square = np.zeros(found.shape, dtype=bool)
+    is_square[ROWS, RIGHT_COLUMNS] = True
+    is_wall = np.isfinite(found) & ~is_square
+    # A place is off by up to half a pixel, a slanted wall's disparity by as little.
+    np.testing.assert_allclose(found[is_wall], right[is_wall], atol=0.03)
+    # Unknown is what the left camera does not see: behind the square, and right of its picture. A
+    # wall that comes nearer on the right has no other gaps: in the right picture it is narrower.
+    _, hidden = hidden_places()
+    unknown = hidden | (np.arange(WIDTH) + right > WIDTH)
+    assert np.isnan(found[hidden]).mean() > 0.95
+    assert np.isfinite(found[~unknown]).mean() > 0.95
+
+
+def test_where_two_surfaces_fall_on_one_place_the_nearer_is_seen() -> None:
+    line = np.full((1, 40), np.nan, dtype=np.float32)
+    line[0, [8, 10, 25]] = (3.0, 5.0, 20.0)
+    found = seen_from_right(line, 0, 40)
+    assert found[0, 5] == 20.0
+    assert np.isfinite(found).sum() == 1
+
+
+def test_a_box_of_the_surface_falls_where_its_columns_say() -> None:
+    left = true_views()[0].astype(np.float32)
+    whole, box = seen_from_right(left, 0, WIDTH), seen_from_right(left[:, 60:], 60, WIDTH)
+    known = np.isfinite(box)
+    assert known.sum() > 0.5 * box.size
+    # Without the pixels left of the box something farther may be seen, never something nearer.
+    assert (whole[known] >= box[known]).all()
+    np.testing.assert_array_equal(box[:, 60:], whole[:, 60:])
+
+
+def test_without_a_surface_the_right_camera_sees_nothing() -> None:
+    nothing = np.full((6, 30), np.nan, dtype=np.float32)
+    assert np.isnan(seen_from_right(nothing, 0, 40)).all()
+    # Everything falls left of the right picture.
+    assert np.isnan(seen_from_right(np.full((6, 30), 99.0, dtype=np.float32), 0, 40)).all()
+    assert seen_from_right(np.empty((6, 0), dtype=np.float32), 0, 40).shape == (6, 40)

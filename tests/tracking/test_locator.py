@@ -1,0 +1,387 @@
+"""Matching and fitting in turns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import RegistrationModel, fit_icp
+from navapp.tracking import locator as module
+from navapp.tracking.locator import Fit, Locator, LocatorSettings
+from navapp.tracking.surface_meter import Margins, Measurement
+from navapp.values import BoneModel, DisparityMap, LineTimings, Reason
+from tests.registration.shapes import TRUE, as_cloud, grid_mesh
+from tests.tracking.rooms import room
+
+# What the meters of these tests are handed is not looked at.
+PAIR = None
+NO_MAP = DisparityMap(*np.empty((2, 0, 0), np.float32), np.empty((0, 0), np.uint8), 0, 0)
+PROBE_MS, ON_MODEL_MS, FREELY_MS = 1.0, 10.0, 1000.0
+
+
+def height_mm(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 0.008 * x**2 + 0.012 * y**2 + 1.5 * np.sin(x / 8.0) * np.cos(y / 9.0)
+
+
+MODEL = RegistrationModel(BoneModel("femur", grid_mesh(height_mm), "right"))
+
+
+def moved(mm: tuple[float, float, float], deg: tuple[float, float, float]) -> RigidTransform:
+    """`TRUE`, moved about the bone's centre."""
+    return TRUE.moved((*mm, *np.radians(deg)), TRUE.apply(MODEL.centre_mm))
+
+
+FAR = moved((1.0, -1.0, 4.8), (0.0, 5.0, 0.0))
+
+
+def error_mm(pose: RigidTransform, true: RigidTransform = TRUE) -> float:
+    """Mean displacement of the model's surface."""
+    offset_mm = pose.apply(MODEL.points_mm) - true.apply(MODEL.points_mm)
+    return float(np.linalg.norm(offset_mm, axis=1).mean())
+
+
+class FakeMeter:
+    """Sees a bone that lies at `true`; notes which matchings it was asked for.
+
+    Freely it sees all of it, but too far away by `free_bias_mm`. On the model it answers where the
+    model lies within `REACH_MM` of the surface, unless `share` tells it how much to claim.
+    """
+
+    REACH_MM = 1.5
+
+    def __init__(self, true: RigidTransform = TRUE, free_bias_mm: float = 0.0) -> None:
+        self.true = true
+        self.free_bias_mm = free_bias_mm
+        self.share: float | None = None
+        self.is_in_view = True
+        self.n_points = 1200
+        self.asked: list[str] = []
+        self.n_probes = 0
+        self.margins: list[Margins] = []
+        self.baselines: list[bool] = []
+
+    def freely(self, pair, pose, margins, *, is_baseline: bool = False) -> Measurement | None:
+        self._note("freely", margins)
+        self.baselines.append(is_baseline)
+        if not self.is_in_view:
+            return None
+        points_mm = self._points_mm() + np.array([0.0, 0.0, self.free_bias_mm])
+        return self._measurement(points_mm, FREELY_MS, 1.0)
+
+    def on_model(self, pair, pose, margins) -> Measurement | None:
+        self._note("on_model", margins)
+        if not self.is_in_view:
+            return None
+        points_mm = self._points_mm()
+        is_near = self._is_near(points_mm, pose)
+        return self._measurement(points_mm[is_near], ON_MODEL_MS, self._share(is_near))
+
+    def probed_share(self, pair, pose, margins) -> tuple[float | None, float]:
+        self.n_probes += 1
+        self.margins.append(margins)
+        if not self.is_in_view:
+            return None, PROBE_MS
+        return self._share(self._is_near(self._points_mm(), pose)), PROBE_MS
+
+    def _is_near(self, points_mm: np.ndarray, pose: RigidTransform) -> np.ndarray:
+        at_bone = pose.inverse().apply(points_mm)
+        index, distance_mm = MODEL.nearest(at_bone, 14.0)
+        offset_mm = np.einsum("ij,ij->i", at_bone - MODEL.points_mm[index], MODEL.normals[index])
+        return np.isfinite(distance_mm) & (np.abs(offset_mm) < self.REACH_MM)
+
+    def _share(self, is_near: np.ndarray) -> float:
+        return float(is_near.mean()) if self.share is None else self.share
+
+    def _note(self, what: str, margins: Margins) -> None:
+        self.asked.append(what)
+        self.margins.append(margins)
+
+    def _points_mm(self) -> np.ndarray:
+        """Every measurement has another noise."""
+        rng = np.random.default_rng(len(self.asked))
+        x, y = rng.uniform(-35.0, 35.0, (2, self.n_points))
+        noise_mm = rng.normal(0.0, 0.02, (self.n_points, 3))
+        return self.true.apply(np.column_stack([x, y, height_mm(x, y)])) + noise_mm
+
+    def _measurement(self, points_mm: np.ndarray, stereo_ms: float, share: float) -> Measurement:
+        return Measurement(
+            NO_MAP, as_cloud(points_mm, 0.1), LineTimings(stereo_ms=stereo_ms), share
+        )
+
+
+def locator_of(meter, settings: LocatorSettings | None = None, score=None) -> Locator:
+    by_share = score or (lambda fit: fit.measured.answered_share)
+    return Locator(meter, MODEL, by_share, settings or LocatorSettings())
+
+
+@pytest.mark.parametrize(
+    "start", [TRUE, moved((0.3, -0.2, 0.4), (0.2, -0.3, 0.2)), moved((0.5, 0.5, 0.9), (0.0,) * 3)]
+)
+def test_a_pose_that_is_right_stays_on_the_model(start: RigidTransform) -> None:
+    meter = FakeMeter(free_bias_mm=5.0)
+    fit = locator_of(meter).locate(PAIR, start)
+    assert "freely" not in meter.asked
+    assert len(meter.asked) == fit.n_rounds <= LocatorSettings().max_rounds
+    assert error_mm(fit.pose) < 0.05
+    assert fit.pose.target == "left_rect"
+
+
+@pytest.mark.parametrize("start", [FAR, moved((-2.0, 1.0, -4.5), (-3.0, 3.0, 2.6))])
+def test_a_pose_that_is_far_off_is_found_through_a_free_search(start: RigidTransform) -> None:
+    meter = FakeMeter()
+    fit = locator_of(meter).locate(PAIR, start)
+    assert error_mm(start) > 4.0
+    assert meter.asked.count("freely") == 1
+    # At most a first matching tells that it is elsewhere.
+    assert meter.asked.index("freely") <= 1
+    assert error_mm(fit.pose) < 0.05
+
+
+def test_a_search_ends_on_the_model() -> None:
+    """What the free measurement is wrong by is gone: the model's own surface is exact."""
+    meter = FakeMeter(free_bias_mm=0.4)
+    found = locator_of(meter).search(PAIR, FAR, LocatorSettings().search)
+    assert meter.asked[0] == "freely"
+    assert set(meter.asked[1:]) == {"on_model"}
+    assert error_mm(found.pose) < 0.05
+    alone = locator_of(meter, LocatorSettings(max_rounds=1)).search(PAIR, FAR, Margins(60, 35.0))
+    assert error_mm(alone.pose) > 0.3
+
+
+@pytest.mark.parametrize("max_rounds", [1, 2, 3, 6])
+def test_no_path_takes_more_matchings_than_allowed(max_rounds: int) -> None:
+    restless = LocatorSettings(max_rounds=max_rounds, settled_mm=0.0)
+    meter = FakeMeter()
+    assert locator_of(meter, restless).locate(PAIR, TRUE).n_rounds == max_rounds
+    assert meter.asked == ["on_model"] * max_rounds
+    meter = FakeMeter()
+    assert locator_of(meter, restless).search(PAIR, FAR, restless.search).n_rounds == max_rounds
+    assert meter.asked == ["freely"] + ["on_model"] * (max_rounds - 1)
+    # Both paths, when the first one does not convince.
+    meter = FakeMeter()
+    meter.share = 0.35
+    locator_of(meter, restless).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    stayed = ["on_model"] * max_rounds
+    assert meter.asked == [*stayed, "freely", *stayed[1:]]
+
+
+def test_a_bone_at_rest_is_not_matched_again() -> None:
+    calm = LocatorSettings(max_rounds=10, settled_mm=0.5)
+    meter = FakeMeter()
+    fit = locator_of(meter, calm).locate(PAIR, TRUE)
+    assert meter.asked == ["on_model"] * 2
+    assert fit.n_rounds == 2
+
+
+@pytest.mark.parametrize("method", ["bimcc", "icp"])
+def test_out_of_view_there_is_no_fit(method: str) -> None:
+    meter = FakeMeter()
+    meter.is_in_view = False
+    locator = locator_of(meter, LocatorSettings(method=method))
+    assert locator.locate(PAIR, TRUE) is None
+    assert len(meter.asked) <= 1
+    # Only the baseline has to look before it knows.
+    assert ("freely" in meter.asked) is locator.is_baseline
+    assert locator.search(PAIR, TRUE, Margins(60, 35.0)) is None
+
+
+def test_the_baseline_makes_one_matching_and_one_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = []
+
+    def spy(*given):
+        fits.append(given)
+        return fit_icp(*given)
+
+    monkeypatch.setattr(module, "fit_icp", spy)
+    monkeypatch.setattr(module, "fit_point_to_plane", None)
+    settings = LocatorSettings(method="icp")
+    start = moved((0.5, -0.5, 1.0), (1.0, 0.0, 0.0))
+    for locate, margins in (
+        (lambda locator: locator.locate(PAIR, start), settings.tracking),
+        (lambda locator: locator.search(PAIR, start, settings.search), settings.search),
+    ):
+        meter = FakeMeter()
+        fits.clear()
+        fit = locate(locator_of(meter, settings))
+        assert (meter.asked, meter.baselines, meter.margins) == (["freely"], [True], [margins])
+        assert len(fits) == fit.n_rounds == 1
+        expected = fit_icp(fit.measured.cloud, MODEL, start)
+        np.testing.assert_array_equal(fit.pose.matrix, expected.camera_from_bone.matrix)
+
+
+def test_only_the_baseline_asks_for_the_baseline() -> None:
+    meter = FakeMeter()
+    locator_of(meter).locate(PAIR, FAR)
+    assert meter.baselines == [False]
+
+
+@pytest.mark.parametrize(("sign", "is_search"), [(1.0, True), (-1.0, False)])
+def test_the_better_of_staying_and_searching_wins(sign: float, is_search: bool) -> None:
+    meter = FakeMeter()
+    meter.share = 0.35
+    told: list[Fit] = []
+
+    def score(fit: Fit) -> float:
+        told.append(fit)
+        return sign * fit.timings.stereo_ms
+
+    fit = locator_of(meter, score=score).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    # Only the search has the free measurement in its time.
+    stayed, searched = sorted(told, key=lambda fit: fit.timings.stereo_ms)
+    assert stayed.timings.stereo_ms < FREELY_MS < searched.timings.stereo_ms
+    assert fit.estimate is (searched if is_search else stayed).estimate
+
+
+def test_a_bone_half_hidden_where_it_was_expected_is_not_searched() -> None:
+    settings = LocatorSettings()
+    meter = FakeMeter()
+    meter.share = 0.5 * (settings.hidden_share + settings.near_share)
+    near = moved((0.0, 0.0, 0.5 * settings.stay_mm), (0.0,) * 3)
+    assert error_mm(locator_of(meter).locate(PAIR, near).pose) < 0.05
+    assert "freely" not in meter.asked
+    # The same share after a longer way is not believed.
+    locator_of(meter).locate(PAIR, moved((0.0, 0.0, 1.8 * settings.stay_mm), (0.0,) * 3))
+    assert "freely" in meter.asked
+
+
+def test_too_small_an_answer_is_not_followed() -> None:
+    meter = FakeMeter()
+    meter.share = LocatorSettings().hidden_share - 0.01
+    locator_of(meter).locate(PAIR, TRUE)
+    assert meter.asked.index("freely") <= 1
+
+
+def test_a_bone_lost_during_the_search_leaves_what_stayed() -> None:
+    class GoesBlind(FakeMeter):
+        def freely(self, *given, **named) -> None:
+            super().freely(*given, **named)
+
+    meter = GoesBlind()
+    meter.share = 0.35
+    fit = locator_of(meter).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    assert "freely" in meter.asked
+    assert error_mm(fit.pose) < 0.05
+
+
+@pytest.mark.parametrize("is_in_view", [True, False])
+def test_a_matching_without_points_does_not_replace_a_fit(is_in_view: bool) -> None:
+    class SeesOnce(FakeMeter):
+        def on_model(self, *given) -> Measurement | None:
+            measured = super().on_model(*given)
+            self.n_points, self.is_in_view = 10, is_in_view
+            return measured
+
+    meter = SeesOnce()
+    fit = locator_of(meter).locate(PAIR, moved((0.3, 0.2, 0.3), (0.0,) * 3))
+    assert meter.asked == ["on_model"] * 2
+    assert fit.n_rounds == 1
+    assert Reason.TOO_FEW_POINTS not in fit.estimate.reasons
+    assert error_mm(fit.pose) < 0.1
+
+
+def test_the_time_of_every_matching_and_fit_is_told() -> None:
+    meter = FakeMeter()
+    fit = locator_of(meter).search(PAIR, FAR, LocatorSettings().search)
+    assert fit.timings.stereo_ms == FREELY_MS + (fit.n_rounds - 1) * ON_MODEL_MS
+    assert fit.n_rounds == len(meter.asked) > 1
+    # Also that of the path which was not taken.
+    meter = FakeMeter()
+    meter.share = 0.35
+    both = locator_of(meter).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    n_on_model = meter.asked.count("on_model")
+    assert n_on_model > both.n_rounds
+    on_model_ms = n_on_model * ON_MODEL_MS + meter.n_probes * PROBE_MS
+    assert both.timings.stereo_ms == FREELY_MS + on_model_ms
+    one = locator_of(FakeMeter(), LocatorSettings(max_rounds=1)).locate(PAIR, TRUE)
+    assert ON_MODEL_MS <= one.timings.stereo_ms <= ON_MODEL_MS + PROBE_MS
+    assert 0.0 < one.timings.estimate_ms < one.timings.total_ms
+
+
+def test_the_margins_of_tracking_and_of_a_first_search_are_kept_apart() -> None:
+    settings = LocatorSettings(tracking=Margins(3, 4.0), search=Margins(50, 60.0))
+    meter = FakeMeter()
+    locator_of(meter, settings).locate(PAIR, FAR)
+    assert set(meter.margins) == {settings.tracking}
+    meter = FakeMeter()
+    locator_of(meter, settings).search(PAIR, FAR, settings.search)
+    assert meter.margins[0] == settings.search
+    assert set(meter.margins[1:]) == {settings.tracking}
+
+
+# --- simulated pictures -------------------------------------------------------------------------
+
+
+class Listening:
+    """A meter that notes which matchings it was asked for."""
+
+    def __init__(self, meter) -> None:
+        self.meter, self.asked = meter, []
+
+    def freely(self, *given, **named) -> Measurement | None:
+        self.asked.append("freely")
+        return self.meter.freely(*given, **named)
+
+    def on_model(self, *given) -> Measurement | None:
+        self.asked.append("on_model")
+        return self.meter.on_model(*given)
+
+    def probed_share(self, *given) -> tuple[float | None, float]:
+        return self.meter.probed_share(*given)
+
+
+def seen_knee():
+    """A frame's pair, the true pose in the rectified camera, a locator and what it asks for."""
+    a = room()
+    frame, line = a.frames[0], a.line
+    true = line._geometry.rectified_from_left @ a.truth(frame)
+    pair, _ = line._rectified_pair(frame.left, frame.right, true)
+    meter = Listening(line._meter)
+    return pair, true, Locator(meter, line.model, line._score, LocatorSettings()), meter.asked
+
+
+def surface_error_mm(pose: RigidTransform, true: RigidTransform) -> float:
+    points_mm = room().line.model.points_mm
+    return float(np.linalg.norm(pose.apply(points_mm) - true.apply(points_mm), axis=1).mean())
+
+
+def test_in_pictures_a_right_pose_stays_on_the_model() -> None:
+    pair, true, locator, asked = seen_knee()
+    fit = locator.locate(pair, true)
+    assert set(asked) == {"on_model"}
+    assert len(asked) <= LocatorSettings().max_rounds
+    assert surface_error_mm(fit.pose, true) < 0.3
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_in_pictures_a_pose_5_mm_and_5_deg_off_is_found(sign: float) -> None:
+    pair, true, locator, asked = seen_knee()
+    shift, turn = np.array([3.0, -2.0, 3.5]), np.array([0.6, -0.5, 0.62])
+    twist = sign * np.concatenate([shift, np.radians(5.0) * turn / np.linalg.norm(turn)])
+    off = true.moved(twist, true.apply(room().line.centre_mm))
+    fit = locator.locate(pair, off)
+    assert asked.count("freely") == 1
+    assert surface_error_mm(off, true) > 3.0
+    assert surface_error_mm(fit.pose, true) < 0.3
+
+
+def test_in_pictures_a_bone_out_of_view_gives_none() -> None:
+    pair, true, locator, asked = seen_knee()
+    assert locator.locate(pair, true.moved((900.0, 0, 0, 0, 0, 0), (0.0,) * 3)) is None
+    assert "freely" not in asked
+
+
+def test_a_dark_pair_gives_no_pose_of_its_own() -> None:
+    pair, true, locator, asked = seen_knee()
+    dark = replace(pair, left=np.zeros_like(pair.left), right=np.zeros_like(pair.right))
+    fit = locator.locate(dark, true)
+    assert asked.count("freely") == 1
+    assert Reason.TOO_FEW_POINTS in fit.estimate.reasons
+
+
+def test_the_probe_is_timed_when_the_bone_stays() -> None:
+    meter = FakeMeter()
+    fit = locator_of(meter).locate(PAIR, TRUE)
+    assert fit is not None
+    asked_ms = len(meter.asked) * ON_MODEL_MS
+    assert fit.timings.stereo_ms == asked_ms + meter.n_probes * PROBE_MS
