@@ -75,7 +75,7 @@ class _Pair:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Match the pair, write what was asked for; the exit code."""
-    from navapp.stereo.chains import smoothed
+    from navapp.stereo import smoothed
 
     _check(options)
     pair = _rectified(_read(options.left), _read(options.right), options)
@@ -156,7 +156,13 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
     """Both pictures grey and rectified; without a rig they are taken as they are."""
     import time
 
-    from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair, Rectifier
+    from navapp.geometry.rectification import (
+        Box,
+        RectifiedGeometry,
+        RectifiedPair,
+        Rectifier,
+        luma,
+    )
     from navapp.geometry.rig import read_rig
     from navapp.geometry.transform import RigidTransform
 
@@ -167,7 +173,7 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
             subject=options.right,
             remedy="give two pictures of one camera pair",
         )
-    grey = _grey(left), _grey(right)
+    grey = luma(left), luma(right)
     height, width = grey[0].shape
     if options.rig is None:
         nowhere = RigidTransform.identity("left_rect", "left")
@@ -188,7 +194,7 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
 
 
 def _match(pair: _Pair, options: argparse.Namespace) -> "StereoAnswer":
-    from navapp.stereo.chains import (
+    from navapp.stereo import (
         match_baseline,
         match_on_support,
         match_scene,
@@ -252,9 +258,7 @@ def _support(pair: _Pair, options: argparse.Namespace) -> NDArray[np.float32]:
     mesh, _ = read_ply(options.model)
     rectified_from_model = geometry.rectified_from_left @ pose
     view = render_rectified(mesh, rectified_from_model, geometry, pair.rectified.box)
-    scale = geometry.focal_px * geometry.baseline_mm
-    support: NDArray[np.float32] = (scale / view.depth_mm).astype(np.float32)
-    return support
+    return geometry.disparity_map_px(view.depth_mm)
 
 
 def _write(pair: _Pair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
@@ -307,14 +311,6 @@ def _content(pair: _Pair, answer: "StereoAnswer") -> dict[str, Any]:
         },
         "reasons": list(answer.reasons),
     }
-
-
-def _grey(picture: Image) -> Image:
-    import cv2
-
-    if picture.ndim == 2:
-        return picture
-    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
 def _channels(picture: Image) -> int:

@@ -100,6 +100,10 @@ class RectifiedGeometry:
         """Disparity of a point at that depth."""
         return self.focal_px * self.baseline_mm / depth_mm
 
+    def disparity_map_px(self, depth_mm: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Disparity (h, w) of a depth map (h, w); NaN stays NaN."""
+        return (self.focal_px * self.baseline_mm / depth_mm).astype(np.float32)
+
     def depth_mm(self, disparity_px: float) -> float:
         """Depth of a point with that disparity."""
         return self.focal_px * self.baseline_mm / disparity_px
@@ -248,6 +252,15 @@ class Rectifier:
             self.geometry,
             inside,
         )
+
+
+def luma(picture: Image) -> Image:
+    """Grey picture: colour adds cost and, with JPEG, halved chroma, but no disparity."""
+    import cv2
+
+    if picture.ndim == 2:
+        return picture
+    return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
 def resampled(

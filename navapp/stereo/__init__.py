@@ -6,6 +6,7 @@ from navapp.stereo.chains import (
     match_on_support,
     match_scene,
     match_surface,
+    smoothed,
 )
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.surface import reproject
@@ -20,4 +21,5 @@ __all__ = [
     "refine",
     "refine_samples",
     "reproject",
+    "smoothed",
 ]

@@ -140,10 +140,12 @@ def match_on_support(
     n_expected = int(np.isfinite(support_px).sum())
     if left.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
         return _nothing(pair, _NOT_CONFIRMED, started)
+    if not fills:
+        return StereoAnswer(left, left, (), LineTimings(stereo_ms=_ms(started)))
     # What the right camera sees of the support is all that is known of its view.
     right_px = seen_from_right(support_px, left.x, pair.geometry.width)
     evidence = _Evidence(right_px, 0, _by_sigma(left))
-    fill = FillSettings(max_gap_px=max_gap_px) if fills else None
+    fill = FillSettings(max_gap_px=max_gap_px)
     return _answer(pair, left, evidence, fill, started, np.isfinite(support_px))
 
 

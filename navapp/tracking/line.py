@@ -9,13 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import (
-    PointToPlaneSettings,
     RegistrationModel,
     distinct,
     estimate_at,
@@ -36,8 +34,6 @@ from navapp.values import (
     TrackedFrame,
     Verdict,
 )
-
-Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +71,6 @@ class Line:
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
         self.locator = Locator(self._meter, self.model, self._score, self.settings.locator)
-        self._as_it_stands = PointToPlaneSettings(radii_mm=PointToPlaneSettings().radii_mm[1:])
 
     @property
     def centre_mm(self) -> FloatArray:
@@ -150,7 +145,7 @@ class Line:
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
-        estimate = estimate_at(measured.cloud, self.model, pose, settings=self._as_it_stands)
+        estimate = estimate_at(measured.cloud, self.model, pose, settings=self.locator.near)
         return self._judged(Fit(estimate, measured, measured.timings), goal, timings)
 
     def _score(self, fit: Fit) -> float:

@@ -92,9 +92,9 @@ class Locator:
         self._model = model
         self._score = score
         self._wide = PointToPlaneSettings()
-        near = PointToPlaneSettings(radii_mm=self._wide.radii_mm[1:])
-        # On the model's own surface errors go together over a window, not over a staircase.
-        self._fine = replace(near, correlation_px=11.0)
+        self.near = PointToPlaneSettings(radii_mm=self._wide.radii_mm[1:])
+        # On the model's own surface errors go together over a window.
+        self._fine = replace(self.near, correlation_px=11.0)
 
     @property
     def is_baseline(self) -> bool:
@@ -110,15 +110,15 @@ class Locator:
         """
         if self.is_baseline:
             return self.search(pair, pose, self.settings.tracking)
-        share, probe_ms = self._meter.probed_share(pair, pose, self.settings.tracking)
-        if share is None:
+        expected = self._meter.expected(pair, pose, self.settings.tracking)
+        if expected is None:
             return None
-        stayed: Fit | None = None
+        share, probe_ms = self._meter.probed_share(expected)
+        fits: list[Fit] = []
         if share >= self.settings.hidden_share:
-            first = self._on_model(pair, pose)
-            stayed = None if first is None else self._settled(pair, first)
-        fits = [] if stayed is None else [stayed]
-        if stayed is None or not self._is_here(stayed, pose):
+            first = self._fitted(self._meter.on_model(expected), pose, self._fine)
+            fits.append(self._settled(pair, first))
+        if not fits or not self._is_here(fits[0], pose):
             found = self.search(pair, pose, self.settings.tracking)
             fits += [] if found is None else [found]
         timings = LineTimings(stereo_ms=probe_ms)
@@ -150,9 +150,10 @@ class Locator:
     def _settled(self, pair: RectifiedPair, fit: Fit) -> Fit:
         """Match on the model and fit until the bone rests; the last fit that had enough points."""
         while fit.n_rounds < self.settings.max_rounds:
-            finer = self._on_model(pair, fit.pose)
-            if finer is None:
+            expected = self._meter.expected(pair, fit.pose, self.settings.tracking)
+            if expected is None:
                 break
+            finer = self._fitted(self._meter.on_model(expected), fit.pose, self._fine)
             timings = sum_timings(fit.timings, finer.timings)
             if Reason.TOO_FEW_POINTS in finer.estimate.reasons:
                 return replace(fit, timings=timings)
@@ -161,11 +162,6 @@ class Locator:
             if moved_mm < self.settings.settled_mm:
                 break
         return fit
-
-    def _on_model(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
-        """One matching on the model at a pose, and the fit to it; None out of view."""
-        measured = self._meter.on_model(pair, pose, self.settings.tracking)
-        return None if measured is None else self._fitted(measured, pose, self._fine)
 
     def _fitted(
         self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings

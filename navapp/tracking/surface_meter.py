@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedPair, Rectifier
+from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import projected_box, render_rectified
@@ -21,8 +21,6 @@ from navapp.stereo import (
     reproject,
 )
 from navapp.values import DisparityMap, LineTimings, SurfaceCloud
-
-Image = NDArray[np.uint8]
 
 # How far the bone may turn out to be from where it was expected, and its box with it.
 _SPARE_PX, _SPARE_MM = 60, 30.0
@@ -55,6 +53,21 @@ class Measurement:
     answered_share: float
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Expected:
+    """What the model at a pose lets expect.
+
+    Attributes:
+        pair: with the model's box.
+        support_px: (h, w) disparity of the model over the box, NaN beside it.
+        render_ms: how long that took.
+    """
+
+    pair: RectifiedPair
+    support_px: NDArray[np.float32]
+    render_ms: float
+
+
 class SurfaceMeter:
     """Measures the surface of one bone under one rig."""
 
@@ -78,7 +91,7 @@ class SurfaceMeter:
         started = time.perf_counter_ns()
         wide = Margins(margins.box_px + _SPARE_PX, margins.band_mm + _SPARE_MM)
         box, band_px = self._region(around, wide) or (None, None)
-        pair = self._rectifier.rectify(_luma(left), _luma(right), box, band_px)
+        pair = self._rectifier.rectify(luma(left), luma(right), box, band_px)
         return pair, LineTimings(rectify_ms=_ms_since(started))
 
     def freely(
@@ -103,53 +116,40 @@ class SurfaceMeter:
         answer = match_surface(inside, band_px, fills=False)
         return self._measurement(answer, box.width * box.height)
 
-    def on_model(
+    def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
-    ) -> Measurement | None:
-        """Sub-pixel matching on the model's own surface at a pose; None out of view.
-
-        Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
-        it answers nothing.
-        """
+    ) -> Expected | None:
+        """What the model at a pose lets expect of a pair; None out of view."""
         started = time.perf_counter_ns()
-        expected = self._expected(pair, pose, margins)
-        if expected is None:
-            return None
-        inside, support_px = expected
-        render_ms = _ms_since(started)
-        answer = match_on_support(inside, support_px, fills=False)
-        stereo_ms = answer.timings.stereo_ms + render_ms
-        answer = replace(answer, timings=replace(answer.timings, stereo_ms=stereo_ms))
-        return self._measurement(answer, int(np.isfinite(support_px).sum()))
-
-    def probed_share(
-        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
-    ) -> tuple[float | None, float]:
-        """Share of thinned samples of the model that answer at a pose; None out of view. And ms.
-
-        One quick step: it tells whether the bone is there, not where else it is.
-        """
-        started = time.perf_counter_ns()
-        expected = self._expected(pair, pose, margins)
-        if expected is None:
-            return None, _ms_since(started)
-        inside, support_px = expected
-        samples = refine_samples(inside, support_px, _PROBE, _PROBE_STRIDE_PX)
-        n_asked = np.isfinite(support_px[::_PROBE_STRIDE_PX, ::_PROBE_STRIDE_PX]).sum()
-        share = float((samples.origin > 0).sum() / max(n_asked, 1))
-        return share, _ms_since(started)
-
-    def _expected(
-        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
-    ) -> tuple[RectifiedPair, NDArray[np.float32]] | None:
-        """The model's box in the pair, and its disparity there; None out of view."""
         region = self._region(pose, margins)
         if region is None:
             return None
         view = render_rectified(self._model.seen_mesh, pose, self.geometry, region[0])
-        scale = self.geometry.focal_px * self.geometry.baseline_mm
-        support_px: NDArray[np.float32] = (scale / view.depth_mm).astype(np.float32)
-        return replace(pair, box=region[0]), support_px
+        support_px = self.geometry.disparity_map_px(view.depth_mm)
+        return Expected(replace(pair, box=region[0]), support_px, _ms_since(started))
+
+    def on_model(self, expected: Expected) -> Measurement:
+        """Sub-pixel matching on the model's own surface.
+
+        Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
+        it answers nothing.
+        """
+        answer = match_on_support(expected.pair, expected.support_px, fills=False)
+        stereo_ms = answer.timings.stereo_ms + expected.render_ms
+        answer = replace(answer, timings=replace(answer.timings, stereo_ms=stereo_ms))
+        return self._measurement(answer, int(np.isfinite(expected.support_px).sum()))
+
+    def probed_share(self, expected: Expected) -> tuple[float, float]:
+        """Share of thinned samples of the model that answer; and how many ms that took.
+
+        One quick step: it tells whether the bone is there, not where else it is.
+        """
+        started = time.perf_counter_ns()
+        support_px = expected.support_px
+        samples = refine_samples(expected.pair, support_px, _PROBE, _PROBE_STRIDE_PX)
+        n_asked = np.isfinite(support_px[::_PROBE_STRIDE_PX, ::_PROBE_STRIDE_PX]).sum()
+        share = float((samples.origin > 0).sum() / max(n_asked, 1))
+        return share, _ms_since(started)
 
     def _measurement(self, answer: StereoAnswer, n_asked: int) -> Measurement:
         found = answer.disparity
@@ -172,15 +172,6 @@ class SurfaceMeter:
             return None
         grown = box.grown(margins.box_px).clipped(self.geometry.width, self.geometry.height)
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
-
-
-def _luma(image: Image) -> Image:
-    """Grey picture: colour adds cost and, with JPEG, halved chroma, but no disparity."""
-    import cv2
-
-    if image.ndim == 2:
-        return image
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
 def _ms_since(started_ns: int) -> float:

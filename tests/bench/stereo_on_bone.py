@@ -16,8 +16,7 @@ import numpy as np
 
 from navapp.geometry import Box
 from navapp.geometry.zbuffer import render_rectified
-from navapp.stereo import match_surface
-from navapp.stereo.chains import smoothed
+from navapp.stereo import match_surface, smoothed
 from navapp.tracking import Goal, Line
 from navapp.values import BoneModel, DisparityMap, LineTimings, Status
 from tests.bench.bone_scenes import (

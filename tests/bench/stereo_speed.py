@@ -58,8 +58,7 @@ def box_chains(scene: Scene, mesh: TriangleMesh) -> dict[str, Callable[[], objec
     def with_pose() -> object:
         geometry = pair.geometry
         depth_mm = render_rectified(mesh, scene.pose, geometry, pair.box).depth_mm
-        support = (geometry.focal_px * geometry.baseline_mm / depth_mm).astype(np.float32)
-        return match_on_support(pair, support, fills=True)
+        return match_on_support(pair, geometry.disparity_map_px(depth_mm), fills=True)
 
     return {
         "with a pose": with_pose,

@@ -159,7 +159,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     pair, _ = line._rectified_pair(frame.left, frame.right, line._rectified(truth))
     pose = rectified_from_left @ truth
     measured = line._meter.freely(pair, pose, line.settings.locator.tracking)
-    inside = estimate_at(measured.cloud, line.model, pose, settings=line._as_it_stands)
+    inside = estimate_at(measured.cloud, line.model, pose, settings=line.locator.near)
     turn = np.kron(np.eye(2), rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15

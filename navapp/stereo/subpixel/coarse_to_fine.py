@@ -16,7 +16,8 @@ from navapp.values import DisparityMap
 
 # Steps of a coarse map are about half a pixel of it.
 _COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.5, 0.75, 0.4))
-_SURFACES = (RegionalSettings(radius_px=12), RegionalSettings(radius_px=12))
+_SURFACE = RegionalSettings(radius_px=12)
+_N_TURNS = 2
 # For a support, many fair points are better than few good ones.
 _FAIR = RefineSettings(n_steps=1, min_correlation=0.5, last_step_px=0.5, max_sigma_px=0.5)
 _GOOD = RefineSettings(last_step_px=0.25, max_roughness_px=0.35)
@@ -38,9 +39,9 @@ def refine_surface(pair: RectifiedPair, coarse_px: NDArray[np.float32]) -> Dispa
         The map over `pair.box`: measured to a part of a pixel, or unknown.
     """
     support = coarse_px
-    for settings in _SURFACES:
-        samples = refine_samples(pair, support, _FAIR, settings.thin)
-        surface = regional_support(samples.disparity_px, _weights(samples), support.shape, settings)
+    for _ in range(_N_TURNS):
+        samples = refine_samples(pair, support, _FAIR, _SURFACE.thin)
+        surface = regional_support(samples.disparity_px, _weights(samples), support.shape, _SURFACE)
         with np.errstate(invalid="ignore"):
             is_same = np.abs(surface - coarse_px) < _FAR_PX
         support = np.where(is_same, surface, coarse_px)
