@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
-KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration/test_model.py \
+KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py \
     tests/sim_devices/test_sensor.py tests/geometry/test_resample.py \
     tests/stereo

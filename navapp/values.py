@@ -135,6 +135,7 @@ class Reason(Enum):
     SURFACE_MISFIT = "surface does not fit the model"
     OUTLIERS = "too many points fit no surface of the model"
     NOT_CONVERGED = "the estimate did not settle"
+    AMBIGUOUS = "a different pose fits as well"
     DEGENERATE = "the seen surface leaves a direction free"
     TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
     JUMPED = "the pose jumped further than a patient moves"
@@ -162,6 +163,7 @@ _REMEDIES = {
     Reason.SURFACE_MISFIT: "check that this is the right bone and plan; register again",
     Reason.OUTLIERS: "clear the view of the bone; register again",
     Reason.NOT_CONVERGED: "hold still, or register again",
+    Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
     Reason.DEGENERATE: "expose more of the bone",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",

@@ -3,6 +3,7 @@
 import os
 import re
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import FloatArray
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -17,6 +19,27 @@ _TYPES = {
     "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawSurface:
+    """What a surface file holds, as stored and unchecked: NaN points, faces out of range.
+
+    Attributes:
+        points: (V, 3) coordinates in the file's unit.
+        faces: (F, 3) indices into the points; (0, 3) for a cloud.
+        normals: (V, 3) of any length, or None when the file has none.
+        unit: what the file says of its unit, lower case, or None.
+    """
+
+    points: FloatArray
+    faces: NDArray[np.integer]
+    normals: FloatArray | None = None
+    unit: str | None = None
+
+
+class UnusableContentError(ValueError):
+    """What is wrong with a file's content, in words for the user."""
 
 
 _END_OF_HEADER = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
@@ -78,33 +101,56 @@ def read_ply(path: str | Path) -> tuple[TriangleMesh, PlyHeader]:
         InputError: missing, not a PLY file, cut short, faces that name no vertex.
     """
     path = Path(path)
+    raw, header = parse_ply(path, surface_content(path, "PLY"))
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"surface {path} cannot be read ({error.strerror})",
-            subject=str(path),
-            remedy="give the path of an existing PLY file",
-        ) from error
+        mesh = TriangleMesh(raw.points, raw.faces.astype(np.int32))
+    except (ValueError, OverflowError) as error:
+        raise damaged(path, str(error)) from error
+    return mesh, header
+
+
+def parse_ply(path: Path, content: bytes) -> tuple[RawSurface, PlyHeader]:
+    """Everything that a PLY file says of its surface, with normals when nx, ny and nz are there.
+
+    Raises:
+        InputError: not a PLY file, cut short, without coordinates.
+    """
     end = _END_OF_HEADER.search(content)
     if not content[:3].lower() == b"ply" or end is None:
         raise damaged(path, "it does not begin with a PLY header")
     header = PlyHeader(path, content[: end.start()].decode("ascii", errors="replace"))
     try:
         columns = _read_elements(header, content, end.end())
+        vertex = columns.get("vertex", {})
+        points, normals = (_three(vertex, names) for names in (("x", "y", "z"), ("nx", "ny", "nz")))
     except (ValueError, IndexError, OverflowError) as error:
         raise damaged(path, "it is cut short or its numbers are broken") from error
-    vertex = columns.get("vertex", {})
-    if not all(axis in vertex for axis in "xyz"):
+    if points is None:
         raise damaged(path, "it has no vertices with x, y and z")
-    vertices = np.column_stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"])
     face = columns.get("face", {})
     polygons = face.get("vertex_indices", face.get("vertex_index", np.empty((0, 3), dtype="i4")))
     try:
-        mesh = TriangleMesh(vertices, _triangles(polygons))
+        triangles = _triangles(polygons)
     except (ValueError, OverflowError) as error:
         raise damaged(path, str(error)) from error
-    return mesh, header
+    unit = (header.tag("UNIT") or "").lower() or None
+    return RawSurface(points, triangles, normals, unit), header
+
+
+def surface_content(path: Path, kind: str) -> bytes:
+    """The bytes of a surface file.
+
+    Raises:
+        InputError: missing, a folder, not readable.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"surface {path} cannot be read ({error.strerror})",
+            subject=str(path),
+            remedy=f"give the path of an existing {kind} file",
+        ) from error
 
 
 def write_ply(
@@ -143,13 +189,23 @@ def write_whole(path: str | Path, content: bytes) -> None:
         raise
 
 
-def damaged(path: Path, why: str) -> InputError:
+def damaged(path: Path, why: str, kind: str = "PLY") -> InputError:
     """The error for a surface file that cannot be understood."""
+    again = "binary or ASCII PLY with triangles" if kind == "PLY" else f"{kind} or as binary PLY"
     return InputError(
-        f"surface {path} is not a usable PLY file, {why}",
+        f"surface {path} is not a usable {kind} file, {why}",
         subject=str(path),
-        remedy="export it again as binary or ASCII PLY with triangles",
+        remedy=f"export it again as {again}",
     )
+
+
+def _three(columns: dict[str, NDArray[np.generic]], names: tuple[str, ...]) -> FloatArray | None:
+    """(V, 3) of three columns, or None where one is missing."""
+    if not all(name in columns for name in names):
+        return None
+    if any(columns[name].ndim != 1 or columns[name].dtype == object for name in names):
+        raise ValueError("a number was expected, not a list")
+    return np.column_stack([np.asarray(columns[name], dtype=np.float64) for name in names])
 
 
 def _read_elements(

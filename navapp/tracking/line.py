@@ -21,7 +21,7 @@ from navapp.registration import (
     tilted_starts,
 )
 from navapp.tracking.judge import Goal, Judge
-from navapp.tracking.locator import Fit, Locator, LocatorSettings, sum_timings
+from navapp.tracking.locator import ON_BONE, Fit, Locator, LocatorSettings, sum_timings
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 from navapp.values import (
@@ -44,7 +44,7 @@ class LineSettings:
         locator: how the bone is located around an expected pose.
         depth_mm: nearest and farthest surface that the rig is used for.
         max_points: about so many measured points enter an estimate.
-        tilt_deg: of the starts of a first registration.
+        tilt_deg, n_tilts: of the starts of a first registration.
         n_refined: so many of its answers are refined.
     """
 
@@ -52,6 +52,7 @@ class LineSettings:
     depth_mm: tuple[float, float] = (300.0, 700.0)
     max_points: int = 2500
     tilt_deg: float = 15.0
+    n_tilts: int = 12
     n_refined: int = 3
 
 
@@ -118,23 +119,24 @@ class Line:
         )
         if measured is None or len(measured.cloud) == 0:
             return [self._lost(Reason.NO_SURFACE)]
-        starts = tilted_starts(rough, self.centre_mm, self.settings.tilt_deg)
+        centre_mm = rough.apply(self.centre_mm)
+        starts = tilted_starts(rough, centre_mm, self.settings.tilt_deg, self.settings.n_tilts)
         if locator.is_baseline:
             starts = [rough]
         coarse = find_candidates(
-            measured.cloud,
+            measured.scene,
             self.model,
             starts,
-            lambda estimate: self._explained(estimate, measured),
+            lambda pose: self._explained(pose, measured),
             on_progress,
         )
         fits = [
-            locator.settle(pair, measured, estimate.camera_from_bone)
-            for estimate in coarse[: self.settings.n_refined]
+            locator.settle(pair, measured, candidate.scene_from_bone)
+            for candidate in coarse[: self.settings.n_refined]
         ]
         fits.sort(key=self._score, reverse=True)
-        kept = distinct([fit.estimate for fit in fits], self.centre_mm)
-        return [self._judged(fit, goal, timings) for fit in fits if fit.estimate in kept]
+        kept = distinct([fit.pose for fit in fits], self.centre_mm)
+        return [self._judged(fit, goal, timings) for fit in fits if fit.pose in kept]
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
@@ -145,17 +147,16 @@ class Line:
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
-        estimate = estimate_at(measured.cloud, self.model, pose, settings=self.locator.near)
+        estimate = estimate_at(measured.scene, self.model, pose, ON_BONE)
         return self._judged(Fit(estimate, measured, measured.timings), goal, timings)
 
     def _score(self, fit: Fit) -> float:
-        return self._explained(fit.estimate, fit.measured)
+        """How much of the model a fit explains; 0 without a covariance."""
+        is_fixed = np.isfinite(fit.estimate.covariance).all()
+        return self._explained(fit.pose, fit.measured) if is_fixed else 0.0
 
-    def _explained(self, estimate: PoseEstimate, measured: Measurement) -> float:
-        """How much of the model a measurement explains; 0 without a covariance."""
-        if not np.isfinite(estimate.covariance).all():
-            return 0.0
-        found = self._judge.agreement(self.model, estimate.camera_from_bone, measured.disparity)
+    def _explained(self, pose: RigidTransform, measured: Measurement) -> float:
+        found = self._judge.agreement(self.model, pose, measured.disparity)
         return found.coverage * found.inlier_share
 
     def _judged(

@@ -9,16 +9,14 @@ import numpy as np
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import (
-    PointToPlaneSettings,
-    RegistrationModel,
-    fit_icp,
-    fit_point_to_plane,
-)
+from navapp.registration import BimccSettings, RegistrationModel, fit_bimcc, fit_icp
 from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason
 
 Method = Literal["bimcc", "icp"]
+
+# Stereo points know their noise, so that a narrower kernel costs little and keeps tissue out.
+ON_BONE = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +89,6 @@ class Locator:
         self._meter = meter
         self._model = model
         self._score = score
-        self._wide = PointToPlaneSettings()
-        self.near = PointToPlaneSettings(radii_mm=self._wide.radii_mm[1:])
-        # On the model's own surface errors go together over a window.
-        self._fine = replace(self.near, correlation_px=11.0)
 
     @property
     def is_baseline(self) -> bool:
@@ -116,7 +110,7 @@ class Locator:
         share, probe_ms = self._meter.probed_share(expected)
         fits: list[Fit] = []
         if share >= self.settings.hidden_share:
-            first = self._fitted(self._meter.on_model(expected), pose, self._fine)
+            first = self._fitted(self._meter.on_model(expected), pose)
             fits.append(self._settled(pair, first))
         if not fits or not self._is_here(fits[0], pose):
             found = self.search(pair, pose, self.settings.tracking)
@@ -144,7 +138,7 @@ class Locator:
 
     def settle(self, pair: RectifiedPair, measured: Measurement, pose: RigidTransform) -> Fit:
         """Fit to a free measurement, then follow onto the model's own surface if it is there."""
-        free = self._fitted(measured, pose, self._wide)
+        free = self._fitted(measured, pose)
         return free if self.is_baseline else self._settled(pair, free)
 
     def _settled(self, pair: RectifiedPair, fit: Fit) -> Fit:
@@ -153,7 +147,7 @@ class Locator:
             expected = self._meter.expected(pair, fit.pose, self.settings.tracking)
             if expected is None:
                 break
-            finer = self._fitted(self._meter.on_model(expected), fit.pose, self._fine)
+            finer = self._fitted(self._meter.on_model(expected), fit.pose)
             timings = sum_timings(fit.timings, finer.timings)
             if Reason.TOO_FEW_POINTS in finer.estimate.reasons:
                 return replace(fit, timings=timings)
@@ -163,14 +157,12 @@ class Locator:
                 break
         return fit
 
-    def _fitted(
-        self, measured: Measurement, start: RigidTransform, settings: PointToPlaneSettings
-    ) -> Fit:
+    def _fitted(self, measured: Measurement, start: RigidTransform) -> Fit:
         started = time.perf_counter_ns()
         if self.is_baseline:
-            estimate = fit_icp(measured.cloud, self._model, start)
+            estimate = fit_icp(measured.scene, self._model, start)
         else:
-            estimate = fit_point_to_plane(measured.cloud, self._model, start, settings)
+            estimate = fit_bimcc(measured.scene, self._model, start, ON_BONE)
         estimate_ms = (time.perf_counter_ns() - started) / 1e6
         return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
 

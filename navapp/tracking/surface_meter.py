@@ -10,7 +10,7 @@ from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, 
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import projected_box, render_rectified
-from navapp.registration import RegistrationModel
+from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     RefineSettings,
     StereoAnswer,
@@ -24,6 +24,9 @@ from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
 # How far the bone may turn out to be from where it was expected, and its box with it.
 _SPARE_PX, _SPARE_MM = 60, 30.0
+# Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
+# it; on the model's own surface over a window.
+_FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
 _PROBE = RefineSettings(n_steps=1, last_step_px=0.3)
 _PROBE_STRIDE_PX = 4
 
@@ -45,12 +48,19 @@ class Measurement:
         cloud: of the measured pixels, thinned.
         timings: how long it took.
         answered_share: of the pixels that were asked for: the box's, or the model's.
+        correlation_px: distance in the picture over which its errors go together.
     """
 
     disparity: DisparityMap
     cloud: SurfaceCloud
     timings: LineTimings
     answered_share: float
+    correlation_px: float
+
+    @property
+    def scene(self) -> Scene:
+        """The cloud, to be registered to."""
+        return Scene.seen(self.cloud, self.correlation_px)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,9 +122,10 @@ class SurfaceMeter:
         box, band_px = region
         inside = replace(pair, box=box)
         if is_baseline:
-            return self._measurement(match_baseline(inside, band_px), box.width * box.height)
-        answer = match_surface(inside, band_px, fills=False)
-        return self._measurement(answer, box.width * box.height)
+            answer = match_baseline(inside, band_px)
+        else:
+            answer = match_surface(inside, band_px, fills=False)
+        return self._measurement(answer, box.width * box.height, _FREE_CORRELATION_PX)
 
     def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
@@ -137,7 +148,8 @@ class SurfaceMeter:
         answer = match_on_support(expected.pair, expected.support_px, fills=False)
         stereo_ms = answer.timings.stereo_ms + expected.render_ms
         answer = replace(answer, timings=replace(answer.timings, stereo_ms=stereo_ms))
-        return self._measurement(answer, int(np.isfinite(expected.support_px).sum()))
+        n_asked = int(np.isfinite(expected.support_px).sum())
+        return self._measurement(answer, n_asked, _MODEL_CORRELATION_PX)
 
     def probed_share(self, expected: Expected) -> tuple[float, float]:
         """Share of thinned samples of the model that answer; and how many ms that took.
@@ -151,12 +163,15 @@ class SurfaceMeter:
         share = float((samples.origin > 0).sum() / max(n_asked, 1))
         return share, _ms_since(started)
 
-    def _measurement(self, answer: StereoAnswer, n_asked: int) -> Measurement:
+    def _measurement(
+        self, answer: StereoAnswer, n_asked: int, correlation_px: float
+    ) -> Measurement:
         found = answer.disparity
         n_matched = found.matched_share * found.origin.size
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
         cloud = reproject(found, self.geometry, stride_px)
-        return Measurement(found, cloud, answer.timings, n_matched / max(n_asked, 1))
+        answered_share = n_matched / max(n_asked, 1)
+        return Measurement(found, cloud, answer.timings, answered_share, correlation_px)
 
     def _region(
         self, pose: RigidTransform, margins: Margins

@@ -229,7 +229,9 @@ def test_wrong_usage_is_exit_code_2(capsys) -> None:
     assert run(["run", "--headless", "--stage", "sewing"]) == 2
 
 
-@pytest.mark.parametrize("verb", ["run", "replay", "plan", "stereo", "doctor", "config"])
+@pytest.mark.parametrize(
+    "verb", ["run", "replay", "plan", "stereo", "register", "doctor", "config"]
+)
 def test_every_verb_has_help_with_an_example(verb: str, capsys) -> None:
     assert run([verb, "--help"]) == 0
     assert "example" in capsys.readouterr().out

@@ -1,96 +1,81 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
+from navapp.geometry.mesh import TriangleMesh
 from navapp.registration import RegistrationModel
 from navapp.values import BoneModel
 from tests.reference.lookup_reference import nearest_by_trying_all
-from tests.registration.shapes import grid_mesh
-
-
-def bumpy() -> BoneModel:
-    mesh = grid_mesh(lambda x, y: 3.0 * np.sin(x / 5.0) * np.cos(y / 7.0) + 0.004 * x * x, 30.0)
-    return BoneModel("femur", mesh)
-
-
-@pytest.fixture(scope="module")
-def model() -> RegistrationModel:
-    return RegistrationModel(bumpy())
-
-
-def points_near(model: RegistrationModel, spread_mm: float, n: int = 800) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    return model.points_mm[rng.integers(0, len(model.points_mm), n)] + rng.normal(
-        0.0, spread_mm, (n, 3)
-    )
-
-
-@pytest.mark.parametrize("spread_mm", [0.3, 1.5, 4.0])
-def test_the_look_up_finds_the_nearest_vertex(model: RegistrationModel, spread_mm: float) -> None:
-    points = points_near(model, spread_mm)
-    index, distance = model.nearest(points, 14.0)
-    expected, least = nearest_by_trying_all(points, model.points_mm)
-    near = least <= 14.0
-    # Descent may end beside the nearest one far from the surface; never by much.
-    assert (index == expected)[near].mean() > 0.99
-    assert (distance - least)[near].max() < 0.3
-    own = np.linalg.norm(points - model.points_mm[index], axis=1)
-    np.testing.assert_allclose(distance[near], own[near], rtol=1e-12)
-
-
-def test_beyond_the_radius_nothing_is_near(model: RegistrationModel) -> None:
-    points = points_near(model, 3.0)
-    _, least = nearest_by_trying_all(points, model.points_mm)
-    _, distance = model.nearest(points, 2.0)
-    assert np.isinf(distance[least > 2.0]).all()
-    assert (least > 2.0).any()
-
-
-def test_points_outside_the_grid_have_no_neighbour_within_its_radius(model) -> None:
-    points = np.array([[500.0, 0, 0], [0, -500.0, 0], [0, 0, 900.0], [-31.0, 0.0, 0.0]])
-    _, distance = model.nearest(points, 14.0)
-    assert np.isinf(distance[:3]).all()
-    assert np.isfinite(distance[3])
-
-
-def test_a_large_radius_is_exact_everywhere(model: RegistrationModel) -> None:
-    points = points_near(model, 40.0)
-    index, distance = model.nearest(points, np.inf)
-    _, least = nearest_by_trying_all(points, model.points_mm)
-    np.testing.assert_allclose(distance, least, rtol=1e-12)
-    np.testing.assert_allclose(
-        np.linalg.norm(points - model.points_mm[index], axis=1), least, rtol=1e-12
-    )
-    _, bounded = model.nearest(points, 20.0)
-    assert np.isinf(bounded[least > 20.0]).all()
-    np.testing.assert_allclose(bounded[least < 20.0], least[least < 20.0], rtol=1e-12)
-
-
-@pytest.mark.parametrize("radius_mm", [5.0, np.inf])
-def test_no_point_is_a_valid_question(model: RegistrationModel, radius_mm: float) -> None:
-    index, distance = model.nearest(np.empty((0, 3)), radius_mm)
-    assert len(index) == len(distance) == 0
-
-
-@pytest.mark.parametrize("radius_mm", [5.0, np.inf])
-def test_parts_that_were_cut_away_pair_with_nothing(radius_mm: float) -> None:
-    bone = bumpy()
-    removed = bone.mesh.vertices_mm[:, 0] > 0.0
-    model = RegistrationModel(replace(bone, is_removed=removed))
-    _, distance = model.nearest(bone.mesh.vertices_mm, radius_mm)
-    assert np.isinf(distance[removed]).all()
-    np.testing.assert_allclose(distance[~removed], 0.0, atol=1e-9)
+from tests.registration.shapes import blob, grid_mesh
 
 
 def test_cartilage_moves_the_surface_out_and_widens_its_sigma() -> None:
-    bone = bumpy()
+    bone = blob()
     n = len(bone.mesh.vertices_mm)
     model = RegistrationModel(
         replace(bone, cartilage_mm=np.full(n, 2.0), cartilage_sd_mm=np.full(n, 0.5))
     )
-    np.testing.assert_allclose(
-        model.points_mm, bone.mesh.vertices_mm + 2.0 * bone.mesh.normals, atol=1e-12
-    )
-    np.testing.assert_allclose(model.sigma_mm, np.hypot(0.1, 0.5))
+    expected = bone.mesh.vertices_mm + 2.0 * bone.mesh.normals
+    np.testing.assert_allclose(model.points_mm, expected, atol=1e-12)
+    np.testing.assert_allclose(model.arrays.points, expected, atol=1e-12)
+    np.testing.assert_allclose(model.seen_mesh.vertices_mm, expected, atol=1e-12)
+    np.testing.assert_allclose(model.arrays.sigma, np.hypot(0.1, 0.5))
     np.testing.assert_allclose(model.centre_mm, bone.mesh.centroid_mm)
+
+
+def test_parts_that_were_cut_away_may_not_pair_and_are_not_seen() -> None:
+    bone = blob()
+    removed = bone.mesh.vertices_mm[:, 0] > 10.0
+    model = RegistrationModel(replace(bone, is_removed=removed))
+    np.testing.assert_array_equal(model.arrays.can_pair, ~removed)
+    used = np.unique(model.seen_mesh.faces)
+    assert not removed[used].any()
+    assert len(used) > 0.9 * (~removed).sum()
+
+
+def test_an_open_border_may_not_pair() -> None:
+    mesh = grid_mesh(lambda x, y: 0.01 * x * x + 0.02 * y, 20.0)
+    model = RegistrationModel(BoneModel("plate", mesh))
+    is_rim = np.abs(mesh.vertices_mm[:, :2]).max(axis=1) > 19.9
+    np.testing.assert_array_equal(model.arrays.can_pair, ~is_rim)
+
+
+def test_a_cloud_with_normals_is_a_model_all_of_which_may_pair() -> None:
+    mesh = blob().mesh
+    no_faces = np.empty((0, 3), dtype=np.int32)
+    cloud = TriangleMesh(mesh.vertices_mm, no_faces, mesh.normals)
+    model = RegistrationModel(BoneModel("femur", cloud))
+    assert model.arrays.can_pair.all()
+    rng = np.random.default_rng(3)
+    points = mesh.vertices_mm + rng.normal(0.0, 1.0, mesh.vertices_mm.shape)
+    _, distance = model.nearest(points)
+    _, least = nearest_by_trying_all(points, mesh.vertices_mm)
+    assert (distance - least).max() < 0.3
+    meshed = RegistrationModel(blob())
+    inner = np.abs(model.arrays.bend - meshed.arrays.bend).max(axis=1)
+    assert np.median(inner) < 0.005
+
+
+def test_the_grid_reaches_beyond_the_bone_and_names_the_nearest_vertices() -> None:
+    model = RegistrationModel(blob())
+    arrays = model.arrays
+    last = arrays.origin + arrays.voxel * (np.array(arrays.grid.shape) - 1)
+    assert (arrays.origin <= model.points_mm.min(axis=0) - 14.0).all()
+    assert (last >= model.points_mm.max(axis=0) + 14.0).all()
+    cells = np.random.default_rng(1).integers(0, arrays.grid.shape, (300, 3))
+    centres = arrays.origin + arrays.voxel * cells
+    expected, _ = nearest_by_trying_all(centres, model.points_mm)
+    np.testing.assert_array_equal(arrays.grid[tuple(cells.T)], expected)
+
+
+def test_a_huge_model_gets_larger_voxels_and_not_more_of_them() -> None:
+    mesh = blob().mesh
+    huge = TriangleMesh(1000.0 * mesh.vertices_mm, mesh.faces)
+    arrays = RegistrationModel(BoneModel("femur", huge)).arrays
+    assert arrays.grid.size < 500_000
+    assert arrays.voxel > 100.0
+
+
+def test_the_arrays_are_made_once() -> None:
+    model = RegistrationModel(blob())
+    assert model.arrays is model.arrays

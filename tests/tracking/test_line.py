@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from navapp.geometry.rig import RigQuality
-from navapp.registration.point_to_plane import estimate_at
+from navapp.registration import estimate_at
 from navapp.tracking import Line, LineSettings, LocatorSettings, TrackState
+from navapp.tracking.locator import ON_BONE
 from navapp.values import Prior, Reason, Status
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -159,7 +160,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     pair, _ = line._rectified_pair(frame.left, frame.right, line._rectified(truth))
     pose = rectified_from_left @ truth
     measured = line._meter.freely(pair, pose, line.settings.locator.tracking)
-    inside = estimate_at(measured.cloud, line.model, pose, settings=line.locator.near)
+    inside = estimate_at(measured.scene, line.model, pose, ON_BONE)
     turn = np.kron(np.eye(2), rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15

@@ -86,7 +86,7 @@ class FakeMeter:
 
     def _is_near(self, points_mm: np.ndarray, pose: RigidTransform) -> np.ndarray:
         at_bone = pose.inverse().apply(points_mm)
-        index, distance_mm = MODEL.nearest(at_bone, 14.0)
+        index, distance_mm = MODEL.nearest(at_bone)
         offset_mm = np.einsum("ij,ij->i", at_bone - MODEL.points_mm[index], MODEL.normals[index])
         return np.isfinite(distance_mm) & (np.abs(offset_mm) < self.REACH_MM)
 
@@ -106,7 +106,11 @@ class FakeMeter:
 
     def _measurement(self, points_mm: np.ndarray, stereo_ms: float, share: float) -> Measurement:
         return Measurement(
-            NO_MAP, as_cloud(points_mm, 0.1), LineTimings(stereo_ms=stereo_ms), share
+            NO_MAP,
+            as_cloud(points_mm, 0.1),
+            LineTimings(stereo_ms=stereo_ms),
+            share,
+            11.0,
         )
 
 
@@ -194,7 +198,7 @@ def test_the_baseline_makes_one_matching_and_one_fit(monkeypatch: pytest.MonkeyP
         return fit_icp(*given)
 
     monkeypatch.setattr(module, "fit_icp", spy)
-    monkeypatch.setattr(module, "fit_point_to_plane", None)
+    monkeypatch.setattr(module, "fit_bimcc", None)
     settings = LocatorSettings(method="icp")
     start = moved((0.5, -0.5, 1.0), (1.0, 0.0, 0.0))
     for locate, margins in (
@@ -206,7 +210,7 @@ def test_the_baseline_makes_one_matching_and_one_fit(monkeypatch: pytest.MonkeyP
         fit = locate(locator_of(meter, settings))
         assert (meter.asked, meter.baselines, meter.margins) == (["freely"], [True], [margins])
         assert len(fits) == fit.n_rounds == 1
-        expected = fit_icp(fit.measured.cloud, MODEL, start)
+        expected = fit_icp(fit.measured.scene, MODEL, start)
         np.testing.assert_array_equal(fit.pose.matrix, expected.camera_from_bone.matrix)
 
 

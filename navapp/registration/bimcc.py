@@ -1,0 +1,308 @@
+"""Production BiMCC-ICP: bidirectional maximum correntropy against what one camera can see.
+
+Two loops (docs/registration.md has the equations): from far, thinned points pair both ways and the
+kernel narrows; at rest, all points pair forward under a kernel as narrow as the noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration.bimcc_kernels import (
+    LoopSettings,
+    LoopState,
+    first_sigma_mm,
+    loop_from_far,
+    loop_to_rest,
+)
+from navapp.registration.information import Information, inform
+from navapp.registration.model import RegistrationModel
+from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
+from navapp.registration.scene import Scene
+from navapp.registration.step_kernels import noise_under_kernel_mm2, weigh
+from navapp.values import PoseEstimate, Reason
+
+MIN_POINTS = 60
+# Pairs that are longer than so many widths of the kernel take no part in the figures.
+_REACH_SIGMAS = 4.0
+_NOISE_ROUNDS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class BimccSettings:
+    """How the estimator works.
+
+    Attributes:
+        widest_mm: the kernel at most, and the longest backward pair.
+        narrowest_mm: the kernel at least.
+        n_sigmas: the kernel's width in standard deviations of the noise; at 2.5 it keeps 97 % of
+            the efficiency that least squares has on pure noise, at 1.6 it keeps 88 %.
+        largest_noise_mm: points noisier than this are not expected.
+        backward_share: what all backward pairs weigh beside all forward pairs.
+        point_share: what the whole distance of a pair weighs beside its plane's, from far.
+        model_points: so many model points ask backward, about.
+        max_iterations: of each loop.
+        settled_mm, settled_rad: a smaller step ends the fit.
+    """
+
+    widest_mm: float = 12.0
+    narrowest_mm: float = 0.3
+    n_sigmas: float = 2.5
+    largest_noise_mm: float = 1.0
+    backward_share: float = 1.5
+    point_share: float = 0.1
+    model_points: int = 2500
+    max_iterations: int = 60
+    settled_mm: float = 2e-3
+    settled_rad: float = 2e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitFigures:
+    """Figures of a pose.
+
+    Attributes:
+        information: what the pairs fix, and what they leave free.
+        n_points: pairs within reach of the kernel.
+        inlier_share: of those, within three sigma.
+        rms_mm, expected_rms_mm: weighted residual, and what the points' own sigma predicts.
+        sigma_mm: width of the kernel.
+    """
+
+    information: Information
+    n_points: int
+    inlier_share: float
+    rms_mm: float
+    expected_rms_mm: float
+    sigma_mm: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution:
+    """A pose, and its figures unless too few points pair."""
+
+    estimate: PoseEstimate
+    figures: FitFigures | None
+
+
+def fit_bimcc(
+    scene: Scene,
+    model: RegistrationModel,
+    scene_from_bone: RigidTransform,
+    settings: BimccSettings | None = None,
+) -> PoseEstimate:
+    """Register a model to a scene from a start.
+
+    Args:
+        scene: what was measured.
+        model: prepared bone.
+        scene_from_bone: start.
+        settings: of the estimator.
+
+    Returns:
+        The pose with covariance and reasons; never the start in disguise: when too few points
+        pair, the reasons say so.
+
+    Source: the paper, proposed equations 4 to 9 (corrected), Algorithm 2; Chen and Medioni 1992.
+    """
+    return solve_bimcc(scene, model, scene_from_bone, settings).estimate
+
+
+def solve_bimcc(
+    scene: Scene,
+    model: RegistrationModel,
+    scene_from_bone: RigidTransform,
+    settings: BimccSettings | None = None,
+) -> Solution:
+    """As `fit_bimcc`, with the figures."""
+    work = _Work(scene, model, scene_from_bone, settings or BimccSettings())
+    if len(scene) < MIN_POINTS:
+        return work.nothing(len(scene))
+    far = work.from_far()
+    if not far.has_finished:
+        work.pair(far.sigma_mm)
+        return work.solution(far.iterations, is_converged=False)
+    rest = work.to_rest(far.sigma_mm)
+    return work.solution(far.iterations + rest.iterations, is_converged=rest.has_finished)
+
+
+def approach(
+    scene: Scene,
+    model: RegistrationModel,
+    scene_from_bone: RigidTransform,
+    settings: BimccSettings,
+) -> RigidTransform | None:
+    """The loop from far alone: where a start leads to, on thinned points; None to nowhere."""
+    work = _Work(scene, model, scene_from_bone, settings)
+    return work.pose if work.from_far().has_finished else None
+
+
+def estimate_at(
+    scene: Scene,
+    model: RegistrationModel,
+    scene_from_bone: RigidTransform,
+    settings: BimccSettings | None = None,
+) -> PoseEstimate:
+    """How well a pose fits a scene, without moving it."""
+    return solution_at(scene, model, scene_from_bone, settings or BimccSettings()).estimate
+
+
+def solution_at(
+    scene: Scene,
+    model: RegistrationModel,
+    pose: RigidTransform,
+    settings: BimccSettings,
+    iterations: int = 0,
+    *,
+    is_converged: bool = True,
+) -> Solution:
+    """A pose as the solution of some solver, with its figures."""
+    work = _Work(scene, model, pose, settings)
+    if len(scene) < MIN_POINTS:
+        return work.nothing(len(scene))
+    work.pair(0.0)
+    return work.solution(iterations, is_converged=is_converged)
+
+
+def bone_from_scene(pose: RigidTransform) -> tuple[FloatArray, FloatArray]:
+    """(3, 3) rotation and (3,) translation in mm of the inverse, as the kernels take them."""
+    inverse = pose.inverse()
+    return np.array(inverse.rotation), np.array(inverse.translation_mm)
+
+
+class _Work:
+    """Buffers and pose of one fit; the loops work in the bone's frame, where the model rests."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        model: RegistrationModel,
+        scene_from_bone: RigidTransform,
+        settings: BimccSettings,
+    ) -> None:
+        self._scene, self._model, self._start = scene, model, scene_from_bone
+        self._settings = settings
+        self._rotation, self._shift = bone_from_scene(scene_from_bone)
+        self._has_moved = False
+        self._model_every = max(1, len(model.points_mm) // settings.model_points)
+        n_backward = len(model.points_mm) // self._model_every + 1
+        self._pairs = make_pairs(max(len(scene), len(scene) // scene.every + 1 + n_backward))
+        self._n, self._sigma_mm = 0, 0.0
+
+    @property
+    def pose(self) -> RigidTransform:
+        """`scene_from_bone` as it stands."""
+        if not self._has_moved:
+            return self._start
+        inverse = RigidTransform.from_parts(
+            self._start.source, self._start.target, self._rotation, self._shift
+        )
+        return inverse.inverse()
+
+    def from_far(self) -> LoopState:
+        """Thinned, both ways; not at all when the start is near."""
+        arrays, model, settings = self._scene.arrays, self._model.arrays, self._loop_settings()
+        sigma_mm = first_sigma_mm(arrays, model, self._rotation, self._shift, self._pairs, settings)
+        if sigma_mm <= settings.narrowest_mm:
+            return LoopState(0, sigma_mm > 0.0, sigma_mm, 0, 0.0)
+        state: LoopState = loop_from_far(
+            arrays, self._scene.grid, model, self._rotation, self._shift, self._pairs, sigma_mm,
+            settings,
+        )  # fmt: skip
+        self._has_moved = True
+        return state
+
+    def to_rest(self, sigma_mm: float) -> LoopState:
+        """All points, forward."""
+        state: LoopState = loop_to_rest(
+            self._scene.arrays, self._model.arrays, self._rotation, self._shift, self._pairs,
+            sigma_mm, self._settings.settled_rad, self._settings.settled_mm, self._loop_settings(),
+        )  # fmt: skip
+        self._has_moved = True
+        self._n, self._sigma_mm = state.n_pairs, state.sigma_mm
+        return state
+
+    def pair(self, sigma_mm: float) -> None:
+        """Pair all points forward where the pose stands."""
+        arrays, model = self._scene.arrays, self._model.arrays
+        rotation, shift = self._rotation, self._shift
+        camera = rotation @ arrays.camera + shift
+        self._n = pair_forward(arrays, model, rotation, shift, camera, 1, self._pairs)
+        measure_pairs(arrays, model, rotation, shift, camera, self._pairs, 0, self._n)
+        self._sigma_mm = sigma_mm
+
+    def solution(self, iterations: int, *, is_converged: bool) -> Solution:
+        """The pose with the figures of its measured pairs."""
+        figures = self._figures() if self._n else None
+        if figures is None or figures.n_points < MIN_POINTS:
+            return self.nothing(0 if figures is None else figures.n_points, iterations)
+        reasons = [] if is_converged else [Reason.NOT_CONVERGED]
+        reasons += [Reason.DEGENERATE] * figures.information.is_degenerate
+        estimate = PoseEstimate(
+            self.pose,
+            figures.information.covariance,
+            figures.n_points,
+            figures.inlier_share,
+            figures.rms_mm,
+            figures.expected_rms_mm,
+            iterations,
+            is_converged,
+            tuple(reasons),
+        )
+        return Solution(estimate, figures)
+
+    def nothing(self, n_points: int, iterations: int = 0) -> Solution:
+        """The solution that says so when too few points pair."""
+        estimate = PoseEstimate(
+            self.pose, np.diag([np.inf] * 6), n_points, 0.0, np.inf, np.inf, iterations, False,
+            (Reason.TOO_FEW_POINTS,),
+        )  # fmt: skip
+        return Solution(estimate, None)
+
+    def _figures(self) -> FitFigures | None:
+        """Weights and information of the pairs; None when none is within reach."""
+        pairs, n, settings = self._pairs, self._n, self._settings
+        sigma_mm, noise_mm2 = settings.narrowest_mm, 0.0
+        if not self._scene.knows_noise:
+            sigma_mm, noise_mm2 = self._own_noise()
+        distance = np.hypot(pairs.residual[:n], pairs.excess[:n])
+        deviation = np.sqrt(pairs.variance[:n] + noise_mm2)
+        width = np.maximum(sigma_mm, settings.n_sigmas * deviation)
+        is_near = distance < _REACH_SIGMAS * width
+        n_near = int(is_near.sum())
+        if n_near == 0:
+            return None
+        sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, noise_mm2)
+        pairs.weight[:n] *= is_near
+        return FitFigures(
+            inform(pairs, n, self.pose, self._model.centre_mm, self._scene.sharing),
+            n_near,
+            float((distance < 3.0 * deviation)[is_near].mean()),
+            float(np.sqrt(sums.squares_mm2 / sums.kernels)),
+            float(np.sqrt(sums.variances_mm2 / sums.kernels)),
+            sigma_mm,
+        )
+
+    def _own_noise(self) -> tuple[float, float]:
+        """Width of the kernel and variance of the noise that agree with each other."""
+        settings = self._settings
+        widest_mm = settings.n_sigmas * settings.largest_noise_mm
+        sigma_mm, noise_mm2 = self._sigma_mm or widest_mm, 0.0
+        for _ in range(_NOISE_ROUNDS):
+            sums = weigh(self._pairs, self._n, sigma_mm, settings.n_sigmas, 0.0)
+            noise_mm2 = float(noise_under_kernel_mm2(sums.squares_mm2, sums.kernels, sigma_mm))
+            wanted_mm = settings.n_sigmas * noise_mm2**0.5
+            wanted_mm = min(max(wanted_mm, settings.narrowest_mm), widest_mm)
+            if abs(wanted_mm - sigma_mm) < 0.02 * sigma_mm:
+                break
+            sigma_mm = wanted_mm
+        return sigma_mm, noise_mm2
+
+    def _loop_settings(self) -> LoopSettings:
+        settings = self._settings
+        return LoopSettings(
+            settings.widest_mm, settings.narrowest_mm, settings.n_sigmas,
+            settings.largest_noise_mm, self._scene.knows_noise, settings.backward_share,
+            settings.point_share, self._scene.every, self._model_every, settings.max_iterations,
+        )  # fmt: skip

@@ -1,0 +1,90 @@
+"""What the pairs fix and what they leave free: covariance and degeneracy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration.pairing_kernels import Pairs
+from navapp.registration.step_kernels import FREE_SHARE, plane_system, weighted_centre
+
+_SINGULAR_SHARE = 1e-9
+# A free direction turns when this much of it, in levers, is rotation; else it is a translation.
+_TURN_SHARE = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Information:
+    """How well a scene fixes a pose.
+
+    Attributes:
+        covariance: (6, 6) of the public twist (translation mm, rotation rad; from the left, about
+            the model's centre); infinite when a direction is not fixed at all.
+        free: (K, 6) directions that are not fixed, as twists about the seen surface's centre in
+            levers: unit vectors, translation first, in the scene's frame.
+        lever_mm: rms distance of the seen surface from its centre.
+    """
+
+    covariance: FloatArray
+    free: FloatArray
+    lever_mm: float
+
+    @property
+    def is_degenerate(self) -> bool:
+        """Whether some direction is free."""
+        return len(self.free) > 0
+
+    def free_in_words(self) -> list[str]:
+        """The free directions for people: rotations first, as many as there are, then shifts."""
+        if not self.is_degenerate:
+            return []
+        # Mixed so that the rotations stand in as few directions as can be.
+        mixing, turns, _ = np.linalg.svd(self.free[:, 3:])
+        mixed = mixing.T @ self.free
+        is_turn = np.append(turns, np.zeros(len(mixed)))[: len(mixed)] > _TURN_SHARE
+        return [
+            f"rotation about {_axis(twist[3:])}"
+            if turning
+            else f"translation along {_axis(twist[:3])}"
+            for twist, turning in zip(mixed, is_turn, strict=True)
+        ]
+
+
+def inform(
+    pairs: Pairs, n: int, pose: RigidTransform, centre_mm: FloatArray, sharing: float
+) -> Information:
+    """Information of weighted pairs about a pose.
+
+    Args:
+        pairs: weighted by kernel over variance, in bone coordinates; first n hold.
+        n: how many.
+        pose: `scene_from_bone`.
+        centre_mm: (3,) of the model, bone coordinates.
+        sharing: so many pairs have their errors in common.
+
+    Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
+    """
+    H, g, seen_mm = np.empty((6, 6)), np.empty(6), np.empty(3)
+    lever_mm = float(weighted_centre(pairs, n, seen_mm))
+    plane_system(pairs, n, seen_mm, lever_mm, H, g)
+    eigenvalues, vectors = np.linalg.eigh(H)
+    is_free = eigenvalues < FREE_SHARE * eigenvalues[-1]
+    # (rotation x lever, translation) of the points become (translation, rotation) of the pose.
+    turned = np.zeros((6, 6))
+    turned[:3, 3:] = turned[3:, :3] = pose.rotation
+    free = (turned @ vectors[:, is_free]).T
+    if eigenvalues[0] <= _SINGULAR_SHARE * eigenvalues[-1]:
+        return Information(np.diag([np.inf] * 6), free, lever_mm)
+    plane_system(pairs, n, np.ascontiguousarray(centre_mm), lever_mm, H, g)
+    levers = np.diag([1.0, 1.0, 1.0, 1.0 / lever_mm, 1.0 / lever_mm, 1.0 / lever_mm])
+    change = levers @ turned
+    covariance = sharing * change @ np.linalg.inv(H) @ change.T
+    return Information(0.5 * (covariance + covariance.T), free, lever_mm)
+
+
+def _axis(vector: FloatArray) -> str:
+    """Direction of a vector, its largest component positive."""
+    axis = vector / np.linalg.norm(vector)
+    axis = axis * np.sign(axis[np.abs(axis).argmax()])
+    x, y, z = (round(float(value), 2) + 0.0 for value in axis)
+    return f"({x:g}, {y:g}, {z:g})"

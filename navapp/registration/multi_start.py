@@ -1,0 +1,133 @@
+"""Many starts, one answer: tilted starts, coarse approaches, distinct candidates, agreement."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from navapp.geometry.bands import run_both
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration.bimcc import BimccSettings, approach, bone_from_scene
+from navapp.registration.coverage import coverage
+from navapp.registration.model import RegistrationModel
+from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
+from navapp.registration.scene import Scene
+from navapp.registration.step_kernels import weigh
+
+# Poses nearer than this are the same answer.
+_SAME_MM = 2.0
+_SAME_RAD = 0.035
+_COARSE_POINTS = 400
+_COARSE = BimccSettings(model_points=1000, max_iterations=35)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """Where some start led to, coarsely, and how much of both sides that explains (0 to 1)."""
+
+    scene_from_bone: RigidTransform
+    score: float
+
+
+def tilted_starts(
+    pose: RigidTransform, centre_mm: FloatArray, tilt_deg: float = 35.0, n_tilts: int = 14
+) -> list[RigidTransform]:
+    """The pose and tilts of it, axes spread over the sphere.
+
+    Args:
+        pose: `scene_from_bone`.
+        centre_mm: (3,) what it is tilted about, in the scene's frame.
+        tilt_deg: angle of each tilt.
+        n_tilts: how many.
+    """
+    starts = [pose]
+    for axis in _sphere_axes(n_tilts):
+        twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
+        starts.append(pose.moved(twist, centre_mm))
+    return starts
+
+
+def find_candidates(
+    scene: Scene,
+    model: RegistrationModel,
+    starts: Sequence[RigidTransform],
+    score: Callable[[RigidTransform], float] | None = None,
+    on_progress: Callable[[float], None] = lambda share: None,
+) -> list[Candidate]:
+    """Approach from every start on a thinned scene; distinct answers, best score first.
+
+    Args:
+        scene: what was measured.
+        model: prepared bone.
+        starts: `scene_from_bone` each.
+        score: of a pose, larger is better; by default `explained_share`.
+        on_progress: told the share done; may raise to cancel.
+    """
+    thinned = replace(scene, thinned_to=_COARSE_POINTS)
+    _ = thinned.grid, model.arrays  # made here once, not in both threads
+    found: list[RigidTransform | None] = [None] * len(starts)
+
+    def run(first: int) -> None:
+        for number in range(first, len(starts), 2):
+            if first == 0:
+                on_progress(number / len(starts))
+            found[number] = approach(thinned, model, starts[number], _COARSE)
+
+    run_both(lambda: run(0), lambda: run(1))
+    on_progress(1.0)
+    poses = distinct([pose for pose in found if pose is not None], model.centre_mm)
+    judged = score or (lambda pose: explained_share(thinned, model, pose))
+    candidates = [Candidate(pose, judged(pose)) for pose in poses]
+    return sorted(candidates, key=lambda candidate: candidate.score, reverse=True)
+
+
+def explained_share(
+    scene: Scene,
+    model: RegistrationModel,
+    scene_from_bone: RigidTransform,
+    settings: BimccSettings | None = None,
+) -> float:
+    """How much a pose explains: share of the scene on the model x share of the model in the scene.
+
+    Both under a kernel as wide as the largest noise, so that poses compare. Without a camera the
+    second is left out.
+    """
+    settings = settings or BimccSettings()
+    sigma_mm = 0.5 * settings.n_sigmas * settings.largest_noise_mm
+    rotation, shift = bone_from_scene(scene_from_bone)
+    arrays = scene.arrays
+    n_asked = len(range(0, len(scene), scene.every))
+    pairs = make_pairs(n_asked)
+    camera = rotation @ arrays.camera + shift
+    n = pair_forward(arrays, model.arrays, rotation, shift, camera, scene.every, pairs)
+    measure_pairs(arrays, model.arrays, rotation, shift, camera, pairs, 0, n)
+    kernels: float = weigh(pairs, n, sigma_mm, settings.n_sigmas, 0.0).kernels
+    share = kernels / max(n_asked, 1)
+    if scene.camera_mm is None:
+        return share
+    return share * coverage(scene, model, scene_from_bone, sigma_mm)
+
+
+def distinct(poses: Sequence[RigidTransform], centre_mm: FloatArray) -> list[RigidTransform]:
+    """Without those that repeat an earlier one; `centre_mm` (3,) in the bone's frame."""
+    kept: list[RigidTransform] = []
+    for pose in poses:
+        if not any(is_same_pose(pose, other, centre_mm) for other in kept):
+            kept.append(pose)
+    return kept
+
+
+def is_same_pose(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> bool:
+    """Whether two answers differ by less than a fit's basin."""
+    shift = float(np.linalg.norm(a.apply(centre_mm) - b.apply(centre_mm)))
+    turn = float(np.linalg.norm(a.rotation - b.rotation)) / np.sqrt(2.0)
+    return shift < _SAME_MM and turn < _SAME_RAD
+
+
+def _sphere_axes(n: int) -> FloatArray:
+    """(n, 3) unit vectors of a golden spiral."""
+    k = np.arange(n) + 0.5
+    z = 1.0 - 2.0 * k / max(n, 1)
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * k
+    radius = np.sqrt(np.maximum(0.0, 1.0 - z * z))
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])

@@ -1,0 +1,212 @@
+"""One registration from start to verdict: what `navapp register` answers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from itertools import chain
+from typing import Literal
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration.bimcc import (
+    MIN_POINTS,
+    BimccSettings,
+    FitFigures,
+    Solution,
+    solution_at,
+    solve_bimcc,
+)
+from navapp.registration.coverage import coverage
+from navapp.registration.model import RegistrationModel
+from navapp.registration.multi_start import (
+    explained_share,
+    find_candidates,
+    is_same_pose,
+    tilted_starts,
+)
+from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
+from navapp.registration.scene import Scene
+from navapp.values import PoseEstimate, Reason
+
+Method = Literal["bimcc", "bimcc-literal", "icp"]
+
+# With a camera, right answers cover more than 0.9 of what should be seen on an open bone.
+_DOUBTFUL_COVERAGE = 0.85
+_LEAST_COVERAGE = 0.25
+# A kernel this near to its upper bound never found the noise: residuals are something else.
+_MISFIT_SHARE = 0.95
+# Residuals so much larger than the points' own sigma lets expect are no noise either.
+_MISFIT_RATIO = 1.5
+_N_REFINED = 3
+# Tilts that leave no orientation far from a start.
+_RINGS_DEG = (35.0, 70.0, 105.0, 140.0, 175.0)
+# Candidates that explain less than this share of the best are not refined ...
+_REFINED_SHARE = 0.6
+# ... and a different one that explains as much as this makes the best one a guess.
+_AMBIGUOUS_SHARE = 0.9
+
+
+class Outcome(Enum):
+    """What became of a registration."""
+
+    CONVERGED = "CONVERGED"
+    DEGENERATE = "DEGENERATE"
+    FAILED = "FAILED"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Registration:
+    """A registered pose and what is to be thought of it.
+
+    Attributes:
+        outcome: only CONVERGED is a registration.
+        reasons: why it is not, in words for people.
+        estimate: the pose, `scene_from_bone`.
+        coverage: share of the model facing the camera that has the scene's surface on it; None
+            without a camera.
+        n_starts: so many starts were tried.
+    """
+
+    outcome: Outcome
+    reasons: tuple[str, ...]
+    estimate: PoseEstimate
+    coverage: float | None
+    n_starts: int
+
+
+def register(
+    scene: Scene,
+    model: RegistrationModel,
+    start: RigidTransform,
+    method: Method = "bimcc",
+    *,
+    is_global: bool = False,
+    on_progress: Callable[[float], None] = lambda share: None,
+) -> Registration:
+    """Register a model to a scene, check the answer, and try tilted starts when it is doubtful.
+
+    Args:
+        scene: what was measured.
+        model: prepared bone.
+        start: rough `scene_from_bone`.
+        method: production, or one of the paper's for comparison (from the start alone).
+        is_global: try the tilted starts in any case; when they leave doubt, centre the model on
+            the scene and tilt it all around.
+        on_progress: told the share done; may raise to cancel.
+    """
+    if method != "bimcc":
+        fit = fit_icp if method == "icp" else fit_bimcc_literal
+        return _verdict(scene, model, _with_figures(scene, model, fit(scene, model, start)), 1)
+    alone = _verdict(scene, model, solve_bimcc(scene, model, start), 1)
+    if len(scene) < MIN_POINTS or not (is_global or _is_doubtful(alone)):
+        return alone
+    middle_mm = np.median(scene.points_mm, axis=0)  # a stray point far away must not move it
+    near = tilted_starts(start, middle_mm)
+    first_part = 0.2 if is_global else 1.0
+    best = _from_many(scene, model, near, alone, lambda share: on_progress(first_part * share))
+    if is_global and _is_doubtful(best):
+        shift = middle_mm - start.apply(np.median(model.points_mm, axis=0))
+        centred = start.moved(np.concatenate([shift, np.zeros(3)]), np.zeros(3))
+        rings = [tilted_starts(centred, middle_mm, tilt_deg)[1:] for tilt_deg in _RINGS_DEG]
+        far = [centred, *chain.from_iterable(rings)]
+        best = _from_many(
+            scene, model, far, best, lambda share: on_progress(first_part + 0.8 * share)
+        )
+    on_progress(1.0)
+    return best
+
+
+def _from_many(
+    scene: Scene,
+    model: RegistrationModel,
+    starts: list[RigidTransform],
+    known: Registration,
+    on_progress: Callable[[float], None],
+) -> Registration:
+    """The best of what is known and of what many starts lead to; a guess is called one."""
+    candidates = find_candidates(scene, model, starts, on_progress=on_progress)
+    least = _REFINED_SHARE * max((candidate.score for candidate in candidates), default=0.0)
+    n_starts = known.n_starts + len(starts)
+    tried = [known]
+    for candidate in candidates[:_N_REFINED]:
+        if candidate.score >= least:
+            solution = solve_bimcc(scene, model, candidate.scene_from_bone)
+            tried.append(_verdict(scene, model, solution, n_starts))
+    scores = [explained_share(scene, model, one.estimate.camera_from_bone) for one in tried]
+    best = int(np.argmax(scores))
+    rivals = [
+        score
+        for score, one in zip(scores, tried, strict=True)
+        if not is_same_pose(
+            one.estimate.camera_from_bone,
+            tried[best].estimate.camera_from_bone,
+            model.centre_mm,
+        )
+    ]
+    answer = replace(tried[best], n_starts=n_starts)
+    is_guess = 0.0 < _AMBIGUOUS_SHARE * scores[best] <= max(rivals, default=0.0)
+    # Along a free direction every pose fits as well: that is said already.
+    if not is_guess or answer.outcome is Outcome.DEGENERATE:
+        return answer
+    reasons = tuple(dict.fromkeys((*answer.reasons, Reason.AMBIGUOUS.value)))
+    return replace(answer, outcome=Outcome.FAILED, reasons=reasons)
+
+
+def _is_doubtful(answer: Registration) -> bool:
+    if answer.outcome is Outcome.FAILED:
+        return True
+    return answer.coverage is not None and answer.coverage < _DOUBTFUL_COVERAGE
+
+
+def _with_figures(scene: Scene, model: RegistrationModel, estimate: PoseEstimate) -> Solution:
+    """The answer of a solver that looks at points only, judged as every other."""
+    return solution_at(
+        scene, model, estimate.camera_from_bone, BimccSettings(), estimate.iterations,
+        is_converged=estimate.is_converged,
+    )  # fmt: skip
+
+
+def _verdict(
+    scene: Scene, model: RegistrationModel, solution: Solution, n_starts: int
+) -> Registration:
+    """Outcome and reasons of a solution."""
+    estimate, figures = solution.estimate, solution.figures
+    if figures is None:
+        why = tuple(reason.value for reason in estimate.reasons)
+        return Registration(Outcome.FAILED, why, estimate, None, n_starts)
+    seen = None
+    if scene.camera_mm is not None:
+        seen = coverage(scene, model, estimate.camera_from_bone, figures.sigma_mm)
+    faults = _faults(scene, estimate, figures, seen)
+    free = [f"not fixed: {words}" for words in figures.information.free_in_words()]
+    outcome = Outcome.FAILED if faults else Outcome.DEGENERATE if free else Outcome.CONVERGED
+    reasons = faults + [Reason.DEGENERATE.value] * bool(free) + free
+    return Registration(outcome, tuple(reasons), estimate, seen, n_starts)
+
+
+def _faults(
+    scene: Scene, estimate: PoseEstimate, figures: FitFigures, seen: float | None
+) -> list[str]:
+    """What makes an estimate no registration."""
+    settings = BimccSettings()
+    faults = [] if estimate.is_converged else [Reason.NOT_CONVERGED.value]
+    widest_mm = settings.n_sigmas * settings.largest_noise_mm
+    if scene.knows_noise:
+        is_misfit = figures.rms_mm > _MISFIT_RATIO * figures.expected_rms_mm
+    else:
+        is_misfit = figures.sigma_mm >= _MISFIT_SHARE * widest_mm
+    faults += [Reason.SURFACE_MISFIT.value] * is_misfit
+    if seen is not None and seen < _LEAST_COVERAGE:
+        faults.append(Reason.COVERAGE_LOW.value)
+    return faults
+
+
+def visible_points(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:
+    """(N, 3) model points, bone coordinates, that face the scene's camera; all without one."""
+    if scene.camera_mm is None:
+        return model.points_mm
+    towards = pose.inverse().apply(scene.camera_mm) - model.points_mm
+    cosine = np.einsum("ij,ij->i", model.normals, towards) / np.linalg.norm(towards, axis=1)
+    facing: FloatArray = model.points_mm[cosine > 0.2]
+    return facing

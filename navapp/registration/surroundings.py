@@ -1,0 +1,102 @@
+"""What lies around each model point: neighbours, open borders, and how the surface bends."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray
+
+_MAX_NEIGHBOURS = 12
+_CLOUD_NEIGHBOURS = 8
+# A radius of curvature below so many spacings is a crease or noise, not a surface that bends.
+_TIGHTEST_RADIUS = 1.5
+
+
+def neighbour_table(
+    points_mm: FloatArray, faces: NDArray[np.int32], tree: Any
+) -> NDArray[np.int32]:
+    """(V, K) vertices beside each vertex, padded with -1.
+
+    Along the edges of a mesh; the nearest ones, made mutual, for vertices that no edge touches.
+
+    Args:
+        points_mm: (V, 3).
+        faces: (F, 3), none for a cloud.
+        tree: of the points.
+    """
+    n = len(points_mm)
+    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    is_alone = np.ones(n, dtype=bool)
+    is_alone[faces.ravel()] = False
+    alone = np.flatnonzero(is_alone)
+    if len(alone):
+        _, index = tree.query(points_mm[alone], k=min(_CLOUD_NEIGHBOURS + 1, n))
+        index = np.asarray(index).reshape(len(alone), -1)
+        near = np.column_stack([np.repeat(alone, index.shape[1]), index.ravel()])
+        pairs = np.concatenate([pairs, near[near[:, 0] != near[:, 1]]])
+    pairs = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
+    starts = np.searchsorted(pairs[:, 0], np.arange(n + 1))
+    rank = np.arange(len(pairs)) - starts[pairs[:, 0]]
+    table = np.full((n, _MAX_NEIGHBOURS), -1, dtype=np.int32)
+    kept = rank < _MAX_NEIGHBOURS
+    table[pairs[kept, 0], rank[kept]] = pairs[kept, 1]
+    return table
+
+
+def open_border(n_points: int, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """(V,) vertices on an edge of one triangle only: there the model ends, not the bone."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    is_border = np.zeros(n_points, dtype=bool)
+    is_border[unique[counts == 1].ravel()] = True
+    return is_border
+
+
+def bend(
+    points_mm: FloatArray, normals: FloatArray, neighbours: NDArray[np.int32]
+) -> tuple[FloatArray, FloatArray]:
+    """How the normal turns around each vertex, and how far its neighbours are.
+
+    The symmetric matrix B that best explains the neighbours' normals, n_j - n_i = B (p_j - p_i), in
+    the tangent plane of i: the second fundamental form.
+
+    Returns:
+        (V, 6) entries xx, yy, zz, xy, xz, yz of B in 1/mm, and (V,) mean distance in mm.
+    """
+    is_there = neighbours >= 0
+    index = np.where(is_there, neighbours, 0)
+    offset = np.where(is_there[..., None], points_mm[index] - points_mm[:, None], 0.0)
+    turned = np.where(is_there[..., None], normals[index] - normals[:, None], 0.0)
+    n_there = np.maximum(is_there.sum(axis=1), 1)
+    spacing = np.linalg.norm(offset, axis=2).sum(axis=1) / n_there
+    u, v = _tangents(normals)
+    a, b = np.einsum("vkc,vc->vk", offset, u), np.einsum("vkc,vc->vk", offset, v)
+    p, q = np.einsum("vkc,vc->vk", turned, u), np.einsum("vkc,vc->vk", turned, v)
+    # Unknowns (Buu, Buv, Bvv) of p = Buu a + Buv b and q = Buv a + Bvv b.
+    aa, ab, bb = (a * a).sum(1), (a * b).sum(1), (b * b).sum(1)
+    system = np.zeros((len(points_mm), 3, 3))
+    system[:, 0, 0], system[:, 0, 1], system[:, 1, 0] = aa, ab, ab
+    system[:, 1, 1] = aa + bb
+    system[:, 1, 2], system[:, 2, 1], system[:, 2, 2] = ab, ab, bb
+    system += (1e-6 * (aa + bb) + 1e-12)[:, None, None] * np.eye(3)
+    right = np.stack([(p * a).sum(1), (p * b + q * a).sum(1), (q * b).sum(1)], axis=1)
+    form = np.linalg.solve(system, right[..., None])[..., 0]
+    steepest = np.abs(form).max(axis=1)
+    bound = 1.0 / (_TIGHTEST_RADIUS * np.maximum(spacing, 1e-9))
+    form *= np.minimum(1.0, bound / np.maximum(steepest, 1e-9))[:, None]
+    outer = (
+        form[:, 0, None, None] * u[:, :, None] * u[:, None, :]
+        + form[:, 1, None, None] * (u[:, :, None] * v[:, None, :] + v[:, :, None] * u[:, None, :])
+        + form[:, 2, None, None] * v[:, :, None] * v[:, None, :]
+    )
+    rows, columns = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
+    return np.ascontiguousarray(outer[:, rows, columns]), spacing
+
+
+def _tangents(normals: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors across each normal and across each other."""
+    least = np.abs(normals).argmin(axis=1)
+    u = np.cross(normals, np.eye(3)[least])
+    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-300)
+    return u, np.cross(normals, u)

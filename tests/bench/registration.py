@@ -1,0 +1,228 @@
+"""Registration of bones in clutter: success, error and time, beside Open3D and small_gicp.
+
+usage: python -m tests.bench.registration [FOLDER] [--seeds N] [--vertices N] [--no-peers] [--lists]
+
+Every method is given the same clouds and the same start; a peer's row is its best setting. With
+--lists the peers also get the list of starts that navapp tries (slow).
+"""
+
+import argparse
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "2")
+
+import numpy as np
+
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import (
+    Outcome,
+    RegistrationModel,
+    Scene,
+    fit_bimcc,
+    fit_bimcc_literal,
+    fit_icp,
+    register,
+    tilted_starts,
+)
+from tests.bench.registration_peers import Answer, Peer, peers
+from tests.bench.registration_scenes import (
+    BONES,
+    Bone,
+    Clouded,
+    error_mm,
+    information_limit_mm,
+    load_bone,
+    scenes,
+)
+
+_STARTS = ((5.0, 5.0), (10.0, 8.0), (25.0, 15.0), (45.0, 20.0))
+_SUCCESS_MM, _SILENT_MM = 1.0, 2.0
+_NEAR_MM = 2.0
+
+
+@dataclass
+class Row:
+    """What one method reached on all scenes of one start."""
+
+    errors_mm: list[float] = field(default_factory=list)
+    ms: list[float] = field(default_factory=list)
+    by_bone: dict[str, list[float]] = field(default_factory=dict)
+    n_silent: int = 0
+    n_unsaid: int = 0
+
+    def add(self, bone: str, error: float, ms: float, outcome: Outcome | None = None) -> None:
+        """One run; peers have no outcome."""
+        self.errors_mm.append(error)
+        self.ms.append(ms)
+        self.by_bone.setdefault(bone, []).append(error)
+        self.n_silent += outcome is Outcome.CONVERGED and error > _SILENT_MM
+        is_doubted = outcome is not None and outcome is not Outcome.CONVERGED
+        self.n_unsaid += is_doubted and error < _SUCCESS_MM
+
+    @property
+    def success(self) -> float:
+        """Share below 1 mm."""
+        return float((np.array(self.errors_mm) < _SUCCESS_MM).mean())
+
+    @property
+    def tre_mm(self) -> float:
+        """Median error of the successes."""
+        right = [error for error in self.errors_mm if error < _SUCCESS_MM]
+        return float(np.median(right)) if right else float("nan")
+
+
+Method = Callable[[Clouded, RegistrationModel], tuple[RigidTransform, Outcome | None]]
+
+
+def main() -> None:
+    """Print the tables."""
+    options = _options()
+    bones = [
+        load_bone(Path(options.folder) / "bones" / "pymskt", name, options.vertices)
+        for name in BONES
+    ]
+    print(f"model of {options.vertices} vertices, {options.seeds} seeds a bone; "
+          "success | TRE of successes mm | ms")  # fmt: skip
+    limit = [
+        information_limit_mm(bone, scene)
+        for bone in bones
+        for scene in scenes(bone, 5.0, 5.0, options.seeds)
+    ]
+    print(f"information limit: {np.median(limit):.3f} mm median, "
+          f"{np.percentile(limit, 95):.3f} at 95 %")  # fmt: skip
+    families = {} if options.no_peers else peers()
+    for turn, shift in _STARTS:
+        print(f"from {turn:g} deg / {shift:g} mm")
+        for name, method in _own().items():
+            if name in _SLOW and options.seeds > 10:
+                _print(name, _run(bones, method, turn, shift, 10))
+            else:
+                _print(name, _run(bones, method, turn, shift, options.seeds))
+        for family, settings in families.items():
+            _best(family, settings, bones, turn, shift, options.seeds)
+            if options.lists and turn >= 25.0:
+                _lists(family, settings, bones, turn, shift, options.seeds)
+
+
+_SLOW = ("bimcc-literal", "icp")
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "folder", nargs="?", default=os.environ.get("NAVAPP_DATA", "../shared/data")
+    )
+    parser.add_argument("--seeds", type=int, default=50)
+    parser.add_argument("--vertices", type=int, default=7000, help="of the model; 1500 is coarse")
+    parser.add_argument("--no-peers", action="store_true")
+    parser.add_argument(
+        "--lists", action="store_true", help="peers get navapp's list of starts too"
+    )
+    return parser.parse_args()
+
+
+def _own() -> dict[str, Method]:
+    def once(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        return fit_bimcc(_seen(scene), model, scene.start).camera_from_bone, None
+
+    def checked(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        found = register(_seen(scene), model, scene.start)
+        return found.estimate.camera_from_bone, found.outcome
+
+    def many(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        found = register(_seen(scene), model, scene.start, is_global=True)
+        return found.estimate.camera_from_bone, found.outcome
+
+    def literal(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        return fit_bimcc_literal(_seen(scene), model, scene.start).camera_from_bone, None
+
+    def plain(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        return fit_icp(_seen(scene), model, scene.start).camera_from_bone, None
+
+    return {
+        "bimcc, the loops alone": once,
+        "bimcc (doubtful answers are tried again)": checked,
+        "bimcc --global": many,
+        "bimcc-literal": literal,
+        "icp": plain,
+    }
+
+
+def _seen(scene: Clouded) -> Scene:
+    return Scene(scene.points_mm, camera_mm=scene.camera_mm)
+
+
+def _run(bones: list[Bone], method: Method, turn: float, shift: float, n_seeds: int) -> Row:
+    row = Row()
+    for bone in bones:
+        for scene in scenes(bone, turn, shift, n_seeds):
+            began = time.perf_counter()
+            pose, outcome = method(scene, bone.model)
+            ms = 1e3 * (time.perf_counter() - began)
+            row.add(bone.name, error_mm(bone, pose, scene), ms, outcome)
+    return row
+
+
+def _as_method(peer: Peer) -> Method:
+    def fit(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        return peer(scene.points_mm, model, scene.start).pose, None
+
+    return fit
+
+
+def _best(
+    family: str, settings: dict[str, Peer], bones: list[Bone], turn: float, shift: float, seeds: int
+) -> None:
+    """The setting of most successes, and of those that mostly succeed the one of least error."""
+    rows = {name: _run(bones, _as_method(peer), turn, shift, seeds)
+            for name, peer in settings.items()}  # fmt: skip
+    widest = max(rows, key=lambda name: rows[name].success)
+    _print(f"{family} ({widest})", rows[widest])
+    useful = [name for name in rows if rows[name].success >= 0.5]
+    if useful:
+        finest = min(useful, key=lambda name: rows[name].tre_mm)
+        if finest != widest:
+            _print(f"{family} ({finest})", rows[finest])
+
+
+def _lists(
+    family: str, settings: dict[str, Peer], bones: list[Bone], turn: float, shift: float, seeds: int
+) -> None:
+    """A peer from all of navapp's starts; the answer with most points on the model counts."""
+    few = {name: _run(bones, _as_method(peer), turn, shift, min(seeds, 5))
+           for name, peer in settings.items()}  # fmt: skip
+    name = max(few, key=lambda setting: few[setting].success)
+    peer = settings[name]
+
+    def fit(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
+        starts = tilted_starts(scene.start, scene.points_mm.mean(axis=0))
+        answers = [peer(scene.points_mm, model, start) for start in starts]
+        return max(answers, key=lambda answer: _on_model(answer, scene, model)).pose, None
+
+    _print(f"{family} ({name}), all starts", _run(bones, fit, turn, shift, seeds))
+
+
+def _on_model(answer: Answer, scene: Clouded, model: RegistrationModel) -> float:
+    _, distance = model.nearest(answer.pose.inverse().apply(scene.points_mm))
+    return float((distance < _NEAR_MM).mean())
+
+
+def _print(name: str, row: Row) -> None:
+    per_bone = " ".join(
+        f"{np.mean(np.array(errors) < _SUCCESS_MM):.2f}" for errors in row.by_bone.values()
+    )
+    silent = (
+        f", {row.n_silent} silent, {row.n_unsaid} right but doubted"
+        if row.n_silent or row.n_unsaid
+        else ""
+    )
+    print(f"  {name:56s} {row.success:.3f} ({per_bone}) | {row.tre_mm:.3f} | "
+          f"{np.median(row.ms):.1f}{silent}", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from navapp.registration.information import inform
+from navapp.registration.pairing_kernels import Pairs, make_pairs
+from navapp.registration.step_kernels import weigh
+from tests.reference import bimcc_reference as reference
+from tests.registration.kernel_cases import POSE, make_case, measured_pairs
+from tests.registration.shapes import ball_mesh, blob_mesh, grid_mesh, tube_mesh
+
+CENTRE = np.array([4.0, -3.0, 8.0])
+# The columns of a surface's own axes in the scene, where a pose turns them.
+AXES = POSE.rotation.T
+
+
+def pairs_on(points: np.ndarray, normals: np.ndarray) -> tuple[Pairs, int]:
+    pairs = make_pairs(len(points))
+    pairs.point[:], pairs.direction[:], pairs.weight[:] = points, normals, 4.0
+    return pairs, len(points)
+
+
+def test_the_covariance_is_the_inverse_of_the_information() -> None:
+    pairs, n, measured, _ = measured_pairs(make_case())
+    weigh(pairs, n, 1.0, 2.5, 0.0)
+    found = inform(pairs, n, POSE, CENTRE, 1.0)
+    expected = np.linalg.inv(reference.twist_information(measured, pairs.weight[:n], POSE, CENTRE))
+    np.testing.assert_allclose(
+        found.covariance, expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max()
+    )
+    np.testing.assert_array_equal(found.covariance, found.covariance.T)
+    assert not found.is_degenerate
+    assert found.free_in_words() == []
+
+
+def test_points_that_share_their_errors_count_as_one() -> None:
+    pairs, n, _, _ = measured_pairs(make_case())
+    weigh(pairs, n, 1.0, 2.5, 0.0)
+    alone = inform(pairs, n, POSE, CENTRE, 1.0).covariance
+    np.testing.assert_allclose(inform(pairs, n, POSE, CENTRE, 9.0).covariance, 9.0 * alone)
+
+
+def test_a_ball_leaves_three_rotations_free() -> None:
+    mesh = ball_mesh(20.0, 1000)
+    found = inform(*pairs_on(mesh.vertices_mm, mesh.vertices_mm / 20.0), POSE, CENTRE, 1.0)
+    assert found.lever_mm == pytest.approx(20.0, rel=1e-3)
+    assert len(found.free) == 3
+    np.testing.assert_allclose(found.free[:, :3], 0.0, atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(found.free, axis=1), 1.0)
+    assert all(words.startswith("rotation about (") for words in found.free_in_words())
+
+
+def test_a_plane_leaves_two_translations_and_a_rotation_free() -> None:
+    points = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3)) * (1.0, 1.0, 0.0)
+    found = inform(*pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0)
+    assert len(found.free) == 3
+    words = sorted(words.split(" (")[0] for words in found.free_in_words())
+    assert words == ["rotation about", "translation along", "translation along"]
+    # Whatever is free keeps the plane where it is: shifts across its normal, turns about it.
+    shifts, turns = found.free[:, :3], found.free[:, 3:]
+    np.testing.assert_allclose(shifts @ AXES[2], 0.0, atol=1e-6)
+    np.testing.assert_allclose(turns @ AXES[:2].T, 0.0, atol=1e-6)
+    assert not np.isfinite(np.diag(found.covariance)).any()
+
+
+def test_a_tube_leaves_a_rotation_and_a_translation_free() -> None:
+    mesh = tube_mesh(20.0, 30.0)
+    found = inform(*pairs_on(mesh.vertices_mm, mesh.normals), POSE, CENTRE, 1.0)
+    assert len(found.free) == 2
+    words = found.free_in_words()
+    assert sorted(w.split(" (")[0] for w in words) == ["rotation about", "translation along"]
+    # Both about the tube's axis, written with its largest component positive.
+    axis = AXES[1] * np.sign(AXES[1][np.abs(AXES[1]).argmax()])
+    x, y, z = (round(float(value), 2) + 0.0 for value in axis)
+    assert {w.split(" (")[1] for w in words} == {f"{x:g}, {y:g}, {z:g})"}
+
+
+def test_a_bone_and_a_bowl_leave_nothing_free_or_a_turn() -> None:
+    bone = blob_mesh()
+    assert not inform(*pairs_on(bone.vertices_mm, bone.normals), POSE, CENTRE, 1.0).is_degenerate
+    bowl = grid_mesh(lambda x, y: 0.02 * (x * x + y * y), 30.0)
+    free = inform(*pairs_on(bowl.vertices_mm, bowl.normals), POSE, CENTRE, 1.0).free
+    assert len(free) == 1
+    np.testing.assert_allclose(np.abs(free[0, 3:] @ AXES[2]), 1.0, atol=1e-3)
+
+
+def test_a_single_point_fixes_one_direction_of_six() -> None:
+    points, normals = np.tile(CENTRE, (80, 1)), np.tile([0.0, 0.0, 1.0], (80, 1))
+    found = inform(*pairs_on(points, normals), POSE, CENTRE, 1.0)
+    assert len(found.free) == 5
+    assert not np.isfinite(np.diag(found.covariance)).any()

@@ -1,0 +1,295 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.registration import Outcome, RegistrationModel, Scene, register, visible_points
+from navapp.values import BoneModel, Reason
+from tests.registration.shapes import (
+    TRUE,
+    ball_mesh,
+    blob,
+    disturbed,
+    facing_points,
+    femur,
+    femur_for_registration,
+    grid_mesh,
+    mean_error_mm,
+    seen_scene,
+    tube_mesh,
+)
+
+BONE = femur()
+MODEL = femur_for_registration()
+EYE = np.zeros(3)
+METHODS = ("bimcc", "icp", "bimcc-literal")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_pose_is_found_from_far_through_clutter(seed: int) -> None:
+    scene = seen_scene(1200, 0.4, seed, n_clutter=800)
+    found = register(scene, MODEL, disturbed(MODEL, 25.0, 15.0, seed))
+    assert found.outcome is Outcome.CONVERGED
+    assert found.reasons == ()
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
+    assert found.coverage is not None
+    assert 0.85 < found.coverage <= 1.0
+    assert found.n_starts in (1, 16)
+
+
+def test_a_good_start_is_the_only_one() -> None:
+    found = register(seen_scene(900, 0.3), MODEL, disturbed(MODEL, 4.0, 3.0, 1))
+    assert found.n_starts == 1
+    everywhere = register(
+        seen_scene(900, 0.3), MODEL, disturbed(MODEL, 4.0, 3.0, 1), is_global=True
+    )
+    assert everywhere.n_starts == 16
+    assert mean_error_mm(everywhere.estimate.camera_from_bone, BONE) < 0.2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_search_everywhere_finds_a_bone_that_is_turned_away(seed: int) -> None:
+    start = disturbed(MODEL, 120.0, 0.0, seed)
+    found = register(seen_scene(1200, 0.4, seed), MODEL, start, is_global=True)
+    assert found.outcome is Outcome.CONVERGED
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
+    # Near the start, then about the scene's middle in five rings.
+    assert found.n_starts == 1 + 15 + 71
+
+
+def test_the_search_everywhere_brings_a_distant_model_to_the_scene() -> None:
+    start = TRUE.moved((500.0, -300.0, 200.0, 0.0, 0.0, 0.1), TRUE.translation_mm)
+    scene = seen_scene(900, 0.3)
+    assert register(scene, MODEL, start).outcome is Outcome.FAILED
+    found = register(scene, MODEL, start, is_global=True)
+    assert found.outcome is Outcome.CONVERGED
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
+
+
+def test_without_a_camera_nothing_is_said_about_coverage() -> None:
+    scene = seen_scene(900, 0.3, 2)
+    found = register(Scene(scene.points_mm), MODEL, disturbed(MODEL, 5.0, 4.0, 1))
+    assert found.coverage is None
+    assert found.outcome is Outcome.CONVERGED
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
+
+
+@pytest.mark.parametrize("method", ["icp", "bimcc-literal"])
+def test_the_papers_methods_are_judged_in_the_same_way(method) -> None:
+    pose = RigidTransform.from_parts("left_rect", "femur", np.eye(3), (0.0, 0.0, 400.0))
+    model = RegistrationModel(blob())
+    points = facing_points(blob(3000), pose)
+    scene = Scene(points, "left_rect", EYE)
+    found = register(scene, model, pose.moved((0.5, 0.3, 0.2, 0, 0.01, 0), (0, 0, 400)), method)
+    assert found.outcome is Outcome.CONVERGED
+    assert found.n_starts == 1
+    assert found.coverage is not None
+    assert found.coverage > 0.85
+    # Far off they fail, and say so: nobody helps them with other starts.
+    lost = register(scene, model, pose.moved((0, 0, 0, 0, 0, 2.5), (0, 0, 400)), method)
+    assert lost.outcome is Outcome.FAILED
+    assert lost.reasons
+
+
+def wrong_shapes() -> dict[str, TriangleMesh]:
+    mesh = blob().mesh
+    shapes = {"ball": ball_mesh(30.0, 1500), "tube": tube_mesh(28.0, 40.0)}
+    for scale in (0.001, 0.7, 1.3, 1000.0):
+        shapes[f"scaled by {scale}"] = TriangleMesh(scale * mesh.vertices_mm, mesh.faces)
+    return shapes
+
+
+@pytest.mark.parametrize("name", wrong_shapes())
+def test_a_scene_of_another_shape_is_never_a_registration(name: str) -> None:
+    pose = RigidTransform.from_parts("left_rect", "femur", TRUE.rotation, (0.0, 0.0, 470.0))
+    clean = facing_points(blob(3000), pose)
+    points = clean + np.random.default_rng(1).normal(0.0, 0.3, clean.shape)
+    right = RegistrationModel(blob())
+    wrong = RegistrationModel(BoneModel("femur", wrong_shapes()[name]))
+    for scene in (Scene(points, "left_rect", EYE), Scene(points)):
+        assert register(scene, right, pose).outcome is Outcome.CONVERGED
+        found = register(scene, wrong, pose)
+        assert found.outcome is Outcome.FAILED
+        assert found.reasons
+
+
+@cache
+def distorted(factors: tuple[float, float, float]) -> RegistrationModel:
+    """The femur, stretched about its middle."""
+    mesh = BONE.mesh
+    vertices = mesh.centroid_mm + np.array(factors) * (mesh.vertices_mm - mesh.centroid_mm)
+    faces = mesh.faces if np.prod(factors) > 0.0 else np.ascontiguousarray(mesh.faces[:, ::-1])
+    return RegistrationModel(BoneModel("femur", TriangleMesh(vertices, faces)))
+
+
+@pytest.mark.parametrize("knows_noise", [False, True])
+@pytest.mark.parametrize("factors", [(-1.0, 1.0, 1.0), (0.9, 0.9, 0.9), (1.1, 1.1, 1.1)])
+def test_a_distorted_bone_is_never_a_registration(
+    factors: tuple[float, float, float], knows_noise: bool
+) -> None:
+    scene = seen_scene(900, 0.3)
+    sigma = np.full(len(scene), 0.3) if knows_noise else None
+    found = register(replace(scene, sigma_ray_mm=sigma), distorted(factors), TRUE)
+    assert found.outcome is Outcome.FAILED
+    assert found.reasons
+
+
+def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
+    """Half a turn maps an ellipsoid onto itself; a quarter of one leads to either."""
+    axes = (22.0, 30.0, 45.0)
+    egg = TriangleMesh(ball_mesh(1.0, 3000).vertices_mm * axes, ball_mesh(1.0, 3000).faces)
+    noise = np.random.default_rng(1).normal(0.0, 0.2, (1100, 3))
+    scene = Scene(ball_mesh(1.0, 1100).vertices_mm * axes + noise)
+    quarter = RigidTransform.from_parts(
+        "scene", "egg", rotation_from_vector((np.pi / 2.0, 0.0, 0.0)), (0.0, 0.0, 0.0)
+    )
+    found = register(scene, RegistrationModel(BoneModel("egg", egg)), quarter, is_global=True)
+    assert found.outcome is Outcome.FAILED
+    assert Reason.AMBIGUOUS.value in found.reasons
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_points_all_over_the_room_are_never_a_registration(method) -> None:
+    rng = np.random.default_rng(1)
+    model = RegistrationModel(blob())
+    pose = RigidTransform.from_parts("left_rect", "femur", np.eye(3), (0.0, 0.0, 400.0))
+    points = rng.uniform(-45.0, 45.0, (800, 3)) + np.array([0.0, 0.0, 400.0])
+    for scene in (Scene(points, "left_rect", EYE), Scene(points)):
+        assert register(scene, model, pose, method).outcome is Outcome.FAILED
+
+
+def surface_scene(bone: BoneModel, *, has_camera: bool) -> tuple[Scene, RigidTransform]:
+    turn = rotation_from_vector((0.3, 0.1, -0.2))
+    pose = RigidTransform.from_parts("left_rect", bone.name, turn, (5.0, 3.0, 450.0))
+    clean = facing_points(bone, pose)
+    points = clean + np.random.default_rng(2).normal(0.0, 0.1, clean.shape)
+    return Scene(points, "left_rect", EYE if has_camera else None), pose
+
+
+@pytest.mark.parametrize("has_camera", [True, False])
+@pytest.mark.parametrize(
+    ("name", "mesh", "n_turns", "n_shifts"),
+    [
+        ("sphere", ball_mesh(30.0, 2500), 3, 0),
+        ("plane", grid_mesh(lambda x, y: 0.0 * x), 1, 2),
+        ("cylinder", tube_mesh(25.0, 40.0), 1, 1),
+    ],
+)
+def test_what_a_simple_surface_leaves_free_is_said_in_words(
+    name: str, mesh: TriangleMesh, n_turns: int, n_shifts: int, has_camera: bool
+) -> None:
+    bone = BoneModel(name, mesh)
+    scene, pose = surface_scene(bone, has_camera=has_camera)
+    found = register(scene, RegistrationModel(bone), pose)
+    assert found.outcome is Outcome.DEGENERATE, found.reasons
+    assert found.reasons[0] == Reason.DEGENERATE.value
+    words = [reason.split(" (")[0] for reason in found.reasons[1:]]
+    assert words.count("not fixed: rotation about") == n_turns
+    assert words.count("not fixed: translation along") == n_shifts
+
+
+@pytest.mark.parametrize("mesh", [ball_mesh(30.0, 2500), tube_mesh(25.0, 40.0)])
+def test_a_simple_surface_is_never_a_registration(mesh: TriangleMesh) -> None:
+    bone = BoneModel("shape", mesh)
+    for has_camera in (True, False):
+        scene, pose = surface_scene(bone, has_camera=has_camera)
+        found = register(scene, RegistrationModel(bone), pose)
+        assert found.outcome is not Outcome.CONVERGED
+        assert found.reasons
+
+
+def meagre_scenes() -> dict[str, np.ndarray]:
+    points = seen_scene(600, 0.3).points_mm
+    middle = points.mean(axis=0)
+    rng = np.random.default_rng(1)
+    along = np.linspace(-30.0, 30.0, 200)[:, None]
+    return {
+        "empty": np.empty((0, 3)),
+        "one point": points[:1],
+        "a point many times": np.tile(points[:1], (200, 1)),
+        "two points many times": np.tile(points[:2], (100, 1)),
+        "a line": middle + along * (1.0, 0.2, 0.1),
+        "a plane": middle + rng.uniform(-30.0, 30.0, (500, 3)) * (1.0, 1.0, 0.0),
+        "far away": points + np.array([0.0, 5000.0, 0.0]),
+        "in metres": points / 1000.0,
+    }
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", meagre_scenes())
+def test_a_meagre_scene_has_a_reason_and_is_never_a_registration(name: str, method) -> None:
+    points = meagre_scenes()[name]
+    small = RegistrationModel(blob())
+    middle = RigidTransform.from_parts("left_rect", "femur", TRUE.rotation, (0.0, 0.0, 470.0))
+    for camera in (EYE, None):
+        found = register(Scene(points, "left_rect", camera), small, middle, method)
+        assert found.outcome is not Outcome.CONVERGED
+        assert found.reasons
+        assert len(set(found.reasons)) == len(found.reasons)
+        if name in ("empty", "one point"):
+            assert found.reasons == (Reason.TOO_FEW_POINTS.value,)
+
+
+@pytest.mark.parametrize("name", meagre_scenes())
+def test_a_search_everywhere_makes_no_more_of_a_meagre_scene(name: str) -> None:
+    scene = Scene(meagre_scenes()[name], "left_rect", EYE)
+    if name == "far away":
+        # Everywhere is everywhere: the same shape elsewhere is the bone.
+        assert register(scene, MODEL, TRUE, is_global=True).outcome is Outcome.CONVERGED
+        return
+    found = register(scene, MODEL, TRUE, is_global=True)
+    assert found.outcome is not Outcome.CONVERGED
+    assert found.reasons
+    assert len(set(found.reasons)) == len(found.reasons)
+
+
+def test_points_that_nobody_measured_break_nothing() -> None:
+    """Depth cameras write unknown points as zeros: where the camera stands."""
+    scene = seen_scene(900, 0.3)
+    points = np.concatenate([scene.points_mm, np.zeros((50, 3))])
+    found = register(Scene(points, "left_rect", EYE), MODEL, disturbed(MODEL, 5.0, 4.0, 1))
+    assert found.outcome is Outcome.CONVERGED
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
+
+
+def test_little_of_a_bone_is_too_little() -> None:
+    """A patch that lies on the bone at a wrong place too."""
+    points = seen_scene(3000, 0.2).points_mm
+    nearest = np.argsort(np.linalg.norm(points - points[0], axis=1))[:150]
+    found = register(Scene(points[nearest], "left_rect", EYE), MODEL, TRUE)
+    assert found.outcome is not Outcome.CONVERGED
+    assert found.reasons
+
+
+def test_two_runs_are_equal_to_the_last_bit() -> None:
+    start = disturbed(MODEL, 45.0, 20.0, 1)
+    runs = [register(seen_scene(900, 0.4, 1, 600), MODEL, start, is_global=True) for _ in range(2)]
+    first, second = (run.estimate for run in runs)
+    assert np.array_equal(first.camera_from_bone.matrix, second.camera_from_bone.matrix)
+    assert np.array_equal(first.covariance, second.covariance)
+    assert runs[0].coverage == runs[1].coverage
+
+
+def test_the_caller_may_stop_the_search() -> None:
+    class StoppedError(Exception):
+        pass
+
+    def stop(share: float) -> None:
+        if share > 0.2:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        register(seen_scene(900, 0.3), MODEL, TRUE, is_global=True, on_progress=stop)
+
+
+def test_points_that_face_the_camera_are_told() -> None:
+    scene = seen_scene(900, 0.3)
+    seen = visible_points(MODEL, TRUE, scene)
+    placed, normals = TRUE.apply(MODEL.points_mm), TRUE.rotate(MODEL.normals)
+    cosine = -(placed * normals).sum(axis=1) / np.linalg.norm(placed, axis=1)
+    np.testing.assert_array_equal(seen, MODEL.points_mm[cosine > 0.2])
+    assert 0.1 * len(placed) < len(seen) < 0.6 * len(placed)
+    assert visible_points(MODEL, TRUE, replace(scene, camera_mm=None)) is MODEL.points_mm
