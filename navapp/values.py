@@ -54,6 +54,17 @@ class DisparityMap:
         """Share of pixels with a measured disparity."""
         return float((self.origin == Origin.MATCHED).mean()) if self.origin.size else 0.0
 
+    def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
+        """The map, unknown beside a mask (h, w)."""
+        unknown = np.float32(np.nan)
+        return DisparityMap(
+            np.where(stays, self.disparity_px, unknown),
+            np.where(stays, self.sigma_px, unknown),
+            np.where(stays, self.origin, np.uint8(Origin.UNKNOWN)),
+            self.x,
+            self.y,
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceCloud:

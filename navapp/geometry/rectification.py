@@ -269,10 +269,11 @@ def resampled(
     rows: NDArray[np.float32],
     part: Box | None = None,
 ) -> Image:
-    """The picture at real places (h, w), Catmull-Rom; 0 outside it, and outside a part.
+    """The picture at real places (h, w), cubic over six pixels; 0 outside it, and outside a part.
 
-    Linear interpolation blurs by where a pixel falls, OpenCV's cubic (a = -0.75) bends a ramp: both
-    tilt a disparity that is measured to a part of a pixel.
+    Linear interpolation, and less so a cubic over four pixels, blurs by where a pixel falls;
+    OpenCV's cubic (a = -0.75) bends a ramp: all tilt a disparity that is measured to a part of a
+    pixel.
     """
     from navapp.geometry.resample_kernels import resample_rows
 

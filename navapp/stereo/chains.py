@@ -17,7 +17,7 @@ from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface, without_steps
 from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
 from navapp.stereo.subpixel.refine import refine
-from navapp.values import DisparityMap, LineTimings, Origin
+from navapp.values import DisparityMap, LineTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
@@ -278,14 +278,7 @@ def _clipped(pair: RectifiedPair) -> RectifiedPair:
 
 def _without_specks(found: DisparityMap) -> DisparityMap:
     """The map without small patches that stand alone."""
-    stays = speckle_free(found.disparity_px, _SPECKLE_PX, _SPECKLE_STEP_PX)
-    unknown = np.float32(np.nan)
-    return replace(
-        found,
-        disparity_px=np.where(stays, found.disparity_px, unknown),
-        sigma_px=np.where(stays, found.sigma_px, unknown),
-        origin=np.where(stays, found.origin, np.uint8(Origin.UNKNOWN)),
-    )
+    return found.only(speckle_free(found.disparity_px, _SPECKLE_PX, _SPECKLE_STEP_PX))
 
 
 def _why(agreement: float) -> str:

@@ -13,7 +13,6 @@ from navapp.geometry.zbuffer import projected_box, render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     RefineSettings,
-    StereoAnswer,
     match_baseline,
     match_on_support,
     match_surface,
@@ -29,6 +28,12 @@ _SPARE_PX, _SPARE_MM = 60, 30.0
 _FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
 _PROBE = RefineSettings(n_steps=1, last_step_px=0.3)
 _PROBE_STRIDE_PX = 4
+# A larger gap in the answers is no highlight: something else covers the bone there. Windows that
+# reach far into it see both, and most of what covers a bone lies in front of it.
+_LARGEST_HIGHLIGHT_PX2 = 400
+_MIXED_PX = 3
+# Where less than this share would be left, the gaps come from a pose that is still off.
+_LEAST_UNMIXED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +130,9 @@ class SurfaceMeter:
             answer = match_baseline(inside, band_px)
         else:
             answer = match_surface(inside, band_px, fills=False)
-        return self._measurement(answer, box.width * box.height, _FREE_CORRELATION_PX)
+        cloud = self._cloud(answer.disparity)
+        share = answer.disparity.matched_share
+        return Measurement(answer.disparity, cloud, answer.timings, share, _FREE_CORRELATION_PX)
 
     def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
@@ -148,8 +155,10 @@ class SurfaceMeter:
         answer = match_on_support(expected.pair, expected.support_px, fills=False)
         stereo_ms = answer.timings.stereo_ms + expected.render_ms
         answer = replace(answer, timings=replace(answer.timings, stereo_ms=stereo_ms))
-        n_asked = int(np.isfinite(expected.support_px).sum())
-        return self._measurement(answer, n_asked, _MODEL_CORRELATION_PX)
+        found, is_expected = answer.disparity, np.isfinite(expected.support_px)
+        cloud = self._cloud(unmixed(found, is_expected))
+        share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)
+        return Measurement(found, cloud, answer.timings, share, _MODEL_CORRELATION_PX)
 
     def probed_share(self, expected: Expected) -> tuple[float, float]:
         """Share of thinned samples of the model that answer; and how many ms that took.
@@ -163,15 +172,11 @@ class SurfaceMeter:
         share = float((samples.origin > 0).sum() / max(n_asked, 1))
         return share, _ms_since(started)
 
-    def _measurement(
-        self, answer: StereoAnswer, n_asked: int, correlation_px: float
-    ) -> Measurement:
-        found = answer.disparity
+    def _cloud(self, found: DisparityMap) -> SurfaceCloud:
+        """About as many points as the line wants."""
         n_matched = found.matched_share * found.origin.size
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
-        cloud = reproject(found, self.geometry, stride_px)
-        answered_share = n_matched / max(n_asked, 1)
-        return Measurement(found, cloud, answer.timings, answered_share, correlation_px)
+        return reproject(found, self.geometry, stride_px)
 
     def _region(
         self, pose: RigidTransform, margins: Margins
@@ -187,6 +192,28 @@ class SurfaceMeter:
             return None
         grown = box.grown(margins.box_px).clipped(self.geometry.width, self.geometry.height)
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
+
+
+def unmixed(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
+    """Without the rims of large gaps, unless that leaves too little.
+
+    Args:
+        found: on the model.
+        is_expected: (h, w) where the model is; what is not expected is no gap.
+    """
+    import cv2
+
+    is_matched = found.origin > 0
+    is_gap = (is_expected & ~is_matched).astype(np.uint8)
+    _, labels, sizes, _ = cv2.connectedComponentsWithStats(is_gap, connectivity=4)
+    is_large = sizes[:, cv2.CC_STAT_AREA] >= _LARGEST_HIGHLIGHT_PX2
+    is_large[0] = False
+    size = 2 * _MIXED_PX + 1
+    around = cv2.dilate(is_large[labels].astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    stays = is_matched & ~around
+    if stays.sum() < _LEAST_UNMIXED * is_matched.sum():
+        return found
+    return found.only(stays)
 
 
 def _ms_since(started_ns: int) -> float:

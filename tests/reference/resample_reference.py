@@ -1,4 +1,4 @@
-"""Catmull-Rom resampling of a picture, from the equation with loops."""
+"""Cubic resampling of a picture, from the equation with loops."""
 
 import math
 
@@ -6,11 +6,13 @@ import numpy as np
 
 
 def cubic_weight(distance):
-    """Weight of a pixel at a distance, a = -0.5."""
+    """Weight of a pixel at a distance: Keys 1981, order four."""
     x = abs(distance)
     if x < 1.0:
-        return 1.5 * x**3 - 2.5 * x**2 + 1.0
-    return -0.5 * x**3 + 2.5 * x**2 - 4.0 * x + 2.0 if x < 2.0 else 0.0
+        return (4.0 * x**3 - 7.0 * x**2 + 3.0) / 3.0
+    if x < 2.0:
+        return (-7.0 * x**3 + 36.0 * x**2 - 59.0 * x + 30.0) / 12.0
+    return (x**3 - 8.0 * x**2 + 21.0 * x - 18.0) / 12.0 if x < 3.0 else 0.0
 
 
 def resample_slowly(picture, columns, rows):
@@ -26,8 +28,8 @@ def resample_slowly(picture, columns, rows):
             cubic_weight(u - x)
             * cubic_weight(v - y)
             * float(picture[min(max(y, 0), height - 1), min(max(x, 0), width - 1)])
-            for y in range(j - 1, j + 3)
-            for x in range(i - 1, i + 3)
+            for y in range(j - 2, j + 4)
+            for x in range(i - 2, i + 4)
         )
         values[place] = int(min(max(math.floor(value + 0.5), 0), 255))
     return values

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo.subpixel.highlights import without_highlights
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 from navapp.values import DisparityMap
@@ -21,6 +22,8 @@ _N_TURNS = 2
 # For a support, many fair points are better than few good ones.
 _FAIR = RefineSettings(n_steps=1, min_correlation=0.5, last_step_px=0.5, max_sigma_px=0.5)
 _GOOD = RefineSettings(last_step_px=0.25, max_roughness_px=0.35)
+# A window that wants to be further from the surface through its neighbours follows something else.
+_FAR_FROM_SURFACE_PX = 0.4
 # A surface that is further from the coarse map belongs to another thing: edges keep their place.
 _FAR_PX = 3.0
 _FAR_FROM_MATCH_PX = 1.5
@@ -45,7 +48,9 @@ def refine_surface(pair: RectifiedPair, coarse_px: NDArray[np.float32]) -> Dispa
         with np.errstate(invalid="ignore"):
             is_same = np.abs(surface - coarse_px) < _FAR_PX
         support = np.where(is_same, surface, coarse_px)
-    return refine(pair, support, _GOOD)
+    found = refine(pair, without_highlights(pair, support), _GOOD)
+    with np.errstate(invalid="ignore"):
+        return found.only(np.abs(found.disparity_px - support) <= _FAR_FROM_SURFACE_PX)
 
 
 def without_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
