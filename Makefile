@@ -59,12 +59,14 @@ bench: setup    ## accuracy on recorded operations (data in NAVAPP_DATA)
 	@$(BIN)/python -m tests.bench.recorded_accuracy
 
 # The peers' wheel excludes the plain OpenCV: it has an environment of its own.
-bench-peers: setup  ## speed of the stereo chain beside OpenCV's contributed filters
+bench-peers: setup  ## stereo beside OpenCV's contributed filters, registration beside Open3D, GICP
 	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
-	    opencv-contrib-python-headless==5.0.0.93 numpy numba scipy pydantic platformdirs
+	    opencv-contrib-python-headless==5.0.0.93 small_gicp==1.0.1 open3d-cpu \
+	    numpy numba scipy pydantic platformdirs
 	@$(PEERS)/bin/python -m tests.bench.stereo_speed
 	@$(PEERS)/bin/python -m tests.bench.occlusion_speed
+	@$(PEERS)/bin/python -m tests.bench.registration --speed --seeds 10
 
 system-deps:    ## Debian packages for everything beyond the simulated session
 	apt-get update -qq

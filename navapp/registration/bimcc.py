@@ -16,7 +16,7 @@ from navapp.registration.bimcc_kernels import (
     loop_from_far,
     loop_to_rest,
 )
-from navapp.registration.information import Information, inform
+from navapp.registration.information import Information, information_of
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
 from navapp.registration.scene import Scene
@@ -57,33 +57,25 @@ class BimccSettings:
     settled_mm: float = 2e-3
     settled_rad: float = 2e-5
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FitFigures:
-    """Figures of a pose.
-
-    Attributes:
-        information: what the pairs fix, and what they leave free.
-        n_points: pairs within reach of the kernel.
-        inlier_share: of those, within three sigma.
-        rms_mm, expected_rms_mm: weighted residual, and what the points' own sigma predicts.
-        sigma_mm: width of the kernel.
-    """
-
-    information: Information
-    n_points: int
-    inlier_share: float
-    rms_mm: float
-    expected_rms_mm: float
-    sigma_mm: float
+    @property
+    def widest_at_rest_mm(self) -> float:
+        """The kernel over the largest noise: one that stays as wide has met something else."""
+        return self.n_sigmas * self.largest_noise_mm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A pose, and its figures unless too few points pair."""
+    """A pose and what stands behind it.
+
+    Attributes:
+        estimate: the pose with its covariance.
+        information: what the pairs fix, and what they leave free; None when too few pair.
+        sigma_mm: width of the kernel at the end.
+    """
 
     estimate: PoseEstimate
-    figures: FitFigures | None
+    information: Information | None
+    sigma_mm: float
 
 
 def fit_bimcc(
@@ -116,26 +108,26 @@ def solve_bimcc(
     settings: BimccSettings | None = None,
 ) -> Solution:
     """As `fit_bimcc`, with the figures."""
-    work = _Work(scene, model, scene_from_bone, settings or BimccSettings())
+    fit = _Fit(scene, model, scene_from_bone, settings or BimccSettings())
     if len(scene) < MIN_POINTS:
-        return work.nothing(len(scene))
-    far = work.from_far()
+        return fit.too_few_points(len(scene))
+    far = fit.from_far()
     if not far.has_finished:
-        work.pair(far.sigma_mm)
-        return work.solution(far.iterations, is_converged=False)
-    rest = work.to_rest(far.sigma_mm)
-    return work.solution(far.iterations + rest.iterations, is_converged=rest.has_finished)
+        fit.pair(far.sigma_mm)
+        return fit.solution(far.iterations, is_converged=False)
+    rest = fit.to_rest(far.sigma_mm)
+    return fit.solution(far.iterations + rest.iterations, is_converged=rest.has_finished)
 
 
-def approach(
+def fit_coarsely(
     scene: Scene,
     model: RegistrationModel,
     scene_from_bone: RigidTransform,
     settings: BimccSettings,
 ) -> RigidTransform | None:
     """The loop from far alone: where a start leads to, on thinned points; None to nowhere."""
-    work = _Work(scene, model, scene_from_bone, settings)
-    return work.pose if work.from_far().has_finished else None
+    fit = _Fit(scene, model, scene_from_bone, settings)
+    return fit.pose if fit.from_far().has_finished else None
 
 
 def estimate_at(
@@ -158,11 +150,11 @@ def solution_at(
     is_converged: bool = True,
 ) -> Solution:
     """A pose as the solution of some solver, with its figures."""
-    work = _Work(scene, model, pose, settings)
+    fit = _Fit(scene, model, pose, settings)
     if len(scene) < MIN_POINTS:
-        return work.nothing(len(scene))
-    work.pair(0.0)
-    return work.solution(iterations, is_converged=is_converged)
+        return fit.too_few_points(len(scene))
+    fit.pair(0.0)
+    return fit.solution(iterations, is_converged=is_converged)
 
 
 def bone_from_scene(pose: RigidTransform) -> tuple[FloatArray, FloatArray]:
@@ -171,7 +163,7 @@ def bone_from_scene(pose: RigidTransform) -> tuple[FloatArray, FloatArray]:
     return np.array(inverse.rotation), np.array(inverse.translation_mm)
 
 
-class _Work:
+class _Fit:
     """Buffers and pose of one fit; the loops work in the bone's frame, where the model rests."""
 
     def __init__(
@@ -217,7 +209,7 @@ class _Work:
         """All points, forward."""
         state: LoopState = loop_to_rest(
             self._scene.arrays, self._model.arrays, self._rotation, self._shift, self._pairs,
-            sigma_mm, self._settings.settled_rad, self._settings.settled_mm, self._loop_settings(),
+            sigma_mm, self._loop_settings(),
         )  # fmt: skip
         self._has_moved = True
         self._n, self._sigma_mm = state.n_pairs, state.sigma_mm
@@ -233,61 +225,49 @@ class _Work:
         self._sigma_mm = sigma_mm
 
     def solution(self, iterations: int, *, is_converged: bool) -> Solution:
-        """The pose with the figures of its measured pairs."""
-        figures = self._figures() if self._n else None
-        if figures is None or figures.n_points < MIN_POINTS:
-            return self.nothing(0 if figures is None else figures.n_points, iterations)
-        reasons = [] if is_converged else [Reason.NOT_CONVERGED]
-        reasons += [Reason.DEGENERATE] * figures.information.is_degenerate
-        estimate = PoseEstimate(
-            self.pose,
-            figures.information.covariance,
-            figures.n_points,
-            figures.inlier_share,
-            figures.rms_mm,
-            figures.expected_rms_mm,
-            iterations,
-            is_converged,
-            tuple(reasons),
-        )
-        return Solution(estimate, figures)
-
-    def nothing(self, n_points: int, iterations: int = 0) -> Solution:
-        """The solution that says so when too few points pair."""
-        estimate = PoseEstimate(
-            self.pose, np.diag([np.inf] * 6), n_points, 0.0, np.inf, np.inf, iterations, False,
-            (Reason.TOO_FEW_POINTS,),
-        )  # fmt: skip
-        return Solution(estimate, None)
-
-    def _figures(self) -> FitFigures | None:
-        """Weights and information of the pairs; None when none is within reach."""
+        """The pose with the figures of its pairs, of those within reach of the kernel."""
         pairs, n, settings = self._pairs, self._n, self._settings
         sigma_mm, noise_mm2 = settings.narrowest_mm, 0.0
         if not self._scene.knows_noise:
             sigma_mm, noise_mm2 = self._own_noise()
         distance = np.hypot(pairs.residual[:n], pairs.excess[:n])
         deviation = np.sqrt(pairs.variance[:n] + noise_mm2)
-        width = np.maximum(sigma_mm, settings.n_sigmas * deviation)
-        is_near = distance < _REACH_SIGMAS * width
+        is_near = distance < _REACH_SIGMAS * np.maximum(sigma_mm, settings.n_sigmas * deviation)
         n_near = int(is_near.sum())
-        if n_near == 0:
-            return None
+        if n_near < MIN_POINTS:
+            return self.too_few_points(n_near, iterations)
         sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, noise_mm2)
         pairs.weight[:n] *= is_near
-        return FitFigures(
-            inform(pairs, n, self.pose, self._model.centre_mm, self._scene.sharing),
+        information = information_of(
+            pairs, n, self.pose, self._model.centre_mm, self._scene.n_sharing_errors
+        )
+        reasons = [] if is_converged else [Reason.NOT_CONVERGED]
+        reasons += [Reason.DEGENERATE] * information.is_degenerate
+        estimate = PoseEstimate(
+            self.pose,
+            information.covariance,
             n_near,
             float((distance < 3.0 * deviation)[is_near].mean()),
             float(np.sqrt(sums.squares_mm2 / sums.kernels)),
             float(np.sqrt(sums.variances_mm2 / sums.kernels)),
-            sigma_mm,
+            iterations,
+            is_converged,
+            tuple(reasons),
         )
+        return Solution(estimate, information, sigma_mm)
+
+    def too_few_points(self, n_points: int, iterations: int = 0) -> Solution:
+        """The solution that says so."""
+        estimate = PoseEstimate(
+            self.pose, np.diag([np.inf] * 6), n_points, 0.0, np.inf, np.inf, iterations, False,
+            (Reason.TOO_FEW_POINTS,),
+        )  # fmt: skip
+        return Solution(estimate, None, 0.0)
 
     def _own_noise(self) -> tuple[float, float]:
         """Width of the kernel and variance of the noise that agree with each other."""
         settings = self._settings
-        widest_mm = settings.n_sigmas * settings.largest_noise_mm
+        widest_mm = settings.widest_at_rest_mm
         sigma_mm, noise_mm2 = self._sigma_mm or widest_mm, 0.0
         for _ in range(_NOISE_ROUNDS):
             sums = weigh(self._pairs, self._n, sigma_mm, settings.n_sigmas, 0.0)
@@ -302,7 +282,16 @@ class _Work:
     def _loop_settings(self) -> LoopSettings:
         settings = self._settings
         return LoopSettings(
-            settings.widest_mm, settings.narrowest_mm, settings.n_sigmas,
-            settings.largest_noise_mm, self._scene.knows_noise, settings.backward_share,
-            settings.point_share, self._scene.every, self._model_every, settings.max_iterations,
-        )  # fmt: skip
+            widest_mm=settings.widest_mm,
+            narrowest_mm=settings.narrowest_mm,
+            n_sigmas=settings.n_sigmas,
+            widest_at_rest_mm=settings.widest_at_rest_mm,
+            knows_noise=self._scene.knows_noise,
+            backward_share=settings.backward_share,
+            point_share=settings.point_share,
+            scene_every=self._scene.every,
+            model_every=self._model_every,
+            max_iterations=settings.max_iterations,
+            settled_rad=settings.settled_rad,
+            settled_mm=settings.settled_mm,
+        )

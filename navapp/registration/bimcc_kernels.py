@@ -29,8 +29,13 @@ _PAIRS_HOLD_MM = 0.2
 # A visible model point must look at the camera at least so much (cosine).
 _FACING = 0.2
 _FEWEST_PAIRS = 6
-# Pairs that flip to and fro never let the last step become small: resting so often is enough.
-_RESTS = 5
+# Pairs that flip to and fro never let the last step become small: so many steps in a row that are
+# nearly small enough will do.
+_RESTS, _NEARLY = 5, 5.0
+# The pose has followed a kernel when its step is below this angle and this share of the kernel.
+_FOLLOWED_RAD, _FOLLOWED_SHARE = 0.02, 0.15
+# Noise stays when the kernel is halved; what a wrong pose leaves shrinks by nearly as much.
+_NOISE_STAYS = 0.75
 
 
 class LoopSettings(NamedTuple):
@@ -39,13 +44,15 @@ class LoopSettings(NamedTuple):
     widest_mm: float
     narrowest_mm: float
     n_sigmas: float
-    largest_noise_mm: float
+    widest_at_rest_mm: float
     knows_noise: bool
     backward_share: float
     point_share: float
     scene_every: int
     model_every: int
     max_iterations: int
+    settled_rad: float
+    settled_mm: float
 
 
 class LoopState(NamedTuple):
@@ -133,13 +140,13 @@ def loop_from_far(
         plane_step(H, g, lever_mm, twist)
         apply_twist(twist, centre, rotation, translation)
         turn_rad, shift_mm = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
-        if turn_rad > 0.02 or shift_mm > 0.15 * sigma_mm:
+        if turn_rad > _FOLLOWED_RAD or shift_mm > _FOLLOWED_SHARE * sigma_mm:
             continue
         if sigma_mm <= settings.narrowest_mm:
             return LoopState(iteration, True, sigma_mm, n, objective)
-        if not settings.knows_noise and sigma_mm <= settings.n_sigmas * settings.largest_noise_mm:
+        if not settings.knows_noise and sigma_mm <= settings.widest_at_rest_mm:
             noise_mm = np.sqrt(noise_under_kernel_mm2(sums.squares_mm2, sums.kernels, sigma_mm))
-            if settings.n_sigmas * noise_mm >= sigma_mm and noise_mm > 0.75 * last_noise_mm:
+            if settings.n_sigmas * noise_mm >= sigma_mm and noise_mm > _NOISE_STAYS * last_noise_mm:
                 return LoopState(iteration, True, settings.n_sigmas * noise_mm, n, objective)
             last_noise_mm = noise_mm
         sigma_mm = max(0.5 * sigma_mm, settings.narrowest_mm)
@@ -154,8 +161,6 @@ def loop_to_rest(
     translation: NDArray[np.float64],
     pairs: Pairs,
     sigma_mm: float,
-    settled_rad: float,
-    settled_mm: float,
     settings: LoopSettings,
 ) -> LoopState:
     """All points pair forward under a kernel as narrow as the noise; the pose in place.
@@ -164,8 +169,7 @@ def loop_to_rest(
     """
     H, g, twist = np.empty((6, 6)), np.empty(6), np.empty(6)
     camera, centre = np.empty(3), np.empty(3)
-    moved_mm, objective, best, n_rests, n = np.inf, 0.0, 0.0, 0, 0
-    widest_mm = settings.n_sigmas * settings.largest_noise_mm
+    moved_mm, objective, n_rests, n = np.inf, 0.0, 0, 0
     for iteration in range(1, settings.max_iterations + 1):
         camera[:] = rotation @ scene.camera + translation
         if moved_mm > _PAIRS_HOLD_MM:
@@ -185,14 +189,16 @@ def loop_to_rest(
         is_steady = True
         if not settings.knows_noise:
             noise_mm = np.sqrt(noise_under_kernel_mm2(sums.squares_mm2, sums.kernels, sigma_mm))
-            wanted_mm = min(max(settings.n_sigmas * noise_mm, settings.narrowest_mm), widest_mm)
+            wanted_mm = max(settings.n_sigmas * noise_mm, settings.narrowest_mm)
+            wanted_mm = min(wanted_mm, settings.widest_at_rest_mm)
             is_steady = abs(wanted_mm - sigma_mm) < 0.02 * sigma_mm
             sigma_mm = sigma_mm if is_steady else wanted_mm
-        if is_steady and turn_rad < settled_rad and shift_mm < settled_mm:
+        if is_steady and turn_rad < settings.settled_rad and shift_mm < settings.settled_mm:
             return LoopState(iteration, True, sigma_mm, n, objective)
-        is_resting = turn_rad < 20.0 * settled_rad and shift_mm < 5.0 * settled_mm
-        n_rests = n_rests + 1 if is_resting and objective < 1.0001 * best else 0
-        best = max(best, objective)
+        is_resting = (
+            turn_rad < _NEARLY * settings.settled_rad and shift_mm < _NEARLY * settings.settled_mm
+        )
+        n_rests = n_rests + 1 if is_resting else 0
         if is_steady and n_rests >= _RESTS:
             return LoopState(iteration, True, sigma_mm, n, objective)
     return LoopState(settings.max_iterations, False, sigma_mm, n, objective)

@@ -50,8 +50,8 @@ class Information:
         ]
 
 
-def inform(
-    pairs: Pairs, n: int, pose: RigidTransform, centre_mm: FloatArray, sharing: float
+def information_of(
+    pairs: Pairs, n: int, pose: RigidTransform, centre_mm: FloatArray, n_sharing_errors: float
 ) -> Information:
     """Information of weighted pairs about a pose.
 
@@ -60,7 +60,7 @@ def inform(
         n: how many.
         pose: `scene_from_bone`.
         centre_mm: (3,) of the model, bone coordinates.
-        sharing: so many pairs have their errors in common.
+        n_sharing_errors: so many neighbouring pairs have their errors in common.
 
     Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
     """
@@ -78,7 +78,7 @@ def inform(
     plane_system(pairs, n, np.ascontiguousarray(centre_mm), lever_mm, H, g)
     levers = np.diag([1.0, 1.0, 1.0, 1.0 / lever_mm, 1.0 / lever_mm, 1.0 / lever_mm])
     change = levers @ turned
-    covariance = sharing * change @ np.linalg.inv(H) @ change.T
+    covariance = n_sharing_errors * change @ np.linalg.inv(H) @ change.T
     return Information(0.5 * (covariance + covariance.T), free, lever_mm)
 
 

@@ -17,8 +17,8 @@ class ModelArrays(NamedTuple):
     Attributes:
         points: (V, 3) of the surface.
         normals: (V, 3) unit, outward.
-        bend: (V, 6) how the normal turns along the surface: xx, yy, zz, xy, xz, yz of a symmetric
-            matrix, 1/mm.
+        curvature: (V, 6) how the normal turns along the surface: xx, yy, zz, xy, xz, yz of a
+            symmetric matrix, 1/mm.
         spacing: (V,) mean distance to the neighbours.
         sigma: (V,) of the surface along the normal.
         can_pair: (V,) False at open borders and where a stage has cut.
@@ -30,7 +30,7 @@ class ModelArrays(NamedTuple):
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
-    bend: NDArray[np.float64]
+    curvature: NDArray[np.float64]
     spacing: NDArray[np.float64]
     sigma: NDArray[np.float64]
     can_pair: NDArray[np.bool_]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
-from navapp.registration.surroundings import bend, neighbour_table, open_border
+from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
 from navapp.values import BoneModel
 
 _FINEST_VOXEL_MM = 2.0
@@ -49,7 +49,7 @@ class RegistrationModel:
 
         tree = cKDTree(self.points_mm)
         neighbours = neighbour_table(self.points_mm, self.bone.mesh.faces, tree)
-        bending, spacing = bend(self.points_mm, self.normals, neighbours)
+        curvatures, spacing = curvature(self.points_mm, self.normals, neighbours)
         low = self.points_mm.min(axis=0) - _GRID_MARGIN_MM
         size = np.ptp(self.points_mm, axis=0) + 2.0 * _GRID_MARGIN_MM
         voxel = max(_FINEST_VOXEL_MM, float((size.prod() / _MOST_VOXELS) ** (1.0 / 3.0)))
@@ -59,7 +59,7 @@ class RegistrationModel:
         return ModelArrays(
             np.ascontiguousarray(self.points_mm),
             np.ascontiguousarray(self.normals),
-            bending,
+            curvatures,
             spacing,
             np.ascontiguousarray(self.sigma_mm),
             self.is_usable & ~open_border(len(self.points_mm), self.bone.mesh.faces),

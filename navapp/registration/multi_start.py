@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navapp.geometry.bands import run_both
-from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration.bimcc import BimccSettings, approach, bone_from_scene
+from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
+from navapp.registration.bimcc import BimccSettings, bone_from_scene, fit_coarsely
 from navapp.registration.coverage import coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
@@ -16,7 +16,7 @@ from navapp.registration.step_kernels import weigh
 
 # Poses nearer than this are the same answer.
 _SAME_MM = 2.0
-_SAME_RAD = 0.035
+_SAME_DEG = 2.0
 _COARSE_POINTS = 400
 _COARSE = BimccSettings(model_points=1000, max_iterations=35)
 
@@ -71,7 +71,7 @@ def find_candidates(
         for number in range(first, len(starts), 2):
             if first == 0:
                 on_progress(number / len(starts))
-            found[number] = approach(thinned, model, starts[number], _COARSE)
+            found[number] = fit_coarsely(thinned, model, starts[number], _COARSE)
 
     run_both(lambda: run(0), lambda: run(1))
     on_progress(1.0)
@@ -93,7 +93,7 @@ def explained_share(
     second is left out.
     """
     settings = settings or BimccSettings()
-    sigma_mm = 0.5 * settings.n_sigmas * settings.largest_noise_mm
+    sigma_mm = 0.5 * settings.widest_at_rest_mm
     rotation, shift = bone_from_scene(scene_from_bone)
     arrays = scene.arrays
     n_asked = len(range(0, len(scene), scene.every))
@@ -119,9 +119,8 @@ def distinct(poses: Sequence[RigidTransform], centre_mm: FloatArray) -> list[Rig
 
 def is_same_pose(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> bool:
     """Whether two answers differ by less than a fit's basin."""
-    shift = float(np.linalg.norm(a.apply(centre_mm) - b.apply(centre_mm)))
-    turn = float(np.linalg.norm(a.rotation - b.rotation)) / np.sqrt(2.0)
-    return shift < _SAME_MM and turn < _SAME_RAD
+    shift_mm = float(np.linalg.norm(a.apply(centre_mm) - b.apply(centre_mm)))
+    return shift_mm < _SAME_MM and rotation_angle_deg(a, b) < _SAME_DEG
 
 
 def _sphere_axes(n: int) -> FloatArray:

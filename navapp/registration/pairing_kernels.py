@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from navapp.registration.lookup_kernels import ModelArrays, SceneGrid, nearest_vertex
 
-# Beyond so many spacings from its vertex a point is off the model's edge: the vertex's own bend
-# says nothing there.
-_BEND_REACH = 2.0
+# Beyond so many spacings from its vertex a point is off the model's edge: the vertex's own
+# curvature says nothing there.
+_CURVATURE_REACH = 2.0
 
 
 class SceneArrays(NamedTuple):
@@ -195,7 +195,7 @@ def measure_pairs(
     The surface around a vertex v with normal n is taken as f(p) = n.(p - v) + (p - v).B(p - v) / 2:
     a plane would lie off a curved bone by what the vertices are apart.
     """
-    points, places, normals, bend = scene.points, model.points, model.normals, model.bend
+    points, places, normals, curvature = scene.points, model.points, model.normals, model.curvature
     for k in range(first, n):
         i, v = pairs.scene[k], pairs.vertex[k]
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
@@ -208,10 +208,10 @@ def measure_pairs(
         out = gx * dx + gy * dy + gz * dz
         along = np.sqrt(max(dx * dx + dy * dy + dz * dz - out * out, 0.0))
         spacing = model.spacing[v]
-        if along < _BEND_REACH * spacing:
-            bx = bend[v, 0] * dx + bend[v, 3] * dy + bend[v, 4] * dz
-            by = bend[v, 3] * dx + bend[v, 1] * dy + bend[v, 5] * dz
-            bz = bend[v, 4] * dx + bend[v, 5] * dy + bend[v, 2] * dz
+        if along < _CURVATURE_REACH * spacing:
+            bx = curvature[v, 0] * dx + curvature[v, 3] * dy + curvature[v, 4] * dz
+            by = curvature[v, 3] * dx + curvature[v, 1] * dy + curvature[v, 5] * dz
+            bz = curvature[v, 4] * dx + curvature[v, 5] * dy + curvature[v, 2] * dz
             gx, gy, gz = gx + bx, gy + by, gz + bz
             length = np.sqrt(gx * gx + gy * gy + gz * gz)
             out = (out + 0.5 * (bx * dx + by * dy + bz * dz)) / length

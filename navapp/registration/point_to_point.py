@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
-from navapp.registration.bimcc import MIN_POINTS, BimccSettings, solution_at
+from navapp.registration.bimcc import MIN_POINTS, BimccSettings, Solution, solution_at
 from navapp.registration.model import RegistrationModel
 from navapp.registration.scene import Scene
 from navapp.values import PoseEstimate
@@ -38,6 +38,11 @@ class LiteralSettings:
 def fit_icp(
     scene: Scene, model: RegistrationModel, scene_from_bone: RigidTransform
 ) -> PoseEstimate:
+    """As `solve_icp`, the pose only."""
+    return solve_icp(scene, model, scene_from_bone).estimate
+
+
+def solve_icp(scene: Scene, model: RegistrationModel, scene_from_bone: RigidTransform) -> Solution:
     """Plain ICP: every point pairs with its nearest model point, all weigh the same.
 
     Arguments and result as those of `fit_bimcc`. Without a robust weight whatever is not bone
@@ -57,11 +62,18 @@ def fit_icp(
 
 
 def fit_bimcc_literal(
+    scene: Scene, model: RegistrationModel, scene_from_bone: RigidTransform
+) -> PoseEstimate:
+    """As `solve_bimcc_literal`, the pose only."""
+    return solve_bimcc_literal(scene, model, scene_from_bone).estimate
+
+
+def solve_bimcc_literal(
     scene: Scene,
     model: RegistrationModel,
     scene_from_bone: RigidTransform,
     settings: LiteralSettings | None = None,
-) -> PoseEstimate:
+) -> Solution:
     """BiMCC-ICP as printed, with the print's slips mended (docs/registration.md).
 
     All scene points pair forward and all model points backward, those that no camera can see too:
@@ -70,8 +82,6 @@ def fit_bimcc_literal(
     Source: the paper, proposed equations (4) to (9) and Algorithm 2.
     """
     settings = settings or LiteralSettings()
-    if len(scene) < MIN_POINTS:
-        return solution_at(scene, model, scene_from_bone, BimccSettings()).estimate
     from scipy.spatial import cKDTree
 
     tree = cKDTree(scene.points_mm)
@@ -80,7 +90,7 @@ def fit_bimcc_literal(
     def pair(pose: RigidTransform) -> tuple[FloatArray, FloatArray]:
         """Equation (4): the stacked sets a (scene) and b (model), forward then backward."""
         forward, _ = model.nearest(pose.inverse().apply(scene.points_mm))
-        _, backward = tree.query(pose.apply(model.points_mm))
+        _, backward = tree.query(pose.apply(model.points_mm), workers=2)
         a = np.concatenate([scene.points_mm, scene.points_mm[backward]])
         b = np.concatenate([model.points_mm[forward], model.points_mm])
         return a, b
@@ -126,10 +136,12 @@ def _iterate(
     pair: Callable[[RigidTransform], tuple[FloatArray, FloatArray]],
     weigh: Callable[[FloatArray, int], FloatArray],
     may_stop: Callable[[], bool],
-) -> PoseEstimate:
+) -> Solution:
     """The skeleton: pairs, weights, least squares, until the bone rests and the weights may."""
+    if len(scene) < MIN_POINTS:
+        return solution_at(scene, model, pose, BimccSettings())
     iterations, is_converged = 0, False
-    for iterations in range(1, _MAX_ITERATIONS + 1 if len(scene) >= MIN_POINTS else 1):
+    for iterations in range(1, _MAX_ITERATIONS + 1):
         a, b = pair(pose)
         weight = weigh(_distances(a, pose.apply(b)), iterations)
         if not weight.sum() > 0.0:
@@ -140,8 +152,7 @@ def _iterate(
         if moved_mm < _STEP_MM and may_stop():
             is_converged = True
             break
-    settings = BimccSettings()
-    return solution_at(scene, model, pose, settings, iterations, is_converged=is_converged).estimate
+    return solution_at(scene, model, pose, BimccSettings(), iterations, is_converged=is_converged)
 
 
 def _distances(a: FloatArray, b: FloatArray) -> NDArray[np.float64]:

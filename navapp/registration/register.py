@@ -12,9 +12,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.bimcc import (
     MIN_POINTS,
     BimccSettings,
-    FitFigures,
     Solution,
-    solution_at,
     solve_bimcc,
 )
 from navapp.registration.coverage import coverage
@@ -25,7 +23,7 @@ from navapp.registration.multi_start import (
     is_same_pose,
     tilted_starts,
 )
-from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
+from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.scene import Scene
 from navapp.values import PoseEstimate, Reason
 
@@ -96,8 +94,8 @@ def register(
         on_progress: told the share done; may raise to cancel.
     """
     if method != "bimcc":
-        fit = fit_icp if method == "icp" else fit_bimcc_literal
-        return _verdict(scene, model, _with_figures(scene, model, fit(scene, model, start)), 1)
+        solve = solve_icp if method == "icp" else solve_bimcc_literal
+        return _verdict(scene, model, solve(scene, model, start), 1)
     alone = _verdict(scene, model, solve_bimcc(scene, model, start), 1)
     if len(scene) < MIN_POINTS or not (is_global or _is_doubtful(alone)):
         return alone
@@ -159,43 +157,32 @@ def _is_doubtful(answer: Registration) -> bool:
     return answer.coverage is not None and answer.coverage < _DOUBTFUL_COVERAGE
 
 
-def _with_figures(scene: Scene, model: RegistrationModel, estimate: PoseEstimate) -> Solution:
-    """The answer of a solver that looks at points only, judged as every other."""
-    return solution_at(
-        scene, model, estimate.camera_from_bone, BimccSettings(), estimate.iterations,
-        is_converged=estimate.is_converged,
-    )  # fmt: skip
-
-
 def _verdict(
     scene: Scene, model: RegistrationModel, solution: Solution, n_starts: int
 ) -> Registration:
     """Outcome and reasons of a solution."""
-    estimate, figures = solution.estimate, solution.figures
-    if figures is None:
+    estimate, information = solution.estimate, solution.information
+    if information is None:
         why = tuple(reason.value for reason in estimate.reasons)
         return Registration(Outcome.FAILED, why, estimate, None, n_starts)
     seen = None
     if scene.camera_mm is not None:
-        seen = coverage(scene, model, estimate.camera_from_bone, figures.sigma_mm)
-    faults = _faults(scene, estimate, figures, seen)
-    free = [f"not fixed: {words}" for words in figures.information.free_in_words()]
+        seen = coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
+    faults = _faults(scene, solution, seen)
+    free = [f"not fixed: {words}" for words in information.free_in_words()]
     outcome = Outcome.FAILED if faults else Outcome.DEGENERATE if free else Outcome.CONVERGED
     reasons = faults + [Reason.DEGENERATE.value] * bool(free) + free
     return Registration(outcome, tuple(reasons), estimate, seen, n_starts)
 
 
-def _faults(
-    scene: Scene, estimate: PoseEstimate, figures: FitFigures, seen: float | None
-) -> list[str]:
-    """What makes an estimate no registration."""
-    settings = BimccSettings()
+def _faults(scene: Scene, solution: Solution, seen: float | None) -> list[str]:
+    """What makes a solution no registration."""
+    estimate = solution.estimate
     faults = [] if estimate.is_converged else [Reason.NOT_CONVERGED.value]
-    widest_mm = settings.n_sigmas * settings.largest_noise_mm
     if scene.knows_noise:
-        is_misfit = figures.rms_mm > _MISFIT_RATIO * figures.expected_rms_mm
+        is_misfit = estimate.rms_mm > _MISFIT_RATIO * estimate.expected_rms_mm
     else:
-        is_misfit = figures.sigma_mm >= _MISFIT_SHARE * widest_mm
+        is_misfit = solution.sigma_mm >= _MISFIT_SHARE * BimccSettings().widest_at_rest_mm
     faults += [Reason.SURFACE_MISFIT.value] * is_misfit
     if seen is not None and seen < _LEAST_COVERAGE:
         faults.append(Reason.COVERAGE_LOW.value)

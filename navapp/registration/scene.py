@@ -22,32 +22,29 @@ class Scene:
 
     Attributes:
         points_mm: (N, 3) in the scene's frame.
-        frame: its name.
         camera_mm: (3,) where it was seen from; None when unknown: then every model point may pair.
         sigma_ray_mm: (N,) standard deviation along the ray of sight (in all directions without a
             camera); None when unknown: it is then taken from the residuals.
-        sharing: so many neighbouring points have their errors in common and count as one.
+        n_sharing_errors: so many neighbouring points have their errors in common and count as one.
         thinned_to: the search from far uses about so many points.
     """
 
     points_mm: FloatArray
-    frame: str = "scene"
     camera_mm: FloatArray | None = None
     sigma_ray_mm: FloatArray | None = None
-    sharing: float = 1.0
+    n_sharing_errors: float = 1.0
     thinned_to: int = 750
 
     @classmethod
-    def seen(cls, cloud: SurfaceCloud, correlation_px: float, frame: str = "left_rect") -> "Scene":
+    def from_stereo(cls, cloud: SurfaceCloud, correlation_px: float) -> "Scene":
         """A cloud of the stereo camera, which stands at the origin.
 
         Args:
             cloud: in the rectified left camera.
             correlation_px: distance in the picture over which the matcher's errors go together.
-            frame: name of that camera's frame.
         """
-        sharing = max(1.0, (correlation_px / cloud.stride_px) ** 2)
-        return cls(cloud.points_mm, frame, np.zeros(3), cloud.sigma_ray_mm, sharing)
+        n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
+        return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors)
 
     def __len__(self) -> int:
         return len(self.points_mm)

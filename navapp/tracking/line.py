@@ -21,7 +21,7 @@ from navapp.registration import (
     tilted_starts,
 )
 from navapp.tracking.judge import Goal, Judge
-from navapp.tracking.locator import ON_BONE, Fit, Locator, LocatorSettings, sum_timings
+from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 from navapp.values import (
@@ -119,21 +119,9 @@ class Line:
         )
         if measured is None or len(measured.cloud) == 0:
             return [self._lost(Reason.NO_SURFACE)]
-        centre_mm = rough.apply(self.centre_mm)
-        starts = tilted_starts(rough, centre_mm, self.settings.tilt_deg, self.settings.n_tilts)
-        if locator.is_baseline:
-            starts = [rough]
-        coarse = find_candidates(
-            measured.scene,
-            self.model,
-            starts,
-            lambda pose: self._explained(pose, measured),
-            on_progress,
-        )
-        fits = [
-            locator.settle(pair, measured, candidate.scene_from_bone)
-            for candidate in coarse[: self.settings.n_refined]
-        ]
+        # The paper's baseline has its start and nothing else.
+        poses = [rough] if locator.is_baseline else self._coarse(measured, rough, on_progress)
+        fits = [locator.settle(pair, measured, pose) for pose in poses]
         fits.sort(key=self._score, reverse=True)
         kept = distinct([fit.pose for fit in fits], self.centre_mm)
         return [self._judged(fit, goal, timings) for fit in fits if fit.pose in kept]
@@ -147,8 +135,23 @@ class Line:
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
-        estimate = estimate_at(measured.scene, self.model, pose, ON_BONE)
+        estimate = estimate_at(measured.scene, self.model, pose, STEREO_SETTINGS)
         return self._judged(Fit(estimate, measured, measured.timings), goal, timings)
+
+    def _coarse(
+        self, measured: Measurement, rough: RigidTransform, on_progress: Callable[[float], None]
+    ) -> list[RigidTransform]:
+        """The best distinct poses that tilts of a rough one lead to."""
+        centre_mm = rough.apply(self.centre_mm)
+        starts = tilted_starts(rough, centre_mm, self.settings.tilt_deg, self.settings.n_tilts)
+        found = find_candidates(
+            measured.scene,
+            self.model,
+            starts,
+            lambda pose: self._explained(pose, measured),
+            on_progress,
+        )
+        return [candidate.scene_from_bone for candidate in found[: self.settings.n_refined]]
 
     def _score(self, fit: Fit) -> float:
         """How much of the model a fit explains; 0 without a covariance."""

@@ -16,7 +16,7 @@ from navapp.values import LineTimings, PoseEstimate, Reason
 Method = Literal["bimcc", "icp"]
 
 # Stereo points know their noise, so that a narrower kernel costs little and keeps tissue out.
-ON_BONE = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
+STEREO_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,7 @@ class Locator:
         if self.is_baseline:
             estimate = fit_icp(measured.scene, self._model, start)
         else:
-            estimate = fit_bimcc(measured.scene, self._model, start, ON_BONE)
+            estimate = fit_bimcc(measured.scene, self._model, start, STEREO_SETTINGS)
         estimate_ms = (time.perf_counter_ns() - started) / 1e6
         return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
 

@@ -65,7 +65,7 @@ class Measurement:
     @property
     def scene(self) -> Scene:
         """The cloud, to be registered to."""
-        return Scene.seen(self.cloud, self.correlation_px)
+        return Scene.from_stereo(self.cloud, self.correlation_px)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +156,7 @@ class SurfaceMeter:
         stereo_ms = answer.timings.stereo_ms + expected.render_ms
         answer = replace(answer, timings=replace(answer.timings, stereo_ms=stereo_ms))
         found, is_expected = answer.disparity, np.isfinite(expected.support_px)
-        cloud = self._cloud(unmixed(found, is_expected))
+        cloud = self._cloud(without_gap_rims(found, is_expected))
         share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)
         return Measurement(found, cloud, answer.timings, share, _MODEL_CORRELATION_PX)
 
@@ -194,7 +194,7 @@ class SurfaceMeter:
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
 
 
-def unmixed(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
+def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
     """Without the rims of large gaps, unless that leaves too little.
 
     Args:

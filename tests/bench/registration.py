@@ -1,9 +1,11 @@
 """Registration of bones in clutter: success, error and time, beside Open3D and small_gicp.
 
 usage: python -m tests.bench.registration [FOLDER] [--seeds N] [--vertices N] [--no-peers] [--lists]
+       python -m tests.bench.registration [FOLDER] --speed
 
 Every method is given the same clouds and the same start; a peer's row is its best setting. With
---lists the peers also get the list of starts that navapp tries (slow).
+--lists the peers also get the list of starts that navapp tries (slow). With --speed only one call
+from 5 deg / 5 mm is timed, in turns with Open3D at the same accuracy, and the search from many.
 """
 
 import argparse
@@ -94,6 +96,9 @@ def main() -> None:
     ]
     print(f"information limit: {np.median(limit):.3f} mm median, "
           f"{np.percentile(limit, 95):.3f} at 95 %")  # fmt: skip
+    if options.speed:
+        _speed(bones, options.seeds)
+        return
     families = {} if options.no_peers else peers()
     for turn, shift in _STARTS:
         print(f"from {turn:g} deg / {shift:g} mm")
@@ -165,6 +170,30 @@ def _run(bones: list[Bone], method: Method, turn: float, shift: float, n_seeds: 
             ms = 1e3 * (time.perf_counter() - began)
             row.add(bone.name, error_mm(bone, pose, scene), ms, outcome)
     return row
+
+
+def _speed(bones: list[Bone], n_seeds: int) -> None:
+    """One call and the search from many starts, in turns with the peer's accurate settings."""
+    own = _own()
+    exact = {
+        name: _as_method(peer)
+        for name, peer in peers()["Open3D point-to-plane, Tukey"].items()
+        if "loss 2" in name
+    }
+    once, many = own["bimcc, the loops alone"], own["bimcc --global"]
+    rows = {name: Row() for name in ("one call", "many starts", *exact)}
+    for bone in bones:
+        for scene in scenes(bone, 5.0, 5.0, n_seeds):
+            for name, method in {"one call": once, "many starts": many, **exact}.items():
+                began = time.perf_counter()
+                pose, _ = method(scene, bone.model)
+                ms = 1e3 * (time.perf_counter() - began)
+                rows[name].add(bone.name, error_mm(bone, pose, scene), ms)
+    for name, row in rows.items():
+        _print(name, row)
+    fastest = min(np.median(rows[name].ms) for name in exact)
+    ratio = np.median(rows["one call"].ms) / fastest
+    print(f"one call takes {ratio:.2f} of Open3D's time")
 
 
 def _as_method(peer: Peer) -> Method:

@@ -17,7 +17,7 @@ from navapp.registration import RegistrationModel
 from navapp.values import BoneModel
 
 BONES = ("femur_1", "femur_2", "femur_3", "tibia_1", "tibia_2")
-N_ON_BONE, N_CLUTTER, NOISE_MM = 1800, 600, 0.5
+N_STEREO_SETTINGS, N_CLUTTER, NOISE_MM = 1800, 600, 0.5
 _CAMERA_MM = 450.0
 _LEAST_FACING = 0.35
 _CAP_COSINE = -np.cos(np.radians(30.0))
@@ -37,7 +37,7 @@ class Bone:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clouded:
-    """A scene, seen from `camera_mm`; its first `N_ON_BONE` points are bone."""
+    """A scene, seen from `camera_mm`; its first `N_STEREO_SETTINGS` points are bone."""
 
     points_mm: FloatArray
     camera_mm: FloatArray
@@ -74,7 +74,7 @@ def clouded(bone: Bone, turn_deg: float, shift_mm: float, seed: int) -> Clouded:
     true = RigidTransform.from_parts("scene", bone.name, rotation, rng.uniform(-200.0, 200.0, 3))
     points = true.apply(points)
     twist = np.concatenate([shift_mm * _unit(rng), np.radians(turn_deg) * _unit(rng)])
-    start = true.moved(twist, points[:N_ON_BONE].mean(axis=0))
+    start = true.moved(twist, points[:N_STEREO_SETTINGS].mean(axis=0))
     return Clouded(points, true.apply(camera), true, start)
 
 
@@ -95,17 +95,17 @@ def scenes(
 def information_limit_mm(bone: Bone, scene: Clouded) -> float:
     """TRE of least squares on the true bone points and the dense surface, from the truth."""
     dense, pose = bone.dense, scene.true
-    points = scene.points_mm[:N_ON_BONE]
+    points = scene.points_mm[:N_STEREO_SETTINGS]
     for _ in range(10):
         moved = pose.inverse().apply(points)
         index, _ = dense.nearest(moved)
         normals, offset = dense.normals[index], moved - dense.points_mm[index]
-        bend = dense.arrays.bend[index]
+        curvature = dense.arrays.curvature[index]
         curved = np.stack(
             [
-                (bend[:, [0, 3, 4]] * offset).sum(axis=1),
-                (bend[:, [3, 1, 5]] * offset).sum(axis=1),
-                (bend[:, [4, 5, 2]] * offset).sum(axis=1),
+                (curvature[:, [0, 3, 4]] * offset).sum(axis=1),
+                (curvature[:, [3, 1, 5]] * offset).sum(axis=1),
+                (curvature[:, [4, 5, 2]] * offset).sum(axis=1),
             ],
             axis=1,
         )
@@ -128,8 +128,8 @@ def _seen_points(mesh: TriangleMesh, direction: FloatArray, rng: np.random.Gener
     """Points spread evenly over the triangles that lean towards a direction."""
     normals, areas = _faces_of(mesh)
     seen = np.flatnonzero(normals @ direction > _LEAST_FACING)
-    chosen = rng.choice(seen, N_ON_BONE, p=areas[seen] / areas[seen].sum())
-    u, v = rng.random((2, N_ON_BONE, 1))
+    chosen = rng.choice(seen, N_STEREO_SETTINGS, p=areas[seen] / areas[seen].sum())
+    u, v = rng.random((2, N_STEREO_SETTINGS, 1))
     u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
     a, b, c = (mesh.vertices_mm[mesh.faces[chosen, k]] for k in range(3))
     points: FloatArray = a + u * (b - a) + v * (c - a)

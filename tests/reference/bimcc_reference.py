@@ -91,7 +91,7 @@ def measure_pairs(scene, model, R, t, chosen, vertex):
     offset = point - model.points[vertex]
     height = (normal * offset).sum(axis=1)
     along = np.linalg.norm(offset - height[:, None] * normal, axis=1)
-    xx, yy, zz, xy, xz, yz = model.bend[vertex].T
+    xx, yy, zz, xy, xz, yz = model.curvature[vertex].T
     B = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
     B = B * (along < 2.0 * model.spacing[vertex])[:, None, None]
     bent = np.einsum("nij,nj->ni", B, offset)
@@ -190,7 +190,7 @@ def step_to_rest(scene, model, R, t, sigma_mm, settings):
     centre, lever_mm = weighted_centre(measured.point, weight)
     twist = plane_step(*plane_system(measured, weight, centre, lever_mm), lever_mm)
     noise_mm = np.sqrt(noise_under_kernel_mm2(measured, kernels, sigma_mm))
-    widest_mm = settings.n_sigmas * settings.largest_noise_mm
+    widest_mm = settings.widest_at_rest_mm
     wanted_mm = np.clip(settings.n_sigmas * noise_mm, settings.narrowest_mm, widest_mm)
     return *apply_twist(twist, centre, R, t), kernels.mean(), wanted_mm
 

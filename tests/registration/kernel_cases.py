@@ -47,7 +47,6 @@ def make_case(*, has_camera: bool = True, knows_noise: bool = True) -> Case:
     points = POSE.apply(model.points_mm[chosen] + rng.normal(0.0, 0.8, (500, 3)))
     scene = Scene(
         points,
-        "left_rect",
         np.array([20.0, -30.0, 5.0]) if has_camera else None,
         rng.uniform(0.1, 0.6, 500) if knows_noise else None,
         thinned_to=250,

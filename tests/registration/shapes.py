@@ -157,9 +157,9 @@ def seen_scene(n: int, sigma_mm: float, seed: int = 0, n_clutter: int = 0) -> Sc
     """The femur at `TRUE` from the origin, with noise in all directions that nobody knows."""
     clean = seen_cloud(femur(), n, 0.0, seed).points_mm
     noise = np.random.default_rng(seed).normal(0.0, sigma_mm, clean.shape)
-    return Scene(with_clutter(clean + noise, n_clutter, seed), "left_rect", np.zeros(3))
+    return Scene(with_clutter(clean + noise, n_clutter, seed), np.zeros(3))
 
 
 def scene_of(cloud: SurfaceCloud) -> Scene:
     """A cloud whose points have independent errors, from the origin."""
-    return Scene(cloud.points_mm, "left_rect", np.zeros(3), cloud.sigma_ray_mm)
+    return Scene(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm)

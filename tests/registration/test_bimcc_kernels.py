@@ -17,13 +17,15 @@ def loop_settings(*, knows_noise: bool = False, max_iterations: int = 1) -> Loop
         widest_mm=12.0,
         narrowest_mm=0.3,
         n_sigmas=2.5,
-        largest_noise_mm=1.0,
+        widest_at_rest_mm=2.5,
         knows_noise=knows_noise,
         backward_share=1.5,
         point_share=0.1,
         scene_every=2,
         model_every=2,
         max_iterations=max_iterations,
+        settled_rad=2e-5,
+        settled_mm=2e-3,
     )
 
 
@@ -58,7 +60,7 @@ def test_a_step_to_rest_is_that_of_the_reference(
     case = make_case(has_camera=has_camera, knows_noise=knows_noise)
     R, t, settings = case.R.copy(), case.t.copy(), loop_settings(knows_noise=knows_noise)
     pairs = make_pairs(500)
-    state = loop_to_rest(case.scene, case.model, R, t, pairs, sigma_mm, 2e-5, 2e-3, settings)
+    state = loop_to_rest(case.scene, case.model, R, t, pairs, sigma_mm, settings)
     R_expected, t_expected, J, wanted_mm = reference.step_to_rest(
         case.scene, case.model, case.R, case.t, sigma_mm, settings
     )
@@ -90,7 +92,7 @@ def test_five_pairs_are_too_few_for_every_loop() -> None:
     R, t, pairs = case.R.copy(), case.t.copy(), make_pairs(2000)
     assert first_sigma_mm(case.scene, case.model, R, t, pairs, settings) == 0.0
     far = loop_from_far(case.scene, case.grid, case.model, R, t, pairs, 2.0, settings)
-    rest = loop_to_rest(case.scene, case.model, R, t, pairs, 2.0, 2e-5, 2e-3, settings)
+    rest = loop_to_rest(case.scene, case.model, R, t, pairs, 2.0, settings)
     for state in (far, rest):
         assert (state.iterations, state.has_finished, state.sigma_mm) == (1, False, 0.0)
     np.testing.assert_array_equal(R, case.R)
@@ -103,12 +105,12 @@ def test_from_far_the_kernel_narrows_to_the_noise_and_at_rest_the_pose_settles()
     far = loop_from_far(case.scene, case.grid, case.model, R, t, pairs, 6.0, settings)
     assert far.has_finished
     assert 1.0 < far.sigma_mm <= 3.0
-    rest = loop_to_rest(case.scene, case.model, R, t, pairs, far.sigma_mm, 2e-5, 2e-3, settings)
+    rest = loop_to_rest(case.scene, case.model, R, t, pairs, far.sigma_mm, settings)
     assert rest.has_finished
     # 0.8 mm of noise, and a kernel of two and a half times that.
     assert rest.sigma_mm == pytest.approx(2.5 * 0.8, rel=0.1)
     before = R.copy(), t.copy()
-    again = loop_to_rest(case.scene, case.model, R, t, pairs, rest.sigma_mm, 2e-5, 2e-3, settings)
+    again = loop_to_rest(case.scene, case.model, R, t, pairs, rest.sigma_mm, settings)
     assert again.iterations <= 5
     np.testing.assert_allclose(moved_points(case, R, t), moved_points(case, *before), atol=0.03)
 

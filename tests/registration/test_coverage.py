@@ -21,13 +21,13 @@ EYE = np.zeros(3)
 
 def test_a_bone_that_is_seen_whole_is_covered_at_its_pose() -> None:
     points = facing_points(femur(), TRUE)
-    assert coverage(Scene(points, "left_rect", EYE), MODEL, TRUE, 0.5) > 0.93
+    assert coverage(Scene(points, EYE), MODEL, TRUE, 0.5) > 0.93
 
 
 def test_half_of_what_should_be_seen_is_half() -> None:
     points = facing_points(femur(), TRUE)
     half = points[points[:, 0] < np.median(points[:, 0])]
-    found = coverage(Scene(half, "left_rect", EYE), MODEL, TRUE, 0.5)
+    found = coverage(Scene(half, EYE), MODEL, TRUE, 0.5)
     assert 0.4 < found < 0.68
 
 
@@ -42,7 +42,7 @@ def test_a_wrong_pose_is_covered_less() -> None:
 
 def test_a_narrow_kernel_asks_for_a_near_surface() -> None:
     points = facing_points(femur(), TRUE)
-    scene = Scene(points * (1.0 + 2.0 / 470.0), "left_rect", EYE)
+    scene = Scene(points * (1.0 + 2.0 / 470.0), EYE)
     assert coverage(scene, MODEL, TRUE, 3.0) > 0.9
     assert coverage(scene, MODEL, TRUE, 0.5) < 0.2
 
@@ -52,7 +52,7 @@ def test_a_surface_that_turns_its_back_is_not_covered() -> None:
     pose = RigidTransform.from_parts(
         "left_rect", "plate", np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 400.0)
     )
-    scene = Scene(pose.apply(model.points_mm), "left_rect", EYE)
+    scene = Scene(pose.apply(model.points_mm), EYE)
     assert coverage(scene, model, pose, 1.0) == 0.0
     front = RigidTransform.from_parts("left_rect", "plate", np.eye(3), (0.0, 0.0, 400.0))
     assert coverage(scene, model, front, 1.0) == 1.0

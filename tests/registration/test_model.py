@@ -52,7 +52,7 @@ def test_a_cloud_with_normals_is_a_model_all_of_which_may_pair() -> None:
     _, least = nearest_by_trying_all(points, mesh.vertices_mm)
     assert (distance - least).max() < 0.3
     meshed = RegistrationModel(blob())
-    inner = np.abs(model.arrays.bend - meshed.arrays.bend).max(axis=1)
+    inner = np.abs(model.arrays.curvature - meshed.arrays.curvature).max(axis=1)
     assert np.median(inner) < 0.005
 
 

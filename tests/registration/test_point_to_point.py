@@ -166,7 +166,7 @@ def test_forward_and_inverse_runs_agree(fit) -> None:
     start = truth.moved((0.4, -0.3, 0.5, 0.02, -0.02, 0.01), truth.translation_mm)
     forward = fit(Scene(placed.vertices_mm), BLOB, start)
     other = RegistrationModel(BoneModel("scene", placed))
-    backward = fit(Scene(BLOB.points_mm, "femur"), other, start.inverse())
+    backward = fit(Scene(BLOB.points_mm), other, start.inverse())
     assert forward.is_converged
     assert backward.is_converged
     assert backward.camera_from_bone.name == "femur_from_scene"
@@ -180,7 +180,7 @@ def test_any_place_and_orientation_of_the_world_gives_the_same_pose(fit) -> None
     scene = SAMPLES + np.random.default_rng(1).normal(0.0, 0.2, SAMPLES.shape)
     start, world = a_pose(8, 0.1, 2.0), a_pose(9).renamed("world", "scene")
     here = fit(Scene(scene), BLOB, start)
-    there = fit(Scene(world.apply(scene), "world"), BLOB, world @ start)
+    there = fit(Scene(world.apply(scene)), BLOB, world @ start)
     back = world.inverse() @ there.camera_from_bone
     assert apart_mm(here.camera_from_bone, back) < 1e-3
 

@@ -82,7 +82,7 @@ def test_the_papers_methods_are_judged_in_the_same_way(method) -> None:
     pose = RigidTransform.from_parts("left_rect", "femur", np.eye(3), (0.0, 0.0, 400.0))
     model = RegistrationModel(blob())
     points = facing_points(blob(3000), pose)
-    scene = Scene(points, "left_rect", EYE)
+    scene = Scene(points, EYE)
     found = register(scene, model, pose.moved((0.5, 0.3, 0.2, 0, 0.01, 0), (0, 0, 400)), method)
     assert found.outcome is Outcome.CONVERGED
     assert found.n_starts == 1
@@ -109,7 +109,7 @@ def test_a_scene_of_another_shape_is_never_a_registration(name: str) -> None:
     points = clean + np.random.default_rng(1).normal(0.0, 0.3, clean.shape)
     right = RegistrationModel(blob())
     wrong = RegistrationModel(BoneModel("femur", wrong_shapes()[name]))
-    for scene in (Scene(points, "left_rect", EYE), Scene(points)):
+    for scene in (Scene(points, EYE), Scene(points)):
         assert register(scene, right, pose).outcome is Outcome.CONVERGED
         found = register(scene, wrong, pose)
         assert found.outcome is Outcome.FAILED
@@ -157,7 +157,7 @@ def test_points_all_over_the_room_are_never_a_registration(method) -> None:
     model = RegistrationModel(blob())
     pose = RigidTransform.from_parts("left_rect", "femur", np.eye(3), (0.0, 0.0, 400.0))
     points = rng.uniform(-45.0, 45.0, (800, 3)) + np.array([0.0, 0.0, 400.0])
-    for scene in (Scene(points, "left_rect", EYE), Scene(points)):
+    for scene in (Scene(points, EYE), Scene(points)):
         assert register(scene, model, pose, method).outcome is Outcome.FAILED
 
 
@@ -166,7 +166,7 @@ def surface_scene(bone: BoneModel, *, has_camera: bool) -> tuple[Scene, RigidTra
     pose = RigidTransform.from_parts("left_rect", bone.name, turn, (5.0, 3.0, 450.0))
     clean = facing_points(bone, pose)
     points = clean + np.random.default_rng(2).normal(0.0, 0.1, clean.shape)
-    return Scene(points, "left_rect", EYE if has_camera else None), pose
+    return Scene(points, EYE if has_camera else None), pose
 
 
 @pytest.mark.parametrize("has_camera", [True, False])
@@ -225,7 +225,7 @@ def test_a_meagre_scene_has_a_reason_and_is_never_a_registration(name: str, meth
     small = RegistrationModel(blob())
     middle = RigidTransform.from_parts("left_rect", "femur", TRUE.rotation, (0.0, 0.0, 470.0))
     for camera in (EYE, None):
-        found = register(Scene(points, "left_rect", camera), small, middle, method)
+        found = register(Scene(points, camera), small, middle, method)
         assert found.outcome is not Outcome.CONVERGED
         assert found.reasons
         assert len(set(found.reasons)) == len(found.reasons)
@@ -235,7 +235,7 @@ def test_a_meagre_scene_has_a_reason_and_is_never_a_registration(name: str, meth
 
 @pytest.mark.parametrize("name", meagre_scenes())
 def test_a_search_everywhere_makes_no_more_of_a_meagre_scene(name: str) -> None:
-    scene = Scene(meagre_scenes()[name], "left_rect", EYE)
+    scene = Scene(meagre_scenes()[name], EYE)
     if name == "far away":
         # Everywhere is everywhere: the same shape elsewhere is the bone.
         assert register(scene, MODEL, TRUE, is_global=True).outcome is Outcome.CONVERGED
@@ -250,7 +250,7 @@ def test_points_that_nobody_measured_break_nothing() -> None:
     """Depth cameras write unknown points as zeros: where the camera stands."""
     scene = seen_scene(900, 0.3)
     points = np.concatenate([scene.points_mm, np.zeros((50, 3))])
-    found = register(Scene(points, "left_rect", EYE), MODEL, disturbed(MODEL, 5.0, 4.0, 1))
+    found = register(Scene(points, EYE), MODEL, disturbed(MODEL, 5.0, 4.0, 1))
     assert found.outcome is Outcome.CONVERGED
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
 
@@ -259,7 +259,7 @@ def test_little_of_a_bone_is_too_little() -> None:
     """A patch that lies on the bone at a wrong place too."""
     points = seen_scene(3000, 0.2).points_mm
     nearest = np.argsort(np.linalg.norm(points - points[0], axis=1))[:150]
-    found = register(Scene(points[nearest], "left_rect", EYE), MODEL, TRUE)
+    found = register(Scene(points[nearest], EYE), MODEL, TRUE)
     assert found.outcome is not Outcome.CONVERGED
     assert found.reasons
 

@@ -9,10 +9,9 @@ POINTS = np.random.default_rng(1).uniform(-30.0, 30.0, (500, 3)) + np.array([0.0
 
 def test_a_stereo_cloud_is_seen_from_the_origin_and_says_how_exact_it_is() -> None:
     cloud = seen_cloud(femur(), 300, 0.2)
-    scene = Scene.seen(cloud, 1.0)
+    scene = Scene.from_stereo(cloud, 1.0)
     assert len(scene) == 300
     assert scene.knows_noise
-    assert scene.frame == "left_rect"
     assert scene.arrays.has_camera
     np.testing.assert_array_equal(scene.arrays.camera, 0.0)
     np.testing.assert_array_equal(scene.arrays.sigma_ray, cloud.sigma_ray_mm)
@@ -27,7 +26,7 @@ def test_points_within_the_correlation_share_their_errors(
 ) -> None:
     cloud = seen_cloud(femur(), 100, 0.2)
     cloud = type(cloud)(cloud.points_mm, cloud.sigma_ray_mm, cloud.pixels, cloud.origin, stride_px)
-    assert Scene.seen(cloud, correlation_px).sharing == pytest.approx(sharing)
+    assert Scene.from_stereo(cloud, correlation_px).n_sharing_errors == pytest.approx(sharing)
 
 
 def test_without_a_camera_and_a_sigma_the_kernels_are_told_so() -> None:

@@ -6,7 +6,7 @@ import pytest
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
 from navapp.stereo import reproject
 from navapp.tracking.judge import Goal, Judge
-from navapp.tracking.locator import ON_BONE
+from navapp.tracking.locator import STEREO_SETTINGS
 from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.registration.shapes import GEOMETRY, TRUE, disturbed, femur
@@ -19,14 +19,14 @@ NO_TARGETS = np.empty((0, 3))
 
 
 def scene_of(measured: DisparityMap) -> Scene:
-    return Scene.seen(reproject(measured, GEOMETRY, 3), correlation_px=40.0)
+    return Scene.from_stereo(reproject(measured, GEOMETRY, 3), correlation_px=40.0)
 
 
 def verdict_on(
     pose=TRUE, measured: DisparityMap = MAP, model=MODEL, is_accepted: bool = True,
     tolerance_mm: float = 3.0, predicted=None,
 ) -> Verdict:  # fmt: skip
-    estimate = estimate_at(scene_of(measured), model, pose, ON_BONE)
+    estimate = estimate_at(scene_of(measured), model, pose, STEREO_SETTINGS)
     judge = Judge(GEOMETRY, is_accepted)
     return judge.judge(model, estimate, measured, Goal(NO_TARGETS, tolerance_mm), predicted)
 
@@ -55,7 +55,7 @@ def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeS
     """The other side's, and one of another size."""
     mesh = make_knee(spec).bones["femur"]
     other = RegistrationModel(BoneModel("femur", mesh, spec.side))
-    fitted = fit_bimcc(scene_of(MAP), other, TRUE, ON_BONE)
+    fitted = fit_bimcc(scene_of(MAP), other, TRUE, STEREO_SETTINGS)
     verdict = verdict_on(fitted.camera_from_bone, model=other)
     assert verdict.status is not Status.OK
     assert {Reason.SURFACE_MISFIT, Reason.OUTLIERS} & set(verdict.reasons)
@@ -64,7 +64,7 @@ def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeS
 def test_another_bone_is_lost() -> None:
     mesh = make_knee(KneeSpec(1)).bones["tibia"]
     other = RegistrationModel(BoneModel("femur", mesh, "right"))
-    fitted = fit_bimcc(scene_of(MAP), other, TRUE, ON_BONE)
+    fitted = fit_bimcc(scene_of(MAP), other, TRUE, STEREO_SETTINGS)
     assert verdict_on(fitted.camera_from_bone, model=other).status is Status.LOST
 
 
@@ -117,7 +117,7 @@ def test_the_bound_is_held_against_the_stages_tolerance() -> None:
 
 
 def test_targets_far_from_the_seen_surface_are_less_certain() -> None:
-    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, ON_BONE)
+    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, STEREO_SETTINGS)
     judge = Judge(GEOMETRY, True)
     near = BONE.mesh.vertices_mm[BONE.mesh.vertices_mm[:, 2].argmin()][None]
     bounds = [

@@ -6,7 +6,7 @@ import pytest
 from navapp.geometry.rig import RigQuality
 from navapp.registration import estimate_at
 from navapp.tracking import Line, LineSettings, LocatorSettings, TrackState
-from navapp.tracking.locator import ON_BONE
+from navapp.tracking.locator import STEREO_SETTINGS
 from navapp.values import Prior, Reason, Status
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -160,7 +160,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     pair, _ = line._rectified_pair(frame.left, frame.right, line._rectified(truth))
     pose = rectified_from_left @ truth
     measured = line._meter.freely(pair, pose, line.settings.locator.tracking)
-    inside = estimate_at(measured.scene, line.model, pose, ON_BONE)
+    inside = estimate_at(measured.scene, line.model, pose, STEREO_SETTINGS)
     turn = np.kron(np.eye(2), rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15

@@ -53,7 +53,7 @@ def open_border(n_points: int, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     return is_border
 
 
-def bend(
+def curvature(
     points_mm: FloatArray, normals: FloatArray, neighbours: NDArray[np.int32]
 ) -> tuple[FloatArray, FloatArray]:
     """How the normal turns around each vertex, and how far its neighbours are.

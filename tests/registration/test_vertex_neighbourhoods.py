@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from navapp.registration.surroundings import bend, neighbour_table, open_border
+from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
 from tests.registration.shapes import ball_mesh, grid_mesh, tube_mesh
 
 NO_FACES = np.empty((0, 3), dtype=np.int32)
@@ -83,7 +83,7 @@ def test_a_closed_surface_and_a_cloud_have_no_border() -> None:
 def test_a_ball_bends_by_one_over_its_radius_in_all_tangents() -> None:
     mesh = ball_mesh(20.0)
     normals = mesh.vertices_mm / 20.0
-    form, spacing = bend(mesh.vertices_mm, normals, table_of(mesh))
+    form, spacing = curvature(mesh.vertices_mm, normals, table_of(mesh))
     expected = (np.eye(3) - normals[:, :, None] * normals[:, None, :]) / 20.0
     np.testing.assert_allclose(matrices(form), expected, atol=1e-4)
     index = table_of(mesh)[7]
@@ -93,7 +93,7 @@ def test_a_ball_bends_by_one_over_its_radius_in_all_tangents() -> None:
 
 def test_a_tube_bends_across_its_axis_only() -> None:
     mesh = tube_mesh(20.0, 30.0)
-    form, _ = bend(mesh.vertices_mm, mesh.normals, table_of(mesh))
+    form, _ = curvature(mesh.vertices_mm, mesh.normals, table_of(mesh))
     inner = np.abs(mesh.vertices_mm[:, 1]) < 25.0
     principal = np.linalg.eigvalsh(matrices(form)[inner])
     np.testing.assert_allclose(principal[:, 2], 1.0 / 20.0, rtol=0.02)
@@ -104,13 +104,13 @@ def test_a_tube_bends_across_its_axis_only() -> None:
 
 def test_a_hollow_bends_the_other_way() -> None:
     mesh = ball_mesh(20.0)
-    form, _ = bend(mesh.vertices_mm, -mesh.vertices_mm / 20.0, table_of(mesh))
+    form, _ = curvature(mesh.vertices_mm, -mesh.vertices_mm / 20.0, table_of(mesh))
     np.testing.assert_allclose(np.trace(matrices(form), axis1=1, axis2=2), -0.1, atol=1e-3)
 
 
 def test_a_crease_bends_no_tighter_than_its_spacing_allows() -> None:
     mesh = grid_mesh(lambda x, y: 5.0 * np.abs(x))
-    form, spacing = bend(mesh.vertices_mm, mesh.normals, table_of(mesh))
+    form, spacing = curvature(mesh.vertices_mm, mesh.normals, table_of(mesh))
     assert np.abs(np.linalg.eigvalsh(matrices(form))).max(axis=1).max() <= (
         np.sqrt(2.0) / (1.5 * spacing.min()) + 1e-9
     )
@@ -119,6 +119,6 @@ def test_a_crease_bends_no_tighter_than_its_spacing_allows() -> None:
 
 
 def test_a_point_without_neighbours_is_flat() -> None:
-    form, spacing = bend(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.full((1, 4), -1))
+    form, spacing = curvature(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), np.full((1, 4), -1))
     np.testing.assert_array_equal(form, 0.0)
     np.testing.assert_array_equal(spacing, 0.0)
