@@ -71,11 +71,14 @@ class Solution:
         estimate: the pose with its covariance.
         information: what the pairs fix, and what they leave free; None when too few pair.
         sigma_mm: width of the kernel at the end.
+        points_mm, residual_mm: (M, 3) in bone coordinates and (M,), of the pairs that fit.
     """
 
     estimate: PoseEstimate
     information: Information | None
     sigma_mm: float
+    points_mm: FloatArray
+    residual_mm: FloatArray
 
 
 def fit_bimcc(
@@ -238,8 +241,9 @@ class _Fit:
             return self.too_few_points(n_near, iterations)
         sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, noise_mm2)
         pairs.weight[:n] *= is_near
+        smooth = pairs._replace(direction=self._model.smooth_normals[pairs.vertex[:n]])
         information = information_of(
-            pairs, n, self.pose, self._model.centre_mm, self._scene.n_sharing_errors
+            smooth, n, self.pose, self._model.centre_mm, self._scene.n_sharing_errors
         )
         reasons = [] if is_converged else [Reason.NOT_CONVERGED]
         reasons += [Reason.DEGENERATE] * information.is_degenerate
@@ -254,7 +258,10 @@ class _Fit:
             is_converged,
             tuple(reasons),
         )
-        return Solution(estimate, information, sigma_mm)
+        fits = distance < sigma_mm
+        return Solution(
+            estimate, information, sigma_mm, pairs.point[:n][fits], pairs.residual[:n][fits]
+        )
 
     def too_few_points(self, n_points: int, iterations: int = 0) -> Solution:
         """The solution that says so."""
@@ -262,7 +269,7 @@ class _Fit:
             self.pose, np.diag([np.inf] * 6), n_points, 0.0, np.inf, np.inf, iterations, False,
             (Reason.TOO_FEW_POINTS,),
         )  # fmt: skip
-        return Solution(estimate, None, 0.0)
+        return Solution(estimate, None, 0.0, np.empty((0, 3)), np.empty(0))
 
     def _own_noise(self) -> tuple[float, float]:
         """Width of the kernel and variance of the noise that agree with each other."""

@@ -124,7 +124,7 @@ def fill_scene_grid(points_mm: NDArray[np.float64], every: int, grid: SceneGrid)
     """Hand every n-th point on from voxel to voxel: two sweeps over the six neighbours.
 
     Args:
-        points_mm: (N, 3) in scene coordinates, all within the grid.
+        points_mm: (N, 3) in scene coordinates; those outside the grid are left out.
         every: 1 for all points.
         grid: `nearest` in place; must be -1.
 
@@ -135,9 +135,11 @@ def fill_scene_grid(points_mm: NDArray[np.float64], every: int, grid: SceneGrid)
     nx, ny, nz = nearest.shape
     distance = np.full((nx, ny, nz), np.inf)
     for i in range(0, points_mm.shape[0], every):
-        gx = int((points_mm[i, 0] - origin[0]) / voxel + 0.5)
-        gy = int((points_mm[i, 1] - origin[1]) / voxel + 0.5)
-        gz = int((points_mm[i, 2] - origin[2]) / voxel + 0.5)
+        gx = int(np.floor((points_mm[i, 0] - origin[0]) / voxel + 0.5))
+        gy = int(np.floor((points_mm[i, 1] - origin[1]) / voxel + 0.5))
+        gz = int(np.floor((points_mm[i, 2] - origin[2]) / voxel + 0.5))
+        if min(gx, min(gy, gz)) < 0 or gx >= nx or gy >= ny or gz >= nz:
+            continue
         dx = points_mm[i, 0] - origin[0] - gx * voxel
         dy = points_mm[i, 1] - origin[1] - gy * voxel
         dz = points_mm[i, 2] - origin[2] - gz * voxel

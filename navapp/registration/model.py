@@ -13,6 +13,8 @@ from navapp.values import BoneModel
 
 _FINEST_VOXEL_MM = 2.0
 _MOST_VOXELS = 400_000
+_LEAST_SIGMA_MM = 1e-3
+_SMOOTHING_ROUNDS = 2
 _GRID_MARGIN_MM = 14.0
 
 
@@ -61,13 +63,31 @@ class RegistrationModel:
             np.ascontiguousarray(self.normals),
             curvatures,
             spacing,
-            np.ascontiguousarray(self.sigma_mm),
-            self.is_usable & ~open_border(len(self.points_mm), self.bone.mesh.faces),
+            np.maximum(self.sigma_mm, _LEAST_SIGMA_MM),
+            self.is_usable
+            & ~open_border(len(self.points_mm), self.bone.mesh.faces)
+            & (np.linalg.norm(self.normals, axis=1) > 0.5),
             neighbours,
             np.asarray(nearest, dtype=np.int32).reshape(centres.shape[:3]),
             low,
             voxel,
         )
+
+    @cached_property
+    def smooth_normals(self) -> FloatArray:
+        """(V, 3) unit normals over two rings of neighbours.
+
+        A rough model's own normals look as if they fixed a rotation that its shape leaves free.
+        """
+        neighbours = self.arrays.neighbours
+        is_there = (neighbours >= 0)[..., None]
+        normals = self.normals
+        for _ in range(_SMOOTHING_ROUNDS):
+            around = np.where(is_there, normals[np.maximum(neighbours, 0)], 0.0)
+            total = normals + around.sum(axis=1)
+            length = np.linalg.norm(total, axis=1, keepdims=True)
+            normals = total / np.maximum(length, 1e-12)
+        return normals
 
     def nearest(self, points_mm: FloatArray) -> tuple[NDArray[np.int32], FloatArray]:
         """Index of the nearest model point of each of (N, 3) points, and its distance."""

@@ -18,7 +18,9 @@ from navapp.registration.step_kernels import weigh
 _SAME_MM = 2.0
 _SAME_DEG = 2.0
 _COARSE_POINTS = 400
-_COARSE = BimccSettings(model_points=1000, max_iterations=35)
+# For starts that are near, or may be anywhere.
+NEAR = BimccSettings(model_points=1000, max_iterations=35)
+ANYWHERE = BimccSettings(model_points=1000, max_iterations=60, widest_mm=30.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +55,7 @@ def find_candidates(
     starts: Sequence[RigidTransform],
     score: Callable[[RigidTransform], float] | None = None,
     on_progress: Callable[[float], None] = lambda share: None,
+    settings: BimccSettings = NEAR,
 ) -> list[Candidate]:
     """Approach from every start on a thinned scene; distinct answers, best score first.
 
@@ -62,6 +65,7 @@ def find_candidates(
         starts: `scene_from_bone` each.
         score: of a pose, larger is better; by default `explained_share`.
         on_progress: told the share done; may raise to cancel.
+        settings: of the approach.
     """
     thinned = replace(scene, thinned_to=_COARSE_POINTS)
     _ = thinned.grid, model.arrays  # made here once, not in both threads
@@ -71,7 +75,7 @@ def find_candidates(
         for number in range(first, len(starts), 2):
             if first == 0:
                 on_progress(number / len(starts))
-            found[number] = fit_coarsely(thinned, model, starts[number], _COARSE)
+            found[number] = fit_coarsely(thinned, model, starts[number], settings)
 
     run_both(lambda: run(0), lambda: run(1))
     on_progress(1.0)

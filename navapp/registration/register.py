@@ -18,6 +18,8 @@ from navapp.registration.bimcc import (
 from navapp.registration.coverage import coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
+    ANYWHERE,
+    NEAR,
     explained_share,
     find_candidates,
     is_same_pose,
@@ -25,7 +27,7 @@ from navapp.registration.multi_start import (
 )
 from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.scene import Scene
-from navapp.values import PoseEstimate, Reason
+from navapp.values import PoseEstimate, Reason, predicted_tre_mm
 
 Method = Literal["bimcc", "bimcc-literal", "icp"]
 
@@ -34,6 +36,14 @@ _DOUBTFUL_COVERAGE = 0.85
 _LEAST_COVERAGE = 0.25
 # A kernel this near to its upper bound never found the noise: residuals are something else.
 _MISFIT_SHARE = 0.95
+# What residuals have in common some millimetres apart is no noise but another shape; a coarse model
+# leaves some of that itself.
+_SMOOTH_MM, _SMOOTH_SPACINGS = 0.2, 0.05
+_CELL_MM = 3.0
+_APART_CELLS = (0.8, 1.6)
+# A pose that is no better known than this is not known.
+_LARGEST_BOUND_MM = 2.0
+_N_BOUND = 200
 # Residuals so much larger than the points' own sigma lets expect are no noise either.
 _MISFIT_RATIO = 1.5
 _N_REFINED = 3
@@ -109,7 +119,7 @@ def register(
         rings = [tilted_starts(centred, middle_mm, tilt_deg)[1:] for tilt_deg in _RINGS_DEG]
         far = [centred, *chain.from_iterable(rings)]
         best = _from_many(
-            scene, model, far, best, lambda share: on_progress(first_part + 0.8 * share)
+            scene, model, far, best, lambda share: on_progress(first_part + 0.8 * share), ANYWHERE
         )
     on_progress(1.0)
     return best
@@ -121,9 +131,10 @@ def _from_many(
     starts: list[RigidTransform],
     known: Registration,
     on_progress: Callable[[float], None],
+    settings: BimccSettings = NEAR,
 ) -> Registration:
     """The best of what is known and of what many starts lead to; a guess is called one."""
-    candidates = find_candidates(scene, model, starts, on_progress=on_progress)
+    candidates = find_candidates(scene, model, starts, on_progress=on_progress, settings=settings)
     least = _REFINED_SHARE * max((candidate.score for candidate in candidates), default=0.0)
     n_starts = known.n_starts + len(starts)
     tried = [known]
@@ -136,7 +147,8 @@ def _from_many(
     rivals = [
         score
         for score, one in zip(scores, tried, strict=True)
-        if not is_same_pose(
+        if one.estimate.is_converged
+        and not is_same_pose(
             one.estimate.camera_from_bone,
             tried[best].estimate.camera_from_bone,
             model.centre_mm,
@@ -152,9 +164,12 @@ def _from_many(
 
 
 def _is_doubtful(answer: Registration) -> bool:
-    if answer.outcome is Outcome.FAILED:
-        return True
-    return answer.coverage is not None and answer.coverage < _DOUBTFUL_COVERAGE
+    return answer.outcome is Outcome.FAILED or _is_little(answer.coverage)
+
+
+def _is_little(seen: float | None) -> bool:
+    """Whether a coverage leaves doubt; where the camera stood unknown, it always does."""
+    return seen is None or seen < _DOUBTFUL_COVERAGE
 
 
 def _verdict(
@@ -168,14 +183,17 @@ def _verdict(
     seen = None
     if scene.camera_mm is not None:
         seen = coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
-    faults = _faults(scene, solution, seen)
+    faults = _faults(scene, model, solution, seen)
     free = [f"not fixed: {words}" for words in information.free_in_words()]
+    free += [Reason.TRE_TOO_LARGE.value] * (bound_mm(scene, model, estimate) > _LARGEST_BOUND_MM)
     outcome = Outcome.FAILED if faults else Outcome.DEGENERATE if free else Outcome.CONVERGED
     reasons = faults + [Reason.DEGENERATE.value] * bool(free) + free
     return Registration(outcome, tuple(reasons), estimate, seen, n_starts)
 
 
-def _faults(scene: Scene, solution: Solution, seen: float | None) -> list[str]:
+def _faults(
+    scene: Scene, model: RegistrationModel, solution: Solution, seen: float | None
+) -> list[str]:
     """What makes a solution no registration."""
     estimate = solution.estimate
     faults = [] if estimate.is_converged else [Reason.NOT_CONVERGED.value]
@@ -183,10 +201,49 @@ def _faults(scene: Scene, solution: Solution, seen: float | None) -> list[str]:
         is_misfit = estimate.rms_mm > _MISFIT_RATIO * estimate.expected_rms_mm
     else:
         is_misfit = solution.sigma_mm >= _MISFIT_SHARE * BimccSettings().widest_at_rest_mm
+    # Where little tells a right pose from a wrong one, residuals must look like noise as well.
+    if _is_little(seen) and not scene.knows_noise:
+        spacing_mm = float(np.median(model.arrays.spacing))
+        limit_mm = max(_SMOOTH_MM, _SMOOTH_SPACINGS * spacing_mm)
+        is_misfit |= smooth_part_mm(solution, max(_CELL_MM, spacing_mm)) > limit_mm
     faults += [Reason.SURFACE_MISFIT.value] * is_misfit
     if seen is not None and seen < _LEAST_COVERAGE:
         faults.append(Reason.COVERAGE_LOW.value)
     return faults
+
+
+def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
+    """Rms of what the mean residuals of cells have in common with those of the cells beside them.
+
+    Noise has nothing in common with the noise beside it; another shape has.
+
+    Args:
+        solution: with points and residuals that fit.
+        cell_mm: residuals within a cell are averaged; wider than what neighbours share by matching.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(solution.residual_mm) == 0:
+        return 0.0
+    cells = np.floor(solution.points_mm / cell_mm)
+    _, place, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    place = place.reshape(-1)
+    mean = np.bincount(place, solution.residual_mm) / counts
+    centres = [np.bincount(place, axis) / counts for axis in solution.points_mm.T]
+    tree = cKDTree(np.column_stack(centres))
+    a, b = tree.query_pairs(_APART_CELLS[1] * cell_mm, output_type="ndarray").T
+    is_apart = np.linalg.norm(tree.data[a] - tree.data[b], axis=1) > _APART_CELLS[0] * cell_mm
+    shared = (mean[a] * mean[b])[is_apart]
+    return float(max(float(shared.mean()), 0.0) ** 0.5) if len(shared) else 0.0
+
+
+def bound_mm(scene: Scene, model: RegistrationModel, estimate: PoseEstimate) -> float:
+    """95 % bound of the mean error over the points that face the camera; infinite if none."""
+    points = visible_points(model, estimate.camera_from_bone, scene)
+    if len(points) == 0 or not np.isfinite(estimate.covariance).all():
+        return float("inf")
+    step = max(1, len(points) // _N_BOUND)
+    return predicted_tre_mm(estimate, model.centre_mm, points[::step])
 
 
 def visible_points(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:

@@ -12,7 +12,6 @@ from navapp.values import SurfaceCloud
 
 _VOXEL_MM = 6.0
 _GRID_MARGIN_MM = 6.0
-# A scene that is wider than this many voxels gets larger ones: clutter far away costs nothing then.
 _MOST_VOXELS = 64
 
 
@@ -27,6 +26,9 @@ class Scene:
             camera); None when unknown: it is then taken from the residuals.
         n_sharing_errors: so many neighbouring points have their errors in common and count as one.
         thinned_to: the search from far uses about so many points.
+
+    Raises:
+        ValueError: points of another shape, or not finite.
     """
 
     points_mm: FloatArray
@@ -46,6 +48,11 @@ class Scene:
         n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
         return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors)
 
+    def __post_init__(self) -> None:
+        points = np.asarray(self.points_mm)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            raise ValueError("a scene's points must be finite and of shape (N, 3)")
+
     def __len__(self) -> int:
         return len(self.points_mm)
 
@@ -61,23 +68,28 @@ class Scene:
 
     @cached_property
     def arrays(self) -> SceneArrays:
-        """What the compiled loops read."""
-        none = np.zeros(len(self.points_mm))
+        """What the compiled loops read, in an order of its own: thinning must not see rows."""
+        n = len(self.points_mm)
+        order = np.random.default_rng(n).permutation(n)
+        sigma = np.zeros(n) if self.sigma_ray_mm is None else self.sigma_ray_mm
         return SceneArrays(
-            np.ascontiguousarray(self.points_mm, dtype=np.float64),
-            none if self.sigma_ray_mm is None else np.ascontiguousarray(self.sigma_ray_mm),
+            np.ascontiguousarray(self.points_mm[order], dtype=np.float64),
+            np.ascontiguousarray(sigma[order], dtype=np.float64),
             np.zeros(3) if self.camera_mm is None else np.asarray(self.camera_mm, dtype=np.float64),
             self.camera_mm is not None,
         )
 
     @cached_property
     def grid(self) -> SceneGrid:
-        """Which point is near each place; made when a start is far."""
+        """Which point is near each place around the scene's middle; made when a start is far.
+
+        What lies further away than any bone reaches has no place in it: walls, stray points.
+        """
         points = self.arrays.points[:: self.every]
-        low = points.min(axis=0) - _GRID_MARGIN_MM
-        size = np.ptp(points, axis=0) + 2.0 * _GRID_MARGIN_MM
-        voxel = max(_VOXEL_MM, float(size.max()) / _MOST_VOXELS)
-        counts = np.ceil(size / voxel).astype(int) + 1
-        grid = SceneGrid(np.full(tuple(counts), -1, dtype=np.int32), low, voxel)
+        middle, half = np.median(points, axis=0), 0.5 * _MOST_VOXELS * _VOXEL_MM
+        low = np.maximum(points.min(axis=0) - _GRID_MARGIN_MM, middle - half)
+        high = np.minimum(points.max(axis=0) + _GRID_MARGIN_MM, middle + half)
+        counts = np.ceil((high - low) / _VOXEL_MM).astype(int) + 1
+        grid = SceneGrid(np.full(tuple(counts), -1, dtype=np.int32), low, _VOXEL_MM)
         fill_scene_grid(self.arrays.points, self.every, grid)
         return grid

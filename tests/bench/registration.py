@@ -249,7 +249,7 @@ def _print(name: str, row: Row) -> None:
         if row.n_silent or row.n_unsaid
         else ""
     )
-    print(f"  {name:56s} {row.success:.3f} ({per_bone}) | {row.tre_mm:.3f} | "
+    print(f"  {name:56s} {row.success:.3f} of {len(row.ms)} ({per_bone}) | {row.tre_mm:.3f} | "
           f"{np.median(row.ms):.1f}{silent}", flush=True)  # fmt: skip
 
 

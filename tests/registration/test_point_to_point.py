@@ -13,7 +13,7 @@ from navapp.registration import (
     fit_bimcc_literal,
     fit_icp,
 )
-from navapp.registration.point_to_point import LiteralSettings, kabsch
+from navapp.registration.point_to_point import LiteralSettings, kabsch, solve_bimcc_literal
 from navapp.values import BoneModel, Reason
 from tests.reference.bimcc_reference import bidirectional_pairs
 from tests.registration.shapes import (
@@ -137,7 +137,7 @@ def test_under_an_endless_kernel_the_literal_variant_is_kabsch_on_both_ways() ->
     endless = LiteralSettings(first_medians=1e9, widest_mm=1e9, narrowest_mm=1e9)
     scene = Scene(SAMPLES)
     start = a_pose(4, 0.1, 2.0)
-    found = fit_bimcc_literal(scene, BLOB, start, endless)
+    found = solve_bimcc_literal(scene, BLOB, start, endless).estimate
     assert found.is_converged
     pose = start
     for _ in range(found.iterations):

@@ -293,3 +293,39 @@ def test_points_that_face_the_camera_are_told() -> None:
     np.testing.assert_array_equal(seen, MODEL.points_mm[cosine > 0.2])
     assert 0.1 * len(placed) < len(seen) < 0.6 * len(placed)
     assert visible_points(MODEL, TRUE, replace(scene, camera_mm=None)) is MODEL.points_mm
+
+
+def test_a_scene_that_holds_no_bone_is_no_registration() -> None:
+    """A noisy sheet lies against a bone's flank well enough: its residuals are no noise."""
+    rng = np.random.default_rng(4)
+    middle = TRUE.apply(MODEL.centre_mm)
+    for seed in range(4):
+        place = np.random.default_rng(seed).uniform(-1.0, 1.0, (600, 2)) * (40.0, 12.0)
+        sheet = middle + np.column_stack([place, rng.normal(-25.0, 0.3, 600)])
+        for camera in (EYE, None):
+            found = register(Scene(sheet, camera), MODEL, disturbed(MODEL, 10.0, 8.0, seed))
+            assert found.outcome is not Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("rough_mm", [0.15, 0.3])
+def test_a_rough_ball_is_as_degenerate_as_a_smooth_one(rough_mm: float) -> None:
+    """The normals of a rough model look as if they fixed a rotation."""
+    rng = np.random.default_rng(3)
+    ball = ball_mesh(30.0, 4000)
+    vertices = ball.vertices_mm * (1.0 + rough_mm / 30.0 * rng.standard_normal((4000, 1)))
+    model = RegistrationModel(BoneModel("ball", TriangleMesh(vertices, ball.faces)))
+    pose = RigidTransform.from_parts("left_rect", "ball", np.eye(3), (0.0, 0.0, 400.0))
+    seen = ball.vertices_mm[ball.vertices_mm[:, 2] < -10.0]
+    scene = Scene(pose.apply(seen) + rng.normal(0.0, 0.3, seen.shape), EYE)
+    start = pose.moved((1.0, -1.0, 2.0, 0.1, 0.05, -0.1), pose.translation_mm)
+    assert register(scene, model, start).outcome is Outcome.DEGENERATE
+
+
+def test_a_stray_point_far_away_changes_nothing() -> None:
+    scene = seen_scene(1200, 0.4, 1)
+    start = disturbed(MODEL, 25.0, 15.0, 1)
+    strayed = Scene(np.vstack([scene.points_mm, [[3000.0, 0.0, 900.0]]]), EYE)
+    found = register(strayed, MODEL, start)
+    assert found.outcome is Outcome.CONVERGED
+    assert found.coverage > 0.85
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
