@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.transform import FloatArray, RigidTransform, read_only, skew
+from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 Side = Literal["left", "right"]
 
@@ -387,13 +387,17 @@ def predicted_tre_mm(
     """
     if len(targets_mm) == 0:
         raise ValueError("no targets to predict an error for")
-    rotation = estimate.camera_from_bone.rotation
-    bounds = []
-    for offset in (targets_mm - centre_mm) @ rotation.T:
-        jacobian = np.hstack([np.eye(3), -skew(offset)])
-        spread = jacobian @ estimate.covariance @ jacobian.T
-        bounds.append(np.sqrt(_CHI2_3_95 * max(float(np.linalg.eigvalsh(spread)[-1]), 0.0)))
-    return float(np.mean(bounds))
+    offsets = (targets_mm - centre_mm) @ estimate.camera_from_bone.rotation.T
+    jacobian = np.zeros((len(offsets), 3, 6))
+    jacobian[:, :, :3] = np.eye(3)
+    x, y, z = offsets.T
+    # -[p - c]x, row by row.
+    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+    spread = jacobian @ estimate.covariance @ jacobian.transpose(0, 2, 1)
+    largest = np.maximum(np.linalg.eigvalsh(spread)[:, -1], 0.0)
+    return float(np.sqrt(_CHI2_3_95 * largest).mean())
 
 
 def _digest(plan: Plan) -> str:

@@ -52,7 +52,7 @@ class BimccSettings:
     largest_noise_mm: float = 1.0
     backward_share: float = 1.5
     point_share: float = 0.1
-    model_points: int = 2500
+    model_points: int = 1500
     max_iterations: int = 60
     settled_mm: float = 2e-3
     settled_rad: float = 2e-5
@@ -241,14 +241,15 @@ class _Fit:
             return self.too_few_points(n_near, iterations)
         sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, noise_mm2)
         pairs.weight[:n] *= is_near
+        pose = self.pose
         smooth = pairs._replace(direction=self._model.smooth_normals[pairs.vertex[:n]])
         information = information_of(
-            smooth, n, self.pose, self._model.centre_mm, self._scene.n_sharing_errors
+            smooth, n, pose, self._model.centre_mm, self._scene.n_sharing_errors
         )
         reasons = [] if is_converged else [Reason.NOT_CONVERGED]
         reasons += [Reason.DEGENERATE] * information.is_degenerate
         estimate = PoseEstimate(
-            self.pose,
+            pose,
             information.covariance,
             n_near,
             float((distance < 3.0 * deviation)[is_near].mean()),

@@ -35,7 +35,7 @@ class Scene:
     camera_mm: FloatArray | None = None
     sigma_ray_mm: FloatArray | None = None
     n_sharing_errors: float = 1.0
-    thinned_to: int = 750
+    thinned_to: int = 500
 
     @classmethod
     def from_stereo(cls, cloud: SurfaceCloud, correlation_px: float) -> "Scene":

@@ -45,7 +45,8 @@ _WIDE_SEARCH_PX = 160
 # A claimed sigma below this says no more.
 _BEST_SIGMA_PX = np.float32(0.1)
 
-_SURFACE_CENSUS = CensusSettings(radius_x=4, radius_y=3, p1=10, p2=60)
+# At half resolution a larger window holds two sides of a crest or a rim.
+_SURFACE_CENSUS = CensusSettings(radius_x=3, radius_y=2, p1=5, p2=30)
 # So few are soon matched as they are; at half resolution too little of the picture is left.
 _FEW_CELLS = 3_000_000
 

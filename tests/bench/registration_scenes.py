@@ -17,7 +17,7 @@ from navapp.registration import RegistrationModel
 from navapp.values import BoneModel
 
 BONES = ("femur_1", "femur_2", "femur_3", "tibia_1", "tibia_2")
-N_STEREO_SETTINGS, N_CLUTTER, NOISE_MM = 1800, 600, 0.5
+N_ON_BONE, N_CLUTTER, NOISE_MM = 1800, 600, 0.5
 _CAMERA_MM = 450.0
 _LEAST_FACING = 0.35
 _CAP_COSINE = -np.cos(np.radians(30.0))
@@ -37,7 +37,7 @@ class Bone:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clouded:
-    """A scene, seen from `camera_mm`; its first `N_STEREO_SETTINGS` points are bone."""
+    """A scene, seen from `camera_mm`; its first `N_ON_BONE` points are bone."""
 
     points_mm: FloatArray
     camera_mm: FloatArray
@@ -74,7 +74,7 @@ def clouded(bone: Bone, turn_deg: float, shift_mm: float, seed: int) -> Clouded:
     true = RigidTransform.from_parts("scene", bone.name, rotation, rng.uniform(-200.0, 200.0, 3))
     points = true.apply(points)
     twist = np.concatenate([shift_mm * _unit(rng), np.radians(turn_deg) * _unit(rng)])
-    start = true.moved(twist, points[:N_STEREO_SETTINGS].mean(axis=0))
+    start = true.moved(twist, points[:N_ON_BONE].mean(axis=0))
     return Clouded(points, true.apply(camera), true, start)
 
 
@@ -95,7 +95,7 @@ def scenes(
 def information_limit_mm(bone: Bone, scene: Clouded) -> float:
     """TRE of least squares on the true bone points and the dense surface, from the truth."""
     dense, pose = bone.dense, scene.true
-    points = scene.points_mm[:N_STEREO_SETTINGS]
+    points = scene.points_mm[:N_ON_BONE]
     for _ in range(10):
         moved = pose.inverse().apply(points)
         index, _ = dense.nearest(moved)
@@ -116,6 +116,20 @@ def information_limit_mm(bone: Bone, scene: Clouded) -> float:
     return error_mm(bone, pose, scene)
 
 
+def is_degenerate(bone: Bone, scene: Clouded) -> bool:
+    """Whether the true bone points at the true pose leave a direction free.
+
+    Smallest over largest eigenvalue below 5e-3, lengths in units of the seen surface's radius.
+    """
+    points = scene.true.inverse().apply(scene.points_mm[:N_ON_BONE])
+    normals = bone.dense.normals[bone.dense.nearest(points)[0]]
+    offset = points - points.mean(axis=0)
+    radius = np.sqrt((offset**2).sum(axis=1).mean())
+    rows = np.hstack([normals, np.cross(offset, normals) / radius])
+    eigenvalues = np.linalg.eigvalsh(rows.T @ rows)
+    return bool(eigenvalues[0] < 5e-3 * eigenvalues[-1])
+
+
 def _direction(rng: np.random.Generator, axis: FloatArray) -> FloatArray:
     """Unit vector within 60 deg of an axis."""
     while True:
@@ -128,8 +142,8 @@ def _seen_points(mesh: TriangleMesh, direction: FloatArray, rng: np.random.Gener
     """Points spread evenly over the triangles that lean towards a direction."""
     normals, areas = _faces_of(mesh)
     seen = np.flatnonzero(normals @ direction > _LEAST_FACING)
-    chosen = rng.choice(seen, N_STEREO_SETTINGS, p=areas[seen] / areas[seen].sum())
-    u, v = rng.random((2, N_STEREO_SETTINGS, 1))
+    chosen = rng.choice(seen, N_ON_BONE, p=areas[seen] / areas[seen].sum())
+    u, v = rng.random((2, N_ON_BONE, 1))
     u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
     a, b, c = (mesh.vertices_mm[mesh.faces[chosen, k]] for k in range(3))
     points: FloatArray = a + u * (b - a) + v * (c - a)

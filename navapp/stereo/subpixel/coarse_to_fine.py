@@ -19,9 +19,13 @@ from navapp.values import DisparityMap
 _COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.5, 0.75, 0.4))
 _SURFACE = RegionalSettings(radius_px=12)
 _N_TURNS = 2
+# On a support that is itself measured, a larger window rounds off crests.
+_RADIUS_PX = 4
 # For a support, many fair points are better than few good ones.
-_FAIR = RefineSettings(n_steps=1, min_correlation=0.5, last_step_px=0.5, max_sigma_px=0.5)
-_GOOD = RefineSettings(last_step_px=0.25, max_roughness_px=0.35)
+_FAIR = RefineSettings(
+    radius_px=_RADIUS_PX, n_steps=1, min_correlation=0.5, last_step_px=0.5, max_sigma_px=0.5
+)
+_GOOD = RefineSettings(radius_px=_RADIUS_PX, last_step_px=0.25, max_roughness_px=0.35)
 # A window that wants to be further from the surface through its neighbours follows something else.
 _FAR_FROM_SURFACE_PX = 0.4
 # A surface that is further from the coarse map belongs to another thing: edges keep their place.
