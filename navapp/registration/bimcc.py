@@ -19,7 +19,7 @@ from navapp.registration.bimcc_kernels import (
 from navapp.registration.information import Information, information_of
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
-from navapp.registration.scene import Scene
+from navapp.registration.scene import NO_GRID, Scene
 from navapp.registration.step_kernels import noise_under_kernel_mm2, weigh
 from navapp.values import PoseEstimate, Reason
 
@@ -27,6 +27,8 @@ MIN_POINTS = 60
 # Pairs that are longer than so many widths of the kernel take no part in the figures.
 _REACH_SIGMAS = 4.0
 _NOISE_ROUNDS = 20
+# A first kernel of this width means a start some millimetres off.
+_NEAR_SIGMA_MM = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,13 +198,15 @@ class _Fit:
         return inverse.inverse()
 
     def from_far(self) -> LoopState:
-        """Thinned, both ways; not at all when the start is near."""
+        """Thinned, both ways; forward only when the start is near, not at all when it is there."""
         arrays, model, settings = self._scene.arrays, self._model.arrays, self._loop_settings()
         sigma_mm = first_sigma_mm(arrays, model, self._rotation, self._shift, self._pairs, settings)
         if sigma_mm <= settings.narrowest_mm:
             return LoopState(0, sigma_mm > 0.0, sigma_mm, 0, 0.0)
+        # Backward pairs are for finding the way; a near start does without the grid they need.
+        grid = NO_GRID if sigma_mm <= _NEAR_SIGMA_MM else self._scene.grid
         state: LoopState = loop_from_far(
-            arrays, self._scene.grid, model, self._rotation, self._shift, self._pairs, sigma_mm,
+            arrays, grid, model, self._rotation, self._shift, self._pairs, sigma_mm,
             settings,
         )  # fmt: skip
         self._has_moved = True

@@ -14,6 +14,9 @@ _VOXEL_MM = 6.0
 _GRID_MARGIN_MM = 6.0
 _MOST_VOXELS = 64
 
+# No place has a point near it.
+NO_GRID = SceneGrid(np.full((1, 1, 1), -1, dtype=np.int32), np.zeros(3), 1.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
