@@ -148,6 +148,7 @@ class Reason(Enum):
     NOT_CONVERGED = "the estimate did not settle"
     AMBIGUOUS = "a different pose fits as well"
     DEGENERATE = "the seen surface leaves a direction free"
+    POSE_UNCERTAIN = "the seen surface fixes the pose too loosely"
     TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
     JUMPED = "the pose jumped further than a patient moves"
     RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
@@ -176,6 +177,7 @@ _REMEDIES = {
     Reason.NOT_CONVERGED: "hold still, or register again",
     Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
     Reason.DEGENERATE: "expose more of the bone",
+    Reason.POSE_UNCERTAIN: "expose more of the bone",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",
     Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",

@@ -9,19 +9,15 @@ import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.register_work import (
-    RegisterTimings,
     RegisterWork,
     prepared,
     since_ms,
-    unless_too_small,
 )
 from navapp.errors import ResultError, UsageError
 from navapp.geometry.transform import FloatArray, skew
 
 if TYPE_CHECKING:
     from navapp.registration import Registration
-
-_TRE_POINTS = 200
 
 _EXAMPLE = """\
 examples:
@@ -73,12 +69,11 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Register, write what was asked for; the exit code."""
     _check(options)
-    timings = RegisterTimings()
-    work = prepared(options, timings)
+    work = prepared(options)
     for warning in work.warnings:
         diagnostics.warn(warning)
-    answer = _registered(work, timings, options, diagnostics)
-    content = _content(work, answer, timings, options)
+    answer, register_ms = _registered(work, options, diagnostics)
+    content = _content(work, answer, register_ms, options)
     write_json(options.json, "register", content)
     if options.json != "-":
         _tell(content, options.units, diagnostics)
@@ -108,11 +103,9 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _registered(
-    work: RegisterWork,
-    timings: RegisterTimings,
-    options: argparse.Namespace,
-    diagnostics: Diagnostics,
-) -> "Registration":
+    work: RegisterWork, options: argparse.Namespace, diagnostics: Diagnostics
+) -> tuple["Registration", float]:
+    """The answer, and how many ms it took."""
     from navapp.registration import register
 
     diagnostics.detail("registering (compiles first, once on a machine)")
@@ -125,14 +118,13 @@ def _registered(
         is_global=options.is_global,
         on_progress=lambda share: diagnostics.progress("starts", share),
     )
-    timings.register_ms = since_ms(started)
-    return unless_too_small(answer, work, options.units)
+    return answer, since_ms(started)
 
 
 def _content(
     work: RegisterWork,
     answer: "Registration",
-    timings: RegisterTimings,
+    register_ms: float,
     options: argparse.Namespace,
 ) -> dict[str, Any]:
     """The result for programs, in the files' unit."""
@@ -152,17 +144,17 @@ def _content(
         "rms": work.length(estimate.rms_mm),
         "inlier_share": n_fit / len(work.scene),
         "covariance": _covariance(work, answer).tolist() if fixes_all else None,
-        "predicted_tre": work.length(_predicted_tre_mm(work, answer)) if fixes_all else None,
+        "predicted_tre": work.length(answer.predicted_tre_mm) if fixes_all else None,
         "coverage": answer.coverage,
         "starts": answer.n_starts,
         "method": options.method,
         "scene_points": len(work.scene),
         "model_vertices": len(work.model.points_mm),
         "timing_ms": {
-            "read": timings.read_ms,
-            "prepare": timings.prepare_ms,
-            "register": timings.register_ms,
-            "total": timings.total_ms,
+            "read": work.read_ms,
+            "prepare": work.prepare_ms,
+            "register": register_ms,
+            "total": work.read_ms + work.prepare_ms + register_ms,
         },
         "warnings": list(work.warnings),
         **({} if has_pose else {"best_guess": pose.to_list()}),
@@ -179,18 +171,6 @@ def _covariance(work: RegisterWork, answer: "Registration") -> FloatArray:
     change[:3] /= work.factor
     moved: FloatArray = change @ estimate.covariance @ change.T
     return moved
-
-
-def _predicted_tre_mm(work: RegisterWork, answer: "Registration") -> float | None:
-    """95 % bound over the points that face the camera; None when there are none."""
-    from navapp.registration import visible_points
-    from navapp.values import predicted_tre_mm
-
-    seen = visible_points(work.model, answer.estimate.camera_from_bone, work.scene)
-    if len(seen) == 0:
-        return None
-    some = seen[np.linspace(0, len(seen) - 1, min(len(seen), _TRE_POINTS)).astype(int)]
-    return predicted_tre_mm(answer.estimate, work.model.centre_mm, some)
 
 
 def _tell(content: dict[str, Any], units: str, diagnostics: Diagnostics) -> None:

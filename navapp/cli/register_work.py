@@ -2,7 +2,7 @@
 
 import argparse
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,14 +11,14 @@ from navapp.geometry.transform import RigidTransform
 
 if TYPE_CHECKING:
     from navapp.cli.cloud_files import ModelFile, SceneFile
-    from navapp.registration import Registration, RegistrationModel, Scene
+    from navapp.registration import RegistrationModel, Scene
 
 _MM_PER_UNIT = {"mm": 1.0, "m": 1000.0}
 # Without a unit, the model's points count as this far apart: as those of a bone's surface.
 _SPACING_MM = 1.5
 _SYNONYMS = {"millimeter": "mm", "millimetre": "mm", "meter": "m", "metre": "m"}
 _DOUBTFUL_RATIO = 100.0
-# No bone measures more or less than this; below it everything lies under one kernel and fits.
+# No bone measures more or less than this.
 _SMALLEST_MM, _LARGEST_MM = 5.0, 5000.0
 
 
@@ -32,6 +32,7 @@ class RegisterWork:
         start: rough `scene_from_model`, mm.
         factor: mm per unit of the files.
         warnings: what the user should know, in words.
+        read_ms, prepare_ms: how long it took to read the files, and to make them ready.
     """
 
     scene: "Scene"
@@ -40,6 +41,8 @@ class RegisterWork:
     start: RigidTransform
     factor: float
     warnings: tuple[str, ...]
+    read_ms: float
+    prepare_ms: float
 
     def pose(self, scene_from_model: RigidTransform) -> RigidTransform:
         """A pose in the files' unit."""
@@ -51,21 +54,7 @@ class RegisterWork:
         return None if length_mm is None else length_mm / self.factor
 
 
-@dataclass(slots=True)
-class RegisterTimings:
-    """How long the parts took."""
-
-    read_ms: float = 0.0
-    prepare_ms: float = 0.0
-    register_ms: float = 0.0
-
-    @property
-    def total_ms(self) -> float:
-        """Sum."""
-        return self.read_ms + self.prepare_ms + self.register_ms
-
-
-def prepared(options: argparse.Namespace, timings: RegisterTimings) -> RegisterWork:
+def prepared(options: argparse.Namespace) -> RegisterWork:
     """Both files and the start, in mm, ready to be registered.
 
     Raises:
@@ -85,16 +74,16 @@ def prepared(options: argparse.Namespace, timings: RegisterTimings) -> RegisterW
     start = RigidTransform.identity("scene", "model")
     if options.initial:
         start = read_pose(options.initial, "scene", "model", factor)
-    timings.read_ms = since_ms(started)
+    read_ms = since_ms(started)
     started = time.perf_counter()
     mesh = TriangleMesh(factor * model.mesh.vertices_mm, model.mesh.faces, model.mesh.normals)
     ready = RegistrationModel(BoneModel("model", mesh, is_removed=model.is_removed))
     _ = ready.arrays  # made at first use
     camera_mm = None if options.camera is None else factor * np.array(options.camera)
     seen = Scene(factor * scene.points, camera_mm=camera_mm)
-    timings.prepare_ms = since_ms(started)
+    prepare_ms = since_ms(started)
     warnings = tuple(_warnings(scene, model, options))
-    return RegisterWork(seen, ready, model, start, factor, warnings)
+    return RegisterWork(seen, ready, model, start, factor, warnings, read_ms, prepare_ms)
 
 
 def _warnings(scene: "SceneFile", model: "ModelFile", options: argparse.Namespace) -> list[str]:
@@ -124,21 +113,6 @@ def _warnings(scene: "SceneFile", model: "ModelFile", options: argparse.Namespac
                 "is --units right?"
             )
     return warnings
-
-
-def unless_too_small(answer: "Registration", work: RegisterWork, units: str) -> "Registration":
-    """The answer, which is none when a file's unit makes everything fit everywhere."""
-    from navapp.registration import Outcome
-
-    unit = "" if units == "none" else f" {units}"
-    faults = tuple(
-        f"the {name} is only {across_mm / work.factor:.2g}{unit} across"
-        for name, points_mm in (("scene", work.scene.points_mm), ("model", work.model.points_mm))
-        if (across_mm := float(np.ptp(points_mm, axis=0).max())) < _SMALLEST_MM
-    )
-    if not faults:
-        return answer
-    return replace(answer, outcome=Outcome.FAILED, reasons=(*answer.reasons, *faults))
 
 
 def since_ms(started: float) -> float:

@@ -11,7 +11,7 @@ from navapp.registration.multi_start import (
     tilted_starts,
 )
 from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
-from navapp.registration.register import Outcome, Registration, register, visible_points
+from navapp.registration.register import Outcome, Registration, register
 from navapp.registration.scene import Scene
 
 __all__ = [
@@ -31,5 +31,4 @@ __all__ = [
     "is_same_pose",
     "register",
     "tilted_starts",
-    "visible_points",
 ]

@@ -22,12 +22,10 @@ class Information:
             the model's centre); infinite when a direction is not fixed at all.
         free: (K, 6) directions that are not fixed, as twists about the seen surface's centre in
             levers: unit vectors, translation first, in the scene's frame.
-        lever_mm: rms distance of the seen surface from its centre.
     """
 
     covariance: FloatArray
     free: FloatArray
-    lever_mm: float
 
     @property
     def is_degenerate(self) -> bool:
@@ -74,12 +72,12 @@ def information_of(
     turned[:3, 3:] = turned[3:, :3] = pose.rotation
     free = (turned @ vectors[:, is_free]).T
     if eigenvalues[0] <= _SINGULAR_SHARE * eigenvalues[-1]:
-        return Information(np.diag([np.inf] * 6), free, lever_mm)
+        return Information(np.diag([np.inf] * 6), free)
     plane_system(pairs, n, np.ascontiguousarray(centre_mm), lever_mm, H, g)
     levers = np.diag([1.0, 1.0, 1.0, 1.0 / lever_mm, 1.0 / lever_mm, 1.0 / lever_mm])
     change = levers @ turned
     covariance = n_sharing_errors * change @ np.linalg.inv(H) @ change.T
-    return Information(0.5 * (covariance + covariance.T), free, lever_mm)
+    return Information(0.5 * (covariance + covariance.T), free)
 
 
 def _axis(vector: FloatArray) -> str:

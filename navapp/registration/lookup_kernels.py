@@ -55,6 +55,33 @@ class SceneGrid(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
+def voxel_of(
+    x: float, y: float, z: float, origin: NDArray[np.float64], voxel: float
+) -> tuple[int, int, int]:
+    """Voxel whose centre is nearest; it may lie outside the grid."""
+    return (
+        int(np.floor((x - origin[0]) / voxel + 0.5)),
+        int(np.floor((y - origin[1]) / voxel + 0.5)),
+        int(np.floor((z - origin[2]) / voxel + 0.5)),
+    )
+
+
+@njit(cache=True, nogil=True)
+def is_voxel(gx: int, gy: int, gz: int, grid: NDArray[np.int32]) -> bool:
+    """Whether a grid has that voxel."""
+    nx, ny, nz = grid.shape
+    return bool(0 <= gx < nx and 0 <= gy < ny and 0 <= gz < nz)
+
+
+@njit(cache=True, nogil=True)
+def squared_distance(x: float, y: float, z: float, points: NDArray[np.float64], i: int) -> float:
+    """Of a place from point i."""
+    dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
+    squared: float = dx * dx + dy * dy + dz * dz
+    return squared
+
+
+@njit(cache=True, nogil=True)
 def nearest_vertex(
     x: float,
     y: float,
@@ -71,12 +98,9 @@ def nearest_vertex(
     costs as much as the look-up.
     """
     nx, ny, nz = grid.shape
-    gx = int(np.floor((x - origin[0]) / voxel + 0.5))
-    gy = int(np.floor((y - origin[1]) / voxel + 0.5))
-    gz = int(np.floor((z - origin[2]) / voxel + 0.5))
+    gx, gy, gz = voxel_of(x, y, z, origin, voxel)
     best: int = grid[min(max(gx, 0), nx - 1), min(max(gy, 0), ny - 1), min(max(gz, 0), nz - 1)]
-    dx, dy, dz = x - points[best, 0], y - points[best, 1], z - points[best, 2]
-    least = dx * dx + dy * dy + dz * dz
+    least = squared_distance(x, y, z, points, best)
     start = -1
     while start != best:
         start = best
@@ -84,8 +108,7 @@ def nearest_vertex(
             other = neighbours[start, k]
             if other < 0:
                 break
-            dx, dy, dz = x - points[other, 0], y - points[other, 1], z - points[other, 2]
-            squared = dx * dx + dy * dy + dz * dz
+            squared = squared_distance(x, y, z, points, other)
             if squared < least:
                 least = squared
                 best = other
@@ -112,11 +135,34 @@ def nearest_vertices(
         best = nearest_vertex(
             x, y, z, model.points, model.neighbours, model.grid, model.origin, model.voxel
         )
-        dx, dy, dz = (
-            x - model.points[best, 0], y - model.points[best, 1], z - model.points[best, 2],
-        )  # fmt: skip
         index[i] = best
-        distance_mm[i] = np.sqrt(dx * dx + dy * dy + dz * dz)
+        distance_mm[i] = np.sqrt(squared_distance(x, y, z, model.points, best))
+
+
+@njit(cache=True, nogil=True)
+def scene_point_near(
+    x: float, y: float, z: float, points: NDArray[np.float64], grid: SceneGrid, radius_mm: float
+) -> int:
+    """A scene point near a place, the nearest or almost; -1 beyond the radius or the grid."""
+    gx, gy, gz = voxel_of(x, y, z, grid.origin, grid.voxel)
+    if not is_voxel(gx, gy, gz, grid.nearest):
+        return -1
+    i: int = grid.nearest[gx, gy, gz]
+    if i < 0 or squared_distance(x, y, z, points, i) > radius_mm * radius_mm:
+        return -1
+    return i
+
+
+@njit(cache=True, nogil=True)
+def squared_from_centre(
+    points_mm: NDArray[np.float64], i: int, gx: int, gy: int, gz: int, grid: SceneGrid
+) -> float:
+    """Of point i from the centre of a voxel."""
+    origin, voxel = grid.origin, grid.voxel
+    squared: float = squared_distance(
+        origin[0] + gx * voxel, origin[1] + gy * voxel, origin[2] + gz * voxel, points_mm, i
+    )
+    return squared
 
 
 @njit(cache=True, nogil=True)
@@ -135,15 +181,11 @@ def fill_scene_grid(points_mm: NDArray[np.float64], every: int, grid: SceneGrid)
     nx, ny, nz = nearest.shape
     distance = np.full((nx, ny, nz), np.inf)
     for i in range(0, points_mm.shape[0], every):
-        gx = int(np.floor((points_mm[i, 0] - origin[0]) / voxel + 0.5))
-        gy = int(np.floor((points_mm[i, 1] - origin[1]) / voxel + 0.5))
-        gz = int(np.floor((points_mm[i, 2] - origin[2]) / voxel + 0.5))
-        if min(gx, min(gy, gz)) < 0 or gx >= nx or gy >= ny or gz >= nz:
+        x, y, z = points_mm[i, 0], points_mm[i, 1], points_mm[i, 2]
+        gx, gy, gz = voxel_of(x, y, z, origin, voxel)
+        if not is_voxel(gx, gy, gz, nearest):
             continue
-        dx = points_mm[i, 0] - origin[0] - gx * voxel
-        dy = points_mm[i, 1] - origin[1] - gy * voxel
-        dz = points_mm[i, 2] - origin[2] - gz * voxel
-        squared = dx * dx + dy * dy + dz * dz
+        squared = squared_from_centre(points_mm, i, gx, gy, gz, grid)
         if squared < distance[gx, gy, gz]:
             distance[gx, gy, gz] = squared
             nearest[gx, gy, gz] = i
@@ -159,15 +201,12 @@ def fill_scene_grid(points_mm: NDArray[np.float64], every: int, grid: SceneGrid)
                         jx = ix - step if axis == 0 else ix
                         jy = iy - step if axis == 1 else iy
                         jz = iz - step if axis == 2 else iz
-                        if min(jx, min(jy, jz)) < 0 or jx >= nx or jy >= ny or jz >= nz:
+                        if not is_voxel(jx, jy, jz, nearest):
                             continue
                         i = nearest[jx, jy, jz]
                         if i < 0 or i == nearest[ix, iy, iz]:
                             continue
-                        dx = points_mm[i, 0] - origin[0] - ix * voxel
-                        dy = points_mm[i, 1] - origin[1] - iy * voxel
-                        dz = points_mm[i, 2] - origin[2] - iz * voxel
-                        squared = dx * dx + dy * dy + dz * dz
+                        squared = squared_from_centre(points_mm, i, ix, iy, iz, grid)
                         if squared < distance[ix, iy, iz]:
                             distance[ix, iy, iz] = squared
                             nearest[ix, iy, iz] = i

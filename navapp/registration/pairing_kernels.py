@@ -6,7 +6,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.registration.lookup_kernels import ModelArrays, SceneGrid, nearest_vertex
+from navapp.registration.lookup_kernels import (
+    ModelArrays,
+    SceneGrid,
+    nearest_vertex,
+    scene_point_near,
+)
 
 # Beyond so many spacings from its vertex a point is off the model's edge: the vertex's own
 # curvature says nothing there.
@@ -62,6 +67,39 @@ def make_pairs(n: int) -> Pairs:
 
 
 @njit(cache=True, nogil=True)
+def moved(
+    rotation: NDArray[np.float64],
+    translation: NDArray[np.float64],
+    points: NDArray[np.float64],
+    i: int,
+) -> tuple[float, float, float]:
+    """Point i after a rotation and a translation."""
+    x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    return (
+        rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0],
+        rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
+        rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2],
+    )
+
+
+@njit(cache=True, nogil=True)
+def faces(
+    camera: NDArray[np.float64],
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    v: int,
+    least_cosine: float,
+) -> bool:
+    """Whether vertex v shows its outer side to a camera, both in bone coordinates."""
+    dx, dy, dz = camera[0] - points[v, 0], camera[1] - points[v, 1], camera[2] - points[v, 2]
+    towards = normals[v, 0] * dx + normals[v, 1] * dy + normals[v, 2] * dz
+    if least_cosine == 0.0:  # most calls, and no root needed
+        return bool(towards >= 0.0)
+    seen: bool = towards >= least_cosine * np.sqrt(dx * dx + dy * dy + dz * dz)
+    return seen
+
+
+@njit(cache=True, nogil=True)
 def pair_forward(
     scene: SceneArrays,
     model: ModelArrays,
@@ -89,19 +127,11 @@ def pair_forward(
     has_camera = scene.has_camera
     n = 0
     for i in range(0, points.shape[0], every):
-        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        x = rotation[0, 0] * px + rotation[0, 1] * py + rotation[0, 2] * pz + translation[0]
-        y = rotation[1, 0] * px + rotation[1, 1] * py + rotation[1, 2] * pz + translation[1]
-        z = rotation[2, 0] * px + rotation[2, 1] * py + rotation[2, 2] * pz + translation[2]
+        x, y, z = moved(rotation, translation, points, i)
         v = nearest_vertex(x, y, z, places, model.neighbours, model.grid, model.origin, model.voxel)
         if not can_pair[v]:
             continue
-        towards = (
-            normals[v, 0] * (camera[0] - places[v, 0])
-            + normals[v, 1] * (camera[1] - places[v, 1])
-            + normals[v, 2] * (camera[2] - places[v, 2])
-        )
-        if has_camera and towards < 0.0:
+        if has_camera and not faces(camera, places, normals, v, 0.0):
             continue
         pairs.scene[n] = i
         pairs.vertex[n] = v
@@ -142,37 +172,16 @@ def pair_backward(
         How many there are now.
     """
     points, normals, places, can_pair = scene.points, model.normals, model.points, model.can_pair
-    nearest, origin, voxel = grid.nearest, grid.origin, grid.voxel
-    nx, ny, nz = nearest.shape
+    inverse = rotation.T.copy()
+    shift = -(inverse @ translation)
     for v in range(0, places.shape[0], every):
         if not can_pair[v]:
             continue
-        if scene.has_camera:
-            cx, cy, cz = (
-                camera[0] - places[v, 0],
-                camera[1] - places[v, 1],
-                camera[2] - places[v, 2],
-            )
-            towards = normals[v, 0] * cx + normals[v, 1] * cy + normals[v, 2] * cz
-            if towards < least_cosine * np.sqrt(cx * cx + cy * cy + cz * cz):
-                continue
-        dx, dy, dz = (
-            places[v, 0] - translation[0], places[v, 1] - translation[1],
-            places[v, 2] - translation[2],
-        )  # fmt: skip
-        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
-        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
-        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
-        gx = int(np.floor((x - origin[0]) / voxel + 0.5))
-        gy = int(np.floor((y - origin[1]) / voxel + 0.5))
-        gz = int(np.floor((z - origin[2]) / voxel + 0.5))
-        if min(gx, min(gy, gz)) < 0 or gx >= nx or gy >= ny or gz >= nz:
+        if scene.has_camera and not faces(camera, places, normals, v, least_cosine):
             continue
-        i = nearest[gx, gy, gz]
-        if i < 0:
-            continue
-        dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
-        if dx * dx + dy * dy + dz * dz <= radius_mm * radius_mm:
+        x, y, z = moved(inverse, shift, places, v)
+        i = scene_point_near(x, y, z, points, grid, radius_mm)
+        if i >= 0:
             pairs.scene[n] = i
             pairs.vertex[n] = v
             n += 1
@@ -198,10 +207,7 @@ def measure_pairs(
     points, places, normals, curvature = scene.points, model.points, model.normals, model.curvature
     for k in range(first, n):
         i, v = pairs.scene[k], pairs.vertex[k]
-        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        x = rotation[0, 0] * px + rotation[0, 1] * py + rotation[0, 2] * pz + translation[0]
-        y = rotation[1, 0] * px + rotation[1, 1] * py + rotation[1, 2] * pz + translation[1]
-        z = rotation[2, 0] * px + rotation[2, 1] * py + rotation[2, 2] * pz + translation[2]
+        x, y, z = moved(rotation, translation, points, i)
         pairs.point[k, 0], pairs.point[k, 1], pairs.point[k, 2] = x, y, z
         dx, dy, dz = x - places[v, 0], y - places[v, 1], z - places[v, 2]
         gx, gy, gz = normals[v, 0], normals[v, 1], normals[v, 2]
@@ -235,8 +241,6 @@ def count_visible(
     normals, places = model.normals, model.points
     n = 0
     for v in range(0, places.shape[0], every):
-        cx, cy, cz = camera[0] - places[v, 0], camera[1] - places[v, 1], camera[2] - places[v, 2]
-        towards = normals[v, 0] * cx + normals[v, 1] * cy + normals[v, 2] * cz
-        is_seen = towards >= least_cosine * np.sqrt(cx * cx + cy * cy + cz * cz)
+        is_seen = faces(camera, places, normals, v, least_cosine)
         n += 1 if is_seen and model.can_pair[v] else 0
     return n

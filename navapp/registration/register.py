@@ -31,7 +31,7 @@ from navapp.values import PoseEstimate, Reason, predicted_tre_mm
 
 Method = Literal["bimcc", "bimcc-literal", "icp"]
 
-# With a camera, right answers cover more than 0.9 of what should be seen on an open bone.
+# With a camera; a bone that lies open is covered better than this.
 _DOUBTFUL_COVERAGE = 0.85
 _LEAST_COVERAGE = 0.25
 # A kernel this near to its upper bound never found the noise: residuals are something else.
@@ -42,8 +42,10 @@ _SMOOTH_MM, _SMOOTH_SPACINGS = 0.2, 0.05
 _CELL_MM = 3.0
 _APART_CELLS = (0.8, 1.6)
 # A pose that is no better known than this is not known.
-_LARGEST_BOUND_MM = 2.0
-_N_BOUND = 200
+_LARGEST_TRE_MM = 2.0
+_N_TRE_POINTS = 200
+# No bone is smaller; below it everything lies under one kernel and fits.
+_SMALLEST_MM = 5.0
 # Residuals so much larger than the points' own sigma lets expect are no noise either.
 _MISFIT_RATIO = 1.5
 _N_REFINED = 3
@@ -73,6 +75,8 @@ class Registration:
         estimate: the pose, `scene_from_bone`.
         coverage: share of the model facing the camera that has the scene's surface on it; None
             without a camera.
+        predicted_tre_mm: 95 % bound of the mean error over the points that face the camera; None
+            when a direction is not fixed at all or no point faces the camera.
         n_starts: so many starts were tried.
     """
 
@@ -80,6 +84,7 @@ class Registration:
     reasons: tuple[str, ...]
     estimate: PoseEstimate
     coverage: float | None
+    predicted_tre_mm: float | None
     n_starts: int
 
 
@@ -179,16 +184,18 @@ def _verdict(
     estimate, information = solution.estimate, solution.information
     if information is None:
         why = tuple(reason.value for reason in estimate.reasons)
-        return Registration(Outcome.FAILED, why, estimate, None, n_starts)
+        return Registration(Outcome.FAILED, why, estimate, None, None, n_starts)
     seen = None
     if scene.camera_mm is not None:
         seen = coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
     faults = _faults(scene, model, solution, seen)
     free = [f"not fixed: {words}" for words in information.free_in_words()]
-    free += [Reason.TRE_TOO_LARGE.value] * (bound_mm(scene, model, estimate) > _LARGEST_BOUND_MM)
+    free = [Reason.DEGENERATE.value] * bool(free) + free
+    tre_mm = _predicted_tre_mm(scene, model, estimate)
+    if tre_mm is None or tre_mm > _LARGEST_TRE_MM:
+        free.append(Reason.POSE_UNCERTAIN.value)
     outcome = Outcome.FAILED if faults else Outcome.DEGENERATE if free else Outcome.CONVERGED
-    reasons = faults + [Reason.DEGENERATE.value] * bool(free) + free
-    return Registration(outcome, tuple(reasons), estimate, seen, n_starts)
+    return Registration(outcome, (*faults, *free), estimate, seen, tre_mm, n_starts)
 
 
 def _faults(
@@ -197,6 +204,9 @@ def _faults(
     """What makes a solution no registration."""
     estimate = solution.estimate
     faults = [] if estimate.is_converged else [Reason.NOT_CONVERGED.value]
+    for name, points_mm in (("scene", scene.points_mm), ("model", model.points_mm)):
+        if float(np.ptp(points_mm, axis=0).max()) < _SMALLEST_MM:
+            faults.append(f"the {name} is too small to fix a bone")
     if scene.knows_noise:
         is_misfit = estimate.rms_mm > _MISFIT_RATIO * estimate.expected_rms_mm
     else:
@@ -237,16 +247,17 @@ def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
     return float(max(float(shared.mean()), 0.0) ** 0.5) if len(shared) else 0.0
 
 
-def bound_mm(scene: Scene, model: RegistrationModel, estimate: PoseEstimate) -> float:
-    """95 % bound of the mean error over the points that face the camera; infinite if none."""
-    points = visible_points(model, estimate.camera_from_bone, scene)
+def _predicted_tre_mm(
+    scene: Scene, model: RegistrationModel, estimate: PoseEstimate
+) -> float | None:
+    points = _facing(model, estimate.camera_from_bone, scene)
     if len(points) == 0 or not np.isfinite(estimate.covariance).all():
-        return float("inf")
-    step = max(1, len(points) // _N_BOUND)
-    return predicted_tre_mm(estimate, model.centre_mm, points[::step])
+        return None
+    some = points[:: max(1, len(points) // _N_TRE_POINTS)]
+    return predicted_tre_mm(estimate, model.centre_mm, some)
 
 
-def visible_points(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:
+def _facing(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:
     """(N, 3) model points, bone coordinates, that face the scene's camera; all without one."""
     if scene.camera_mm is None:
         return model.points_mm

@@ -15,7 +15,7 @@ from navapp.registration.lookup_kernels import ModelArrays
 from navapp.registration.pairing_kernels import Pairs
 
 # Smallest over largest eigenvalue of the information below which a direction counts as free.
-# One-sided views of femur and tibia have 0.036 and 0.055, a sphere 1e-4, a cylinder 0.
+# One-sided views of bones have more (docs/registration.md), balls and cylinders next to nothing.
 FREE_SHARE = 5e-3
 # Squared distance in widths beyond which a kernel is nothing.
 _FARTHEST2 = 50.0

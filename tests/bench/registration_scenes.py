@@ -116,10 +116,10 @@ def information_limit_mm(bone: Bone, scene: Clouded) -> float:
     return error_mm(bone, pose, scene)
 
 
-def is_degenerate(bone: Bone, scene: Clouded) -> bool:
-    """Whether the true bone points at the true pose leave a direction free.
+def least_share(bone: Bone, scene: Clouded) -> float:
+    """Least over largest eigenvalue of what the true bone points fix at the true pose.
 
-    Smallest over largest eigenvalue below 5e-3, lengths in units of the seen surface's radius.
+    Lengths are in units of the seen surface's radius.
     """
     points = scene.true.inverse().apply(scene.points_mm[:N_ON_BONE])
     normals = bone.dense.normals[bone.dense.nearest(points)[0]]
@@ -127,7 +127,7 @@ def is_degenerate(bone: Bone, scene: Clouded) -> bool:
     radius = np.sqrt((offset**2).sum(axis=1).mean())
     rows = np.hstack([normals, np.cross(offset, normals) / radius])
     eigenvalues = np.linalg.eigvalsh(rows.T @ rows)
-    return bool(eigenvalues[0] < 5e-3 * eigenvalues[-1])
+    return float(eigenvalues[0] / eigenvalues[-1])
 
 
 def _direction(rng: np.random.Generator, axis: FloatArray) -> FloatArray:

@@ -1,10 +1,12 @@
 """Stereo on bone: how far the measured surface is from the true one, beside OpenCV's SGBM.
 
-usage: python -m tests.bench.stereo_on_bone [FOLDER] [--seeds N] [--only NAME] [--skip free|guided]
+usage: python -m tests.bench.stereo_on_bone [FOLDER] [--seeds N] [--only NAME]
+                                             [--part floor|free|guided]
 
 Without a pose: the whole frame, within the depths that a rig is used for; then a plain fit of the
 true model to every second measured point each way, started at the truth (it shows a tilt of the
 disparity). With a pose: the truth disturbed about the bone's centre, then located as in the line.
+The floor: the same plain fit to what is measured on the true surface itself.
 """
 
 import argparse
@@ -16,7 +18,7 @@ import numpy as np
 
 from navapp.geometry import Box
 from navapp.geometry.zbuffer import render_rectified
-from navapp.stereo import match_surface, smoothed
+from navapp.stereo import match_on_support, match_surface, smoothed
 from navapp.tracking import Goal, Line
 from navapp.values import BoneModel, DisparityMap, LineTimings, Status
 from tests.bench.bone_scenes import (
@@ -37,22 +39,26 @@ _CAUGHT_MM = 0.5
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("NAVAPP_DATA", "../shared/data")
     )
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--only", default="", help="sequences whose name contains this")
-    parser.add_argument("--skip", choices=("free", "guided"), help="one of the two parts")
+    parser.add_argument("--part", choices=("floor", "free", "guided"), help="this part only")
     options = parser.parse_args()
     chosen = [s for s in sequences(Path(options.folder)) if options.only in s.name]
-    if options.skip != "free":
+    if options.part in (None, "floor"):
+        print("on the true surface: fit TRE median / worst mm", flush=True)
+        for sequence in chosen:
+            floor(sequence)
+    if options.part in (None, "free"):
         print("without a pose: fit TRE median / worst mm, density, depth MAD, signed mm | worse "
               "by at most: after the fill, after WLS smoothing | SGBM median / worst")  # fmt: skip
         for sequence in chosen:
             free(sequence)
-    if options.skip != "guided":
+    if options.part in (None, "guided"):
         print(f"with a pose off by: TRE median / 98 % / worst mm, share below {_CAUGHT_MM} mm, "
               "slope of those, signed depth mm")  # fmt: skip
         for sequence in chosen:
@@ -88,6 +94,18 @@ def depth_error_mm(scene: Scene, found: DisparityMap, sequence: Sequence) -> np.
     scale = geometry.focal_px * geometry.baseline_mm
     error = scale / on_bone(scene, found).disparity_px - true
     return error[np.isfinite(error)]
+
+
+def floor(sequence: Sequence) -> None:
+    """What the pictures leave when the expected surface is the true one."""
+    fits = []
+    for scene in sequence.scenes:
+        geometry = scene.pair.geometry
+        true = render_rectified(sequence.mesh, scene.pose, geometry, scene.pair.box)
+        expected_px = geometry.disparity_map_px(true.depth_mm)
+        answer = match_on_support(scene.pair, expected_px, fills=False)
+        fits.append(fit_error_mm(scene, answer.matched, sequence.mesh))
+    print(f"{sequence.name}: {np.median(fits):.3f} / {max(fits):.3f}", flush=True)
 
 
 def free(sequence: Sequence) -> None:

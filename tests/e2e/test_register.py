@@ -393,7 +393,7 @@ def test_metres_taken_for_millimetres_do_not_pass(bone: Bone, capsys) -> None:
     bone.write(1e-3, "")
     found = register(bone.scene, bone.model, "--initial", bone.start(5.0, 5.0, 1e-3), code=4)
     assert found["status"] == "FAILED"
-    assert any("the model is only 0.0" in reason for reason in found["reasons"])
+    assert any(reason == "the model is too small to fix a bone" for reason in found["reasons"])
     assert "no bone's size: is --units right?" in capsys.readouterr().err
 
 

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from navapp.registration.information import information_of
 from navapp.registration.pairing_kernels import Pairs, make_pairs
@@ -42,7 +41,6 @@ def test_points_that_share_their_errors_count_as_one() -> None:
 def test_a_ball_leaves_three_rotations_free() -> None:
     mesh = ball_mesh(20.0, 1000)
     found = information_of(*pairs_on(mesh.vertices_mm, mesh.vertices_mm / 20.0), POSE, CENTRE, 1.0)
-    assert found.lever_mm == pytest.approx(20.0, rel=1e-3)
     assert len(found.free) == 3
     np.testing.assert_allclose(found.free[:, :3], 0.0, atol=1e-3)
     np.testing.assert_allclose(np.linalg.norm(found.free, axis=1), 1.0)

@@ -6,8 +6,8 @@ import pytest
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.registration import Outcome, RegistrationModel, Scene, register, visible_points
-from navapp.values import BoneModel, Reason
+from navapp.registration import Outcome, RegistrationModel, Scene, register
+from navapp.values import BoneModel, Reason, predicted_tre_mm
 from tests.registration.shapes import (
     TRUE,
     ball_mesh,
@@ -285,14 +285,37 @@ def test_the_caller_may_stop_the_search() -> None:
         register(seen_scene(900, 0.3), MODEL, TRUE, is_global=True, on_progress=stop)
 
 
-def test_points_that_face_the_camera_are_told() -> None:
+def test_the_error_is_predicted_over_what_faces_the_camera() -> None:
     scene = seen_scene(900, 0.3)
-    seen = visible_points(MODEL, TRUE, scene)
-    placed, normals = TRUE.apply(MODEL.points_mm), TRUE.rotate(MODEL.normals)
+    found = register(scene, MODEL, TRUE)
+    pose = found.estimate.camera_from_bone
+    placed, normals = pose.apply(MODEL.points_mm), pose.rotate(MODEL.normals)
     cosine = -(placed * normals).sum(axis=1) / np.linalg.norm(placed, axis=1)
-    np.testing.assert_array_equal(seen, MODEL.points_mm[cosine > 0.2])
+    seen = MODEL.points_mm[cosine > 0.2]
     assert 0.1 * len(placed) < len(seen) < 0.6 * len(placed)
-    assert visible_points(MODEL, TRUE, replace(scene, camera_mm=None)) is MODEL.points_mm
+    expected_mm = predicted_tre_mm(found.estimate, MODEL.centre_mm, seen)
+    assert found.predicted_tre_mm == pytest.approx(expected_mm, rel=0.01)
+    everywhere_mm = predicted_tre_mm(found.estimate, MODEL.centre_mm, MODEL.points_mm)
+    assert found.predicted_tre_mm != pytest.approx(everywhere_mm, rel=0.015)
+
+
+def test_a_pose_that_is_fixed_too_loosely_is_none() -> None:
+    """Few and noisy points on a small part fix all six directions, but badly."""
+    points = seen_scene(3000, 0.9).points_mm
+    near = np.argsort(np.linalg.norm(points - points.mean(axis=0), axis=1))[:150]
+    found = register(Scene(points[near], None), MODEL, TRUE)
+    assert found.outcome is not Outcome.CONVERGED
+    assert found.predicted_tre_mm is not None
+    assert found.predicted_tre_mm > 2.0
+    assert Reason.POSE_UNCERTAIN.value in found.reasons
+
+
+def test_what_is_smaller_than_a_kernel_fits_everywhere() -> None:
+    points = seen_scene(900, 0.0).points_mm
+    tiny = points.mean(axis=0) + 0.02 * (points - points.mean(axis=0))
+    found = register(Scene(tiny), MODEL, TRUE)
+    assert found.outcome is Outcome.FAILED
+    assert "the scene is too small to fix a bone" in found.reasons
 
 
 def test_a_scene_that_holds_no_bone_is_no_registration() -> None:
