@@ -257,6 +257,13 @@ def test_known_noise_is_taken_at_its_word() -> None:
     assert np.diag(unknown.covariance).max() < 0.1 * np.diag(small.covariance).max()
 
 
+@pytest.mark.parametrize("sigma_mm", [1.0, 2.0])
+def test_points_take_part_as_far_off_as_their_own_noise_lets_expect(sigma_mm: float) -> None:
+    cloud = seen_cloud(BONE, 900, sigma_mm, 3)
+    found = estimate_at(scene_of(cloud), MODEL, TRUE)
+    assert found.n_points > 0.95 * len(cloud)
+
+
 def test_neighbouring_points_within_the_correlation_count_as_one() -> None:
     cloud = replace(seen_cloud(BONE, 900, 0.3), stride_px=3)
     alone = estimate_at(Scene.from_stereo(cloud, 1.0), MODEL, TRUE).covariance

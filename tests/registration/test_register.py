@@ -1,12 +1,16 @@
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.registration import Outcome, RegistrationModel, Scene, register
+from navapp.registration import Outcome, RegistrationModel, Scene, point_to_point, register
+from navapp.registration.bimcc import BimccSettings, solution_at
+from navapp.registration.multi_start import Candidate
+from navapp.registration.register import smooth_part_mm
 from navapp.values import BoneModel, Reason, predicted_tre_mm
 from tests.registration.shapes import (
     TRUE,
@@ -60,6 +64,36 @@ def test_the_search_everywhere_finds_a_bone_that_is_turned_away(seed: int) -> No
     assert found.n_starts == 1 + 15 + 71
 
 
+def only_candidates(monkeypatch: pytest.MonkeyPatch, *candidates: Candidate) -> None:
+    """Let every search lead to these, best first."""
+    # The package's own `register` is the function.
+    module = import_module("navapp.registration.register")
+    monkeypatch.setattr(module, "find_candidates", lambda *args, **more: list(candidates))
+
+
+def elsewhere(seed: int) -> RigidTransform:
+    return disturbed(MODEL, 150.0, 10.0, seed)
+
+
+@pytest.mark.parametrize(("score", "is_found"), [(0.7, True), (0.5, False)])
+def test_candidates_that_explain_nearly_as_much_get_their_chance(
+    score: float, is_found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The coarse approach may rank the right one third; what explains little costs no time."""
+    wrong = Candidate(elsewhere(1), 1.0), Candidate(elsewhere(2), 0.9)
+    only_candidates(monkeypatch, *wrong, Candidate(TRUE, score))
+    found = register(seen_scene(900, 0.3), MODEL, elsewhere(3))
+    assert (found.outcome is Outcome.CONVERGED) == is_found
+    assert (mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25) == is_found
+
+
+def test_a_search_that_leads_elsewhere_takes_nothing_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    only_candidates(monkeypatch, Candidate(elsewhere(1), 1.0))
+    found = register(seen_scene(900, 0.3), MODEL, disturbed(MODEL, 4.0, 3.0, 1), is_global=True)
+    assert found.outcome is Outcome.CONVERGED
+    assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.2
+
+
 def test_the_search_everywhere_brings_a_distant_model_to_the_scene() -> None:
     start = TRUE.moved((500.0, -300.0, 200.0, 0.0, 0.0, 0.1), TRUE.translation_mm)
     scene = seen_scene(900, 0.3)
@@ -67,6 +101,17 @@ def test_the_search_everywhere_brings_a_distant_model_to_the_scene() -> None:
     found = register(scene, MODEL, start, is_global=True)
     assert found.outcome is Outcome.CONVERGED
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
+
+
+def test_what_is_seen_in_part_is_tried_from_other_starts_too() -> None:
+    """An answer that fits is doubtful while little of the model, or nobody knows what, was seen."""
+    points, start = seen_scene(900, 0.3).points_mm, disturbed(MODEL, 4.0, 3.0, 1)
+    half = points[points[:, 0] < np.median(points[:, 0])]
+    for scene in (Scene(half, EYE), Scene(points)):
+        found = register(scene, MODEL, start)
+        assert found.outcome is Outcome.CONVERGED
+        assert found.n_starts == 16
+        assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.35
 
 
 def test_without_a_camera_nothing_is_said_about_coverage() -> None:
@@ -137,6 +182,38 @@ def test_a_distorted_bone_is_never_a_registration(
     assert found.reasons
 
 
+@pytest.mark.parametrize("factors", [(1.03, 1.03, 1.03), (1.0, 1.05, 1.0)])
+def test_a_slightly_larger_bone_betrays_itself_by_what_residuals_share(
+    factors: tuple[float, float, float],
+) -> None:
+    """It lies under the kernel everywhere, and no camera tells what should be seen."""
+    found = register(Scene(seen_scene(900, 0.3).points_mm), distorted(factors), TRUE)
+    assert found.outcome is Outcome.FAILED
+    assert found.reasons == (Reason.SURFACE_MISFIT.value,)
+    assert found.estimate.rms_mm < 0.6
+
+
+@pytest.mark.parametrize("wave_mm", [0.0, 0.5, 1.0])
+def test_the_smooth_part_is_the_rms_of_a_wave_beneath_the_noise(wave_mm: float) -> None:
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-30.0, 30.0, (4000, 3)) * (1.0, 1.0, 0.0)
+    wave = wave_mm * np.sin(2.0 * np.pi * points[:, 0] / 30.0)
+    solution = solution_at(seen_scene(900, 0.3), MODEL, TRUE, BimccSettings())
+    residual = wave + rng.normal(0.0, 0.3, 4000)
+    found = smooth_part_mm(replace(solution, points_mm=points, residual_mm=residual), 3.0)
+    assert found == pytest.approx(wave_mm / np.sqrt(2.0), abs=0.07)
+    none = replace(solution, points_mm=points[:0], residual_mm=residual[:0])
+    assert smooth_part_mm(none, 3.0) == 0.0
+
+
+def test_a_fit_that_runs_out_of_steps_is_no_registration(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, start = seen_scene(900, 0.3), disturbed(MODEL, 1.0, 0.5, 1)
+    monkeypatch.setattr(point_to_point, "_MAX_ITERATIONS", 1)
+    found = register(scene, MODEL, start, "icp")
+    assert found.outcome is Outcome.FAILED
+    assert found.reasons == (Reason.NOT_CONVERGED.value,)
+
+
 def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
     """Half a turn maps an ellipsoid onto itself; a quarter of one leads to either."""
     axes = (22.0, 30.0, 45.0)
@@ -189,6 +266,14 @@ def test_what_a_simple_surface_leaves_free_is_said_in_words(
     words = [reason.split(" (")[0] for reason in found.reasons[1:]]
     assert words.count("not fixed: rotation about") == n_turns
     assert words.count("not fixed: translation along") == n_shifts
+
+
+def test_a_pose_with_a_free_direction_has_no_predicted_error() -> None:
+    bone = BoneModel("plane", grid_mesh(lambda x, y: 0.0 * x))
+    scene, pose = surface_scene(bone, has_camera=True)
+    found = register(scene, RegistrationModel(bone), pose)
+    assert found.predicted_tre_mm is None
+    assert found.reasons[-1] == Reason.POSE_UNCERTAIN.value
 
 
 @pytest.mark.parametrize("mesh", [ball_mesh(30.0, 2500), tube_mesh(25.0, 40.0)])
