@@ -18,8 +18,8 @@ from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 Side = Literal["left", "right"]
 
-# Chi-square quantile of three degrees of freedom at 95 %: safe bound of a 3-D Gaussian's length.
-_CHI2_3_95 = 7.815
+# Quantile of the normal distribution at 95 %, one side.
+_NORMAL_95 = 1.645
 
 
 class Origin(IntEnum):
@@ -143,6 +143,7 @@ class Reason(Enum):
     NO_SURFACE = "no surface was measured where the bone should be"
     TOO_FEW_POINTS = "too few points on the bone"
     COVERAGE_LOW = "too little of the bone is seen"
+    SEEN_THROUGH = "something is seen where the bone should be in the way"
     SURFACE_MISFIT = "surface does not fit the model"
     OUTLIERS = "too many points fit no surface of the model"
     NOT_CONVERGED = "the estimate did not settle"
@@ -172,6 +173,7 @@ _REMEDIES = {
     Reason.NO_SURFACE: "aim the cameras at the bone, or check the light",
     Reason.TOO_FEW_POINTS: "clear the view, or check the light",
     Reason.COVERAGE_LOW: "move the instrument or hand away",
+    Reason.SEEN_THROUGH: "check that this is the right bone and plan; register again",
     Reason.SURFACE_MISFIT: "check that this is the right bone and plan; register again",
     Reason.OUTLIERS: "clear the view of the bone; register again",
     Reason.NOT_CONVERGED: "hold still, or register again",
@@ -385,7 +387,12 @@ def predicted_tre_mm(
         centre_mm: (3,) mean of the model's vertices, in bone coordinates.
         targets_mm: (N, 3) in bone coordinates.
 
-    Source: C(p) = J S J^T with J = [I | -[p - c]x]; |e| <= sqrt(7.815 * largest eigenvalue of C).
+    The mean length is at most the root mean square, whose square is a sum of the information's
+    independent errors: a weighted chi-square, here one of as many degrees of freedom and as large a
+    scale as has its mean and its variance (Welch and Satterthwaite), with Wilson and Hilferty's
+    quantile.
+
+    Source: e(p) = J x, J = [I | -[p - c]x], x ~ N(0, S); mean |e|^2 = x^T M x, M = mean J^T J.
     """
     if len(targets_mm) == 0:
         raise ValueError("no targets to predict an error for")
@@ -397,9 +404,14 @@ def predicted_tre_mm(
     jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
     jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
     jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
-    spread = jacobian @ estimate.covariance @ jacobian.transpose(0, 2, 1)
-    largest = np.maximum(np.linalg.eigvalsh(spread)[:, -1], 0.0)
-    return float(np.sqrt(_CHI2_3_95 * largest).mean())
+    mean_square = np.einsum("nki,nkj->ij", jacobian, jacobian) / len(jacobian)
+    errors = estimate.covariance @ mean_square
+    first, second = float(np.trace(errors)), float(np.trace(errors @ errors))
+    if first <= 0.0:
+        return 0.0
+    freedom = first**2 / second
+    spread = 2.0 / (9.0 * freedom)
+    return float(np.sqrt(first * (1.0 - spread + _NORMAL_95 * np.sqrt(spread)) ** 3))
 
 
 def _digest(plan: Plan) -> str:

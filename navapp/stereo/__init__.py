@@ -3,6 +3,7 @@
 from navapp.stereo.chains import (
     StereoAnswer,
     match_baseline,
+    match_coarsely,
     match_on_support,
     match_scene,
     match_surface,
@@ -15,6 +16,7 @@ __all__ = [
     "RefineSettings",
     "StereoAnswer",
     "match_baseline",
+    "match_coarsely",
     "match_on_support",
     "match_scene",
     "match_surface",

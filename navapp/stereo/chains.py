@@ -112,13 +112,28 @@ def match_surface(
     """
     started = time.perf_counter_ns()
     pair = _clipped(pair)
-    n_cells = pair.box.width * pair.box.height * (band_px[1] - band_px[0])
-    coarse = (_coarse_at_half if n_cells > _FEW_CELLS else _coarse_at_full)(pair, band_px)
+    coarse = _coarse(pair, band_px)
     if not coarse.agreement >= _LEAST_AGREEMENT:
         return _nothing(pair, _why(coarse.agreement), started)
     left = refine_surface(pair, coarse.surface_px)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
     return _answer(pair, left, coarse.evidence, fill, started)
+
+
+def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray[np.float32]:
+    """What lies where, to about a pixel: for what hides a surface, not for measuring it.
+
+    Arguments as for `match_scene`.
+
+    Returns:
+        (h, w) disparity over the part of `pair.box` inside the pictures, NaN where unknown; all
+        unknown when the pictures hardly agree.
+    """
+    pair = _clipped(pair)
+    coarse = _coarse(pair, band_px)
+    if not coarse.agreement >= _LEAST_AGREEMENT:
+        return np.full(coarse.surface_px.shape, np.nan, dtype=np.float32)
+    return coarse.surface_px
 
 
 def match_on_support(
@@ -215,6 +230,11 @@ class _Coarse:
     surface_px: NDArray[np.float32]
     evidence: _Evidence
     agreement: float
+
+
+def _coarse(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
+    n_cells = pair.box.width * pair.box.height * (band_px[1] - band_px[0])
+    return (_coarse_at_half if n_cells > _FEW_CELLS else _coarse_at_full)(pair, band_px)
 
 
 def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:

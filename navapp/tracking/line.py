@@ -35,6 +35,13 @@ from navapp.values import (
     Verdict,
 )
 
+# A first registration tries near starts first, which is so much of the work of both lists.
+_NEAR_SHARE = 0.1
+# Tilts and shifts of a rough pose: (deg, how many).
+_NEAR_TILTS = (15.0, 12)
+_FAR_TILTS = ((15.0, 12), (28.0, 20))
+_FAR_SHIFT_MM = 8.0
+
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
@@ -44,15 +51,12 @@ class LineSettings:
         locator: how the bone is located around an expected pose.
         depth_mm: nearest and farthest surface that the rig is used for.
         max_points: about so many measured points enter an estimate.
-        tilt_deg, n_tilts: of the starts of a first registration.
         n_refined: so many of its answers are refined.
     """
 
     locator: LocatorSettings = field(default_factory=LocatorSettings)
     depth_mm: tuple[float, float] = (300.0, 700.0)
     max_points: int = 2500
-    tilt_deg: float = 15.0
-    n_tilts: int = 12
     n_refined: int = 3
 
 
@@ -85,10 +89,10 @@ class Line:
         predicted = self._rectified(state.predicted(captured_ns, self.centre_mm))
         pair, timings = self._rectified_pair(left, right, predicted)
         fit = self.locator.locate(pair, predicted) if state.n_lost == 0 else None
-        tracked = self._judged(fit, goal, timings, predicted)
+        tracked = self._judged(pair, fit, goal, timings, predicted)
         if tracked.verdict.status is Status.LOST:
             fit = self.locator.search(pair, predicted, self.settings.locator.search)
-            tracked = self._judged(fit, goal, tracked.timings, predicted)
+            tracked = self._judged(pair, fit, goal, tracked.timings, predicted)
         return tracked, state.updated(tracked, captured_ns, self.centre_mm)
 
     def register(
@@ -119,12 +123,30 @@ class Line:
         )
         if measured is None or len(measured.cloud) == 0:
             return [self._lost(Reason.NO_SURFACE)]
-        # The paper's baseline has its start and nothing else.
-        poses = [rough] if locator.is_baseline else self._coarse(measured, rough, on_progress)
-        fits = [locator.settle(pair, measured, pose) for pose in poses]
-        fits.sort(key=self._score, reverse=True)
+        if locator.is_baseline:
+            # The paper's baseline has its start and nothing else.
+            return [self._judged(pair, locator.settle(pair, measured, rough), goal, timings)]
+
+        def looked_from(starts: list[RigidTransform], done: float, share: float) -> list[Fit]:
+            poses = self._coarse(measured, starts, lambda part: on_progress(done + share * part))
+            return [locator.settle(pair, measured, pose) for pose in poses]
+
+        centre_mm = rough.apply(self.centre_mm)
+        fits = looked_from(near_starts(rough, centre_mm), 0.0, _NEAR_SHARE)
+        answers = self._ranked(pair, fits, goal, timings)
+        if not answers or answers[0].verdict.status is not Status.OK:
+            fits += looked_from(far_starts(rough, centre_mm), _NEAR_SHARE, 1.0 - _NEAR_SHARE)
+            answers = self._ranked(pair, fits, goal, timings)
+        on_progress(1.0)
+        return answers
+
+    def _ranked(
+        self, pair: RectifiedPair, fits: list[Fit], goal: Goal, timings: LineTimings
+    ) -> list[TrackedFrame]:
+        """Distinct answers, best first."""
+        fits = sorted(fits, key=self._score, reverse=True)
         kept = distinct([fit.pose for fit in fits], self.centre_mm)
-        return [self._judged(fit, goal, timings) for fit in fits if fit.pose in kept]
+        return [self._judged(pair, fit, goal, timings) for fit in fits if fit.pose in kept]
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
@@ -136,14 +158,15 @@ class Line:
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
         estimate = estimate_at(measured.scene, self.model, pose, STEREO_SETTINGS)
-        return self._judged(Fit(estimate, measured, measured.timings), goal, timings)
+        return self._judged(pair, Fit(estimate, measured, measured.timings), goal, timings)
 
     def _coarse(
-        self, measured: Measurement, rough: RigidTransform, on_progress: Callable[[float], None]
+        self,
+        measured: Measurement,
+        starts: list[RigidTransform],
+        on_progress: Callable[[float], None],
     ) -> list[RigidTransform]:
-        """The best distinct poses that tilts of a rough one lead to."""
-        centre_mm = rough.apply(self.centre_mm)
-        starts = tilted_starts(rough, centre_mm, self.settings.tilt_deg, self.settings.n_tilts)
+        """The best distinct poses that starts lead to."""
         found = find_candidates(
             measured.scene,
             self.model,
@@ -164,6 +187,7 @@ class Line:
 
     def _judged(
         self,
+        pair: RectifiedPair,
         fit: Fit | None,
         goal: Goal,
         timings: LineTimings,
@@ -173,9 +197,9 @@ class Line:
         if fit is None:
             return self._lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
-        verdict = self._judge.judge(
-            self.model, fit.estimate, fit.measured.disparity, goal, predicted
-        )
+        found = fit.measured.disparity
+        coarse_px = self._meter.coarsely(pair, fit.pose, found)
+        verdict = self._judge.judge(self.model, fit.estimate, found, goal, predicted, coarse_px)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         name = self.model.bone.name
@@ -204,3 +228,19 @@ class Line:
             camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
             covariance=turn @ estimate.covariance @ turn.T,
         )
+
+
+def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """A rough pose, and tilts of it about a place in the camera's frame."""
+    return tilted_starts(rough, centre_mm, *_NEAR_TILTS)
+
+
+def far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """Tilts of a rough pose and of what it becomes when shifted along each axis."""
+    starts = []
+    for shift in (np.zeros(3), *(_FAR_SHIFT_MM * np.eye(3)), *(-_FAR_SHIFT_MM * np.eye(3))):
+        moved = rough.moved(np.concatenate([shift, np.zeros(3)]), centre_mm)
+        starts.append(moved)
+        for tilt_deg, n_tilts in _FAR_TILTS:
+            starts += tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
+    return starts

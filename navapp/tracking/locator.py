@@ -15,8 +15,12 @@ from navapp.values import LineTimings, PoseEstimate, Reason
 
 Method = Literal["bimcc", "icp"]
 
-# Stereo points know their noise, so that a narrower kernel costs little and keeps tissue out.
+# Points that were measured freely know their noise, but not all of their errors.
 STEREO_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
+_NEARBY = replace(STEREO_SETTINGS, widest_mm=3.0)
+# On the model a kernel as narrow as the noise costs little, and keeps out tissue that lies flush
+# with the bone.
+_ON_MODEL = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +114,7 @@ class Locator:
         share, probe_ms = self._meter.probed_share(expected)
         fits: list[Fit] = []
         if share >= self.settings.hidden_share:
-            first = self._fitted(self._meter.on_model(expected), pose)
+            first = self._fitted(self._meter.on_model(expected), pose, _ON_MODEL)
             fits.append(self._settled(pair, first))
         if not fits or not self._is_here(fits[0], pose):
             found = self.search(pair, pose, self.settings.tracking)
@@ -134,11 +138,23 @@ class Locator:
         measured = self._meter.freely(pair, pose, margins, is_baseline=self.is_baseline)
         if measured is None:
             return None
-        return self.settle(pair, measured, pose)
+        far = self._fitted(measured, pose)
+        if self.is_baseline:
+            return far
+        far = self._settled(pair, far)
+        if far.n_rounds > 1 and far.measured.answered_share >= self.settings.near_share:
+            return far
+        near = self.settle(pair, replace(measured, timings=LineTimings()), pose)
+        timings = sum_timings(far.timings, near.timings)
+        return replace(max(far, near, key=self._score), timings=timings)
 
     def settle(self, pair: RectifiedPair, measured: Measurement, pose: RigidTransform) -> Fit:
-        """Fit to a free measurement, then follow onto the model's own surface if it is there."""
-        free = self._fitted(measured, pose)
+        """Fit to a free measurement nearby, then follow onto the model itself if it is there.
+
+        Nearby, because half of what is measured freely may be a hand: a fit that may look far ends
+        on it even from the truth.
+        """
+        free = self._fitted(measured, pose, _NEARBY)
         return free if self.is_baseline else self._settled(pair, free)
 
     def _settled(self, pair: RectifiedPair, fit: Fit) -> Fit:
@@ -147,7 +163,7 @@ class Locator:
             expected = self._meter.expected(pair, fit.pose, self.settings.tracking)
             if expected is None:
                 break
-            finer = self._fitted(self._meter.on_model(expected), fit.pose)
+            finer = self._fitted(self._meter.on_model(expected), fit.pose, _ON_MODEL)
             timings = sum_timings(fit.timings, finer.timings)
             if Reason.TOO_FEW_POINTS in finer.estimate.reasons:
                 return replace(fit, timings=timings)
@@ -157,12 +173,17 @@ class Locator:
                 break
         return fit
 
-    def _fitted(self, measured: Measurement, start: RigidTransform) -> Fit:
+    def _fitted(
+        self,
+        measured: Measurement,
+        start: RigidTransform,
+        settings: BimccSettings = STEREO_SETTINGS,
+    ) -> Fit:
         started = time.perf_counter_ns()
         if self.is_baseline:
             estimate = fit_icp(measured.scene, self._model, start)
         else:
-            estimate = fit_bimcc(measured.scene, self._model, start, STEREO_SETTINGS)
+            estimate = fit_bimcc(measured.scene, self._model, start, settings)
         estimate_ms = (time.perf_counter_ns() - started) / 1e6
         return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
 

@@ -14,6 +14,7 @@ from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     RefineSettings,
     match_baseline,
+    match_coarsely,
     match_on_support,
     match_surface,
     refine_samples,
@@ -42,6 +43,10 @@ class Margins:
 
     box_px: int
     band_mm: float
+
+
+# What hides the bone may be so much nearer; what is seen through a wrong pose, so much further.
+_AROUND = Margins(box_px=0, band_mm=60.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +138,16 @@ class SurfaceMeter:
         cloud = self._cloud(answer.disparity)
         share = answer.disparity.matched_share
         return Measurement(answer.disparity, cloud, answer.timings, share, _FREE_CORRELATION_PX)
+
+    def coarsely(
+        self, pair: RectifiedPair, pose: RigidTransform, found: DisparityMap
+    ) -> NDArray[np.float32] | None:
+        """(h, w) rough disparity of whatever lies in a map's box; None out of view or depth."""
+        region = self._region(pose, _AROUND)
+        if region is None:
+            return None
+        height, width = found.disparity_px.shape
+        return match_coarsely(replace(pair, box=Box(found.x, found.y, width, height)), region[1])
 
     def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins

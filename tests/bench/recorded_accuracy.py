@@ -1,9 +1,12 @@
-"""Accuracy on recorded operations with truth, printed as the table of docs/accuracy.md.
+"""Accuracy on recorded operations with truth, printed as the tables of docs/accuracy.md.
 
-usage: python -m tests.bench.recorded_accuracy [FOLDER] [--method bimcc|icp]
+usage: python -m tests.bench.recorded_accuracy [FOLDER] [--method bimcc|icp] [--bone femur|tibia]
+                                               [--only NAME] [--order ORDER ...] [--frames]
 
-FOLDER (default: NAVAPP_DATA) holds `phantom_*` folders with femur.ply, rig.yml and sequences that
-have prior.json and truth.json.
+FOLDER (default: NAVAPP_DATA) holds `phantom_*` folders with surfaces, rig.yml and sequences that
+have prior.json and truth.json. Each sequence is replayed as it is, as one loop of 120 frames there
+and back, and with each frame as the first; unrelated frames only one by one. With --frames every
+frame has a line of its own.
 """
 
 import argparse
@@ -11,6 +14,8 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,69 +27,133 @@ from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform
 from navapp.values import BoneModel
 
+ORDERS = ("forward", "pingpong", "each")
 # Frames of these are unrelated poses: each is registered on its own.
 _UNRELATED = ("registration",)
+_LOOP_FRAMES = 120
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One replayed frame beside the truth; `tre_mm` and what follows are NaN without a pose."""
+
+    index: int
+    status: str
+    reasons: tuple[str, ...]
+    tre_mm: float
+    rotation_deg: float
+    bound_mm: float
+    total_ms: float
 
 
 def main() -> int:
-    """Replay every sequence and print one line for each."""
+    """Replay every sequence and print one line for each way."""
+    options = _options()
+    print("| sequence | order | frames | OK | TRE median | worst OK | rotation worst | "
+          "bound median | bound holds | ms |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for phantom in sorted(Path(options.folder).glob("phantom_*")):
+        surface = phantom / f"{options.bone}.ply"
+        with tempfile.TemporaryDirectory() as plan:
+            run(["--quiet", "plan", "--surface", f"{options.bone}={surface}", "--out", plan])
+            for sequence in _sequences(phantom, options.only):
+                for order in _orders(sequence, options.order):
+                    frames = replayed(phantom, sequence, plan, order, options)
+                    scored = list(_scored(frames, sequence, options.bone, surface))
+                    print(_row(f"{phantom.name}/{sequence.name}", order, scored), flush=True)
+                    if options.frames:
+                        _print_frames(scored)
+    return 0
+
+
+def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("NAVAPP_DATA", "../shared/data")
     )
     parser.add_argument("--method", choices=("bimcc", "icp"), default="bimcc")
-    options = parser.parse_args()
-    print("| sequence | frames | OK | TRE median | TRE worst | bound median | bound holds | ms |")
-    print("|---|---|---|---|---|---|---|---|")
-    for phantom in sorted(Path(options.folder).glob("phantom_*")):
-        bone = BoneModel("femur", read_ply(phantom / "femur.ply")[0])
-        for truth in sorted(phantom.glob("*/truth.json")):
-            if (truth.parent / "prior.json").is_file():
-                frames = replayed(phantom, truth.parent, options.method)
-                print(line(f"{phantom.name}/{truth.parent.name}", frames, truth, bone))
-    return 0
+    parser.add_argument("--bone", choices=("femur", "tibia"), default="femur")
+    parser.add_argument("--only", default="", help="sequences whose name contains this")
+    parser.add_argument("--order", choices=ORDERS, nargs="+", default=list(ORDERS))
+    parser.add_argument("--frames", action="store_true", help="a line for every frame as well")
+    return parser.parse_args()
 
 
-def replayed(phantom: Path, sequence: Path, method: str) -> list[dict[str, Any]]:
+def _sequences(phantom: Path, only: str) -> list[Path]:
+    found = [truth.parent for truth in sorted(phantom.glob("*/truth.json"))]
+    return [
+        folder
+        for folder in found
+        if (folder / "prior.json").is_file() and only in f"{phantom.name}/{folder.name}"
+    ]
+
+
+def _orders(sequence: Path, asked: list[str]) -> list[str]:
+    return ["each"] if sequence.name in _UNRELATED else asked
+
+
+def replayed(
+    phantom: Path, sequence: Path, plan: str, order: str, options: argparse.Namespace
+) -> list[dict[str, Any]]:
     """Frames of `navapp replay`, started from the sequence's prior only."""
     with tempfile.TemporaryDirectory() as folder:
-        plan, poses = f"{folder}/plan", f"{folder}/poses.json"
-        run(["--quiet", "plan", "--surface", f"femur={phantom / 'femur.ply'}", "--out", plan])
-        order = "each" if sequence.name in _UNRELATED else "forward"
-        run([
+        poses = f"{folder}/poses.json"
+        command = [
             "--quiet", "replay", str(sequence), "--rig", str(phantom / "rig.yml"), "--plan", plan,
-            "--prior", str(sequence / "prior.json"), "--order", order, "--method", method,
-            "--json", poses,
-        ])  # fmt: skip
+            "--prior", str(sequence / "prior.json"), "--order", order, "--method", options.method,
+            "--bone", options.bone, "--json", poses,
+        ]  # fmt: skip
+        run(command + (["--frames", str(_LOOP_FRAMES)] if order == "pingpong" else []))
         frames: list[dict[str, Any]] = json.loads(Path(poses).read_text())["frames"]
         return frames
 
 
-def line(name: str, frames: list[dict[str, Any]], truth_path: Path, bone: BoneModel) -> str:
-    """One row: errors of the frames that the judge calls OK."""
+def _scored(
+    frames: list[dict[str, Any]], sequence: Path, bone_name: str, surface: Path
+) -> Iterator[Scored]:
+    bone = BoneModel(bone_name, read_ply(surface)[0])
+    content = json.loads((sequence / "truth.json").read_text())
     truth = {
-        entry["index"]: RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        for entry in json.loads(truth_path.read_text())["frames"]
+        entry["index"]: RigidTransform("left", bone_name, entry["T_leftcam_from_ct"][bone_name])
+        for entry in content["frames"]
     }
-    ok = [frame for frame in frames if frame["status"] == "OK"]
-    head = f"| {name} | {len(frames)} | {len(ok)} |"
+    for frame in frames:
+        tre_mm = turn_deg = float("nan")
+        if frame["camera_from_model"] is not None:
+            pose = RigidTransform("left", bone_name, frame["camera_from_model"])
+            true = truth[frame["index"]]
+            tre_mm = mean_tre_mm(pose, true, bone, np.empty((0, 3)))
+            cosine = 0.5 * (np.trace(pose.rotation.T @ true.rotation) - 1.0)
+            turn_deg = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+        bound_mm = frame["predicted_tre_mm"]
+        yield Scored(
+            frame["index"], frame["status"], tuple(frame["reasons"]), tre_mm, turn_deg,
+            float("nan") if bound_mm is None else bound_mm, frame["timing_ms"]["total"],
+        )  # fmt: skip
+
+
+def _row(name: str, order: str, scored: list[Scored]) -> str:
+    """Errors of the frames that the judge calls OK."""
+    ok = [one for one in scored if one.status == "OK"]
+    head = f"| {name} | {order} | {len(scored)} | {len(ok)} |"
     if not ok:
-        return f"{head} - | - | - | - | - |"
-    errors = np.array([
-        mean_tre_mm(
-            RigidTransform("left", "femur", frame["camera_from_model"]),
-            truth[frame["index"]],
-            bone,
-            np.empty((0, 3)),
-        )
-        for frame in ok
-    ])  # fmt: skip
-    bounds = np.array([frame["predicted_tre_mm"] for frame in ok])
-    ms = np.median([frame["timing_ms"]["total"] for frame in frames])
+        return f"{head} - | - | - | - | - | - |"
+    errors = np.array([one.tre_mm for one in ok])
+    bounds = np.array([one.bound_mm for one in ok])
+    turns = np.array([one.rotation_deg for one in ok])
+    ms = np.median([one.total_ms for one in scored])
     return (
-        f"{head} {np.median(errors):.2f} | {errors.max():.2f} | {np.median(bounds):.2f} | "
-        f"{100 * np.mean(errors <= bounds):.0f} % | {ms:.0f} |"
+        f"{head} {np.median(errors):.3f} | {errors.max():.3f} | {turns.max():.2f} | "
+        f"{np.median(bounds):.2f} | {100 * np.mean(errors <= bounds):.0f} % | {ms:.0f} |"
     )
+
+
+def _print_frames(scored: list[Scored]) -> None:
+    for one in scored:
+        print(
+            f"  {one.index:3d} {one.status:8s} {one.tre_mm:7.3f} mm {one.rotation_deg:6.3f} deg "
+            f"bound {one.bound_mm:5.2f} mm {one.total_ms:5.0f} ms  {'; '.join(one.reasons)}"
+        )
 
 
 if __name__ == "__main__":
