@@ -12,6 +12,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -204,7 +205,7 @@ def thirds_mm(line: Line, frame: StereoFrame, pose: RigidTransform) -> float:
     largest = 0.0
     for place in (rows, columns):
         edges = np.quantile(place, (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0))
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges):
             part = difference_mm[(place >= low) & (place <= high)]
             largest = max(largest, abs(float(np.median(part))))
     return largest
