@@ -125,12 +125,12 @@ def distance_above(bone: TriangleMesh, surface: TriangleMesh, reach_mm: float) -
     middle = bone.centroid_mm
     scene = open3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(
-        open3d.core.Tensor((surface.vertices_mm - middle).astype(np.float32)),
-        open3d.core.Tensor(surface.faces.astype(np.uint32)),
+        open3d.core.Tensor.from_numpy((surface.vertices_mm - middle).astype(np.float32)),
+        open3d.core.Tensor.from_numpy(surface.faces.astype(np.uint32)),
     )
     starts = bone.vertices_mm - middle - reach_mm * bone.normals
     rays = np.hstack([starts, bone.normals]).astype(np.float32)
-    found = scene.list_intersections(open3d.core.Tensor(rays))
+    found = scene.list_intersections(open3d.core.Tensor.from_numpy(rays))
     ray, place = found["ray_ids"].numpy().astype(np.intp), found["t_hit"].numpy() - reach_mm
     corners = surface.vertices_mm[surface.faces[found["primitive_ids"].numpy().astype(np.intp)]]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

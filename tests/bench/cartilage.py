@@ -142,10 +142,12 @@ def followed(known: Patient, bone: BoneModel) -> Iterator[Row]:
     line = Line(known.world.rig, bone)
     prior = Prior({"femur": known.world.nominal_left_from_femur})
     first = known.frames[0]
-    tracked = line.register(first.left, first.right, prior, GOAL)[0]
-    yield _row(known, 0, tracked, line)
-    if tracked.left_from_bone is None:
+    answers = line.register(first.left, first.right, prior, GOAL)
+    if not answers or answers[0].left_from_bone is None:
+        yield _lost(known.seed, 0, "no candidate")
         return
+    tracked = answers[0]
+    yield _row(known, 0, tracked, line)
     state = TrackState.at_rest(tracked.left_from_bone, first.captured_ns)
     for number, frame in enumerate(known.frames[1:], start=1):
         tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
@@ -156,8 +158,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, line: Line) -> Row:
     verdict, pose = tracked.verdict, tracked.left_from_bone
     reasons = "; ".join(reason.value for reason in verdict.reasons)
     if pose is None:
-        nan = float("nan")
-        return Row(known.seed, number, verdict.status, reasons, *[nan] * 9)
+        return _lost(known.seed, number, reasons)
     frame = known.frames[number]
     free = line.assess(frame.left, frame.right, pose, GOAL).verdict
     bone = BoneModel("femur", known.mesh, known.side)
@@ -176,6 +177,10 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, line: Line) -> Row:
         free.coverage,
         free.inlier_share,
     )
+
+
+def _lost(seed: int, number: int, reasons: str) -> Row:
+    return Row(seed, number, Status.LOST, reasons, *[float("nan")] * 9)
 
 
 def _ratio(rms_mm: float | None, expected_mm: float | None) -> float:
