@@ -18,7 +18,7 @@ from tests.bench.cartilage import (
     unknown,
 )
 
-SEEDS = (5, 6)
+SEEDS = (3, 5)
 N_FRAMES = 2
 # Never shown beyond this.
 WRONG_MM = 1.0
@@ -69,7 +69,7 @@ def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> N
 def test_one_mean_is_not_enough_to_be_shown(seed: int) -> None:
     for answer, error_mm in tracked(seed, one_mean):
         assert answer.verdict.status is Status.DEGRADED
-        assert error_mm <= 1.3
+        assert WRONG_MM < error_mm <= answer.verdict.predicted_tre_mm
 
 
 @pytest.mark.slow
