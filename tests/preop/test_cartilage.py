@@ -7,6 +7,8 @@ from navapp.geometry.ply import write_ply
 from navapp.preop import even_cartilage, figures_of, import_cartilage
 from navapp.preop.cartilage import MAPPED_SD_MM
 from navapp.values import BoneModel
+from sim_devices.anatomy import KneeSpec, make_knee
+from sim_devices.cartilage import cartilage_thickness_mm
 from tests.geometry.shapes import cube, sphere
 
 CENTRE = (5.0, -20.0, 100.0)
@@ -125,6 +127,19 @@ def test_a_surface_that_is_not_this_bone_s_cartilage_is_refused(covered, mesh, w
     with pytest.raises(PlanError, match=words) as caught:
         covered(mesh)
     assert caught.value.subject.endswith("cartilage.ply")
+
+
+@pytest.mark.parametrize("name", ["femur", "tibia", "patella"])
+def test_the_cartilage_of_a_knee_is_found_again_from_its_outer_surface(tmp_path, name):
+    """Also in the notch and where bare bone goes over into cartilage."""
+    knee = make_knee(KneeSpec(4))
+    mesh = TriangleMesh(knee.bones[name].vertices_mm, knee.bones[name].faces)
+    true = cartilage_thickness_mm(knee, name, 2.0, 4)
+    true[true < 0.1] = 0.0
+    write_ply(tmp_path / "cartilage.ply", raised(true, mesh))
+    found = import_cartilage(BoneModel(name, mesh), tmp_path / "cartilage.ply").bone.cartilage_mm
+    assert (np.abs(found - true) > 0.05).mean() < 0.001
+    assert (found[true == 0.0] == 0.0).mean() > 0.999
 
 
 def test_another_unit_or_a_missing_file_is_refused(covered, tmp_path):
