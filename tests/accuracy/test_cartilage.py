@@ -7,7 +7,7 @@ import pytest
 
 from navapp.evaluation import mean_tre_mm
 from navapp.tracking import Line, TrackState
-from navapp.values import BoneModel, Reason, Status, TrackedFrame
+from navapp.values import BoneModel, Prior, Reason, Status, TrackedFrame
 from tests.bench.cartilage import (
     GOAL,
     Patient,
@@ -62,6 +62,20 @@ def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> N
     for answer, error_mm in tracked(seed, mapped):
         assert answer.verdict.status is Status.OK
         assert error_mm <= 0.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 6])
+def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(seed: int) -> None:
+    """Soft tissue continues its exact parts: they must not pull the search to themselves."""
+    case = known(seed)
+    line = Line(case.world.rig, mapped(case))
+    first = case.frames[0]
+    prior = Prior({"femur": case.world.nominal_left_from_femur})
+    answer = line.register(first.left, first.right, prior, GOAL)[0]
+    assert answer.verdict.status is Status.OK
+    bone = BoneModel("femur", case.mesh)
+    assert mean_tre_mm(answer.left_from_bone, case.poses[0], bone, np.empty((0, 3))) <= 0.6
 
 
 @pytest.mark.slow
