@@ -112,6 +112,9 @@ class BoneModel:
         cartilage_sd_mm: (V,) its standard deviation.
         is_removed: (V,) parts that a stage has cut away.
         version: counts the changes by stages.
+
+    Raises:
+        ValueError: not one value per vertex, or cartilage that is negative or not finite.
     """
 
     name: str
@@ -133,6 +136,8 @@ class BoneModel:
             values = read_only(values if len(values) else np.zeros(n), kind)
             if values.shape != (n,):
                 raise ValueError(f"{self.name}: {name} needs one value per vertex")
+            if kind is float and not (np.isfinite(values) & (values >= 0.0)).all():
+                raise ValueError(f"{self.name}: {name} must be finite and not negative")
             object.__setattr__(self, name, values)
 
 

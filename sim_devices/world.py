@@ -138,6 +138,21 @@ class World:
         """
         return self._seen(self._table_from_body(body, time_ns / 1e9))
 
+    def cartilage_mm(self, bone: str) -> FloatArray:
+        """(V,) true thickness over the vertices of a bone of the anatomy, worn at the defect.
+
+        Truth: no stage of the line may be handed it.
+
+        Raises:
+            UsageError: the anatomy has no such bone.
+        """
+        mean_mm, seed = self.scenario.cartilage_mm, self.scenario.seed
+        thickness = cartilage_thickness_mm(self.anatomy, bone, mean_mm, seed)
+        if bone == "femur":
+            mesh = self.anatomy.bones[bone]
+            thickness = worn(mesh, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
+        return thickness
+
     def render(self, eye: Eye, time_ns: int, scale: float = 1.0) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure.
 
@@ -245,17 +260,9 @@ class World:
         return middle
 
     def _surfaces_mm(self) -> Iterator[tuple[str, TriangleMesh]]:
-        """The bones as a camera sees them: with their cartilage, worn at the defect."""
+        """The bones as a camera sees them: with their cartilage."""
         for name, bone in self.anatomy.bones.items():
-            if self.scenario.cartilage_mm == 0.0:
-                yield name, bone
-                continue
-            thickness = cartilage_thickness_mm(
-                self.anatomy, name, self.scenario.cartilage_mm, self.scenario.seed
-            )
-            if name == "femur":
-                thickness = worn(bone, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
-            yield name, with_cartilage(bone, thickness)
+            yield name, with_cartilage(bone, self.cartilage_mm(name))
 
     def _make_site(self, right: dict[str, TriangleMesh]) -> Site:
         femur = self._start

@@ -121,6 +121,15 @@ def test_a_bone_needs_one_value_per_vertex(name, count):
         BoneModel("femur", cube(), **{name: np.ones(count)})
 
 
+@pytest.mark.parametrize("name", ["cartilage_mm", "cartilage_sd_mm"])
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+def test_cartilage_that_cannot_be_is_refused(name, value):
+    values = np.ones(8)
+    values[3] = value
+    with pytest.raises(ValueError, match=rf"femur: {name} must be finite and not negative"):
+        BoneModel("femur", cube(), **{name: values})
+
+
 def test_a_bone_cannot_be_changed_from_outside():
     thickness = np.ones(8)
     bone = BoneModel("femur", cube(), cartilage_mm=thickness)

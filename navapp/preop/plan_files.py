@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from navapp.errors import InputError, PlanError
-from navapp.geometry.ply import read_ply, write_ply
 from navapp.geometry.transform import FloatArray
+from navapp.preop.bone_files import read_bone, write_bone
 from navapp.preop.preview import draw_preview
 from navapp.values import BoneModel, Plan
 
@@ -116,17 +116,13 @@ def _write_content(folder: Path, plan: Plan) -> None:
     bones: dict[str, Any] = {}
     for name, bone in plan.bones.items():
         file = f"{name}.ply"
-        write_ply(folder / file, bone.mesh)
+        write_bone(folder / file, bone)
         (folder / f"preview_{name}.png").write_bytes(draw_preview(bone.mesh))
         bones[name] = {
             "file": file,
             "sha256": _sha256(folder / file),
             "side": bone.side,
             "version": bone.version,
-            "cartilage_mm": bone.cartilage_mm.tolist() if bone.cartilage_mm.any() else None,
-            "cartilage_sd_mm": (
-                bone.cartilage_sd_mm.tolist() if bone.cartilage_sd_mm.any() else None
-            ),
             "removed": np.flatnonzero(bone.is_removed).tolist(),
         }
     content = {
@@ -166,15 +162,15 @@ def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
         raise _damaged(folder, f"{entry['file']} is missing")
     if _sha256(path) != entry["sha256"]:
         raise _damaged(folder, f"{entry['file']} was changed or cut short")
-    mesh, _ = read_ply(path)
+    mesh, cartilage_mm, cartilage_sd_mm = read_bone(path)
     is_removed = np.zeros(len(mesh.vertices_mm), dtype=bool)
     is_removed[np.array(entry["removed"], dtype=np.intp)] = True
     return BoneModel(
         name,
         mesh,
         entry["side"],
-        np.array(entry["cartilage_mm"] or []),
-        np.array(entry["cartilage_sd_mm"] or []),
+        cartilage_mm,
+        cartilage_sd_mm,
         is_removed,
         version=int(entry["version"]),
     )

@@ -12,7 +12,8 @@ from navapp.values import BoneModel, Side
 
 # A knee's bone end measures 35 (patella) to 500 mm (a whole femur) across.
 _SMALLEST_MM, _LARGEST_MM = 25.0, 600.0
-_MIN_FACES = 200
+# Fewer triangles than this are no surface that was segmented.
+MIN_FACES = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,15 +34,15 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
     path = Path(path)
     mesh, header = read_ply(path)
     warnings: list[str] = []
-    if len(mesh.faces) < _MIN_FACES:
+    if len(mesh.faces) < MIN_FACES:
         raise PlanError(
             f"surface {path} of the {name} has only {len(mesh.faces)} triangles",
             subject=str(path),
             remedy="export the bone's surface, not its points",
         )
-    mesh = _in_lps(mesh, header, path, warnings)
+    mesh = in_lps(mesh, header, path, warnings)
     whole = mesh.largest_component()
-    if len(whole.faces) < _MIN_FACES:
+    if len(whole.faces) < MIN_FACES:
         raise PlanError(
             f"surface {path} of the {name} is in separate pieces of at most "
             f"{len(whole.faces)} triangles",
@@ -60,8 +61,12 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
     return ImportedSurface(BoneModel(name, whole, side), tuple(warnings))
 
 
-def _in_lps(mesh: TriangleMesh, header: PlyHeader, path: Path, warnings: list[str]) -> TriangleMesh:
-    """Honour what the file says of its space and unit."""
+def in_lps(mesh: TriangleMesh, header: PlyHeader, path: Path, warnings: list[str]) -> TriangleMesh:
+    """The surface as LPS in mm, by what the file says of its space and unit.
+
+    Raises:
+        PlanError: it names another unit, or a space that is not known.
+    """
     unit = (header.tag("UNIT") or "").lower()
     if unit not in ("", "mm"):
         raise PlanError(

@@ -127,7 +127,10 @@ def loop_from_far(
             min(3.0 * sigma_mm, settings.widest_mm), _FACING, pairs, n_forward,
         )  # fmt: skip
         measure_pairs(scene, model, rotation, translation, camera, pairs, 0, n)
-        sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, 0.0)
+        # From far, distances say how far off the pose is, not how exact a part of the bone is:
+        # weights by noise alone let the exact parts pull everything to themselves.
+        off_mm2 = (sigma_mm / settings.n_sigmas) ** 2
+        sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, off_mm2)
         if sums.kernels < _FEWEST_PAIRS:
             return LoopState(iteration, False, 0.0, 0, 0.0)
         objective = sums.kernels / n

@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh import TriangleMesh, vertex_normals
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
 from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
@@ -23,8 +23,8 @@ class RegistrationModel:
 
     Attributes:
         points_mm: (V, 3) the surface that the camera sees: bone moved out by its mean cartilage.
-        normals: (V, 3) unit, outward.
-        sigma_mm: (V,) of the surface along the normal (model and cartilage).
+        normals: (V, 3) of that surface, unit, outward.
+        sigma_mm: (V,) of that surface along the normal (model and cartilage).
         is_usable: (V,) False for parts that a stage removed.
         seen_mesh: those points and the triangles that are left: what a camera should see.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
@@ -33,15 +33,15 @@ class RegistrationModel:
     # Uncertainty of a segmented surface that carries no figure of its own.
     SURFACE_SIGMA_MM = 0.1
 
-    def __init__(self, bone: BoneModel, surface_sigma_mm: float = SURFACE_SIGMA_MM) -> None:
+    def __init__(self, bone: BoneModel) -> None:
         mesh = bone.mesh
         self.bone = bone
         self.points_mm: FloatArray = mesh.vertices_mm + bone.cartilage_mm[:, None] * mesh.normals
-        self.normals: FloatArray = np.array(mesh.normals)
-        self.sigma_mm: FloatArray = np.hypot(surface_sigma_mm, bone.cartilage_sd_mm)
+        self.normals: FloatArray = _seen_normals(bone, self.points_mm)
+        self.sigma_mm: FloatArray = np.hypot(self.SURFACE_SIGMA_MM, bone.cartilage_sd_mm)
         self.is_usable: NDArray[np.bool_] = ~bone.is_removed
         is_left = self.is_usable[mesh.faces].all(axis=1)
-        self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], mesh.normals)
+        self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], self.normals)
         self.centre_mm: FloatArray = mesh.centroid_mm
 
     @cached_property
@@ -95,3 +95,14 @@ class RegistrationModel:
         distance = np.empty(len(points_mm))
         nearest_vertices(np.ascontiguousarray(points_mm), self.arrays, index, distance)
         return index, distance
+
+
+def _seen_normals(bone: BoneModel, points_mm: FloatArray) -> FloatArray:
+    """(V, 3) normals of the seen surface: it leans where the cartilage grows thicker."""
+    normals = np.array(bone.mesh.normals)
+    if not bone.cartilage_mm.any():
+        return normals
+    seen = vertex_normals(points_mm, bone.mesh.faces)
+    has_faces = np.linalg.norm(seen, axis=1) > 0.0
+    normals[has_faces] = seen[has_faces]
+    return normals

@@ -1,3 +1,4 @@
+import hashlib
 import json
 import os
 from pathlib import Path
@@ -6,6 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.errors import PlanError
+from navapp.geometry.ply import read_ply
 from navapp.preop import plan_files, read_plan, write_plan
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
@@ -86,6 +88,51 @@ def test_the_folder_holds_a_surface_and_a_picture_for_each_bone(tmp_path):
     ]
     assert names(tmp_path / "deep") == ["plan"]
     assert (tmp_path / "deep" / "plan").stat().st_mode & 0o777 == 0o755
+
+
+def header_of(file):
+    return file.read_bytes().split(b"end_header\n")[0].decode()
+
+
+def test_cartilage_is_stored_at_the_vertices_of_the_bones_that_have_some(tmp_path):
+    write_plan(tmp_path / "plan", make_plan())
+    head = header_of(tmp_path / "plan" / "femur.ply")
+    assert "property double cartilage_mm\nproperty double cartilage_sd_mm\n" in head
+    assert "cartilage" not in header_of(tmp_path / "plan" / "tibia.ply")
+    assert "cartilage" not in (tmp_path / "plan" / "plan.json").read_text()
+
+
+def test_a_bone_with_cartilage_is_a_surface_for_any_reader(tmp_path):
+    plan = make_plan()
+    write_plan(tmp_path / "plan", plan)
+    mesh, header = read_ply(tmp_path / "plan" / "femur.ply")
+    np.testing.assert_array_equal(mesh.vertices_mm, plan.bones["femur"].mesh.vertices_mm)
+    np.testing.assert_array_equal(mesh.faces, plan.bones["femur"].mesh.faces)
+    assert (header.tag("SPACE"), header.tag("UNIT")) == ("LPS", "mm")
+
+
+def test_an_older_plan_that_knows_of_no_cartilage_still_reads(tmp_path):
+    plan = Plan({"femur": BoneModel("femur", sphere(30.0), "left")})
+    write_plan(tmp_path / "plan", plan)
+    edit(tmp_path / "plan", set_at("bones", "femur", "cartilage_mm", value=None))
+    edit(tmp_path / "plan", set_at("bones", "femur", "cartilage_sd_mm", value=None))
+    again = read_plan(tmp_path / "plan")
+    assert again.digest == plan.digest
+    assert not again.bones["femur"].cartilage_mm.any()
+
+
+@pytest.mark.parametrize("column", [3, 4])
+def test_changed_cartilage_is_noticed_by_the_plan_s_own_hash(written, column):
+    """Also when whoever changed it brought the file's hash up to date."""
+    file = written / "femur.ply"
+    content = bytearray(file.read_bytes())
+    place = content.index(b"end_header\n") + len(b"end_header\n") + (5 * 7 + column) * 8
+    content[place : place + 8] = np.float64(0.25).tobytes()
+    file.write_bytes(content)
+    digest = hashlib.sha256(content).hexdigest()
+    edit(written, set_at("bones", "femur", "sha256", value=digest))
+    with pytest.raises(PlanError, match="does not match its hash"):
+        read_plan(written)
 
 
 def test_an_older_plan_is_replaced(tmp_path):
@@ -247,9 +294,6 @@ def set_at(*path, value):
         set_at("bones", "femur", "side", value="left"),
         set_at("bones", "femur", "version", value=3),
         set_at("bones", "femur", "version", value=float("inf")),
-        set_at("bones", "femur", "cartilage_mm", value=None),
-        set_at("bones", "femur", "cartilage_mm", value=[1.0]),
-        set_at("bones", "femur", "cartilage_sd_mm", value=None),
         set_at("bones", "femur", value=7),
         set_at("bones", "femur", value={}),
         set_at("bones", "femur", "file", value=5),

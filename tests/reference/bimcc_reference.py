@@ -172,7 +172,8 @@ def step_from_far(scene, grid, model, R, t, sigma_mm, settings):
     backward = pair_backward(scene, grid, model, R, t, settings.model_every, radius_mm, 0.2)
     chosen, vertex = np.concatenate([forward, backward], axis=1)
     measured = measure_pairs(scene, model, R, t, chosen, vertex)
-    kernels, weight = weigh(measured, sigma_mm, settings.n_sigmas, 0.0)
+    off_mm2 = (sigma_mm / settings.n_sigmas) ** 2
+    kernels, weight = weigh(measured, sigma_mm, settings.n_sigmas, off_mm2)
     n, n_backward = len(forward[0]), max(len(backward[0]), 1)
     weight[n:] *= settings.backward_share * n / n_backward
     centre, lever_mm = weighted_centre(measured.point, weight)

@@ -6,7 +6,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.registration import RegistrationModel
 from navapp.values import BoneModel
 from tests.reference.lookup_reference import nearest_by_trying_all
-from tests.registration.shapes import blob, grid_mesh
+from tests.registration.shapes import ball_mesh, blob, grid_mesh
 
 
 def test_cartilage_moves_the_surface_out_and_widens_its_sigma() -> None:
@@ -21,6 +21,34 @@ def test_cartilage_moves_the_surface_out_and_widens_its_sigma() -> None:
     np.testing.assert_allclose(model.seen_mesh.vertices_mm, expected, atol=1e-12)
     np.testing.assert_allclose(model.arrays.sigma, np.hypot(0.1, 0.5))
     np.testing.assert_allclose(model.centre_mm, bone.mesh.centroid_mm)
+
+
+def test_where_cartilage_grows_thicker_the_seen_surface_leans() -> None:
+    bone = BoneModel("plate", grid_mesh(lambda x, y: 0.0 * x, 20.0))
+    along = bone.mesh.vertices_mm[:, 0]
+    model = RegistrationModel(replace(bone, cartilage_mm=2.0 + 0.1 * along))
+    expected = np.array([-0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0)
+    expected *= np.sign(bone.mesh.normals[0, 2])
+    expected[0] *= np.sign(bone.mesh.normals[0, 2])
+    np.testing.assert_allclose(model.normals, np.tile(expected, (len(along), 1)), atol=1e-9)
+    np.testing.assert_array_equal(model.seen_mesh.normals, model.normals)
+    np.testing.assert_array_equal(model.arrays.normals, model.normals)
+
+
+def test_the_seen_surface_bends_as_it_is_seen() -> None:
+    ball = ball_mesh(25.0, 800)
+    n = len(ball.vertices_mm)
+    bone = BoneModel("ball", ball, cartilage_mm=np.full(n, 3.0))
+    seen = BoneModel("ball", TriangleMesh(ball.vertices_mm * 28.0 / 25.0, ball.faces))
+    bends, expected = (RegistrationModel(b).arrays.curvature for b in (bone, seen))
+    np.testing.assert_allclose(bends, expected, atol=1e-3)
+
+
+def test_a_cloud_keeps_its_normals_under_cartilage() -> None:
+    mesh = blob().mesh
+    cloud = TriangleMesh(mesh.vertices_mm, np.empty((0, 3), dtype=np.int32), mesh.normals)
+    bone = BoneModel("femur", cloud, cartilage_mm=np.ones(len(mesh.vertices_mm)))
+    np.testing.assert_array_equal(RegistrationModel(bone).normals, mesh.normals)
 
 
 def test_parts_that_were_cut_away_may_not_pair_and_are_not_seen() -> None:

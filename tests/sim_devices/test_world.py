@@ -255,6 +255,29 @@ def test_cartilage_lies_on_the_bone_except_at_the_defect():
     assert abs(bare.depth_mm[v, u] - thick.depth_mm[v, u]) < 0.2
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_surface_that_is_seen_lies_its_true_thickness_above_the_bone(side):
+    site = World(replace(PLAIN, side=side, cartilage_mm=2.0))
+    bone, thickness = site.anatomy.bones["femur"], site.cartilage_mm("femur")
+    above = bone.vertices_mm + thickness[:, None] * bone.normals
+    chosen = np.flatnonzero(thickness > 1.0)[::40]
+    pose, camera = site.left_from_body("femur", 0), site.rig.left
+    points = pose.apply(above[chosen])
+    u, v = np.rint(camera.project(points)).astype(int).T
+    picture = site.depth("left", 0)
+    is_femur = mask_of(picture, "femur")[v, u]
+    off_mm = (picture.depth_mm[v, u] - points[:, 2])[is_femur]
+    # What turns away from the camera is behind something nearer.
+    is_seen = off_mm > -1.0
+    assert is_seen.sum() > 30
+    assert np.median(np.abs(off_mm[is_seen])) < 0.1
+    assert 0.8 < thickness[chosen].min() < thickness.max() < 3.3
+
+
+def test_a_bare_bone_has_no_thickness_anywhere():
+    assert not any(world().cartilage_mm(name).any() for name in world().anatomy.bones)
+
+
 def test_edges_of_large_triangles_follow_the_lens():
     site = world()
     _, parts = site._renderer("left", 1.0)

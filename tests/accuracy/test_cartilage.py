@@ -1,0 +1,95 @@
+"""Cartilage through the whole line: what the plan knows of it decides what the pose is worth."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from navapp.evaluation import mean_tre_mm
+from navapp.tracking import Line, TrackState
+from navapp.values import BoneModel, Prior, Reason, Status, TrackedFrame
+from tests.bench.cartilage import (
+    GOAL,
+    Patient,
+    exact,
+    mapped,
+    one_mean,
+    patient,
+    unknown,
+)
+
+SEEDS = (3, 5)
+N_FRAMES = 2
+# Never shown beyond this.
+WRONG_MM = 1.0
+
+
+@lru_cache(maxsize=2)
+def known(seed: int) -> Patient:
+    return patient(seed, N_FRAMES)
+
+
+@lru_cache(maxsize=8)
+def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
+    """Followed from a degree and a millimetre off the truth; each with its TRE."""
+    case = known(seed)
+    line = Line(case.world.rig, make(case))
+    bone = BoneModel("femur", case.mesh)
+    turn = np.radians(1.0) * np.array([0.6, -0.64, 0.48])
+    twist = np.concatenate([[0.5, -0.5, 0.7], turn])
+    start = case.poses[0].moved(twist, case.poses[0].apply(line.centre_mm))
+    state = TrackState.at_rest(start, case.frames[0].captured_ns)
+    found = []
+    for frame, true in zip(case.frames, case.poses, strict=True):
+        answer, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        assert answer.left_from_bone is not None
+        error_mm = mean_tre_mm(answer.left_from_bone, true, bone, np.empty((0, 3)))
+        found.append((answer, error_mm))
+    return tuple(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
+def test_cartilage_that_is_known_exactly_costs_nothing(seed: int) -> None:
+    for answer, error_mm in tracked(seed, exact):
+        assert answer.verdict.status is Status.OK
+        assert error_mm <= 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> None:
+    for answer, error_mm in tracked(seed, mapped):
+        assert answer.verdict.status is Status.OK
+        assert error_mm <= 0.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 6])
+def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(seed: int) -> None:
+    """Soft tissue continues its exact parts: they must not pull the search to themselves."""
+    case = known(seed)
+    line = Line(case.world.rig, mapped(case))
+    first = case.frames[0]
+    prior = Prior({"femur": case.world.nominal_left_from_femur})
+    answer = line.register(first.left, first.right, prior, GOAL)[0]
+    assert answer.verdict.status is Status.OK
+    bone = BoneModel("femur", case.mesh)
+    assert mean_tre_mm(answer.left_from_bone, case.poses[0], bone, np.empty((0, 3))) <= 0.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
+def test_one_mean_is_not_enough_to_be_shown(seed: int) -> None:
+    for answer, error_mm in tracked(seed, one_mean):
+        assert answer.verdict.status is Status.DEGRADED
+        assert WRONG_MM < error_mm <= answer.verdict.predicted_tre_mm
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", SEEDS)
+def test_cartilage_that_the_plan_does_not_know_is_noticed(seed: int) -> None:
+    for answer, error_mm in tracked(seed, unknown):
+        assert error_mm > WRONG_MM
+        assert answer.verdict.status is not Status.OK
+        assert Reason.SURFACE_MISFIT in answer.verdict.reasons
