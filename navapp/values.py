@@ -18,9 +18,6 @@ from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 Side = Literal["left", "right"]
 
-# Quantile of the normal distribution at 95 %, one side.
-_NORMAL_95 = 1.645
-
 
 class Origin(IntEnum):
     """Where a disparity comes from."""
@@ -155,6 +152,7 @@ class Reason(Enum):
     AMBIGUOUS = "a different pose fits as well"
     DEGENERATE = "the seen surface leaves a direction free"
     POSE_UNCERTAIN = "the seen surface fixes the pose too loosely"
+    CARTILAGE_UNCERTAIN = "the plan knows the cartilage too roughly"
     TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
     JUMPED = "the pose jumped further than a patient moves"
     RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
@@ -185,6 +183,7 @@ _REMEDIES = {
     Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
     Reason.DEGENERATE: "expose more of the bone",
     Reason.POSE_UNCERTAIN: "expose more of the bone",
+    Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",
     Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",
@@ -392,13 +391,13 @@ def predicted_tre_mm(
         centre_mm: (3,) mean of the model's vertices, in bone coordinates.
         targets_mm: (N, 3) in bone coordinates.
 
-    The mean length is at most the root mean square, whose square is a sum of the information's
-    independent errors: a weighted chi-square, here one of as many degrees of freedom and as large a
-    scale as has its mean and its variance (Welch and Satterthwaite), with Wilson and Hilferty's
-    quantile.
+    The mean length is at most the root mean square, whose square is a weighted sum of chi-squares:
+    here one chi-square of the same mean and variance (Welch 1938, Satterthwaite 1946).
 
     Source: e(p) = J x, J = [I | -[p - c]x], x ~ N(0, S); mean |e|^2 = x^T M x, M = mean J^T J.
     """
+    from scipy.special import chdtri
+
     if len(targets_mm) == 0:
         raise ValueError("no targets to predict an error for")
     offsets = (targets_mm - centre_mm) @ estimate.camera_from_bone.rotation.T
@@ -415,8 +414,7 @@ def predicted_tre_mm(
     if first <= 0.0:
         return 0.0
     freedom = first**2 / second
-    spread = 2.0 / (9.0 * freedom)
-    return float(np.sqrt(first * (1.0 - spread + _NORMAL_95 * np.sqrt(spread)) ** 3))
+    return float(np.sqrt(first / freedom * chdtri(freedom, 0.05)))
 
 
 def _digest(plan: Plan) -> str:

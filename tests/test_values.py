@@ -61,7 +61,7 @@ def test_the_predicted_error_bounds_the_sampled_one(seed):
 def test_the_predicted_error_of_a_shift_is_its_chi_square_quantile():
     covariance = np.diag([0.01, 0.01, 0.01, 0, 0, 0])
     bound = predicted_tre_mm(estimate(covariance), np.zeros(3), np.eye(3) * 70)
-    assert bound == pytest.approx(0.1 * np.sqrt(7.815), rel=1e-9)
+    assert bound == pytest.approx(0.1 * np.sqrt(7.815), rel=1e-4)
 
 
 def test_the_predicted_error_grows_with_the_distance_from_the_centre():
@@ -71,7 +71,7 @@ def test_the_predicted_error_grows_with_the_distance_from_the_centre():
         predicted_tre_mm(estimate(covariance), centre, np.add(centre, [[d, 0.0, 0.0]]))
         for d in (0.0, 10.0, 20.0)
     ]
-    np.testing.assert_allclose(bounds, np.array([0, 0.1, 0.2]) * np.sqrt(7.815), atol=1e-9)
+    np.testing.assert_allclose(bounds, np.array([0, 0.1, 0.2]) * np.sqrt(5.991), rtol=1e-4)
 
 
 def test_a_turn_that_a_shift_undoes_leaves_its_point_without_error():
@@ -84,8 +84,8 @@ def test_a_turn_that_a_shift_undoes_leaves_its_point_without_error():
     assert predicted_tre_mm(estimate(covariance), centre, target) < 1e-6
     # On the other side of the centre both add up.
     opposite = predicted_tre_mm(estimate(covariance), centre, 2 * centre - target)
-    expected = 2 * np.linalg.norm(np.cross(turn, offset)) * np.sqrt(7.815)
-    assert opposite == pytest.approx(expected, rel=1e-6)
+    expected = 2 * np.linalg.norm(np.cross(turn, offset)) * np.sqrt(3.841)
+    assert opposite == pytest.approx(expected, rel=1e-4)
 
 
 def test_no_targets_have_no_predicted_error():

@@ -27,6 +27,7 @@ class RegistrationModel:
         sigma_mm: (V,) of that surface along the normal (model and cartilage).
         is_usable: (V,) False for parts that a stage removed.
         seen_mesh: those points and the triangles that are left: what a camera should see.
+        seen_face_sigma_mm: (F,) of its triangles.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
     """
 
@@ -42,6 +43,7 @@ class RegistrationModel:
         self.is_usable: NDArray[np.bool_] = ~bone.is_removed
         is_left = self.is_usable[mesh.faces].all(axis=1)
         self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], self.normals)
+        self.seen_face_sigma_mm: FloatArray = self.sigma_mm[mesh.faces[is_left]].mean(axis=1)
         self.centre_mm: FloatArray = mesh.centroid_mm
 
     @cached_property

@@ -80,7 +80,8 @@ def compare(
     is_measured = seen & (measured.origin == Origin.MATCHED)
     difference_px = np.where(is_measured, measured.disparity_px - expected_px, np.nan)
     px_per_mm = expected_px**2 / scale
-    sigma_px = np.hypot(measured.sigma_px, float(model.sigma_mm.mean()) * px_per_mm)
+    surface_mm = model.seen_face_sigma_mm[np.maximum(view.face_index, 0)]
+    sigma_px = np.hypot(measured.sigma_px, surface_mm * px_per_mm)
     off_px = np.maximum(_OFF_SIGMAS * sigma_px, _OFF_MM * px_per_mm)
     is_hidden = _large_regions(difference_px > off_px)
     inner = _without_rim(seen)
@@ -108,7 +109,7 @@ def _spread_ratio(difference_px: NDArray[np.floating], sigma_px: NDArray[np.floa
     if len(difference_px) == 0:
         return 0.0
     deviation = np.abs(difference_px - np.median(difference_px))
-    return float(_MAD_TO_SIGMA * np.median(deviation) / np.median(sigma_px))
+    return float(_MAD_TO_SIGMA * np.median(deviation / sigma_px))
 
 
 def _large_regions(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

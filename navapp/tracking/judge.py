@@ -24,6 +24,10 @@ from navapp.values import (
     visible_vertices,
 )
 
+# Errors of a cartilage's thickness go together over much of a bone: no number of points averages
+# them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
+_COMMON_ERROR = 2.0
+
 
 @dataclass(frozen=True, slots=True)
 class JudgeLimits:
@@ -36,6 +40,7 @@ class JudgeLimits:
         inlier_ok, inlier_lost: share of the measured model pixels that agree.
         spread_ok: spread of all differences over the sigma that they claim.
         rms_ratio_ok, rms_ratio_lost: rms of the fit's residual over what its sigma predicts.
+        cartilage_sd_ok: rms standard deviation, mm, of the cartilage over the seen surface.
         jump_mm: largest motion of the bone's centre from the prediction.
         max_bound_targets: targets used for the predicted error.
     """
@@ -51,6 +56,7 @@ class JudgeLimits:
     spread_ok: float = 1.1
     rms_ratio_ok: float = 1.25
     rms_ratio_lost: float = 2.0
+    cartilage_sd_ok: float = 0.5
     jump_mm: float = 12.0
     max_bound_targets: int = 200
 
@@ -109,8 +115,12 @@ class Judge:
         agreement = self.agreement(model, estimate.camera_from_bone, measured, coarse_px)
         if agreement.n_visible == 0:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
-        bound_mm = self._bound_mm(model, estimate, goal.targets_mm)
+        is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)
+        cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
+        bound_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
+        bound_mm = float(np.hypot(bound_mm, _COMMON_ERROR * cartilage_mm))
         doubts = self._doubts(estimate, agreement)
+        doubts += [Reason.CARTILAGE_UNCERTAIN] * (cartilage_mm > self._limits.cartilage_sd_ok)
         doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > goal.tolerance_mm)
         doubts += [Reason.JUMPED] * self._has_jumped(model, estimate, predicted)
         is_lost = self._is_lost(estimate, agreement)
@@ -172,13 +182,20 @@ class Judge:
         )
 
     def _bound_mm(
-        self, model: RegistrationModel, estimate: PoseEstimate, targets_mm: FloatArray
+        self,
+        model: RegistrationModel,
+        estimate: PoseEstimate,
+        targets_mm: FloatArray,
+        is_seen: NDArray[np.bool_],
     ) -> float:
+        """Of the measurement alone; over what is seen when there are no targets."""
         if len(targets_mm) == 0:
-            targets_mm = model.bone.mesh.vertices_mm[
-                visible_vertices(model.bone.mesh, estimate.camera_from_bone)
-            ]
-        step = max(1, len(targets_mm) // self._limits.max_bound_targets)
+            targets_mm = model.bone.mesh.vertices_mm[is_seen]
         if len(targets_mm) == 0:
             return float("inf")
+        step = max(1, len(targets_mm) // self._limits.max_bound_targets)
         return predicted_tre_mm(estimate, model.centre_mm, targets_mm[::step])
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
