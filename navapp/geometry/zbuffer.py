@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import in_row_bands
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedGeometry
@@ -51,18 +52,37 @@ def render(mesh: TriangleMesh, camera_from_mesh: RigidTransform, camera: Camera)
 
 
 def render_rectified(
-    mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry, box: Box
+    mesh: TriangleMesh,
+    rectified_from_mesh: RigidTransform,
+    geometry: RectifiedGeometry,
+    box: Box,
+    *,
+    is_closed: bool = False,
 ) -> RenderedView:
-    """The mesh in a box of the rectified left view."""
+    """The mesh in a box of the rectified left view.
+
+    Args:
+        mesh: what is seen.
+        rectified_from_mesh: its pose.
+        geometry: of the rectified pair.
+        box: part of the left view.
+        is_closed: the mesh has no border, and its triangles look outward: half of them need not be
+            drawn.
+    """
     points_mm = rectified_from_mesh.apply(mesh.vertices_mm)
-    return _raster(geometry.project(points_mm), points_mm[:, 2], mesh.faces, box)
+    return _raster(geometry.project(points_mm), points_mm[:, 2], mesh.faces, box, is_closed)
 
 
 def projected_box(
     mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry
 ) -> Box | None:
     """Box around the mesh in the rectified left view, clipped; None when it is out of view."""
-    around = Box.around(geometry.project(rectified_from_mesh.apply(mesh.vertices_mm)))
+    return box_around(rectified_from_mesh.apply(mesh.vertices_mm), geometry)
+
+
+def box_around(points_mm: FloatArray, geometry: RectifiedGeometry) -> Box | None:
+    """Box around (N, 3) points in the rectified left view, clipped; None when out of view."""
+    around = Box.around(geometry.project(points_mm))
     if around is None:
         return None
     clipped = around.clipped(geometry.width, geometry.height)
@@ -92,14 +112,22 @@ def unhidden_vertices(
 
 
 def _raster(
-    pixels: FloatArray, depths_mm: FloatArray, faces: NDArray[np.int32], box: Box
+    pixels: FloatArray,
+    depths_mm: FloatArray,
+    faces: NDArray[np.int32],
+    box: Box,
+    is_closed: bool = False,
 ) -> RenderedView:
     inverse_depth = np.zeros((max(box.height, 0), max(box.width, 0)), dtype=np.float32)
     face_index = np.full(inverse_depth.shape, -1, dtype=np.int32)
     if not box.is_empty and len(faces):
-        shifted = np.ascontiguousarray(pixels - (box.x, box.y))
-        raster_nearest(
-            shifted, np.ascontiguousarray(depths_mm), np.array(faces), inverse_depth, face_index
+        shifted, depths = np.ascontiguousarray(pixels - (box.x, box.y)), depths_mm.copy()
+        writable = np.array(faces)
+        in_row_bands(
+            box.height,
+            lambda first, last: raster_nearest(
+                shifted, depths, writable, inverse_depth, face_index, (first, last), is_closed
+            ),
         )
     depth = np.full(inverse_depth.shape, np.nan, dtype=np.float32)
     np.divide(1.0, inverse_depth, out=depth, where=face_index >= 0)

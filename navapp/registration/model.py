@@ -27,6 +27,7 @@ class RegistrationModel:
         sigma_mm: (V,) of that surface along the normal (model and cartilage).
         is_usable: (V,) False for parts that a stage removed.
         seen_mesh: those points and the triangles that are left: what a camera should see.
+        is_closed: they have no border and look outward.
         seen_face_sigma_mm: (F,) of its triangles.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
     """
@@ -43,6 +44,8 @@ class RegistrationModel:
         self.is_usable: NDArray[np.bool_] = ~bone.is_removed
         is_left = self.is_usable[mesh.faces].all(axis=1)
         self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], self.normals)
+        has_border = open_border(len(self.points_mm), mesh.faces[is_left]).any()
+        self.is_closed = not has_border and self.seen_mesh.volume_mm3() > 0.0
         self.seen_face_sigma_mm: FloatArray = self.sigma_mm[mesh.faces[is_left]].mean(axis=1)
         self.centre_mm: FloatArray = mesh.centroid_mm
 
@@ -74,6 +77,16 @@ class RegistrationModel:
             low,
             voxel,
         )
+
+    @cached_property
+    def hull_mm(self) -> FloatArray:
+        """(H, 3) corners of the seen surface's convex hull: they bound it in every view."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            return self.points_mm[ConvexHull(self.points_mm).vertices]
+        except QhullError:  # flat
+            return self.points_mm
 
     @cached_property
     def smooth_normals(self) -> FloatArray:

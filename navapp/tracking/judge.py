@@ -85,9 +85,11 @@ class Judge:
         rectified_from_bone: RigidTransform,
         measured: DisparityMap,
         coarse_px: NDArray[np.float32] | None = None,
+        view: RenderedView | None = None,
     ) -> Agreement:
         """How much of the model that should be seen was measured, and agrees."""
-        view = self._render(model, rectified_from_bone, measured)
+        if view is None:
+            view = self._render(model, rectified_from_bone, measured)
         return compare(view, model, measured, self._geometry, coarse_px)
 
     def judge(
@@ -98,6 +100,7 @@ class Judge:
         goal: Goal,
         predicted: RigidTransform | None = None,
         coarse_px: NDArray[np.float32] | None = None,
+        view: RenderedView | None = None,
     ) -> Verdict:
         """Status, reasons and predicted error of a pose.
 
@@ -109,10 +112,11 @@ class Judge:
             predicted: pose expected by the motion model, for the jump test.
             coarse_px: (h, w) rough disparity of whatever is in that box: what hides the bone, and
                 what is seen through the model.
+            view: the model in that box at the pose, or next to it; rendered when absent.
         """
         if not np.isfinite(estimate.covariance).all():
             return Verdict(Status.LOST, None, estimate.reasons or (Reason.DEGENERATE,))
-        agreement = self.agreement(model, estimate.camera_from_bone, measured, coarse_px)
+        agreement = self.agreement(model, estimate.camera_from_bone, measured, coarse_px, view)
         if agreement.n_visible == 0:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
         is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)
@@ -177,8 +181,9 @@ class Judge:
         self, model: RegistrationModel, pose: RigidTransform, measured: DisparityMap
     ) -> RenderedView:
         height, width = measured.disparity_px.shape
+        box = Box(measured.x, measured.y, width, height)
         return render_rectified(
-            model.seen_mesh, pose, self._geometry, Box(measured.x, measured.y, width, height)
+            model.seen_mesh, pose, self._geometry, box, is_closed=model.is_closed
         )
 
     def _bound_mm(

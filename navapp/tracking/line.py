@@ -23,7 +23,7 @@ from navapp.registration import (
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
 from navapp.tracking.motion import TrackState
-from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import (
     BoneModel,
     LineTimings,
@@ -37,6 +37,12 @@ from navapp.values import (
 
 # A first registration tries near starts first, which is so much of the work of both lists.
 _NEAR_SHARE = 0.1
+# Rectified around an expected bone: a little more than is matched when it is there, for it may have
+# moved; much more when it has to be searched.
+_NEAR_VIEW = Margins(box_px=56, band_mm=60.0)
+_WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
+# A model that moved by less looks the same.
+_SAME_VIEW_MM = 0.05
 # Tilts and shifts of a rough pose: (deg, how many).
 _NEAR_TILTS = (15.0, 12)
 _FAR_TILTS = ((15.0, 12), (28.0, 20))
@@ -87,12 +93,16 @@ class Line:
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame (the paper's intra-operative loop)."""
         predicted = self._rectified(state.predicted(captured_ns, self.centre_mm))
-        pair, timings = self._rectified_pair(left, right, predicted)
-        fit = self.locator.locate(pair, predicted) if state.n_lost == 0 else None
-        tracked = self._judged(pair, fit, goal, timings, predicted)
+        tracked = self._lost(Reason.BONE_LOST)
+        if state.n_lost == 0:
+            pair, timings = self._rectified_pair(left, right, predicted, _NEAR_VIEW)
+            fit = self.locator.locate(pair, predicted)
+            tracked = self._judged(pair, fit, goal, timings, predicted)
         if tracked.verdict.status is Status.LOST:
+            pair, timings = self._rectified_pair(left, right, predicted)
+            timings = sum_timings(tracked.timings, timings)
             fit = self.locator.search(pair, predicted, self.settings.locator.search)
-            tracked = self._judged(pair, fit, goal, tracked.timings, predicted)
+            tracked = self._judged(pair, fit, goal, timings, predicted)
         return tracked, state.updated(tracked, captured_ns, self.centre_mm)
 
     def register(
@@ -153,7 +163,7 @@ class Line:
     ) -> TrackedFrame:
         """Judge a pose as it stands, without moving it, by the surface that is seen there."""
         pose = self._rectified(left_from_bone)
-        pair, timings = self._rectified_pair(left, right, pose)
+        pair, timings = self._rectified_pair(left, right, pose, _NEAR_VIEW)
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._lost(Reason.OUT_OF_VIEW)
@@ -199,7 +209,10 @@ class Line:
         started = time.perf_counter_ns()
         found = fit.measured.disparity
         coarse_px = self._meter.coarsely(pair, fit.pose, found)
-        verdict = self._judge.judge(self.model, fit.estimate, found, goal, predicted, coarse_px)
+        view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
+        verdict = self._judge.judge(
+            self.model, fit.estimate, found, goal, predicted, coarse_px, view
+        )
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         name = self.model.bone.name
@@ -212,9 +225,9 @@ class Line:
         return TrackedFrame(self.model.bone.name, None, verdict, timings or LineTimings())
 
     def _rectified_pair(
-        self, left: Image, right: Image, around: RigidTransform
+        self, left: Image, right: Image, around: RigidTransform, margins: Margins = _WIDE_VIEW
     ) -> tuple[RectifiedPair, LineTimings]:
-        return self._meter.rectified(left, right, around, self.settings.locator.search)
+        return self._meter.rectified(left, right, around, margins)
 
     def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
         return self._geometry.rectified_from_left @ left_from_bone

@@ -58,12 +58,14 @@ class Fit:
         measured: the surface it was fitted to.
         timings: of all matchings and fits that led to it.
         n_rounds: so many they were.
+        moved_mm: how far the last one moved the bone's surface.
     """
 
     estimate: PoseEstimate
     measured: Measurement
     timings: LineTimings
     n_rounds: int = 1
+    moved_mm: float = np.inf
 
     @property
     def pose(self) -> RigidTransform:
@@ -115,6 +117,7 @@ class Locator:
         fits: list[Fit] = []
         if share >= self.settings.hidden_share:
             first = self._fitted(self._meter.on_model(expected), pose, _ON_MODEL)
+            first = replace(first, moved_mm=self._moved_mm(pose, first.pose))
             fits.append(self._settled(pair, first))
         if not fits or not self._is_here(fits[0], pose):
             found = self.search(pair, pose, self.settings.tracking)
@@ -122,8 +125,10 @@ class Locator:
         timings = LineTimings(stereo_ms=probe_ms)
         for fit in fits:
             timings = sum_timings(timings, fit.timings)
-        best = max(fits, key=self._score, default=None)
-        return None if best is None else replace(best, timings=timings)
+        if not fits:
+            return None
+        best = fits[0] if len(fits) == 1 else max(fits, key=self._score)
+        return replace(best, timings=timings)
 
     def _is_here(self, fit: Fit, expected: RigidTransform) -> bool:
         """Enough of the model answers, or what answers is where it was expected."""
@@ -159,7 +164,7 @@ class Locator:
 
     def _settled(self, pair: RectifiedPair, fit: Fit) -> Fit:
         """Match on the model and fit until the bone rests; the last fit that had enough points."""
-        while fit.n_rounds < self.settings.max_rounds:
+        while fit.n_rounds < self.settings.max_rounds and fit.moved_mm >= self.settings.settled_mm:
             expected = self._meter.expected(pair, fit.pose, self.settings.tracking)
             if expected is None:
                 break
@@ -168,9 +173,7 @@ class Locator:
             if Reason.TOO_FEW_POINTS in finer.estimate.reasons:
                 return replace(fit, timings=timings)
             moved_mm = self._moved_mm(fit.pose, finer.pose)
-            fit = replace(finer, timings=timings, n_rounds=fit.n_rounds + 1)
-            if moved_mm < self.settings.settled_mm:
-                break
+            fit = replace(finer, timings=timings, n_rounds=fit.n_rounds + 1, moved_mm=moved_mm)
         return fit
 
     def _fitted(
@@ -188,8 +191,8 @@ class Locator:
         return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
 
     def _moved_mm(self, before: RigidTransform, after: RigidTransform) -> float:
-        """Mean displacement of the bone's surface."""
-        points_mm = self._model.points_mm
+        """Mean displacement of the corners around the bone's surface."""
+        points_mm = self._model.hull_mm
         moved = after.apply(points_mm) - before.apply(points_mm)
         return float(np.linalg.norm(moved, axis=1).mean())
 

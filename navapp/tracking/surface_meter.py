@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.geometry.zbuffer import RenderedView, box_around, render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     RefineSettings,
@@ -22,8 +22,6 @@ from navapp.stereo import (
 )
 from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
-# How far the bone may turn out to be from where it was expected, and its box with it.
-_SPARE_PX, _SPARE_MM = 60, 30.0
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
 _FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
@@ -59,6 +57,7 @@ class Measurement:
         timings: how long it took.
         answered_share: of the pixels that were asked for: the box's, or the model's.
         correlation_px: distance in the picture over which its errors go together.
+        view: the model that it was measured on; None of a free measurement.
     """
 
     disparity: DisparityMap
@@ -66,6 +65,7 @@ class Measurement:
     timings: LineTimings
     answered_share: float
     correlation_px: float
+    view: RenderedView | None = None
 
     @property
     def scene(self) -> Scene:
@@ -80,11 +80,13 @@ class Expected:
     Attributes:
         pair: with the model's box.
         support_px: (h, w) disparity of the model over the box, NaN beside it.
+        view: the model in that box.
         render_ms: how long that took.
     """
 
     pair: RectifiedPair
     support_px: NDArray[np.float32]
+    view: RenderedView
     render_ms: float
 
 
@@ -109,8 +111,7 @@ class SurfaceMeter:
     ) -> tuple[RectifiedPair, LineTimings]:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         started = time.perf_counter_ns()
-        wide = Margins(margins.box_px + _SPARE_PX, margins.band_mm + _SPARE_MM)
-        box, band_px = self._region(around, wide) or (None, None)
+        box, band_px = self._region(around, margins) or (None, None)
         pair = self._rectifier.rectify(luma(left), luma(right), box, band_px)
         return pair, LineTimings(rectify_ms=_ms_since(started))
 
@@ -157,9 +158,12 @@ class SurfaceMeter:
         region = self._region(pose, margins)
         if region is None:
             return None
-        view = render_rectified(self._model.seen_mesh, pose, self.geometry, region[0])
+        model = self._model
+        view = render_rectified(
+            model.seen_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
+        )
         support_px = self.geometry.disparity_map_px(view.depth_mm)
-        return Expected(replace(pair, box=region[0]), support_px, _ms_since(started))
+        return Expected(replace(pair, box=region[0]), support_px, view, _ms_since(started))
 
     def on_model(self, expected: Expected) -> Measurement:
         """Sub-pixel matching on the model's own surface.
@@ -173,7 +177,9 @@ class SurfaceMeter:
         found, is_expected = answer.disparity, np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
         share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)
-        return Measurement(found, cloud, answer.timings, share, _MODEL_CORRELATION_PX)
+        return Measurement(
+            found, cloud, answer.timings, share, _MODEL_CORRELATION_PX, expected.view
+        )
 
     def probed_share(self, expected: Expected) -> tuple[float, float]:
         """Share of thinned samples of the model that answer; and how many ms that took.
@@ -197,10 +203,11 @@ class SurfaceMeter:
         self, pose: RigidTransform, margins: Margins
     ) -> tuple[Box, tuple[float, float]] | None:
         """Box and disparity band around the model at a pose; None out of view or out of depth."""
-        box = projected_box(self._model.bone.mesh, pose, self.geometry)
+        hull_mm = pose.apply(self._model.hull_mm)
+        box = box_around(hull_mm, self.geometry)
         if box is None:
             return None
-        depths = pose.apply(self._model.points_mm)[:, 2]
+        depths = hull_mm[:, 2]
         near = max(float(depths.min()) - margins.band_mm, self._depth_mm[0])
         far = min(float(depths.max()) + margins.band_mm, self._depth_mm[1])
         if near >= far:

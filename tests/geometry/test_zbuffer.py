@@ -48,7 +48,8 @@ def test_the_kernel_agrees_with_the_reference(seed):
     faces = rng.integers(0, 60, (25, 3)).astype(np.int32)
     inverse_depth = np.zeros((height, width), dtype=np.float32)
     face_index = np.full((height, width), -1, dtype=np.int32)
-    raster_nearest(pixels, depths, faces, inverse_depth, face_index)
+    for band in ((0, 11), (11, height)):
+        raster_nearest(pixels, depths, faces, inverse_depth, face_index, band, False)
     expected_depth, expected_face = zbuffer_reference.nearest(pixels, depths, faces, width, height)
     assert (face_index >= 0).mean() > 0.3
     np.testing.assert_array_equal(face_index, expected_face)
@@ -59,13 +60,26 @@ def test_the_edges_of_a_triangle_on_pixel_centres_belong_to_it():
     pixels = np.array([[2.0, 3.0], [8.0, 3.0], [2.0, 9.0]])
     inverse_depth = np.zeros((12, 12), dtype=np.float32)
     face_index = np.full((12, 12), -1, dtype=np.int32)
-    raster_nearest(
-        pixels, np.full(3, 100.0), np.array([[0, 1, 2]], dtype=np.int32), inverse_depth, face_index
-    )
+    faces = np.array([[0, 1, 2]], dtype=np.int32)
+    raster_nearest(pixels, np.full(3, 100.0), faces, inverse_depth, face_index, (0, 12), False)
     expected, _ = zbuffer_reference.nearest(pixels, np.full(3, 100.0), [[0, 1, 2]], 12, 12)
     np.testing.assert_array_equal(inverse_depth > 0, expected > 0)
     assert face_index[3, 2:9].tolist() == [0] * 7
     assert face_index[3:10, 2].tolist() == [0] * 7
+
+
+def test_a_closed_mesh_looks_the_same_without_its_far_side():
+    mesh, left_rect_from_bone = sphere(30.0, 30), pose()
+    whole = seen(mesh, left_rect_from_bone)
+    facing = render_rectified(mesh, left_rect_from_bone, GEOMETRY, whole.box, is_closed=True)
+    np.testing.assert_array_equal(facing.face_index, whole.face_index)
+    np.testing.assert_array_equal(facing.depth_mm, whole.depth_mm)
+    # Turned inside out, only its far side is drawn.
+    inside = render_rectified(
+        mesh.flipped(), left_rect_from_bone, GEOMETRY, whole.box, is_closed=True
+    )
+    middle = np.isfinite(whole.depth_mm)
+    assert (inside.depth_mm[middle] > whole.depth_mm[middle] + 1.0).mean() > 0.9
 
 
 def test_depth_agrees_with_ray_casting():
@@ -276,5 +290,7 @@ def test_neighbours_leave_no_seam(seed):
             np.roll(faces, turn, axis=1).astype(np.int32),
             inverse_depth,
             face_index,
+            (0, 40),
+            False,
         )
         assert (face_index >= 0).all()

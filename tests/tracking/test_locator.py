@@ -174,6 +174,10 @@ def test_a_bone_at_rest_is_not_matched_again() -> None:
     calm = LocatorSettings(max_rounds=10, settled_mm=0.5)
     meter = FakeMeter()
     fit = locator_of(meter, calm).locate(PAIR, TRUE)
+    assert meter.asked == ["on_model"]
+    assert fit.n_rounds == 1
+    meter = FakeMeter()
+    fit = locator_of(meter, calm).locate(PAIR, moved((0.0, 0.0, 0.8), (0.0,) * 3))
     assert meter.asked == ["on_model"] * 2
     assert fit.n_rounds == 2
 
