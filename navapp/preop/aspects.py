@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from navapp.geometry.bands import run_both
 from navapp.geometry.camera import Camera
+from navapp.geometry.directions import ViewCone, seen_from
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render
@@ -63,7 +64,8 @@ def build_aspects(
         on_progress: told the share done; what it raises stops the work.
     """
     settings = settings or AspectSettings()
-    directions = view_directions(axis, half_angle_deg, settings.step_deg)
+    cone = ViewCone(None if axis is None else np.asarray(axis, dtype=np.float64), half_angle_deg)
+    directions = cone.directions(settings.step_deg)
     look = _Look(bone, settings)
     views: list[tuple[FloatArray, FloatArray] | None] = [None] * len(directions)
 
@@ -85,26 +87,6 @@ def build_aspects(
         np.concatenate([points_mm for points_mm, _ in seen]),
         np.concatenate([tangents for _, tangents in seen]),
     )
-
-
-def view_directions(axis: ArrayLike | None, half_angle_deg: float, step_deg: float) -> FloatArray:
-    """(V, 3) unit vectors about `step_deg` apart on the sphere's part inside a cone.
-
-    The axis itself is one of them, so that the narrowest cone has a view.
-    """
-    n = max(1, round(4.0 * np.pi / (np.radians(step_deg) ** 2 * 0.866)))
-    k = np.arange(n) + 0.5
-    z = 1.0 - 2.0 * k / n
-    angle = np.pi * (1.0 + np.sqrt(5.0)) * k
-    radius = np.sqrt(1.0 - z * z)
-    spiral: FloatArray = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
-    if axis is None or half_angle_deg >= 180.0:
-        return spiral
-    unit = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    cosine = spiral @ unit
-    is_inside = cosine >= np.cos(np.radians(half_angle_deg))
-    is_inside &= cosine < np.cos(np.radians(0.5 * step_deg))
-    return np.vstack([unit, spiral[is_inside]])
 
 
 class _Look:
@@ -132,7 +114,9 @@ class _Look:
 
     def at(self, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(n, 3) points of the edges seen from a direction, and their tangents."""
-        pose = looking_at(direction, self._middle_mm, self._settings.distance_mm)
+        rotation = seen_from(direction)
+        shift = np.array([0.0, 0.0, self._settings.distance_mm]) - rotation @ self._middle_mm
+        pose = RigidTransform.from_parts("view", "bone", rotation, shift)
         camera_mm = pose.inverse().translation_mm
         rays = camera_mm - self._mesh.vertices_mm
         facing = np.einsum("ij,ij->i", self._mesh.normals, rays)
@@ -170,16 +154,6 @@ class _Look:
         column, row = np.where(inside[:, None], pixels, 0).T
         seen: NDArray[np.bool_] = inside & (moved[:, 2] <= furthest_mm[row, column] + _HIDDEN_MM)
         return seen
-
-
-def looking_at(direction: FloatArray, middle_mm: FloatArray, distance_mm: float) -> RigidTransform:
-    """`view_from_bone` of a camera that looks from a direction at a point; some roll."""
-    forward = -direction / np.linalg.norm(direction)
-    right = np.cross(np.eye(3)[np.abs(forward).argmin()], forward)
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
-    shift = np.array([0.0, 0.0, distance_mm]) - rotation @ middle_mm
-    return RigidTransform.from_parts("view", "bone", rotation, shift)
 
 
 def _spread(points_mm: FloatArray, n: int) -> NDArray[np.int64]:
