@@ -177,13 +177,43 @@ def around(
 
 def poses_of(some: Hypotheses, target: str, bone: str) -> list[RigidTransform]:
     """`target_from_bone` of each hypothesis."""
-    rotations = some.towards[some.place] @ some.rotation[some.orientation]
-    anchored = np.einsum("hij,hj->hi", rotations, some.anchor[some.orientation])
-    shifts = some.position[some.place] - anchored
+    rotations, shifts = _parts(some)
     return [
         RigidTransform.from_parts(target, bone, rotation, shift)
         for rotation, shift in zip(rotations, shifts, strict=True)
     ]
+
+
+def apart(
+    some: Hypotheses, centre_mm: FloatArray, least_mm: float, least_deg: float
+) -> NDArray[np.intp]:
+    """Indices of hypotheses that repeat none before them, in their order.
+
+    Args:
+        some: hypotheses, best first.
+        centre_mm: (3,) of the bone; its distance counts.
+        least_mm: two whose centres are nearer than this ...
+        least_deg: ... and that are turned by less are the same.
+    """
+    rotations, shifts = _parts(some)
+    centres = rotations @ centre_mm + shifts
+    least_trace = 1.0 + 2.0 * np.cos(np.radians(least_deg))
+    left = np.arange(len(rotations))
+    kept: list[int] = []
+    while len(left):
+        first = left[0]
+        kept.append(int(first))
+        trace = np.einsum("hij,ij->h", rotations[left], rotations[first])
+        distance = np.linalg.norm(centres[left] - centres[first], axis=1)
+        left = left[(trace < least_trace) | (distance > least_mm)]
+    return np.array(kept, dtype=np.intp)
+
+
+def _parts(some: Hypotheses) -> tuple[FloatArray, FloatArray]:
+    """(H, 3, 3) rotations and (H, 3) translations."""
+    rotations = some.towards[some.place] @ some.rotation[some.orientation]
+    anchored = np.einsum("hij,hj->hi", rotations, some.anchor[some.orientation])
+    return rotations, some.position[some.place] - anchored
 
 
 def thinned_views(views: Views, step_deg: float) -> NDArray[np.intp]:

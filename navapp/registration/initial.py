@@ -20,6 +20,7 @@ from navapp.registration.bimcc import MIN_POINTS, fit_coarsely
 from navapp.registration.edge_tables import EdgeTables, edge_tables, scaled_optics
 from navapp.registration.hypotheses import (
     Views,
+    apart,
     around,
     everywhere,
     places_of,
@@ -30,13 +31,15 @@ from navapp.registration.hypotheses import (
 )
 from navapp.registration.initial_kernels import Hypotheses, score_edges, score_surface
 from navapp.registration.model import RegistrationModel
-from navapp.registration.multi_start import ANYWHERE, Candidate, explained_share, is_same_pose
+from navapp.registration.multi_start import ANYWHERE, Candidate, explained_share
 from navapp.registration.scene import Scene
 from navapp.values import AspectGraph
 
 _CELL_PX = 8
 # Hypotheses that the coarse loop brings to the same end.
 _ALIKE_MM, _ALIKE_DEG = 12.0, 15.0
+# Coarse answers that a fit on all points brings to the same end.
+_BASIN_MM, _BASIN_DEG = 6.0, 8.0
 # Around a hypothesis so much of the scene takes part.
 _SPARE_PX, _SPARE_MM = 40, 35.0
 _COARSE_POINTS, _JUDGED_POINTS = 400, 1500
@@ -100,7 +103,8 @@ def find_initial(
     views = views_of(model, cone, settings.fine_step_deg, aspects, settings.n_surface_points)
     best = _best_hypotheses(pair, scene, views, settings, on_progress)
     target = pair.geometry.rectified_from_left.target
-    starts = _distinct(poses_of(best, target, model.bone.name), model, settings.n_verified)
+    best = taken(best, apart(best, model.centre_mm, _ALIKE_MM, _ALIKE_DEG)[: settings.n_verified])
+    starts = poses_of(best, target, model.bone.name)
     told = lambda share: on_progress(_REFINED + (1.0 - _REFINED) * share)  # noqa: E731
     return _verified(pair, scene, model, starts, told)
 
@@ -211,10 +215,16 @@ def _verified(
     ranked = sorted((one for one in found if one is not None), key=lambda one: -one.score)
     kept: list[Candidate] = []
     for one in ranked:
-        pose = one.scene_from_bone
-        if not any(is_same_pose(pose, other.scene_from_bone, model.centre_mm) for other in kept):
+        if not any(_same_basin(one, other, model) for other in kept):
             kept.append(one)
     return kept
+
+
+def _same_basin(a: Candidate, b: Candidate, model: RegistrationModel) -> bool:
+    """Whether two coarse answers are on their way to the same pose."""
+    one, other = a.scene_from_bone, b.scene_from_bone
+    shift_mm = np.linalg.norm(one.apply(model.centre_mm) - other.apply(model.centre_mm))
+    return bool(shift_mm < _BASIN_MM and rotation_angle_deg(one, other) < _BASIN_DEG)
 
 
 def _near(
@@ -240,24 +250,6 @@ def _near(
         points_mm=scene.points_mm[inside],
         sigma_ray_mm=None if sigma is None else sigma[inside],
     )
-
-
-def _distinct(
-    poses: list[RigidTransform], model: RegistrationModel, most: int
-) -> list[RigidTransform]:
-    """The first poses that differ from each other by more than the coarse loop mends."""
-    kept: list[RigidTransform] = []
-    for pose in poses:
-        if len(kept) == most:
-            break
-        centre_mm = pose.apply(model.centre_mm)
-        if not any(
-            np.linalg.norm(centre_mm - other.apply(model.centre_mm)) < _ALIKE_MM
-            and rotation_angle_deg(pose, other) < _ALIKE_DEG
-            for other in kept
-        ):
-            kept.append(pose)
-    return kept
 
 
 def _largest(score: NDArray[np.float32], n: int) -> NDArray[np.intp]:
