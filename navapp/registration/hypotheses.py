@@ -105,7 +105,9 @@ def places_of(
     depth.flat[cell[first]] = z_mm[middle]
     every = max(1, round((len(first) / max(most, 1)) ** 0.5))
     thinned = np.zeros_like(depth)
-    thinned[every // 2 :: every, every // 2 :: every] = depth[every // 2 :: every, every // 2 :: every]
+    thinned[every // 2 :: every, every // 2 :: every] = depth[
+        every // 2 :: every, every // 2 :: every
+    ]
     rows, columns = np.nonzero(thinned)
     z = thinned[rows, columns].astype(np.float64)
     u, v = (columns + 0.5) * cell_px - 0.5, (rows + 0.5) * cell_px - 0.5

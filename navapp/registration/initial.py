@@ -202,9 +202,7 @@ def _verified(
             near = _near(pair, scene, pixels, model, start)
             if len(near) < MIN_POINTS:
                 continue
-            pose = fit_coarsely(
-                replace(near, thinned_to=_COARSE_POINTS), model, start, ANYWHERE
-            )
+            pose = fit_coarsely(replace(near, thinned_to=_COARSE_POINTS), model, start, ANYWHERE)
             if pose is not None:
                 # In shares of the whole scene, so that candidates compare.
                 share = explained_share(replace(near, thinned_to=_JUDGED_POINTS), model, pose)
