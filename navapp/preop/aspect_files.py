@@ -46,7 +46,7 @@ def read_aspects(path: str | Path) -> AspectGraph:
     """
     path = Path(path)
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             if int(content["format"]) != _FORMAT:
                 raise ValueError(f"format {content['format']}")
             arrays = {name: content[name] for name in _ARRAYS}

@@ -20,8 +20,11 @@ from navapp.registration.initial_kernels import (
 )
 
 _BLUR_PX = 0.8
-# So much of the box is taken to be flat.
+# So much of the box is taken to be flat; and whatever is no steeper than so many sigma of noise.
 _FLAT_SHARE = 0.6
+_NOISE_SIGMAS = 3.0
+# Sigma of a central difference after that blur, of white noise with sigma 1 before it.
+_BLURRED_NOISE = 0.222
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,10 +92,26 @@ def _responses(picture: Image, inside: Box, scale: int, reach: int) -> NDArray[n
     gy, gx = np.gradient(small)
     x, y = inside.x // scale, inside.y // scale
     part = np.hypot(gx, gy)[y : y + inside.height // scale, x : x + inside.width // scale]
-    least = float(np.quantile(part, _FLAT_SHARE)) if part.size else 0.0
+    least = _NOISE_SIGMAS * _BLURRED_NOISE * _noise(picture, inside) / scale
+    least = max(least, float(np.quantile(part, _FLAT_SHARE)) if part.size else 0.0)
     bins = np.zeros(small.shape, dtype=np.uint8)
     in_row_bands(height, lambda a, b: quantised_gradients(small, least, (a, b), bins))
     response = np.zeros((height, width, N_BINS), dtype=np.uint8)
     answers = answer_table()
     in_row_bands(height, lambda a, b: spread_responses(bins, reach, answers, (a, b), response))
     return response
+
+
+def _noise(picture: Image, inside: Box) -> float:
+    """Sigma of the pixels' noise, grey levels.
+
+    Source: Immerkaer 1996, with the median in place of the mean: edges must not count.
+    """
+    import cv2
+
+    part = picture[inside.y : inside.y + inside.height, inside.x : inside.x + inside.width]
+    if part.size == 0:
+        return 0.0
+    mask = np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]])
+    found = cv2.filter2D(part, cv2.CV_32F, mask)
+    return float(np.median(np.abs(found))) / (0.6745 * 6.0)
