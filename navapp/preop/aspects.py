@@ -150,7 +150,7 @@ class _Look:
         moved = pose.apply(points_mm)
         pixels = np.floor(self._camera.project(moved) + 0.5).astype(int)
         height, width = depth_mm.shape
-        inside = ((pixels >= 0) & (pixels < (width, height))).all(axis=1)
+        inside = np.all((pixels >= 0) & (pixels < (width, height)), axis=1)
         column, row = np.where(inside[:, None], pixels, 0).T
         seen: NDArray[np.bool_] = inside & (moved[:, 2] <= furthest_mm[row, column] + _HIDDEN_MM)
         return seen
@@ -181,8 +181,8 @@ def _merged(
                 continue
             distance, index = cKDTree(views[other][0]).query(points_mm)
             parallel = np.abs(np.einsum("ij,ij->i", tangents, views[other][1][index]))
-            agrees = (distance < _SAME_MM) & (parallel > _SAME_COSINE)
-            is_new &= bool(agrees.mean() < _SAME_SHARE)
+            agrees = np.asarray(distance < _SAME_MM) & (parallel > _SAME_COSINE)
+            is_new &= float(agrees.mean()) < _SAME_SHARE
         if is_new:
             kept.append(k)
     return kept

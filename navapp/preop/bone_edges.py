@@ -39,8 +39,7 @@ def no_anatomy(mesh: TriangleMesh) -> NDArray[np.bool_]:
     if not is_end.any():
         return is_end
     distance, _ = cKDTree(mesh.vertices_mm[is_end]).query(mesh.vertices_mm)
-    around: NDArray[np.bool_] = distance < _AROUND_MM
-    return around
+    return np.asarray(distance < _AROUND_MM)
 
 
 def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
@@ -89,7 +88,7 @@ def _smoothed(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
     around = (half + half.T + identity(n)).tocsr()
     normals: FloatArray = np.array(mesh.normals)
     for _ in range(rounds):
-        normals = around @ normals
+        normals = np.asarray(around @ normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return normals
 

@@ -78,7 +78,8 @@ def answer_table() -> NDArray[np.uint8]:
     cosine = np.abs(np.cos(np.pi / N_BINS * between))
     has_bin = (np.arange(256)[:, None] >> np.arange(N_BINS)) & 1
     best = (has_bin[:, :, None] * cosine).max(axis=1)
-    return np.round(255.0 * best).astype(np.uint8)
+    answers: NDArray[np.uint8] = np.round(255.0 * best).astype(np.uint8)
+    return answers
 
 
 def _responses(picture: Image, inside: Box, scale: int, reach: int) -> NDArray[np.uint8]:

@@ -149,7 +149,12 @@ def around(
     some: Hypotheses, views: Views, step_deg: float, roll_deg: float, shift_mm: float
 ) -> Hypotheses:
     """Each hypothesis with its neighbours: views within a step, rolls and places beside it."""
-    orientation, place, aspect, rotation, position, anchor = [], [], [], [], [], []
+    orientation: list[int] = []
+    place: list[int] = []
+    aspect: list[int] = []
+    anchor: list[FloatArray] = []
+    rotation: list[FloatArray] = []
+    position: list[FloatArray] = []
     turns = [rotation_from_vector((0.0, 0.0, np.radians(a))) for a in (-roll_deg, 0.0, roll_deg)]
     sides = shift_mm * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
     cosine = np.cos(np.radians(step_deg))
@@ -158,11 +163,10 @@ def around(
         for view in np.flatnonzero(views.directions @ here >= cosine):
             tilted = some.rotation[o] @ turn_between(views.directions[view], here)
             for turn in turns:
-                n = len(rotation)
-                orientation += [n] * len(sides)
+                orientation += [len(rotation)] * len(sides)
                 place += range(len(position), len(position) + len(sides))
                 rotation.append(turn @ tilted)
-                aspect.append(view)
+                aspect.append(int(view))
                 anchor.append(some.anchor[o])
                 position.extend(some.position[c] + sides)
     positions = np.array(position).reshape(-1, 3)

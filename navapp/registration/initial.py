@@ -54,7 +54,8 @@ class InitialSettings:
     Attributes:
         coarse_step_deg, fine_step_deg: between views.
         roll_step_deg: between rolls, all around.
-        n_places: on the measured surface, about.
+        n_places: on the measured surface, about ...
+        n_hypotheses: ... and fewer when all together would be more than this.
         n_surface_points: of each view, to be looked up.
         n_edge_points: of each view, coarse and fine.
         reach_mm: a measured depth within this agrees with a hypothesis.
@@ -66,13 +67,14 @@ class InitialSettings:
     coarse_step_deg: float = 16.0
     fine_step_deg: float = 8.0
     roll_step_deg: float = 24.0
-    n_places: int = 1000
+    n_places: int = 2500
+    n_hypotheses: int = 3_000_000
     n_surface_points: int = 40
     n_edge_points: tuple[int, int] = (50, 120)
     reach_mm: float = 6.0
-    n_passed: int = 4000
-    n_refined: int = 150
-    n_verified: int = 24
+    n_passed: int = 8000
+    n_refined: int = 300
+    n_verified: int = 40
 
 
 def find_initial(
@@ -141,8 +143,10 @@ def _best_hypotheses(
     on_progress: Callable[[float], None],
 ) -> Hypotheses:
     """Hypotheses, best first, coarse to fine."""
-    depth_mm, positions_mm = places_of(scene, pair.geometry, _CELL_PX, settings.n_places)
     chosen = thinned_views(views, settings.coarse_step_deg)
+    n_orientations = len(chosen) * views.anchors_mm.shape[1] * 360.0 / settings.roll_step_deg
+    n_places = min(settings.n_places, int(settings.n_hypotheses / n_orientations))
+    depth_mm, positions_mm = places_of(scene, pair.geometry, _CELL_PX, n_places)
     some = everywhere(views, chosen, settings.roll_step_deg, positions_mm)
     optics = scaled_optics(pair, _CELL_PX)
     largest_px = pair.geometry.disparity_px(float(scene.points_mm[:, 2].min()))

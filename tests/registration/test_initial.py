@@ -40,7 +40,7 @@ CONE = ViewCone(AXIS, 30.0)
 TRUE = RigidTransform.from_parts(
     "left_rect",
     "femur",
-    rotation_from_vector((0.0, 0.0, 0.5)) @ seen_from(AXIS + (0.2, 0.1, 0.0)),
+    rotation_from_vector((0.0, 0.0, 0.5)) @ seen_from(AXIS + np.array([0.2, 0.1, 0.0])),
     (20.0, 5.0, 430.0),
 )
 
@@ -152,7 +152,7 @@ def test_pictures_decide_between_poses_that_the_surface_allows() -> None:
 
 
 def test_places_lie_on_the_surface_and_the_map_holds_its_depth() -> None:
-    pair, scene = seen()
+    _pair, scene = seen()
     depth, places = places_of(scene, GEOMETRY, 8, 500)
     assert 300 < len(places) < 900
     wall = depth[2, 2]

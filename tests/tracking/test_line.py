@@ -147,8 +147,8 @@ def drawn_box(a: Room) -> tuple[int, int, int, int]:
     seen = mesh.vertices_mm[visible_vertices(mesh, truth)]
     bare = seen[seen[:, 2] < mesh.vertices_mm[:, 2].min() + 60.0]
     pixels = a.rig.left.project(truth.apply(bare))
-    x, y = pixels.min(axis=0) - (12.0, -8.0)
-    width, height = np.ptp(pixels, axis=0) + (15.0, -20.0)
+    x, y = pixels.min(axis=0) - np.array([12.0, -8.0])
+    width, height = np.ptp(pixels, axis=0) + np.array([15.0, -20.0])
     return int(x), int(y), int(width), int(height)
 
 
