@@ -172,6 +172,7 @@ def _merged(
 
     near = np.cos(np.radians(1.5 * settings.step_deg))
     kept: list[int] = []
+    trees: dict[int, cKDTree] = {}
     for k, (points_mm, tangents) in enumerate(views):
         if len(points_mm) == 0:
             continue
@@ -179,10 +180,11 @@ def _merged(
         for other in kept:
             if directions[other] @ directions[k] < near:
                 continue
-            distance, index = cKDTree(views[other][0]).query(points_mm)
+            distance, index = trees[other].query(points_mm)
             parallel = np.abs(np.einsum("ij,ij->i", tangents, views[other][1][index]))
             agrees = np.asarray(distance < _SAME_MM) & (parallel > _SAME_COSINE)
             is_new &= float(agrees.mean()) < _SAME_SHARE
         if is_new:
             kept.append(k)
+            trees[k] = cKDTree(points_mm)
     return kept
