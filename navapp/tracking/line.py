@@ -160,13 +160,22 @@ class Line:
         pair, candidates = self._first_look.candidates(left, right, prior, on_progress)
         timings = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
         poses = poses_to_refine(candidates, self.settings.n_refined, _REFINED_SHARE)
-        found = [self.locator.search(pair, pose, self.settings.locator.search) for pose in poses]
+        found = [self._from_candidate(pair, pose) for pose in poses]
         fits = [fit for fit in found if fit is not None]
         if not fits:
             return [self._lost(Reason.NO_SURFACE, timings)]
         fits = doubted(fits, [self._score(fit) for fit in fits], self.model)
         kept = distinct([fit.pose for fit in fits], self.centre_mm)
         return [self._judged(fit, goal, timings) for fit in fits if fit.pose in kept]
+
+    def _from_candidate(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
+        """What explains more: the model matched where it is expected, or what lies around it.
+
+        Clutter around a bone can pull it away from where the first finds it.
+        """
+        locator = self.locator
+        fits = (locator.locate(pair, pose), locator.search(pair, pose, locator.settings.search))
+        return max((fit for fit in fits if fit is not None), key=self._score, default=None)
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal

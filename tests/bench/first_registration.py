@@ -94,7 +94,7 @@ def main() -> int:
                     word in f"{frame.group} {way}" for word in options.only.split()
                 ):
                     continue
-                line = lines["without" not in way]
+                line = lines["+" in way]
                 if not found:  # compiles
                     line.register(frame.left, frame.right, prior, _GOAL)
                 answer = registered(line, frame, prior)
@@ -115,8 +115,8 @@ def ways(case: Case, frame: Frame, number: int) -> Iterator[tuple[str, Prior]]:
     box = drawn_box(frame.visible, number)
     for place, box_or_none in (("box", box), ("view", None)):
         prior = Prior({}, case.axis, case.half_angle_deg, box_or_none)
-        yield f"{place}, aspects", prior
-        yield f"{place}, without aspects", prior
+        yield f"{place} + aspects", prior
+        yield f"{place}", prior
     yield "from the true pose", Prior({"femur": frame.true})
 
 
