@@ -351,6 +351,16 @@ class Prior:
     approach_half_angle_deg: float = 180.0
     box: tuple[int, int, int, int] | None = None
 
+    def starts(self, bone: str) -> bool:
+        """Whether it says anything of where a bone is."""
+        return (
+            bone in self.left_from_bone or self.box is not None or self.axis_for(bone) is not None
+        )
+
+    def axis_for(self, bone: str) -> FloatArray | None:
+        """The approach axis in a bone's coordinates: known for the femur only."""
+        return self.approach_axis if bone == "femur" else None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:

@@ -25,8 +25,6 @@ _SPARE_SHARE = 0.15
 _MOST_POINTS = 40_000
 _CORRELATION_PX = 40.0
 _EDGE_SAMPLES = 9
-# The approach cone of a prior is told in the coordinates of this bone.
-_BONE_OF_CONE = "femur"
 # A different pose that explains as much as this of the best one makes that one a guess.
 _AMBIGUOUS_SHARE = 0.9
 
@@ -54,11 +52,6 @@ class FirstLook:
         self._depth_mm = depth_mm
         self._aspects = aspects
 
-    @staticmethod
-    def can_start(prior: Prior) -> bool:
-        """Whether a prior without a pose says anything."""
-        return prior.box is not None or prior.approach_axis is not None
-
     def candidates(
         self, left: Image, right: Image, prior: Prior, on_progress: Callable[[float], None]
     ) -> tuple[RectifiedPair, list[Candidate]]:
@@ -80,10 +73,10 @@ class FirstLook:
         n_matched = found.matched_share * found.origin.size
         stride_px = max(1, int(np.ceil((n_matched / _MOST_POINTS) ** 0.5)))
         scene = Scene.from_stereo(reproject(found, geometry, stride_px), _CORRELATION_PX)
-        is_told = self._model.bone.name == _BONE_OF_CONE and prior.approach_axis is not None
-        cone = ViewCone(prior.approach_axis, prior.approach_half_angle_deg) if is_told else None
+        axis = prior.axis_for(self._model.bone.name)
+        cone = ViewCone() if axis is None else ViewCone(axis, prior.approach_half_angle_deg)
         candidates = find_initial(
-            pair, scene, self._model, cone or ViewCone(), self._aspects, on_progress=on_progress
+            pair, scene, self._model, cone, self._aspects, on_progress=on_progress
         )
         return pair, candidates
 

@@ -185,7 +185,7 @@ class Line:
         on_progress: Callable[[float], None],
     ) -> list[TrackedFrame]:
         """As `register`, without a pose to start from; the paper's baseline cannot."""
-        if not self._first_look.can_start(prior) or self.locator.is_baseline:
+        if not prior.starts(self.model.bone.name) or self.locator.is_baseline:
             return []
         started = time.perf_counter_ns()
         pair, candidates = self._first_look.candidates(left, right, prior, on_progress)
