@@ -138,6 +138,48 @@ class BoneModel:
             object.__setattr__(self, name, values)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class AspectGraph:
+    """A bone's edges from many sides: what a camera would see of its outline and creases.
+
+    The points of a view are in an order in which the first n are spread evenly over it, for every
+    n: a coarser level of the view is its first points.
+
+    Attributes:
+        bone: name of the bone.
+        directions: (V, 3) unit, from the bone towards the camera, in bone coordinates.
+        starts: (V + 1,) int64; view k has the points starts[k] to starts[k + 1].
+        points_mm: (N, 3) on the edges, in bone coordinates.
+        tangents: (N, 3) unit, along the edge.
+
+    Raises:
+        ValueError: shapes that do not belong together, or values that are not finite.
+    """
+
+    bone: str
+    directions: FloatArray
+    starts: NDArray[np.int64]
+    points_mm: FloatArray
+    tangents: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("directions", "points_mm", "tangents"):
+            values = read_only(getattr(self, name))
+            if values.ndim != 2 or values.shape[1] != 3 or not np.isfinite(values).all():
+                raise ValueError(f"{name} of an aspect graph must be finite and of shape (N, 3)")
+            object.__setattr__(self, name, values)
+        starts = read_only(self.starts, np.int64)
+        is_whole = starts.shape == (len(self.directions) + 1,) and starts[0] == 0
+        if not is_whole or (np.diff(starts) < 0).any() or starts[-1] != len(self.points_mm):
+            raise ValueError("starts of an aspect graph must divide its points among its views")
+        if self.tangents.shape != self.points_mm.shape:
+            raise ValueError("an aspect graph needs one tangent a point")
+        object.__setattr__(self, "starts", starts)
+
+    def __len__(self) -> int:
+        return len(self.directions)
+
+
 class Reason(Enum):
     """Why a pose is not good, or why nothing is shown. The value is the phrase for people."""
 
@@ -308,6 +350,16 @@ class Prior:
     approach_axis: FloatArray | None = None
     approach_half_angle_deg: float = 180.0
     box: tuple[int, int, int, int] | None = None
+
+    def starts(self, bone: str) -> bool:
+        """Whether it says anything of where a bone is."""
+        return (
+            bone in self.left_from_bone or self.box is not None or self.axis_for(bone) is not None
+        )
+
+    def axis_for(self, bone: str) -> FloatArray | None:
+        """The approach axis in a bone's coordinates: known for the femur only."""
+        return self.approach_axis if bone == "femur" else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

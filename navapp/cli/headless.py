@@ -47,11 +47,11 @@ def check_start(prior: Prior, stage: StageSpec) -> None:
     """Refuse a session in which nothing could ever be found.
 
     Raises:
-        PriorError: no rough pose of the stage's bone is known.
+        PriorError: nothing is known of where the stage's bone is.
     """
-    if stage.bone not in prior.left_from_bone:
+    if not prior.starts(stage.bone):
         raise PriorError(
-            f"no rough pose of the {stage.bone} is known",
+            f"nothing is known of where the {stage.bone} is",
             remedy="give --prior FILE with camera_from_model"
             + ("" if stage.bone == "femur" else f"_{stage.bone}"),
         )

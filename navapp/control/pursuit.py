@@ -6,6 +6,7 @@ from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job, JobCancelled
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
+from navapp.preop import build_aspects
 from navapp.tracking import Goal, Line, LineSettings, TrackState
 from navapp.values import (
     LineTimings,
@@ -75,6 +76,7 @@ class Pursuit:
         self._settings = settings
         self._executor = executor
         self._lines: dict[str, Line] = {}
+        self._edged: set[str] = set()
         self._tracks: dict[str, TrackState] = {}
         self._candidates: list[Candidate] = []
         self._search: _Search | None = None
@@ -101,9 +103,11 @@ class Pursuit:
         """Start a first registration on a frame, unless one runs; whether it was started."""
         if self._search is not None:
             return False
-        line, goal, prior = self._line(stage), self._goal(stage), self._prior
+        goal, prior = self._goal(stage), self._prior
         job: Job[list[TrackedFrame]] = Job(
-            lambda report: line.register(frame.left, frame.right, prior, goal, report)
+            lambda report: self._searching_line(stage).register(
+                frame.left, frame.right, prior, goal, report
+            )
         )
         self._search = _Search(job, frame)
         self._executor.start(job)
@@ -184,6 +188,19 @@ class Pursuit:
             self._goal(stage),
         )
         return tracked
+
+    def _searching_line(self, stage: StageSpec) -> Line:
+        """The bone's line, which knows its edges when there is no pose to start from."""
+        name, prior = stage.bone, self._prior
+        axis = prior.axis_for(name)
+        if name in prior.left_from_bone or axis is None or name in self._edged:
+            return self._line(stage)
+        bone = self._plan.bones[name]
+        aspects = build_aspects(bone, axis, prior.approach_half_angle_deg)
+        line = Line(self._rig, bone, self._settings, aspects)
+        self._lines[name] = line
+        self._edged.add(name)
+        return line
 
     def _line(self, stage: StageSpec) -> Line:
         name = stage.bone

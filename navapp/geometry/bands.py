@@ -7,18 +7,31 @@ from concurrent.futures import ThreadPoolExecutor
 _N_THREADS = 2
 _lock = threading.Lock()
 _pools: list[ThreadPoolExecutor] = []
+_here = threading.local()
+
+
+def _mark() -> None:
+    _here.is_of_pool = True
 
 
 def pool() -> ThreadPoolExecutor:
     """The pool of two threads, made at first use; its jobs must not wait for other jobs of it."""
     with _lock:
         if not _pools:
-            _pools.append(ThreadPoolExecutor(_N_THREADS))
+            _pools.append(ThreadPoolExecutor(_N_THREADS, initializer=_mark))
         return _pools[0]
 
 
 def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
-    """Run two jobs side by side and wait for both; the first error is raised."""
+    """Run two jobs side by side and wait for both; the first error is raised.
+
+    A thread of the pool runs them one after the other: if both threads waited for others of the
+    pool, none would be left to do the work.
+    """
+    if getattr(_here, "is_of_pool", False):
+        first()
+        second()
+        return
     jobs = [pool().submit(first), pool().submit(second)]
     errors = [job.exception() for job in jobs]
     for error in errors:

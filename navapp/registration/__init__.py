@@ -1,6 +1,8 @@
 """From a measured surface and a model to a pose with its covariance."""
 
 from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc
+from navapp.registration.initial import InitialSettings, find_initial
+from navapp.registration.landmarks import Landmarks, register_landmarks
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     Candidate,
@@ -17,6 +19,8 @@ from navapp.registration.scene import Scene
 __all__ = [
     "BimccSettings",
     "Candidate",
+    "InitialSettings",
+    "Landmarks",
     "Outcome",
     "Registration",
     "RegistrationModel",
@@ -25,10 +29,12 @@ __all__ = [
     "estimate_at",
     "explained_share",
     "find_candidates",
+    "find_initial",
     "fit_bimcc",
     "fit_bimcc_literal",
     "fit_icp",
     "is_same_pose",
     "register",
+    "register_landmarks",
     "tilted_starts",
 ]

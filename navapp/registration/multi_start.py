@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navapp.geometry.bands import run_both
+from navapp.geometry.directions import sphere_spiral
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
 from navapp.registration.bimcc import BimccSettings, bone_from_scene, fit_coarsely
 from navapp.registration.coverage import coverage
@@ -43,7 +44,7 @@ def tilted_starts(
         n_tilts: how many.
     """
     starts = [pose]
-    for axis in _sphere_axes(n_tilts):
+    for axis in sphere_spiral(n_tilts):
         twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
         starts.append(pose.moved(twist, centre_mm))
     return starts
@@ -125,12 +126,3 @@ def is_same_pose(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) ->
     """Whether two answers differ by less than a fit's basin."""
     shift_mm = float(np.linalg.norm(a.apply(centre_mm) - b.apply(centre_mm)))
     return shift_mm < _SAME_MM and rotation_angle_deg(a, b) < _SAME_DEG
-
-
-def _sphere_axes(n: int) -> FloatArray:
-    """(n, 3) unit vectors of a golden spiral."""
-    k = np.arange(n) + 0.5
-    z = 1.0 - 2.0 * k / max(n, 1)
-    angle = np.pi * (1.0 + np.sqrt(5.0)) * k
-    radius = np.sqrt(np.maximum(0.0, 1.0 - z * z))
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])

@@ -20,11 +20,13 @@ from navapp.registration import (
     find_candidates,
     tilted_starts,
 )
+from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import (
+    AspectGraph,
     BoneModel,
     LineTimings,
     PoseEstimate,
@@ -47,6 +49,8 @@ _SAME_VIEW_MM = 0.05
 _NEAR_TILTS = (15.0, 12)
 _FAR_TILTS = ((15.0, 12), (28.0, 20))
 _FAR_SHIFT_MM = 8.0
+# Candidates of a search everywhere that explain less than this share of the best are left out.
+_REFINED_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,10 +71,23 @@ class LineSettings:
 
 
 class Line:
-    """The steps of one rig and one bone; holds only what is constant."""
+    """The steps of one rig and one bone; holds only what is constant.
+
+    Args:
+        rig: of the pictures.
+        bone: what is followed.
+        settings: how.
+        aspects: edges of the bone, for a first registration without a pose. Without them it goes by
+            the measured surface alone, which finds the bone in a box, but less often in the whole
+            view (docs/registration.md).
+    """
 
     def __init__(
-        self, rig: StereoRig, bone: BoneModel, settings: LineSettings | None = None
+        self,
+        rig: StereoRig,
+        bone: BoneModel,
+        settings: LineSettings | None = None,
+        aspects: AspectGraph | None = None,
     ) -> None:
         self.settings = settings or LineSettings()
         self.rig = rig
@@ -79,6 +96,7 @@ class Line:
             rig, self.model, self.settings.depth_mm, self.settings.max_points
         )
         self._geometry = self._meter.geometry
+        self._first_look = FirstLook(rig, self.model, self.settings.depth_mm, aspects)
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
         self.locator = Locator(self._meter, self.model, self._score, self.settings.locator)
@@ -113,18 +131,18 @@ class Line:
         goal: Goal,
         on_progress: Callable[[float], None] = lambda share: None,
     ) -> list[TrackedFrame]:
-        """Find the bone from a rough pose: distinct candidates, best first.
+        """Find the bone from a rough pose, a box or a cone: distinct candidates, best first.
 
         Args:
             left: picture of the left camera.
             right: of the right one, at the same instant.
-            prior: must hold a pose of this bone.
+            prior: a pose of this bone; or a box, a cone, or both, which are used without one.
             goal: for the judge.
             on_progress: told the share done; what it raises stops the search.
         """
         start = prior.left_from_bone.get(self.model.bone.name)
         if start is None:
-            return []
+            return self._register_anywhere(left, right, prior, goal, on_progress)
         rough = self._rectified(start)
         pair, timings = self._rectified_pair(left, right, rough)
         locator = self.locator
@@ -153,10 +171,40 @@ class Line:
     def _ranked(
         self, pair: RectifiedPair, fits: list[Fit], goal: Goal, timings: LineTimings
     ) -> list[TrackedFrame]:
-        """Distinct answers, best first."""
-        fits = sorted(fits, key=self._score, reverse=True)
+        """Distinct answers, best first; a guess is called one."""
+        fits = doubted(fits, [self._score(fit) for fit in fits], self.model)
         kept = distinct([fit.pose for fit in fits], self.centre_mm)
         return [self._judged(pair, fit, goal, timings) for fit in fits if fit.pose in kept]
+
+    def _register_anywhere(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None],
+    ) -> list[TrackedFrame]:
+        """As `register`, without a pose to start from; the paper's baseline cannot."""
+        if not prior.starts(self.model.bone.name) or self.locator.is_baseline:
+            return []
+        started = time.perf_counter_ns()
+        pair, candidates = self._first_look.candidates(left, right, prior, on_progress)
+        timings = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
+        poses = poses_to_refine(candidates, self.settings.n_refined, _REFINED_SHARE)
+        found = [self._from_candidate(pair, pose) for pose in poses]
+        fits = [fit for fit in found if fit is not None]
+        if not fits:
+            return [self._lost(Reason.NO_SURFACE, timings)]
+        return self._ranked(pair, fits, goal, timings)
+
+    def _from_candidate(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
+        """What explains more: the model matched where it is expected, or what lies around it.
+
+        Clutter around a bone can pull it away from where the first finds it.
+        """
+        locator = self.locator
+        fits = (locator.locate(pair, pose), locator.search(pair, pose, locator.settings.search))
+        return max((fit for fit in fits if fit is not None), key=self._score, default=None)
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal

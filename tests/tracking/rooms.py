@@ -75,3 +75,10 @@ def room(motion: str = "still", n_frames: int = 3, is_grey: bool = False) -> Roo
         TruthOracle(world, camera.world_time_ns),
         Prior({"femur": world.nominal_left_from_femur}),
     )
+
+
+@lru_cache(maxsize=1)
+def cone() -> tuple[np.ndarray, float]:
+    """Axis and half angle of the approach to the room's knee."""
+    world = World(Scenario(seed=5, motion="still"))
+    return world.approach_axis, world.approach_half_angle_deg

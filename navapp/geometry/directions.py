@@ -1,0 +1,77 @@
+"""Directions that a camera may look from, and how a body is turned to be seen from one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, read_only, rotation_from_vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewCone:
+    """Where the cameras may stand, seen from a body.
+
+    Attributes:
+        axis: (3,) unit, from the body towards the cameras, in its coordinates; None: anywhere.
+        half_angle_deg: around the axis.
+
+    Raises:
+        ValueError: the axis has no length.
+    """
+
+    axis: FloatArray | None = None
+    half_angle_deg: float = 180.0
+
+    def __post_init__(self) -> None:
+        if self.axis is None:
+            return
+        length = float(np.linalg.norm(self.axis))
+        if not 0.0 < length < np.inf:
+            raise ValueError("the axis of a view cone must have a length")
+        object.__setattr__(self, "axis", read_only(np.asarray(self.axis) / length))
+
+    def off_axis_deg(self, directions: FloatArray) -> FloatArray:
+        """(N,) angle of unit vectors (N, 3) from the axis; 0 without one."""
+        if self.axis is None:
+            return np.zeros(len(directions))
+        angle: FloatArray = np.degrees(np.arccos(np.clip(directions @ self.axis, -1.0, 1.0)))
+        return angle
+
+    def directions(self, step_deg: float) -> FloatArray:
+        """(N, 3) unit vectors about `step_deg` apart inside the cone, its axis among them."""
+        n = max(1, round(4.0 * np.pi / (np.radians(step_deg) ** 2 * 0.866)))
+        spiral = sphere_spiral(n)
+        if self.axis is None:
+            return spiral
+        angle = self.off_axis_deg(spiral)
+        is_taken = (angle <= self.half_angle_deg) & (angle > 0.5 * step_deg)
+        return np.vstack([self.axis, spiral[is_taken]])
+
+
+def sphere_spiral(n: int) -> FloatArray:
+    """(n, 3) unit vectors of a golden spiral, spread evenly over the sphere."""
+    k = np.arange(n) + 0.5
+    z = 1.0 - 2.0 * k / max(n, 1)
+    angle = np.pi * (1.0 + np.sqrt(5.0)) * k
+    radius = np.sqrt(np.maximum(0.0, 1.0 - z * z))
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+
+
+def seen_from(direction: FloatArray) -> FloatArray:
+    """(3, 3) rotation into a camera that a body's direction points at; its roll is arbitrary."""
+    forward = -np.asarray(direction) / np.linalg.norm(direction)
+    right = np.cross(np.eye(3)[np.abs(forward).argmin()], forward)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(forward, right), forward])
+
+
+def turn_between(source: FloatArray, target: FloatArray) -> FloatArray:
+    """(3, 3) the smallest rotation that takes the direction of one vector to that of another."""
+    a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
+    across = np.cross(a, b)
+    sine = float(np.linalg.norm(across))
+    if sine < 1e-9:
+        if a @ b > 0.0:
+            return np.eye(3)
+        return rotation_from_vector(np.pi * np.cross(a, seen_from(a)[0]))
+    return rotation_from_vector(across * (np.arctan2(sine, float(a @ b)) / sine))

@@ -1,0 +1,211 @@
+"""First registration without a pose, printed as the table of docs/registration.md.
+
+usage: python -m tests.bench.first_registration [FOLDER] [--seeds N] [--first SEED]
+                                                [--only WORDS] [--verbose]
+
+Every frame of the recorded sequences in FOLDER (default: NAVAPP_DATA) and one frame of each of N
+simulated knees is registered on its own, with nothing but the approach cone, in a box and in the
+whole view, with and without the aspects. The truth draws the box (that of the visible bone, each
+side off by up to 15 % of its size, as an operator would draw it) and scores the answer. The last
+rows start from the true pose: what the judge then refuses, no search can make good.
+"""
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from navapp.evaluation import mean_tre_mm
+from navapp.geometry import RigidTransform, TriangleMesh, read_rig
+from navapp.geometry.ply import read_ply
+from navapp.geometry.rig import StereoRig
+from navapp.preop import build_aspects
+from navapp.tracking import Goal, Line
+from navapp.values import BoneModel, Prior, Status
+from sim_devices.scenario import Scenario
+from sim_devices.sensor import SensorModel
+from sim_devices.world import World
+
+_SEQUENCES = ("registration", "patient", "instrument")
+_OFF_SHARE = 0.15
+_RIGHT_MM = 1.0
+_GOAL = Goal(np.empty((0, 3)), 2.0)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A pair with its truth."""
+
+    group: str
+    left: np.ndarray
+    right: np.ndarray
+    visible: np.ndarray
+    true: RigidTransform
+
+
+@dataclass(frozen=True)
+class Case:
+    """Frames of one bone under one rig, and where its cameras may stand."""
+
+    rig: StereoRig
+    bone: BoneModel
+    axis: np.ndarray
+    half_angle_deg: float
+    frames: list[Frame]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a first registration came to."""
+
+    error_mm: float
+    is_ok: bool
+    seconds: float
+
+
+def main() -> int:
+    """Register every frame in every way and print a row for each group and way."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    folder = os.environ.get("NAVAPP_DATA", "../shared/data")
+    parser.add_argument("folder", nargs="?", default=folder)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first", type=int, default=401)
+    parser.add_argument("--only", default="", help="ways and cases whose names hold these words")
+    parser.add_argument("--verbose", action="store_true")
+    options = parser.parse_args()
+    found: dict[tuple[str, str], list[Answer]] = {}
+    for case in cases(Path(options.folder), options.first, options.seeds):
+        build_started = time.perf_counter()
+        aspects = build_aspects(case.bone, case.axis, case.half_angle_deg)
+        build_s = time.perf_counter() - build_started
+        lines = {True: Line(case.rig, case.bone, aspects=aspects), False: Line(case.rig, case.bone)}
+        for line in lines.values():
+            _ = line.model.arrays
+        for number, frame in enumerate(case.frames):
+            for way, prior in ways(case, frame, number):
+                if options.only and not all(
+                    word in f"{frame.group} {way}" for word in options.only.split()
+                ):
+                    continue
+                line = lines["+" in way]
+                if not found:  # compiles
+                    line.register(frame.left, frame.right, prior, _GOAL)
+                answer = registered(line, frame, prior)
+                found.setdefault((frame.group, way), []).append(answer)
+                if options.verbose:
+                    print(frame.group, number, way, answer, f"built in {build_s:.1f} s", flush=True)
+    print("| frames | way | n | right and OK | right | silent | TRE median | s median | s worst |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for (group, way), answers in sorted(found.items()):
+        print(row(group, way, answers))
+    for way in sorted({way for _, way in found}):
+        print(row("all", way, [a for key, some in found.items() if key[1] == way for a in some]))
+    return 0
+
+
+def ways(case: Case, frame: Frame, number: int) -> Iterator[tuple[str, Prior]]:
+    """Name and prior of each way to start."""
+    box = drawn_box(frame.visible, number)
+    for place, box_or_none in (("box", box), ("view", None)):
+        prior = Prior({}, case.axis, case.half_angle_deg, box_or_none)
+        yield f"{place} + aspects", prior
+        yield f"{place}", prior
+    yield "from the true pose", Prior({"femur": frame.true})
+
+
+def drawn_box(visible: np.ndarray, seed: int) -> tuple[int, int, int, int]:
+    """The box of a mask, each side off by up to 15 % of its size."""
+    rows, columns = np.nonzero(visible)
+    low = np.array([columns.min(), rows.min()], dtype=float)
+    high = np.array([columns.max() + 1, rows.max() + 1], dtype=float)
+    off = np.random.default_rng([seed, 77]).uniform(-_OFF_SHARE, _OFF_SHARE, (2, 2)) * (high - low)
+    height, width = visible.shape
+    x, y = np.clip(low + off[0], 0, (width, height)).astype(int)
+    right, bottom = np.clip(high + off[1], 0, (width, height)).astype(int)
+    return int(x), int(y), int(right - x), int(bottom - y)
+
+
+def registered(line: Line, frame: Frame, prior: Prior) -> Answer:
+    """The best candidate against the truth."""
+    started = time.perf_counter()
+    tracked = line.register(frame.left, frame.right, prior, _GOAL)
+    seconds = time.perf_counter() - started
+    pose = tracked[0].left_from_bone if tracked else None
+    if pose is None:
+        return Answer(np.inf, False, seconds)
+    error_mm = mean_tre_mm(pose, frame.true, line.model.bone, np.empty((0, 3)))
+    return Answer(error_mm, tracked[0].verdict.status is Status.OK, seconds)
+
+
+def row(group: str, way: str, answers: list[Answer]) -> str:
+    """Of the table."""
+    errors = np.array([answer.error_mm for answer in answers])
+    is_ok = np.array([answer.is_ok for answer in answers])
+    seconds = np.array([answer.seconds for answer in answers])
+    is_right = errors < _RIGHT_MM
+    median = f"{np.median(errors[is_right]):.3f} mm" if is_right.any() else "-"
+    return (
+        f"| {group} | {way} | {len(answers)} | {100 * np.mean(is_right & is_ok):.0f} % | "
+        f"{100 * np.mean(is_right):.0f} % | {int((is_ok & ~is_right).sum())} | {median} | "
+        f"{np.median(seconds):.2f} | {seconds.max():.2f} |"
+    )
+
+
+def cases(folder: Path, first_seed: int, n_seeds: int) -> Iterator[Case]:
+    """Recorded sequences, then simulated knees."""
+    for phantom in sorted(folder.glob("phantom_*")):
+        bone = BoneModel("femur", read_ply(phantom / "femur.ply")[0])
+        for name in _SEQUENCES:
+            yield _recorded(phantom / name, bone, read_rig(phantom / "rig.yml"))
+    for seed in range(first_seed, first_seed + n_seeds):
+        yield simulated(seed)
+
+
+def _recorded(folder: Path, bone: BoneModel, rig: StereoRig) -> Case:
+    frames = []
+    for entry in json.loads((folder / "truth.json").read_text(encoding="utf-8"))["frames"]:
+        number = f"{entry['index']:04d}"
+        left, right, mask = (
+            cv2.imread(str(next(folder.glob(f"{name}_{number}.*"))), cv2.IMREAD_COLOR)
+            for name in ("left", "right", "bone_mask_left")
+        )
+        true = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
+        group = f"{folder.parent.name}/{folder.name}"
+        frames.append(Frame(group, left, right, mask[..., 0] > 0, true))
+    cone = json.loads((folder / "prior.json").read_text(encoding="utf-8"))["approach_cone"]
+    return Case(rig, bone, np.array(cone["axis"]), float(cone["half_angle_deg"]), frames)
+
+
+def simulated(seed: int) -> Case:
+    """One frame of a simulated knee; every fourth has a hand and an instrument in the view."""
+    rng = np.random.default_rng(seed)
+    scenario = Scenario(
+        seed=seed,
+        side=("right", "left")[rng.integers(2)],
+        sex=("female", "male")[rng.integers(2)],
+        motion="patient",
+        instrument="sweep" if seed % 4 == 0 else "none",
+        contrast=float(rng.uniform(0.03, 0.08)),
+        blood=float(rng.uniform(0.0, 0.8)),
+    )
+    world, sensor = World(scenario), SensorModel(seed=seed)
+    time_ns = int(rng.uniform(0.0, 6e9))
+    left, right = (sensor.picture(world.render(eye, time_ns), eye, 0) for eye in ("left", "right"))
+    seen = world.depth("left", time_ns)
+    mesh = world.anatomy.bones["femur"]
+    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), scenario.side)
+    group = "simulated, hand" if scenario.instrument == "sweep" else "simulated"
+    visible = seen.body == seen.bodies.index("femur")
+    frame = Frame(group, left, right, visible, world.left_from_body("femur", time_ns))
+    return Case(world.rig, bone, world.approach_axis, world.approach_half_angle_deg, [frame])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

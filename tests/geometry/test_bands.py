@@ -1,0 +1,41 @@
+"""Two halves of a job."""
+
+import threading
+
+import pytest
+
+from navapp.geometry.bands import in_row_bands, run_both
+
+
+def test_halves_of_halves_do_not_wait_for_each_other():
+    done = []
+
+    def quarter(name):
+        return lambda: done.append(name)
+
+    def half(name):
+        return lambda: run_both(quarter(f"{name} upper"), quarter(f"{name} lower"))
+
+    worker = threading.Thread(target=lambda: run_both(half("left"), half("right")), daemon=True)
+    worker.start()
+    worker.join(20.0)
+    assert not worker.is_alive()
+    assert sorted(done) == ["left lower", "left upper", "right lower", "right upper"]
+
+
+def test_the_first_error_is_raised_after_both_have_ended():
+    ended = []
+
+    def fails():
+        raise ValueError("upper")
+
+    with pytest.raises(ValueError, match="upper"):
+        run_both(fails, lambda: ended.append("lower"))
+    assert ended == ["lower"]
+
+
+@pytest.mark.parametrize("height", [0, 1, 7, 16, 40, 41])
+def test_bands_cover_every_row_once(height):
+    rows = []
+    in_row_bands(height, lambda first, last: rows.extend(range(first, last)))
+    assert sorted(rows) == list(range(height))

@@ -1,0 +1,291 @@
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from navapp.geometry import Box, RectifiedPair
+from navapp.geometry.directions import ViewCone, seen_from
+from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotation_from_vector
+from navapp.geometry.zbuffer import render_rectified
+from navapp.preop import build_aspects
+from navapp.registration import InitialSettings, RegistrationModel, Scene, find_initial
+from navapp.registration.edge_tables import answer_table, edge_tables, scaled_optics
+from navapp.registration.hypotheses import (
+    apart,
+    around,
+    everywhere,
+    places_of,
+    poses_of,
+    taken,
+    thinned_views,
+    views_of,
+)
+from navapp.registration.initial import score_views
+from navapp.registration.initial_kernels import (
+    Hypotheses,
+    Optics,
+    quantised_gradients,
+    score_edges,
+    score_surface,
+    spread_responses,
+)
+from navapp.values import AspectGraph
+from tests.bones import femur_model
+from tests.reference import initial_reference as reference
+from tests.registration.shapes import GEOMETRY
+
+AXIS = np.array([0.0, -0.5, -0.866])
+CONE = ViewCone(AXIS, 30.0)
+TRUE = RigidTransform.from_parts(
+    "left_rect",
+    "femur",
+    rotation_from_vector((0.0, 0.0, 0.5)) @ seen_from(AXIS + np.array([0.2, 0.1, 0.0])),
+    (20.0, 5.0, 430.0),
+)
+
+
+@lru_cache(maxsize=1)
+def model() -> RegistrationModel:
+    return RegistrationModel(femur_model())
+
+
+@lru_cache(maxsize=1)
+def aspects() -> AspectGraph:
+    return build_aspects(femur_model(), AXIS, 30.0)
+
+
+@lru_cache(maxsize=1)
+def seen() -> tuple[RectifiedPair, Scene]:
+    """A bright bone before a dark wall, in both pictures; and its surface with the wall's."""
+    whole = Box(0, 0, GEOMETRY.width, GEOMETRY.height)
+    shift = RigidTransform.from_parts(
+        "left_rect", "left_rect", np.eye(3), (-GEOMETRY.baseline_mm, 0.0, 0.0)
+    )
+    mesh, rng = femur_model().mesh, np.random.default_rng(8)
+    pictures, depth = [], None
+    for pose in (TRUE, shift @ TRUE):
+        view = render_rectified(mesh, pose, GEOMETRY, whole)
+        depth = view.depth_mm if depth is None else depth
+        grey = np.where(view.mask, 170.0, 60.0) + rng.normal(0.0, 3.0, view.mask.shape)
+        pictures.append(np.clip(grey, 0, 255).astype(np.uint8))
+    rows, columns = np.mgrid[0 : GEOMETRY.height : 4, 0 : GEOMETRY.width : 4].reshape(2, -1)
+    z = np.nan_to_num(depth[rows, columns], nan=520.0).astype(float)
+    z += rng.normal(0.0, 0.2, z.shape)
+    x = (columns - GEOMETRY.centre_x_px) / GEOMETRY.focal_px * z
+    y = (rows - GEOMETRY.centre_y_px) / GEOMETRY.focal_px * z
+    points = np.column_stack([x, y, z])
+    scene = Scene(points, np.zeros(3), np.full(len(z), 0.2), 9.0)
+    return RectifiedPair(*pictures, GEOMETRY, whole), scene
+
+
+def error_mm(pose: RigidTransform) -> float:
+    points = model().points_mm
+    return float(np.linalg.norm(pose.apply(points) - TRUE.apply(points), axis=1).mean())
+
+
+def is_right(pose: RigidTransform) -> bool:
+    return error_mm(pose) < 3.0
+
+
+@pytest.mark.parametrize("has_aspects", [True, False])
+def test_a_bone_is_found_in_the_whole_view_without_a_pose(has_aspects: bool) -> None:
+    pair, scene = seen()
+    told: list[float] = []
+    found = find_initial(
+        pair, scene, model(), CONE, aspects() if has_aspects else None, on_progress=told.append
+    )
+    assert is_right(found[0].scene_from_bone)
+    assert found[0].scene_from_bone.name == "left_rect_from_femur"
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    scores = [one.score for one in found]
+    assert scores == sorted(scores, reverse=True)
+    assert sum(is_right(one.scene_from_bone) for one in found) == 1
+
+
+def test_the_search_twice_gives_the_same() -> None:
+    pair, scene = seen()
+    first, second = (find_initial(pair, scene, model(), CONE, aspects()) for _ in range(2))
+    assert [a.score for a in first] == [b.score for b in second]
+
+
+def test_too_small_a_surface_has_no_candidates() -> None:
+    pair, scene = seen()
+    few = replace(scene, points_mm=scene.points_mm[:20], sigma_ray_mm=scene.sigma_ray_mm[:20])
+    assert find_initial(pair, few, model(), CONE, aspects()) == []
+
+
+def test_a_search_can_be_stopped() -> None:
+    class StoppedError(Exception):
+        pass
+
+    def stop(share: float) -> None:
+        if share > 0.55:
+            raise StoppedError
+
+    with pytest.raises(StoppedError):
+        find_initial(*seen(), model(), CONE, aspects(), on_progress=stop)
+
+
+def test_pictures_decide_between_poses_that_the_surface_allows() -> None:
+    """Equation 3 is highest at the true pose, and thanks to the gate low beside the bone."""
+    pair, _ = seen()
+    near = int(np.argmax(aspects().directions @ (TRUE.rotation.T @ [0, 0, -1.0])))
+    tables = edge_tables(pair, 4, 2, 250.0)
+    turns = [0.0, 20.0, 40.0]
+    poses = [
+        TRUE.moved((0, 0, 0, 0, 0, np.radians(turn)), TRUE.apply(model().centre_mm))
+        for turn in turns
+    ]
+    poses.append(TRUE.moved((70.0, 0, 0, 0, 0, 0), (0, 0, 0)))
+    some = Hypotheses(
+        np.arange(4, dtype=np.int32), np.arange(4, dtype=np.int32), np.full(4, near, np.int32),
+        np.array([pose.rotation for pose in poses]), np.array([np.eye(3)] * 4),
+        np.array([pose.translation_mm for pose in poses]), np.zeros((4, 3)),
+    )  # fmt: skip
+    score = score_views(some, aspects(), tables, 120)
+    assert score[0] > 0.7
+    assert score[0] > score[1] + 0.1
+    assert score[0] > score[2] + 0.2
+    assert score[3] < 0.5 * score[0]
+
+
+def test_places_lie_on_the_surface_and_the_map_holds_its_depth() -> None:
+    _pair, scene = seen()
+    depth, places = places_of(scene, GEOMETRY, 8, 500)
+    assert 300 < len(places) < 900
+    wall = depth[2, 2]
+    assert wall == pytest.approx(520.0, abs=0.5)
+    pixels = GEOMETRY.project(places)
+    cell = np.floor((pixels + 0.5) / 8).astype(int)
+    np.testing.assert_allclose(depth[cell[:, 1], cell[:, 0]], places[:, 2], rtol=1e-6)
+
+
+def test_hypotheses_put_their_anchor_at_their_place_and_face_the_camera() -> None:
+    views = views_of(model(), CONE, 12.0, None, 20)
+    places = np.array([(10.0, -20.0, 400.0), (-60.0, 30.0, 500.0)])
+    some = everywhere(views, thinned_views(views, 16.0), 90.0, places)
+    assert len(some.orientation) == 2 * len(some.rotation)
+    for h, pose in enumerate(poses_of(some, "left_rect", "femur")):
+        o, place = some.orientation[h], places[some.place[h]]
+        np.testing.assert_allclose(pose.apply(some.anchor[o]), place, atol=1e-9)
+        sight = pose.rotate(views.directions[some.aspect[o]])
+        np.testing.assert_allclose(sight, -place / np.linalg.norm(place), atol=1e-9)
+
+
+def test_neighbours_keep_the_anchor_near_and_hold_the_hypothesis_itself() -> None:
+    views = views_of(model(), CONE, 8.0, None, 20)
+    some = everywhere(views, thinned_views(views, 16.0), 90.0, np.array([(10.0, -20.0, 400.0)]))
+    one = taken(some, np.array([5]))
+    (pose,) = poses_of(one, "left_rect", "femur")
+    beside = poses_of(around(one, views, 12.0, 6.0, 2.0), "left_rect", "femur")
+    angles = np.array([rotation_angle_deg(pose, other) for other in beside])
+    assert angles.min() < 1e-3
+    assert angles.max() < 20.0
+    anchor = one.anchor[one.orientation[0]]
+    moved = [np.linalg.norm(other.apply(anchor) - (10.0, -20.0, 400.0)) for other in beside]
+    assert max(moved) < 2.1
+
+
+def test_hypotheses_that_repeat_an_earlier_one_are_left_out() -> None:
+    views = views_of(model(), CONE, 8.0, None, 20)
+    places = np.array([(0.0, 0.0, 400.0), (0.5, 0.0, 400.0), (90.0, 0.0, 400.0)])
+    some = everywhere(views, np.array([0]), 360.0, places)
+    assert len(some.orientation) == 6
+    kept = apart(some, model().centre_mm, 12.0, 15.0)
+    assert kept[0] == 0
+    assert 1 not in kept
+    assert 2 in kept
+
+
+def test_aspects_outside_the_cone_are_left_out() -> None:
+    narrow = views_of(model(), ViewCone(AXIS, 10.0), 8.0, aspects(), 20)
+    assert 0 < len(narrow.directions) < len(aspects())
+    assert (ViewCone(AXIS).off_axis_deg(narrow.directions) <= 14.0).all()
+    assert narrow.edges is not None
+    assert len(narrow.edges) == len(narrow.directions)
+
+
+def test_a_cone_needs_an_axis_with_a_length() -> None:
+    with pytest.raises(ValueError, match="length"):
+        ViewCone(np.zeros(3), 20.0)
+
+
+def test_gradients_and_responses_are_those_of_the_reference() -> None:
+    picture = np.random.default_rng(2).normal(0.0, 20.0, (40, 50)).astype(np.float32)
+    bins = np.zeros(picture.shape, dtype=np.uint8)
+    for rows in ((0, 17), (17, 40)):
+        quantised_gradients(picture, 12.0, rows, bins)
+    np.testing.assert_array_equal(bins, reference.quantised(picture.astype(np.float64), 12.0))
+    assert 0.1 < (bins > 0).mean() < 0.9
+    for reach in (0, 2):
+        response = np.zeros((*picture.shape, 8), dtype=np.uint8)
+        spread_responses(bins, reach, answer_table(), (0, 40), response)
+        np.testing.assert_array_equal(response, reference.responses(bins, reach))
+
+
+def random_hypotheses(n: int) -> Hypotheses:
+    rng = np.random.default_rng(4)
+    views = views_of(model(), CONE, 12.0, None, 30)
+    places = rng.uniform((-40, -30, 380), (40, 30, 480), (5, 3))
+    some = everywhere(views, thinned_views(views, 16.0), 45.0, places)
+    return taken(some, rng.choice(len(some.orientation), n, replace=False))
+
+
+def test_scores_are_those_of_the_reference() -> None:
+    rng = np.random.default_rng(6)
+    some, n = random_hypotheses(12), 25
+    n_views = int(some.aspect.max()) + 1
+    points = rng.uniform(-30, 30, (n_views * n, 3)) + model().centre_mm
+    tangents = rng.normal(size=points.shape)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    starts = np.arange(n_views + 1, dtype=np.int64) * n
+    optics = Optics(175.0, 79.3, 44.8, 80.0)
+    left, right = rng.integers(0, 256, (2, 90, 160, 8)).astype(np.uint8)
+    depth = np.where(rng.random((90, 160)) < 0.8, rng.uniform(380, 480, (90, 160)), 0.0)
+    depth = depth.astype(np.float32)
+    edges, surface = np.zeros((2, 12), dtype=np.float32)
+    for span in ((0, 5), (5, 12)):
+        score_edges(some, points, tangents, starts, 20, left, right, optics, span, edges)
+        score_surface(some, points, starts, depth, optics, 30.0, span, surface)
+    for h, pose in enumerate(poses_of(some, "left_rect", "femur")):
+        first = starts[some.aspect[some.orientation[h]]]
+        mine = np.s_[first : first + 20]
+        rotation, shift = pose.rotation, pose.translation_mm
+        expected = reference.edge_score(
+            rotation, shift, points[mine], tangents[mine], (left, right), optics
+        )
+        assert edges[h] == pytest.approx(expected, abs=0.02)
+        expected = reference.surface_score(
+            rotation, shift, points[first : first + n], depth, optics, 30.0
+        )
+        assert surface[h] == pytest.approx(expected, abs=1e-6)
+    assert np.ptp(edges) > 0.0
+    assert np.ptp(surface) > 0.0
+
+
+def test_smaller_pictures_keep_their_places() -> None:
+    pair, _ = seen()
+    optics = scaled_optics(pair, 8)
+    point = np.array([[30.0, -20.0, 450.0]])
+    u, v = GEOMETRY.project(point)[0]
+    assert optics.focal * 30.0 / 450.0 + optics.centre_x == pytest.approx((u + 0.5) / 8 - 0.5)
+    assert optics.focal * -20.0 / 450.0 + optics.centre_y == pytest.approx((v + 0.5) / 8 - 0.5)
+
+
+def test_fewer_hypotheses_still_find_a_bone_in_its_box() -> None:
+    pair, scene = seen()
+    pixels = GEOMETRY.project(scene.points_mm)
+    around_bone = Box.around(GEOMETRY.project(TRUE.apply(model().points_mm)))
+    box = around_bone.grown(20).clipped(GEOMETRY.width, GEOMETRY.height)
+    inside = ((pixels >= (box.x, box.y)) & (pixels < (box.x + box.width, box.y + box.height))).all(
+        axis=1
+    )
+    part = replace(
+        scene, points_mm=scene.points_mm[inside], sigma_ray_mm=scene.sigma_ray_mm[inside]
+    )
+    settings = InitialSettings(n_places=200, n_passed=500, n_refined=40, n_verified=8)
+    found = find_initial(replace(pair, box=box), part, model(), CONE, aspects(), settings=settings)
+    assert len(found) <= 8
+    assert is_right(found[0].scene_from_bone)
