@@ -41,7 +41,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("sequence", metavar="SEQ", help="folder, or LEFT.mp4,RIGHT.mp4")
     parser.add_argument("--plan", metavar="P", help="plan folder (a session brings its own)")
     parser.add_argument("--rig", metavar="R", help="rig file (a session brings its own)")
-    parser.add_argument("--prior", metavar="FILE", help="rough start pose (JSON)")
+    parser.add_argument("--prior", metavar="FILE", help="rough start: pose, cone, box (JSON)")
     parser.add_argument("--method", choices=("bimcc", "icp"), help="icp is the paper's baseline")
     parser.add_argument(
         "--bone", metavar="NAME", help="bone to follow (default: the first stage's)"

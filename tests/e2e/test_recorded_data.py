@@ -13,22 +13,33 @@ from navapp.geometry.transform import RigidTransform
 from navapp.values import BoneModel
 
 # Block matching alone does not reach it: this fails when the fine matching stops working.
-WORST_OK_MM = 0.4
+WORST_OK_MM = 0.2
 
 
 @pytest.mark.data
 @pytest.mark.slow
-@pytest.mark.parametrize("phantom", ["phantom_a", "phantom_c"])
+@pytest.mark.parametrize(
+    ("phantom", "start"),
+    [
+        ("phantom_a", ("camera_from_model",)),
+        ("phantom_c", ("camera_from_model",)),
+        ("phantom_c", ("approach_cone", "box")),
+        ("phantom_c", ("approach_cone",)),
+    ],
+)
 def test_most_frames_of_a_recorded_operation_get_a_pose(
-    data: Path, tmp_path: Path, phantom: str
+    data: Path, tmp_path: Path, phantom: str, start: tuple[str, ...]
 ) -> None:
     root = data / phantom
+    known = json.loads((root / "patient" / "prior.json").read_text(encoding="utf-8"))
+    prior = tmp_path / "prior.json"
+    prior.write_text(json.dumps({key: known[key] for key in start}), encoding="utf-8")
     plan, poses, overlay = tmp_path / "plan", tmp_path / "poses.json", tmp_path / "overlay"
     surface = f"femur={root / 'femur.ply'}"
     assert run(["--quiet", "plan", "--surface", surface, "--out", str(plan)]) == 0
     arguments = [
         "--quiet", "replay", str(root / "patient"), "--rig", str(root / "rig.yml"),
-        "--plan", str(plan), "--prior", str(root / "patient" / "prior.json"),
+        "--plan", str(plan), "--prior", str(prior),
         "--overlay", str(overlay), "--json", str(poses),
     ]  # fmt: skip
     assert run(arguments) == 0
@@ -49,6 +60,6 @@ def test_most_frames_of_a_recorded_operation_get_a_pose(
         if frame["status"] == "OK"
     ]
     assert len(frames) == len(truth)
-    assert len(errors_mm) >= 0.7 * len(frames)
+    assert len(errors_mm) >= 0.9 * len(frames)
     assert max(errors_mm) < WORST_OK_MM
     assert len(list(overlay.glob("overlay_*.jpg"))) == len(frames)
