@@ -287,7 +287,7 @@ def test_json_into_a_folder_instead_of_a_file(pairs, rig, plan, prior, tmp_path,
 def test_no_start_pose(pairs, rig, plan, prior, capsys) -> None:
     arguments = ["replay", str(pairs), "--rig", str(rig), "--plan", str(plan)]
     refused(arguments, capsys, 3, "femur", "--prior")
-    prior.write_text(json.dumps({"box": [1, 2, 3, 4]}), encoding="utf-8")
+    prior.write_text(json.dumps({}), encoding="utf-8")
     refused([*arguments, "--prior", str(prior)], capsys, 3, "camera_from_model")
 
 
