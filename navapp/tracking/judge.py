@@ -56,7 +56,7 @@ class JudgeLimits:
     spread_ok: float = 1.1
     rms_ratio_ok: float = 1.25
     rms_ratio_lost: float = 2.0
-    cartilage_sd_ok: float = 0.5
+    cartilage_sd_ok: float = 0.45
     jump_mm: float = 12.0
     max_bound_targets: int = 200
 
