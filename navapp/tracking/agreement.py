@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
+from navapp.tracking.regions import large_regions
 from navapp.values import DisparityMap, Origin
 
 # Nearer or further than the model by at least this, and by so many sigma, is not the model.
 _OFF_MM, _OFF_SIGMAS = 2.0, 4.0
 _OFF_COARSE_PX = 1.5
-_LEAST_REGION_PX = 25
+_LEAST_REGION_PX2 = 25
 # Matching blurs depth over the model's rim, and what lies beside the bone is further away.
 _RIM_PX = 4
 _FIT_SIGMAS = 3.0
@@ -113,14 +114,7 @@ def _spread_ratio(difference_px: NDArray[np.floating], sigma_px: NDArray[np.floa
 
 
 def _large_regions(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The mask without its connected specks."""
-    import cv2
-
-    _, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
-    is_large = statistics[:, cv2.CC_STAT_AREA] >= _LEAST_REGION_PX
-    is_large[0] = False
-    large: NDArray[np.bool_] = is_large[labels]
-    return large
+    return large_regions(mask, _LEAST_REGION_PX2)
 
 
 def _without_rim(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

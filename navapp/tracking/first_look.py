@@ -7,7 +7,6 @@ import numpy as np
 
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, luma
-from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import (
     Candidate,
@@ -18,12 +17,12 @@ from navapp.registration import (
 )
 from navapp.stereo import match_surface, reproject
 from navapp.tracking.locator import Fit
+from navapp.tracking.surface_meter import FREE_CORRELATION_PX
 from navapp.values import AspectGraph, Prior, Reason
 
 # An operator's box may cut the bone: so much more is looked at, of its size.
 _SPARE_SHARE = 0.15
 _MOST_POINTS = 40_000
-_CORRELATION_PX = 40.0
 _EDGE_SAMPLES = 9
 # A different pose that explains as much as this of the best one makes that one a guess.
 _AMBIGUOUS_SHARE = 0.9
@@ -34,7 +33,7 @@ class FirstLook:
 
     def __init__(
         self,
-        rig: StereoRig,
+        rectifier: Rectifier,
         model: RegistrationModel,
         depth_mm: tuple[float, float],
         aspects: AspectGraph | None,
@@ -42,12 +41,12 @@ class FirstLook:
         """Join what is looked for and where.
 
         Args:
-            rig: of the pictures.
+            rectifier: of the rig's pictures.
             model: of the bone.
             depth_mm: nearest and farthest surface that the rig is used for.
             aspects: edges of the bone, of at least the prior's cone.
         """
-        self._rectifier = Rectifier(rig)
+        self._rectifier = rectifier
         self._model = model
         self._depth_mm = depth_mm
         self._aspects = aspects
@@ -72,7 +71,7 @@ class FirstLook:
         found = match_surface(pair, band_px, fills=False).disparity
         n_matched = found.matched_share * found.origin.size
         stride_px = max(1, int(np.ceil((n_matched / _MOST_POINTS) ** 0.5)))
-        scene = Scene.from_stereo(reproject(found, geometry, stride_px), _CORRELATION_PX)
+        scene = Scene.from_stereo(reproject(found, geometry, stride_px), FREE_CORRELATION_PX)
         axis = prior.axis_for(self._model.bone.name)
         cone = ViewCone() if axis is None else ViewCone(axis, prior.approach_half_angle_deg)
         candidates = find_initial(

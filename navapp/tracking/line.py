@@ -96,7 +96,9 @@ class Line:
             rig, self.model, self.settings.depth_mm, self.settings.max_points
         )
         self._geometry = self._meter.geometry
-        self._first_look = FirstLook(rig, self.model, self.settings.depth_mm, aspects)
+        self._first_look = FirstLook(
+            self._meter.rectifier, self.model, self.settings.depth_mm, aspects
+        )
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
         self.locator = Locator(self._meter, self.model, self._score, self.settings.locator)

@@ -20,11 +20,12 @@ from navapp.stereo import (
     refine_samples,
     reproject,
 )
+from navapp.tracking.regions import large_regions
 from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
-_FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
+FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
 _PROBE = RefineSettings(n_steps=1, last_step_px=0.3)
 _PROBE_STRIDE_PX = 4
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
@@ -100,11 +101,11 @@ class SurfaceMeter:
         depth_mm: tuple[float, float],
         max_points: int,
     ) -> None:
-        self._rectifier = Rectifier(rig)
+        self.rectifier = Rectifier(rig)
         self._model = model
         self._depth_mm = depth_mm
         self._max_points = max_points
-        self.geometry = self._rectifier.geometry
+        self.geometry = self.rectifier.geometry
 
     def rectified(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins
@@ -112,7 +113,7 @@ class SurfaceMeter:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         started = time.perf_counter_ns()
         box, band_px = self._region(around, margins) or (None, None)
-        pair = self._rectifier.rectify(luma(left), luma(right), box, band_px)
+        pair = self.rectifier.rectify(luma(left), luma(right), box, band_px)
         return pair, LineTimings(rectify_ms=_ms_since(started))
 
     def freely(
@@ -138,7 +139,7 @@ class SurfaceMeter:
             answer = match_surface(inside, band_px, fills=False)
         cloud = self._cloud(answer.disparity)
         share = answer.disparity.matched_share
-        return Measurement(answer.disparity, cloud, answer.timings, share, _FREE_CORRELATION_PX)
+        return Measurement(answer.disparity, cloud, answer.timings, share, FREE_CORRELATION_PX)
 
     def coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, found: DisparityMap
@@ -226,12 +227,9 @@ def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> Dis
     import cv2
 
     is_matched = found.origin > 0
-    is_gap = (is_expected & ~is_matched).astype(np.uint8)
-    _, labels, sizes, _ = cv2.connectedComponentsWithStats(is_gap, connectivity=4)
-    is_large = sizes[:, cv2.CC_STAT_AREA] >= _LARGEST_HIGHLIGHT_PX2
-    is_large[0] = False
+    gaps = large_regions(is_expected & ~is_matched, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
     size = 2 * _MIXED_PX + 1
-    around = cv2.dilate(is_large[labels].astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     stays = is_matched & ~around
     if stays.sum() < _LEAST_UNMIXED * is_matched.sum():
         return found
