@@ -4,6 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.float_lane_kernels import LANES, load_grey, spread, store
+
 Taps = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 
 # Pixels before the place, and after it.
@@ -68,8 +70,9 @@ def resample_rows(
     """
     height, width = picture.shape
     last_column, last_row = np.float32(width - 1), np.float32(height - 1)
-    zero, before, after = np.float32(0.0), np.float32(_BEFORE), np.float32(_AFTER)
-    far_column, far_row = np.float32(width) - after, np.float32(height) - after
+    zero, before = np.float32(0.0), np.float32(_BEFORE)
+    far_column, far_row = np.float32(width - (LANES - 1 - _BEFORE)), np.float32(height - _AFTER)
+    grey, sums = picture.ravel(), np.empty(LANES, dtype=np.float32)
     for y in range(band[0], band[1]):
         for x in range(span[0], span[1]):
             u, v = columns[y, x], rows[y, x]
@@ -80,14 +83,17 @@ def resample_rows(
             if not (u >= before and u < far_column and v >= before and v < far_row):
                 resampled[y, x] = value_at(picture, u, v)
                 continue
-            # Unsigned indices are not looked at twice, for they cannot count from the end.
-            i, j = np.uintp(int(u) - _BEFORE), np.uintp(int(v) - _BEFORE)
-            a0, a1, a2, a3, a4, a5 = weights_at(u - np.float32(int(u)))
-            down = weights_at(v - np.float32(int(v)))
-            value = np.float32(0.5)
-            for k in range(6):
-                line = picture[j + np.uintp(k)]
-                near = a0 * line[i] + a1 * line[i + np.uintp(1)] + a2 * line[i + np.uintp(2)]
-                far = a3 * line[i + np.uintp(3)] + a4 * line[i + np.uintp(4)]
-                value += down[k] * (near + far + a5 * line[i + np.uintp(5)])
+            i, j = int(u), int(v)
+            d0, d1, d2, d3, d4, d5 = weights_at(v - np.float32(j))
+            at = (j - _BEFORE) * width + i - _BEFORE
+            # Eight columns at once, of which the last two do not count.
+            above = spread(d0) * load_grey(grey, at) + spread(d1) * load_grey(grey, at + width)
+            at += 2 * width
+            middle = spread(d2) * load_grey(grey, at) + spread(d3) * load_grey(grey, at + width)
+            at += 2 * width
+            below = spread(d4) * load_grey(grey, at) + spread(d5) * load_grey(grey, at + width)
+            store(sums, 0, above + middle + below)
+            a0, a1, a2, a3, a4, a5 = weights_at(u - np.float32(i))
+            value = np.float32(0.5) + (a0 * sums[0] + a1 * sums[1]) + (a2 * sums[2] + a3 * sums[3])
+            value += a4 * sums[4] + a5 * sums[5]
             resampled[y, x] = np.uint8(min(max(value, zero), np.float32(255.0)))

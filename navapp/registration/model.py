@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh, vertex_normals
+from navapp.geometry.simplify import simplified
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
 from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
@@ -16,6 +17,8 @@ _MOST_VOXELS = 400_000
 _LEAST_SIGMA_MM = 1e-3
 _SMOOTHING_ROUNDS = 2
 _GRID_MARGIN_MM = 14.0
+# Drawing takes as long as there are triangles; a camera cannot tell the difference.
+_DRAWN_VERTICES, _DRAWN_WITHIN_MM = 6500, 0.1
 
 
 class RegistrationModel:
@@ -27,8 +30,6 @@ class RegistrationModel:
         sigma_mm: (V,) of that surface along the normal (model and cartilage).
         is_usable: (V,) False for parts that a stage removed.
         seen_mesh: those points and the triangles that are left: what a camera should see.
-        is_closed: they have no border and look outward.
-        seen_face_sigma_mm: (F,) of its triangles.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
     """
 
@@ -44,10 +45,28 @@ class RegistrationModel:
         self.is_usable: NDArray[np.bool_] = ~bone.is_removed
         is_left = self.is_usable[mesh.faces].all(axis=1)
         self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], self.normals)
-        has_border = open_border(len(self.points_mm), mesh.faces[is_left]).any()
-        self.is_closed = not has_border and self.seen_mesh.volume_mm3() > 0.0
-        self.seen_face_sigma_mm: FloatArray = self.sigma_mm[mesh.faces[is_left]].mean(axis=1)
         self.centre_mm: FloatArray = mesh.centroid_mm
+
+    @cached_property
+    def drawn_mesh(self) -> TriangleMesh:
+        """`seen_mesh` in fewer triangles where it has many: what is rendered."""
+        return simplified(self.seen_mesh, _DRAWN_VERTICES, _DRAWN_WITHIN_MM)
+
+    @cached_property
+    def is_closed(self) -> bool:
+        """What is rendered has no border and looks outward."""
+        drawn = self.drawn_mesh
+        has_border = open_border(len(drawn.vertices_mm), drawn.faces).any()
+        return not has_border and drawn.volume_mm3() > 0.0
+
+    @cached_property
+    def drawn_face_sigma_mm(self) -> FloatArray:
+        """(F,) `sigma_mm` of the triangles that are rendered."""
+        from scipy.spatial import cKDTree
+
+        _, nearest = cKDTree(self.points_mm).query(self.drawn_mesh.vertices_mm, workers=2)
+        mean_mm: FloatArray = self.sigma_mm[nearest][self.drawn_mesh.faces].mean(axis=1)
+        return mean_mm
 
     @cached_property
     def arrays(self) -> ModelArrays:

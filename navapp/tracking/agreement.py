@@ -13,6 +13,15 @@ from numpy.typing import NDArray
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
+from navapp.tracking.agreement_kernels import (
+    FURTHER,
+    NEARER,
+    ROUGHLY_FURTHER,
+    ROUGHLY_NEARER,
+    Comparison,
+    classify_pixels,
+    gather_open,
+)
 from navapp.tracking.regions import large_regions
 from navapp.values import DisparityMap, Origin
 
@@ -24,6 +33,8 @@ _LEAST_REGION_PX2 = 25
 _RIM_PX = 4
 _FIT_SIGMAS = 3.0
 _MAD_TO_SIGMA = 1.4826
+# Errors of neighbours go together: the spread is as well known from every second pixel each way.
+_SPREAD_STRIDE_PX = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,49 +83,48 @@ def compare(
         geometry: of the rectified pair.
         coarse_px: (h, w) rough disparity of whatever is there, where `measured` is silent.
     """
-    seen = view.mask
-    n_visible = int(seen.sum())
+    classes = np.empty(view.face_index.shape, dtype=np.uint8)
+    deviation, sigma = (np.empty(classes.shape, dtype=np.float32) for _ in range(2))
+    limits = Comparison(
+        geometry.focal_px * geometry.baseline_mm, _OFF_MM, _OFF_SIGMAS, _OFF_COARSE_PX, _FIT_SIGMAS
+    )
+    if coarse_px is None:
+        coarse_px = np.full(classes.shape, np.nan, dtype=np.float32)
+    n_visible, n_agreeing = classify_pixels(
+        view.depth_mm, view.face_index, model.drawn_face_sigma_mm, measured.disparity_px,
+        measured.sigma_px, measured.origin == Origin.MATCHED, coarse_px, limits, classes,
+        deviation, sigma,
+    )  # fmt: skip
     if n_visible == 0:
         return NO_AGREEMENT
-    scale = geometry.focal_px * geometry.baseline_mm
-    expected_px = np.where(seen, scale / view.depth_mm, np.nan)
-    is_measured = seen & (measured.origin == Origin.MATCHED)
-    difference_px = np.where(is_measured, measured.disparity_px - expected_px, np.nan)
-    px_per_mm = expected_px**2 / scale
-    surface_mm = model.seen_face_sigma_mm[np.maximum(view.face_index, 0)]
-    sigma_px = np.hypot(measured.sigma_px, surface_mm * px_per_mm)
-    off_px = np.maximum(_OFF_SIGMAS * sigma_px, _OFF_MM * px_per_mm)
-    is_hidden = _large_regions(difference_px > off_px)
-    inner = _without_rim(seen)
-    is_behind = _large_regions(inner & (difference_px < -off_px))
-    if coarse_px is not None:
-        silent = seen & ~is_measured
-        rough_px = np.where(silent, coarse_px - expected_px, np.nan)
-        off_px = np.maximum(np.float32(_OFF_COARSE_PX), _OFF_MM * px_per_mm)
-        is_hidden |= _large_regions(rough_px > off_px)
-        is_behind |= _large_regions(inner & (rough_px < -off_px))
-    agrees = np.abs(difference_px) < _FIT_SIGMAS * sigma_px
-    is_open = is_measured & ~is_hidden
-    n_agreeing, n_open = int(agrees.sum()), int(is_open.sum())
+    is_hidden = _regions(classes, NEARER) | _regions(classes, ROUGHLY_NEARER)
+    inner = np.where(_without_rim(view.mask), classes, np.uint8(0))
+    is_behind = _regions(inner, FURTHER) | _regions(inner, ROUGHLY_FURTHER)
+    room = classes[::_SPREAD_STRIDE_PX, ::_SPREAD_STRIDE_PX].size
+    deviations, sigmas = (np.empty(room, dtype=np.float32) for _ in range(2))
+    n_open, n = gather_open(
+        classes, is_hidden, deviation, sigma, _SPREAD_STRIDE_PX, deviations, sigmas
+    )
     return Agreement(
         n_visible,
         n_agreeing / n_visible,
         float(is_hidden.sum()) / n_visible,
         float(is_behind.sum()) / n_visible,
         n_agreeing / n_open if n_open else 0.0,
-        _spread_ratio(difference_px[is_open], sigma_px[is_open]),
+        _spread_ratio(deviations[:n], sigmas[:n]),
     )
 
 
-def _spread_ratio(difference_px: NDArray[np.floating], sigma_px: NDArray[np.floating]) -> float:
-    if len(difference_px) == 0:
+def _spread_ratio(deviations_px: NDArray[np.float32], sigmas_px: NDArray[np.float32]) -> float:
+    if len(deviations_px) == 0:
         return 0.0
-    deviation = np.abs(difference_px - np.median(difference_px))
-    return float(_MAD_TO_SIGMA * np.median(deviation / sigma_px))
+    from_middle = np.abs(deviations_px - np.median(deviations_px))
+    return float(_MAD_TO_SIGMA * np.median(from_middle / sigmas_px))
 
 
-def _large_regions(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return large_regions(mask, _LEAST_REGION_PX2)
+def _regions(classes: NDArray[np.uint8], kind: int) -> NDArray[np.bool_]:
+    """Large regions of pixels of a kind."""
+    return large_regions((classes & np.uint8(kind)) > 0, _LEAST_REGION_PX2)
 
 
 def _without_rim(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -183,7 +183,7 @@ class Judge:
         height, width = measured.disparity_px.shape
         box = Box(measured.x, measured.y, width, height)
         return render_rectified(
-            model.seen_mesh, pose, self._geometry, box, is_closed=model.is_closed
+            model.drawn_mesh, pose, self._geometry, box, is_closed=model.is_closed
         )
 
     def _bound_mm(

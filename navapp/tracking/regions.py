@@ -10,6 +10,9 @@ def large_regions(
     """A mask (h, w) without its connected regions of fewer pixels; 4 or 8 neighbours connect."""
     import cv2
 
+    # Most masks are empty, and looking for regions takes longer than counting.
+    if np.count_nonzero(mask) < least_px2:
+        return np.zeros_like(mask)
     _, labels, statistics, _ = cv2.connectedComponentsWithStats(
         mask.astype(np.uint8), connectivity=connectivity
     )

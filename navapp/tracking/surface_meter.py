@@ -161,7 +161,7 @@ class SurfaceMeter:
             return None
         model = self._model
         view = render_rectified(
-            model.seen_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
+            model.drawn_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
         )
         support_px = self.geometry.disparity_map_px(view.depth_mm)
         return Expected(replace(pair, box=region[0]), support_px, view, _ms_since(started))

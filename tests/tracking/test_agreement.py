@@ -18,7 +18,7 @@ MODEL = RegistrationModel(BONE)
 MAP = measured_map(BONE)
 HEIGHT, WIDTH = MAP.disparity_px.shape
 BOX = Box(MAP.x, MAP.y, WIDTH, HEIGHT)
-VIEW = render_rectified(MODEL.seen_mesh, TRUE, GEOMETRY, BOX)
+VIEW = render_rectified(MODEL.drawn_mesh, TRUE, GEOMETRY, BOX)
 EXPECTED_PX = GEOMETRY.disparity_map_px(VIEW.depth_mm)
 SEEN = VIEW.mask
 

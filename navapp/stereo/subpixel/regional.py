@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
-from navapp.stereo.subpixel.float_lane_kernels import lanes_for
+from navapp.geometry.float_lane_kernels import lanes_for
 from navapp.stereo.subpixel.regional_kernels import Rules, fit_rows
 from navapp.stereo.subpixel.regional_picture_kernels import picture_rows
 from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, place_rows

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.stereo.subpixel.float_lane_kernels import LANES, load, spread, store, where_positive
+from navapp.geometry.float_lane_kernels import LANES, load, spread, store, where_positive
 from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, count_known, medians
 
 # 1, u, v, u^2, uv, v^2.

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.stereo.subpixel.float_lane_kernels import (
+from navapp.geometry.float_lane_kernels import (
     LANES,
     larger,
     load,

@@ -67,6 +67,20 @@ def load(_: Any, array: Any, __: Any) -> Any:
 
 
 @intrinsic
+def load_grey(_: Any, array: Any, __: Any) -> Any:
+    """The lanes of a flat uint8 array that begin at an index, as float32."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, values[0]).data
+        bytes_type = ir.VectorType(ir.IntType(8), LANES)
+        place = builder.bitcast(builder.gep(data, [values[1]]), bytes_type.as_pointer())
+        return builder.uitofp(builder.load(place, align=1), _VECTOR)
+
+    is_grey = bool(array == types.Array(types.uint8, 1, "C"))
+    return (_LANES_TYPE(array, types.intp), generate) if is_grey else None
+
+
+@intrinsic
 def store(_: Any, array: Any, __: Any, lanes: Any) -> Any:
     """Write lanes into an array from an index on."""
 

@@ -7,8 +7,8 @@ import pytest
 from numba import njit
 from numba.core.errors import TypingError
 
-from navapp.stereo.subpixel import float_lane_kernels
-from navapp.stereo.subpixel.float_lane_kernels import (
+from navapp.geometry import float_lane_kernels
+from navapp.geometry.float_lane_kernels import (
     LANES,
     lanes_for,
     load,

@@ -1,0 +1,94 @@
+"""The same surface in fewer triangles, within a guaranteed distance."""
+
+import numpy as np
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import FloatArray
+
+# The nearest triangle is looked for among so many whose middles are nearest.
+_N_TRIANGLES = 12
+
+
+def simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
+    """A mesh of about so many vertices, or of as many as the distance asks for.
+
+    Args:
+        mesh: any.
+        n_vertices: wanted; a smaller mesh is handed back as it is.
+        within_mm: no vertex of the mesh lies further from the new surface.
+
+    Source: Garland and Heckbert 1997, quadric error metrics.
+    """
+    while 0 < n_vertices < len(mesh.vertices_mm):
+        candidate = _collapsed(mesh, n_vertices)
+        if candidate is not None and distance_mm(mesh, candidate, within_mm).max() <= within_mm:
+            return candidate
+        n_vertices *= 2
+    return mesh
+
+
+def distance_mm(mesh: TriangleMesh, surface: TriangleMesh, doubted_mm: float = 0.0) -> FloatArray:
+    """(V,) distance of a mesh's used vertices from another surface; never too small.
+
+    Args:
+        mesh: whose vertices.
+        surface: from where.
+        doubted_mm: up to this a distance may be too large: a large triangle lies nearer than its
+            middle tells.
+    """
+    from scipy.spatial import cKDTree
+
+    points = mesh.vertices_mm[np.unique(mesh.faces)]
+    corners = surface.vertices_mm[surface.faces]
+    n_near = min(_N_TRIANGLES, len(corners))
+    _, near = cKDTree(corners.mean(axis=1)).query(points, k=n_near, workers=2)
+    nearest = np.full(len(points), np.inf)
+    for triangle in near.reshape(len(points), n_near).T:
+        np.minimum(nearest, _to_triangles_mm(points, corners[triangle]), out=nearest)
+    for index in np.flatnonzero(nearest > doubted_mm):
+        point = np.broadcast_to(points[index], (len(corners), 3))
+        nearest[index] = _to_triangles_mm(point, corners).min()
+    return nearest
+
+
+def _collapsed(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh | None:
+    """The mesh after edge collapses; None when the library makes nothing sensible of it."""
+    import fast_simplification
+
+    share = 1.0 - n_vertices / len(mesh.vertices_mm)
+    # About the middle, float32 keeps its digits.
+    middle = mesh.centroid_mm
+    points, faces = fast_simplification.simplify(
+        np.asarray(mesh.vertices_mm - middle, dtype=np.float32),
+        np.array(mesh.faces),
+        target_reduction=share,
+    )
+    if len(faces) == 0 or not np.isfinite(points).all():
+        return None
+    return TriangleMesh(np.asarray(points, dtype=float) + middle, np.asarray(faces, np.int32))
+
+
+def _to_triangles_mm(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """(N,) distance of points (N, 3) from triangles (N, 3, 3)."""
+    nearest = np.min(
+        [_to_edges_mm(points, corners[:, k], corners[:, (k + 1) % 3]) for k in range(3)], axis=0
+    )
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    is_inside = length > 0.0
+    for k in range(3):
+        edge = corners[:, (k + 1) % 3] - corners[:, k]
+        side = np.einsum("ij,ij->i", np.cross(edge, points - corners[:, k]), normal)
+        is_inside &= side >= 0.0
+    above = np.abs(np.einsum("ij,ij->i", points - corners[:, 0], normal))
+    distance: FloatArray = np.where(is_inside, above / np.where(length > 0.0, length, 1.0), nearest)
+    return distance
+
+
+def _to_edges_mm(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    edge = end - start
+    squared = np.einsum("ij,ij->i", edge, edge)
+    along = np.einsum("ij,ij->i", points - start, edge) / np.where(squared > 0.0, squared, 1.0)
+    foot = start + np.clip(along, 0.0, 1.0)[:, None] * edge
+    distance: FloatArray = np.linalg.norm(points - foot, axis=1)
+    return distance
