@@ -39,10 +39,13 @@ def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
             raise error
 
 
-def in_row_bands(height: int, job: Callable[[int, int], object]) -> None:
+def in_row_bands(height: int, job: Callable[[int, int], object], every: int = 8) -> None:
     """Run `job(first_row, last_row)` for the upper and the lower half of the rows.
 
-    The lower half begins at a multiple of 8: a job for every 2nd, 4th or 8th row meets its rows.
+    Args:
+        height: number of rows.
+        job: of some rows.
+        every: the lower half begins at a multiple of this: a job for every n-th row meets its rows.
     """
-    middle = height // 16 * 8
+    middle = height // (2 * every) * every
     run_both(lambda: job(0, middle), lambda: job(middle, height))

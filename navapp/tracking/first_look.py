@@ -16,7 +16,7 @@ from navapp.registration import (
     is_same_pose,
 )
 from navapp.stereo import match_surface, reproject
-from navapp.tracking.locator import Fit
+from navapp.tracking.follower import Fit
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX
 from navapp.values import AspectGraph, Prior, Reason
 

@@ -21,8 +21,9 @@ from navapp.registration import (
     tilted_starts,
 )
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
+from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
-from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
+from navapp.tracking.locator import STEREO_SETTINGS, Locator, LocatorSettings
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import (

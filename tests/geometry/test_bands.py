@@ -39,3 +39,11 @@ def test_bands_cover_every_row_once(height):
     rows = []
     in_row_bands(height, lambda first, last: rows.extend(range(first, last)))
     assert sorted(rows) == list(range(height))
+
+
+@pytest.mark.parametrize("every", [1, 6, 8, 48])
+def test_the_lower_half_begins_at_a_multiple(every):
+    first_rows = []
+    in_row_bands(200, lambda first, last: first_rows.append(first), every)
+    assert max(first_rows) > 0
+    assert all(first % every == 0 for first in first_rows)

@@ -9,7 +9,19 @@ from navapp.geometry import Box
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration import RegistrationModel
 from navapp.tracking.agreement import Agreement, compare
+from navapp.tracking.agreement_kernels import (
+    AGREES,
+    FURTHER,
+    MEASURED,
+    NEARER,
+    ROUGHLY_FURTHER,
+    ROUGHLY_NEARER,
+    Comparison,
+    classify_pixels,
+    gather_open,
+)
 from navapp.values import DisparityMap, Origin
+from tests.reference.agreement_reference import classify_slowly
 from tests.registration.shapes import GEOMETRY, TRUE, femur
 from tests.tracking.rooms import measured_map
 
@@ -117,3 +129,53 @@ def test_a_view_without_the_model_agrees_with_nothing() -> None:
     assert found.coverage == 0.0
     nothing = replace(MAP, origin=np.full_like(MAP.origin, Origin.UNKNOWN))
     assert agreement(nothing).spread_ratio == 0.0
+
+
+@pytest.mark.parametrize("with_coarse", [True, False])
+def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
+    rng = np.random.default_rng(4)
+    shape = EXPECTED_PX.shape
+    noisy = replace(
+        MAP,
+        disparity_px=(MAP.disparity_px + rng.normal(0.0, 0.8, shape)).astype(np.float32),
+        sigma_px=rng.uniform(0.05, 0.5, shape).astype(np.float32),
+        origin=np.where(rng.random(shape) < 0.7, MAP.origin, 0).astype(np.uint8),
+    )
+    coarse_px = np.full(shape, np.nan, dtype=np.float32)
+    if with_coarse:
+        coarse_px = (EXPECTED_PX + rng.normal(0.0, 3.0, shape)).astype(np.float32)
+        coarse_px[rng.random(shape) < 0.2] = np.nan
+    limits = Comparison(GEOMETRY.focal_px * GEOMETRY.baseline_mm, 0.4, 2.0, 1.5, 2.5)
+    classes = np.empty(shape, np.uint8)
+    deviation, sigma = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    face_sigma_mm = rng.uniform(0.05, 0.6, len(MODEL.drawn_mesh.faces))
+    n_visible, n_agreeing = classify_pixels(
+        VIEW.depth_mm, VIEW.face_index, face_sigma_mm, noisy.disparity_px, noisy.sigma_px,
+        noisy.origin == Origin.MATCHED, coarse_px, limits, classes, deviation, sigma,
+    )  # fmt: skip
+    masks, expected, expected_sigma = classify_slowly(VIEW, face_sigma_mm, noisy, coarse_px, limits)
+    assert n_visible == SEEN.sum()
+    assert n_agreeing == masks["agrees"].sum() > 0
+    for bit, (name, mask) in zip(
+        (MEASURED, NEARER, FURTHER, ROUGHLY_NEARER, ROUGHLY_FURTHER, AGREES),
+        masks.items(),
+        strict=True,
+    ):
+        np.testing.assert_array_equal((classes & bit) > 0, mask, err_msg=name)
+        assert mask.any() == (with_coarse or "roughly" not in name), name
+    measured = masks["measured"]
+    np.testing.assert_allclose(deviation[measured], expected[measured], atol=1e-4)
+    np.testing.assert_allclose(sigma[measured], expected_sigma[measured], rtol=1e-5)
+
+
+def test_open_deviations_are_gathered_every_so_many_pixels() -> None:
+    classes = np.full((5, 7), MEASURED | AGREES, np.uint8)
+    classes[0, 0], classes[4, 6] = 0, NEARER
+    is_hidden = np.zeros((5, 7), bool)
+    is_hidden[2] = True
+    values = np.arange(35, dtype=np.float32).reshape(5, 7)
+    deviations, sigmas = np.empty(12, np.float32), np.empty(12, np.float32)
+    n_open, n = gather_open(classes, is_hidden, values, 2 * values, 2, deviations, sigmas)
+    assert n_open == 35 - 1 - 1 - 7
+    np.testing.assert_array_equal(deviations[:n], [2, 4, 6, 28, 30, 32])
+    np.testing.assert_array_equal(sigmas[:n], [4, 8, 12, 56, 60, 64])

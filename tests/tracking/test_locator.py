@@ -1,14 +1,16 @@
 """Matching and fitting in turns."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel, fit_icp
+from navapp.tracking import follower
 from navapp.tracking import locator as module
-from navapp.tracking.locator import Fit, Locator, LocatorSettings
+from navapp.tracking.follower import Fit
+from navapp.tracking.locator import Locator, LocatorSettings
 from navapp.tracking.surface_meter import Margins, Measurement
 from navapp.values import BoneModel, DisparityMap, LineTimings, Reason
 from tests.registration.shapes import TRUE, as_cloud, grid_mesh
@@ -17,7 +19,7 @@ from tests.tracking.rooms import room
 # What the meters of these tests are handed is not looked at.
 PAIR = None
 NO_MAP = DisparityMap(*np.empty((2, 0, 0), np.float32), np.empty((0, 0), np.uint8), 0, 0)
-PROBE_MS, ON_MODEL_MS, FREELY_MS = 1.0, 10.0, 1000.0
+SAMPLED_MS, ON_MODEL_MS, FREELY_MS, RENDER_MS = 1.0, 10.0, 1000.0, 0.1
 
 
 def height_mm(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -41,6 +43,14 @@ def error_mm(pose: RigidTransform, true: RigidTransform = TRUE) -> float:
     return float(np.linalg.norm(offset_mm, axis=1).mean())
 
 
+@dataclass
+class FakeExpected:
+    """A model at a pose."""
+
+    pose: RigidTransform
+    render_ms: float = RENDER_MS
+
+
 class FakeMeter:
     """Sees a bone that lies at `true`; notes which matchings it was asked for.
 
@@ -57,7 +67,7 @@ class FakeMeter:
         self.is_in_view = True
         self.n_points = 1200
         self.asked: list[str] = []
-        self.n_probes = 0
+        self.n_rendered = 0
         self.margins: list[Margins] = []
         self.baselines: list[bool] = []
 
@@ -69,20 +79,22 @@ class FakeMeter:
         points_mm = self._points_mm() + np.array([0.0, 0.0, self.free_bias_mm])
         return self._measurement(points_mm, FREELY_MS, 1.0)
 
-    def expected(self, pair, pose, margins) -> RigidTransform | None:
-        """Of the fake, what is expected is the pose."""
+    def expected(self, pair, pose, margins) -> FakeExpected | None:
         self.margins.append(margins)
-        return pose if self.is_in_view else None
+        self.n_rendered += self.is_in_view
+        return FakeExpected(pose) if self.is_in_view else None
 
-    def on_model(self, expected: RigidTransform) -> Measurement:
-        self.asked.append("on_model")
+    def on_model(self, expected: FakeExpected) -> Measurement:
+        return self._near_the_model("on_model", expected, ON_MODEL_MS)
+
+    def sampled(self, expected: FakeExpected) -> Measurement:
+        return self._near_the_model("sampled", expected, SAMPLED_MS)
+
+    def _near_the_model(self, what: str, expected: FakeExpected, ms: float) -> Measurement:
+        self.asked.append(what)
         points_mm = self._points_mm()
-        is_near = self._is_near(points_mm, expected)
-        return self._measurement(points_mm[is_near], ON_MODEL_MS, self._share(is_near))
-
-    def probed_share(self, expected: RigidTransform) -> tuple[float, float]:
-        self.n_probes += 1
-        return self._share(self._is_near(self._points_mm(), expected)), PROBE_MS
+        is_near = self._is_near(points_mm, expected.pose)
+        return self._measurement(points_mm[is_near], ms, self._share(is_near))
 
     def _is_near(self, points_mm: np.ndarray, pose: RigidTransform) -> np.ndarray:
         at_bone = pose.inverse().apply(points_mm)
@@ -126,7 +138,6 @@ def test_a_pose_that_is_right_stays_on_the_model(start: RigidTransform) -> None:
     meter = FakeMeter(free_bias_mm=5.0)
     fit = locator_of(meter).locate(PAIR, start)
     assert "freely" not in meter.asked
-    assert len(meter.asked) == fit.n_rounds <= LocatorSettings().max_rounds
     assert error_mm(fit.pose) < 0.05
     assert fit.pose.target == "left_rect"
 
@@ -147,39 +158,19 @@ def test_a_search_ends_on_the_model() -> None:
     meter = FakeMeter(free_bias_mm=0.4)
     found = locator_of(meter).search(PAIR, FAR, LocatorSettings().search)
     assert meter.asked[0] == "freely"
-    assert set(meter.asked[1:]) == {"on_model"}
+    assert meter.asked[-1] == "on_model"
+    assert meter.asked.count("freely") == 1
     assert error_mm(found.pose) < 0.05
-    alone = locator_of(meter, LocatorSettings(max_rounds=1)).search(PAIR, FAR, Margins(60, 35.0))
-    assert error_mm(alone.pose) > 0.3
 
 
-@pytest.mark.parametrize("max_rounds", [1, 2, 3, 6])
-def test_no_path_takes_more_matchings_than_allowed(max_rounds: int) -> None:
-    restless = LocatorSettings(max_rounds=max_rounds, settled_mm=0.0)
-    meter = FakeMeter()
-    assert locator_of(meter, restless).locate(PAIR, TRUE).n_rounds == max_rounds
-    assert meter.asked == ["on_model"] * max_rounds
-    meter = FakeMeter()
-    assert locator_of(meter, restless).search(PAIR, FAR, restless.search).n_rounds == max_rounds
-    assert meter.asked == ["freely"] + ["on_model"] * (max_rounds - 1)
-    # Every path, when none convinces: staying, and the search from far and nearby.
+def test_what_does_not_convince_is_searched_from_far_and_nearby() -> None:
     meter = FakeMeter()
     meter.share = 0.35
-    locator_of(meter, restless).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
-    stayed = ["on_model"] * max_rounds
-    assert meter.asked == [*stayed, "freely", *stayed[1:], *stayed[1:]]
-
-
-def test_a_bone_at_rest_is_not_matched_again() -> None:
-    calm = LocatorSettings(max_rounds=10, settled_mm=0.5)
-    meter = FakeMeter()
-    fit = locator_of(meter, calm).locate(PAIR, TRUE)
-    assert meter.asked == ["on_model"]
-    assert fit.n_rounds == 1
-    meter = FakeMeter()
-    fit = locator_of(meter, calm).locate(PAIR, moved((0.0, 0.0, 0.8), (0.0,) * 3))
-    assert meter.asked == ["on_model"] * 2
-    assert fit.n_rounds == 2
+    locator_of(meter).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    followed = [k for k, what in enumerate(meter.asked) if what == "on_model"]
+    first = meter.asked.index("freely")
+    assert meter.asked.count("freely") == 1
+    assert followed[0] < first < followed[-1]
 
 
 @pytest.mark.parametrize("method", ["bimcc", "icp"])
@@ -188,9 +179,7 @@ def test_out_of_view_there_is_no_fit(method: str) -> None:
     meter.is_in_view = False
     locator = locator_of(meter, LocatorSettings(method=method))
     assert locator.locate(PAIR, TRUE) is None
-    assert len(meter.asked) <= 1
-    # Only the baseline has to look before it knows.
-    assert ("freely" in meter.asked) is locator.is_baseline
+    assert set(meter.asked) <= {"freely"}
     assert locator.search(PAIR, TRUE, Margins(60, 35.0)) is None
 
 
@@ -202,7 +191,7 @@ def test_the_baseline_makes_one_matching_and_one_fit(monkeypatch: pytest.MonkeyP
         return fit_icp(*given)
 
     monkeypatch.setattr(module, "fit_icp", spy)
-    monkeypatch.setattr(module, "fit_bimcc", None)
+    monkeypatch.setattr(follower, "fit_bimcc", None)
     settings = LocatorSettings(method="icp")
     start = moved((0.5, -0.5, 1.0), (1.0, 0.0, 0.0))
     for locate, margins in (
@@ -272,38 +261,29 @@ def test_a_bone_lost_during_the_search_leaves_what_stayed() -> None:
     assert error_mm(fit.pose) < 0.05
 
 
-@pytest.mark.parametrize("is_in_view", [True, False])
-def test_a_matching_without_points_does_not_replace_a_fit(is_in_view: bool) -> None:
-    class SeesOnce(FakeMeter):
-        def on_model(self, *given) -> Measurement | None:
-            measured = super().on_model(*given)
-            self.n_points, self.is_in_view = 10, is_in_view
-            return measured
-
-    meter = SeesOnce()
-    fit = locator_of(meter).locate(PAIR, moved((0.3, 0.2, 0.3), (0.0,) * 3))
-    assert meter.asked == ["on_model"] * (2 if is_in_view else 1)
-    assert fit.n_rounds == 1
-    assert Reason.TOO_FEW_POINTS not in fit.estimate.reasons
-    assert error_mm(fit.pose) < 0.1
+def spent_ms(meter: FakeMeter) -> float:
+    """What all that it was asked for took."""
+    cost = {"freely": FREELY_MS, "on_model": ON_MODEL_MS, "sampled": SAMPLED_MS}
+    return sum(cost[what] for what in meter.asked) + RENDER_MS * meter.n_rendered
 
 
-def test_the_time_of_every_matching_and_fit_is_told() -> None:
-    meter = FakeMeter()
-    fit = locator_of(meter).search(PAIR, FAR, LocatorSettings().search)
-    assert fit.timings.stereo_ms == FREELY_MS + (fit.n_rounds - 1) * ON_MODEL_MS
-    assert fit.n_rounds == len(meter.asked) > 1
-    # Also that of the path which was not taken.
-    meter = FakeMeter()
-    meter.share = 0.35
-    both = locator_of(meter).locate(PAIR, moved((1.0, 0.0, 1.0), (0.0,) * 3))
-    n_on_model = meter.asked.count("on_model")
-    assert n_on_model > both.n_rounds
-    on_model_ms = n_on_model * ON_MODEL_MS + meter.n_probes * PROBE_MS
-    assert both.timings.stereo_ms == FREELY_MS + on_model_ms
-    one = locator_of(FakeMeter(), LocatorSettings(max_rounds=1)).locate(PAIR, TRUE)
-    assert ON_MODEL_MS <= one.timings.stereo_ms <= ON_MODEL_MS + PROBE_MS
-    assert 0.0 < one.timings.estimate_ms < one.timings.total_ms
+@pytest.mark.parametrize(
+    ("start", "share"), [(TRUE, None), (FAR, None), (moved((1.0, 0.0, 1.0), (0.0,) * 3), 0.35)]
+)
+def test_the_time_of_every_matching_and_fit_is_told(
+    start: RigidTransform, share: float | None
+) -> None:
+    """Also that of the path which was not taken."""
+    for way in ("locate", "search"):
+        meter = FakeMeter()
+        meter.share = share
+        locator = locator_of(meter)
+        if way == "locate":
+            fit = locator.locate(PAIR, start)
+        else:
+            fit = locator.search(PAIR, start, LocatorSettings().search)
+        assert fit.timings.stereo_ms == pytest.approx(spent_ms(meter))
+        assert 0.0 < fit.timings.estimate_ms < fit.timings.total_ms
 
 
 def test_the_margins_of_tracking_and_of_a_first_search_are_kept_apart() -> None:
@@ -337,8 +317,9 @@ class Listening:
         self.asked.append("on_model")
         return self.meter.on_model(*given)
 
-    def probed_share(self, *given) -> tuple[float, float]:
-        return self.meter.probed_share(*given)
+    def sampled(self, *given) -> Measurement:
+        self.asked.append("sampled")
+        return self.meter.sampled(*given)
 
 
 def seen_knee():
@@ -359,8 +340,7 @@ def surface_error_mm(pose: RigidTransform, true: RigidTransform) -> float:
 def test_in_pictures_a_right_pose_stays_on_the_model() -> None:
     pair, true, locator, asked = seen_knee()
     fit = locator.locate(pair, true)
-    assert set(asked) == {"on_model"}
-    assert len(asked) <= LocatorSettings().max_rounds
+    assert set(asked) == {"sampled", "on_model"}
     assert surface_error_mm(fit.pose, true) < 0.3
 
 
@@ -377,9 +357,8 @@ def test_in_pictures_a_pose_5_mm_and_5_deg_off_is_found(sign: float) -> None:
 
 
 def test_in_pictures_a_bone_out_of_view_gives_none() -> None:
-    pair, true, locator, asked = seen_knee()
+    pair, true, locator, _ = seen_knee()
     assert locator.locate(pair, true.moved((900.0, 0, 0, 0, 0, 0), (0.0,) * 3)) is None
-    assert "freely" not in asked
 
 
 def test_a_dark_pair_gives_no_pose_of_its_own() -> None:
@@ -388,11 +367,3 @@ def test_a_dark_pair_gives_no_pose_of_its_own() -> None:
     fit = locator.locate(dark, true)
     assert asked.count("freely") == 1
     assert Reason.TOO_FEW_POINTS in fit.estimate.reasons
-
-
-def test_the_probe_is_timed_when_the_bone_stays() -> None:
-    meter = FakeMeter()
-    fit = locator_of(meter).locate(PAIR, TRUE)
-    assert fit is not None
-    asked_ms = len(meter.asked) * ON_MODEL_MS
-    assert fit.timings.stereo_ms == asked_ms + meter.n_probes * PROBE_MS

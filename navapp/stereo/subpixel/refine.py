@@ -137,7 +137,7 @@ def _steps(
     quality = np.empty((height, width, N_QUALITIES), dtype=np.float32)
     for _ in range(settings.n_steps):
         fixed = (left, right, support, offset, box.x - columns.start, window)
-        in_row_bands(box.height, partial(_band, fixed, refined, quality))
+        in_row_bands(box.height, partial(_band, fixed, refined, quality), 8 * stride_px)
         offset, refined = refined, offset
     return offset, quality
 

@@ -1,0 +1,26 @@
+"""Model against measurement, with whole arrays."""
+
+import numpy as np
+
+
+def classify_slowly(view, face_sigma_mm, measured_map, coarse_px, limits):
+    """Masks by name, and deviation and its standard deviation in px, NaN where not measured."""
+    seen = view.face_index >= 0
+    expected = np.where(seen, limits.scale_px_mm / view.depth_mm.astype(float), np.nan)
+    px_per_mm = expected**2 / limits.scale_px_mm
+    is_measured = seen & (measured_map.origin == 1)
+    difference = np.where(is_measured, measured_map.disparity_px - expected, np.nan)
+    surface_mm = face_sigma_mm[np.maximum(view.face_index, 0)]
+    sigma = np.where(is_measured, np.hypot(measured_map.sigma_px, surface_mm * px_per_mm), np.nan)
+    off = np.maximum(limits.off_sigmas * sigma, limits.off_mm * px_per_mm)
+    rough = np.where(seen & ~is_measured, coarse_px - expected, np.nan)
+    off_rough = np.maximum(limits.off_coarse_px, limits.off_mm * px_per_mm)
+    masks = {
+        "measured": is_measured,
+        "nearer": difference > off,
+        "further": difference < -off,
+        "roughly nearer": rough > off_rough,
+        "roughly further": rough < -off_rough,
+        "agrees": np.abs(difference) < limits.fit_sigmas * sigma,
+    }
+    return masks, difference, sigma

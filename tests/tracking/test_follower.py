@@ -1,0 +1,119 @@
+"""Matching on the model itself, and fitting, in turns."""
+
+import pytest
+
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking.follower import Follower, FollowerSettings
+from navapp.tracking.locator import LocatorSettings
+from navapp.tracking.surface_meter import Measurement
+from tests.registration.shapes import TRUE
+from tests.tracking.test_locator import (
+    MODEL,
+    PAIR,
+    RENDER_MS,
+    SAMPLED_MS,
+    FakeMeter,
+    error_mm,
+    moved,
+)
+
+MARGINS = LocatorSettings().tracking
+NEAR = moved((0.3, -0.2, 0.4), (0.2, -0.3, 0.2))
+RESTLESS = FollowerSettings(settled_mm=0.0)
+
+
+def follower(meter: FakeMeter, settings: FollowerSettings | None = None) -> Follower:
+    return Follower(meter, MODEL, settings or FollowerSettings(), MARGINS)
+
+
+@pytest.mark.parametrize("start", [TRUE, NEAR, moved((0.5, 0.5, 0.9), (0.0,) * 3)])
+def test_a_near_pose_comes_to_rest_where_the_bone_is(start: RigidTransform) -> None:
+    meter = FakeMeter()
+    fit, _ = follower(meter).follow(PAIR, start)
+    assert error_mm(fit.pose) < 0.05
+    assert fit.n_rounds == len(meter.asked) <= FollowerSettings().max_rounds
+    assert fit.moved_mm < FollowerSettings().settled_mm
+    assert set(meter.margins) == {MARGINS}
+
+
+def test_samples_come_first_and_the_whole_model_last() -> None:
+    meter = FakeMeter()
+    follower(meter).follow(PAIR, NEAR)
+    n_sampled = meter.asked.count("sampled")
+    assert 1 <= n_sampled <= FollowerSettings().max_sampled
+    assert meter.asked[:n_sampled] == ["sampled"] * n_sampled
+    assert set(meter.asked[n_sampled:]) == {"on_model"}
+
+
+def test_at_rest_the_model_is_rendered_once() -> None:
+    meter = FakeMeter()
+    fit, _ = follower(meter).follow(PAIR, TRUE)
+    assert meter.asked == ["sampled", "on_model"]
+    assert meter.n_rendered == 1
+    assert fit.n_rounds == 2
+
+
+def test_after_a_move_the_model_is_rendered_again() -> None:
+    meter = FakeMeter()
+    follower(meter).follow(PAIR, NEAR)
+    assert meter.n_rendered >= 2
+
+
+@pytest.mark.parametrize("max_rounds", [2, 3, 6])
+def test_it_never_takes_more_rounds_than_allowed(max_rounds: int) -> None:
+    meter = FakeMeter()
+    settings = FollowerSettings(max_sampled=1, max_rounds=max_rounds, settled_mm=0.0)
+    fit, _ = follower(meter, settings).follow(PAIR, TRUE)
+    assert fit.n_rounds == len(meter.asked) == max_rounds
+    assert meter.n_rendered == max_rounds
+
+
+def test_a_bone_that_keeps_moving_is_measured_everywhere_all_the_same() -> None:
+    meter = FakeMeter()
+    restless = FollowerSettings(near_mm=0.0, settled_mm=0.0)
+    follower(meter, restless).follow(PAIR, TRUE)
+    assert meter.asked == ["sampled"] * restless.max_sampled + ["on_model"] * (
+        restless.max_rounds - restless.max_sampled
+    )
+
+
+def test_too_few_samples_end_it() -> None:
+    meter = FakeMeter()
+    meter.share = 0.2
+    fit, timings = follower(meter).follow(PAIR, TRUE, 0.3)
+    assert fit is None
+    assert meter.asked == ["sampled"]
+    assert timings.stereo_ms == pytest.approx(SAMPLED_MS + RENDER_MS)
+    assert follower(meter).follow(PAIR, TRUE, 0.1)[0] is not None
+
+
+def test_out_of_view_there_is_no_fit() -> None:
+    meter = FakeMeter()
+    meter.is_in_view = False
+    fit, timings = follower(meter).follow(PAIR, TRUE)
+    assert fit is None
+    assert meter.asked == []
+    assert timings.total_ms == 0.0
+
+
+@pytest.mark.parametrize("blind_after", ["sampled", "on_model"])
+@pytest.mark.parametrize("is_in_view", [True, False])
+def test_a_matching_without_points_does_not_replace_a_fit(
+    is_in_view: bool, blind_after: str
+) -> None:
+    class GoesBlind(FakeMeter):
+        def _near_the_model(self, what: str, *given) -> Measurement:
+            measured = super()._near_the_model(what, *given)
+            if what == blind_after:
+                self.n_points, self.is_in_view = 10, is_in_view
+            return measured
+
+    meter = GoesBlind()
+    settings = FollowerSettings(max_sampled=1, settled_mm=0.0)
+    fit, _ = follower(meter, settings).follow(PAIR, NEAR)
+    if blind_after == "sampled":
+        assert fit is None
+        return
+    assert fit.n_rounds == 2
+    assert not fit.estimate.reasons
+    assert error_mm(fit.pose) < 0.1
