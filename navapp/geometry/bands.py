@@ -1,8 +1,11 @@
-"""Two halves of one matching, on the two threads of one shared pool."""
+"""Jobs side by side, on the two threads of one shared pool."""
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+_Answer = TypeVar("_Answer")
 
 _N_THREADS = 2
 _lock = threading.Lock()
@@ -37,6 +40,11 @@ def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
     for error in errors:
         if error is not None:
             raise error
+
+
+def beside(job: Callable[[], _Answer]) -> "Future[_Answer]":
+    """Begin a job on a thread of the pool; its halves are run one after the other there."""
+    return pool().submit(job)
 
 
 def in_row_bands(height: int, job: Callable[[int, int], object], every: int = 8) -> None:

@@ -10,6 +10,7 @@ Taps = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.floa
 
 # Pixels before the place, and after it.
 _BEFORE, _AFTER = 2, 3
+N_TAPS = 6
 _TWELFTH = np.float32(1.0 / 12.0)
 
 
@@ -32,6 +33,15 @@ def weights_at(t: np.float32) -> Taps:
         _TWELFTH * (seven * t3 - np.float32(6.0) * t2 - t),
         _TWELFTH * (t2 - t3),
     )
+
+
+@njit(cache=True, nogil=True)
+def weigh_row(places: NDArray[np.float32], weights: NDArray[np.float32]) -> None:
+    """Weights (6, n) in place, of the pixels around places (n,); see `weights_at`."""
+    w0, w1, w2, w3, w4, w5 = weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
+    for x in range(places.shape[0]):
+        t = places[x] - np.floor(places[x])
+        w0[x], w1[x], w2[x], w3[x], w4[x], w5[x] = weights_at(t)
 
 
 @njit(cache=True, nogil=True)
@@ -73,9 +83,14 @@ def resample_rows(
     zero, before = np.float32(0.0), np.float32(_BEFORE)
     far_column, far_row = np.float32(width - (LANES - 1 - _BEFORE)), np.float32(height - _AFTER)
     grey, sums = picture.ravel(), np.empty(LANES, dtype=np.float32)
+    first, after = span
+    across = np.empty((N_TAPS, after - first), dtype=np.float32)
+    down = np.empty_like(across)
     for y in range(band[0], band[1]):
-        for x in range(span[0], span[1]):
-            u, v = columns[y, x], rows[y, x]
+        weigh_row(columns[y, first:after], across)
+        weigh_row(rows[y, first:after], down)
+        for x in range(first, after):
+            u, v, k = columns[y, x], rows[y, x], x - first
             # Also false for NaN.
             if not (u >= zero and u <= last_column and v >= zero and v <= last_row):
                 resampled[y, x] = 0
@@ -83,17 +98,18 @@ def resample_rows(
             if not (u >= before and u < far_column and v >= before and v < far_row):
                 resampled[y, x] = value_at(picture, u, v)
                 continue
-            i, j = int(u), int(v)
-            d0, d1, d2, d3, d4, d5 = weights_at(v - np.float32(j))
-            at = (j - _BEFORE) * width + i - _BEFORE
+            at = (int(v) - _BEFORE) * width + int(u) - _BEFORE
             # Eight columns at once, of which the last two do not count.
-            above = spread(d0) * load_grey(grey, at) + spread(d1) * load_grey(grey, at + width)
+            above = spread(down[0, k]) * load_grey(grey, at)
+            above = above + spread(down[1, k]) * load_grey(grey, at + width)
             at += 2 * width
-            middle = spread(d2) * load_grey(grey, at) + spread(d3) * load_grey(grey, at + width)
+            middle = spread(down[2, k]) * load_grey(grey, at)
+            middle = middle + spread(down[3, k]) * load_grey(grey, at + width)
             at += 2 * width
-            below = spread(d4) * load_grey(grey, at) + spread(d5) * load_grey(grey, at + width)
+            below = spread(down[4, k]) * load_grey(grey, at)
+            below = below + spread(down[5, k]) * load_grey(grey, at + width)
             store(sums, 0, above + middle + below)
-            a0, a1, a2, a3, a4, a5 = weights_at(u - np.float32(i))
-            value = np.float32(0.5) + (a0 * sums[0] + a1 * sums[1]) + (a2 * sums[2] + a3 * sums[3])
-            value += a4 * sums[4] + a5 * sums[5]
+            value = np.float32(0.5) + (across[0, k] * sums[0] + across[1, k] * sums[1])
+            value += across[2, k] * sums[2] + across[3, k] * sums[3]
+            value += across[4, k] * sums[4] + across[5, k] * sums[5]
             resampled[y, x] = np.uint8(min(max(value, zero), np.float32(255.0)))

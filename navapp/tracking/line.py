@@ -9,8 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Image, RectifiedPair
+from navapp.geometry.bands import beside
+from navapp.geometry.rectification import Box, Image, RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import (
@@ -25,7 +27,7 @@ from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Locator, LocatorSettings
 from navapp.tracking.motion import TrackState
-from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
+from navapp.tracking.surface_meter import Margins, Measurement, RoughMap, SurfaceMeter
 from navapp.values import (
     AspectGraph,
     BoneModel,
@@ -117,8 +119,10 @@ class Line:
         tracked = self._lost(Reason.BONE_LOST)
         if state.n_lost == 0:
             pair, timings = self._rectified_pair(left, right, predicted, _NEAR_VIEW)
+            # What may hide the bone does not depend on where exactly it is.
+            rough = beside(lambda: self._meter.coarsely(pair, predicted))
             fit = self.locator.locate(pair, predicted)
-            tracked = self._judged(pair, fit, goal, timings, predicted)
+            tracked = self._judged(pair, fit, goal, timings, predicted, rough.result())
         if tracked.verdict.status is Status.LOST:
             pair, timings = self._rectified_pair(left, right, predicted)
             timings = sum_timings(tracked.timings, timings)
@@ -253,13 +257,14 @@ class Line:
         goal: Goal,
         timings: LineTimings,
         predicted: RigidTransform | None = None,
+        rough: RoughMap | None = None,
     ) -> TrackedFrame:
         """Judge, and hand the pose out in the unrectified left camera."""
         if fit is None:
             return self._lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
         found = fit.measured.disparity
-        coarse_px = self._meter.coarsely(pair, fit.pose, found)
+        coarse_px = self._rough_px(pair, fit, rough)
         view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
         verdict = self._judge.judge(
             self.model, fit.estimate, found, goal, predicted, coarse_px, view
@@ -270,6 +275,19 @@ class Line:
         if verdict.predicted_tre_mm is None:
             return TrackedFrame(name, None, verdict, timings)
         return TrackedFrame(name, self._unrectified(fit.estimate), verdict, timings)
+
+    def _rough_px(
+        self, pair: RectifiedPair, fit: Fit, rough: RoughMap | None
+    ) -> NDArray[np.float32] | None:
+        """Rough disparity over the box of a fit; matched anew when there is none of all of it."""
+        found = fit.measured.disparity
+        height, width = found.disparity_px.shape
+        box = Box(found.x, found.y, width, height)
+        known_px = None if rough is None else rough.over(box)
+        if known_px is not None:
+            return known_px
+        rough = self._meter.coarsely(pair, fit.pose, box)
+        return None if rough is None else rough.disparity_px
 
     def _lost(self, reason: Reason, timings: LineTimings | None = None) -> TrackedFrame:
         verdict = Verdict(Status.LOST, None, (reason,))

@@ -45,7 +45,7 @@ class Margins:
 
 
 # What hides the bone may be so much nearer; what is seen through a wrong pose, so much further.
-_AROUND = Margins(box_px=0, band_mm=60.0)
+_AROUND = Margins(box_px=24, band_mm=60.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +89,25 @@ class Expected:
     support_px: NDArray[np.float32]
     view: RenderedView
     render_ms: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoughMap:
+    """What lies where, to about a pixel.
+
+    Attributes:
+        disparity_px: (h, w) over the box, NaN where unknown.
+        box: of the rectified left view.
+    """
+
+    disparity_px: NDArray[np.float32]
+    box: Box
+
+    def over(self, box: Box) -> NDArray[np.float32] | None:
+        """(h, w) of a box inside this one; None when it reaches beyond."""
+        row, column = box.y - self.box.y, box.x - self.box.x
+        part = self.disparity_px[max(row, 0) :, max(column, 0) :][: box.height, : box.width]
+        return part if min(row, column) >= 0 and part.shape == (box.height, box.width) else None
 
 
 class SurfaceMeter:
@@ -142,14 +161,20 @@ class SurfaceMeter:
         return Measurement(answer.disparity, cloud, answer.timings, share, FREE_CORRELATION_PX)
 
     def coarsely(
-        self, pair: RectifiedPair, pose: RigidTransform, found: DisparityMap
-    ) -> NDArray[np.float32] | None:
-        """(h, w) rough disparity of whatever lies in a map's box; None out of view or depth."""
+        self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
+    ) -> RoughMap | None:
+        """Whatever lies in a box, roughly; None out of view or depth.
+
+        Args:
+            pair: pictures.
+            pose: of the bone: tells the depth.
+            box: of the rectified left view; None is around the bone, with some room.
+        """
         region = self._region(pose, _AROUND)
         if region is None:
             return None
-        height, width = found.disparity_px.shape
-        return match_coarsely(replace(pair, box=Box(found.x, found.y, width, height)), region[1])
+        around = box or region[0]
+        return RoughMap(match_coarsely(replace(pair, box=around), region[1]), around)
 
     def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from navapp.geometry.bands import in_row_bands, run_both
+from navapp.geometry.bands import beside, in_row_bands, run_both
 
 
 def test_halves_of_halves_do_not_wait_for_each_other():
@@ -47,3 +47,25 @@ def test_the_lower_half_begins_at_a_multiple(every):
     in_row_bands(200, lambda first, last: first_rows.append(first), every)
     assert max(first_rows) > 0
     assert all(first % every == 0 for first in first_rows)
+
+
+def test_a_job_beside_runs_on_its_own_and_its_error_is_told():
+    name = beside(lambda: threading.current_thread().name).result(20.0)
+    assert name != threading.current_thread().name
+
+    def fails():
+        raise ValueError("beside")
+
+    with pytest.raises(ValueError, match="beside"):
+        beside(fails).result(20.0)
+
+
+def test_halves_of_a_job_beside_do_not_wait_for_others():
+    done = []
+    jobs = [
+        beside(lambda: run_both(lambda: done.append("a"), lambda: done.append("b")))
+        for _ in range(4)
+    ]
+    for job in jobs:
+        job.result(20.0)
+    assert sorted(done) == ["a"] * 4 + ["b"] * 4
