@@ -216,8 +216,8 @@ def _scanned(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float
     view = cv2.resize(picture, (int(size[0]), int(size[1])), interpolation=cv2.INTER_AREA)
     # A box may lie half outside the picture.
     margin = _SIZE_PX // 2
-    view = cv2.copyMakeBorder(view, *[margin] * 4, cv2.BORDER_REPLICATE).astype(np.float32)
-    maps = _correlated(view, memory.examples.parts[-1])
+    view = cv2.copyMakeBorder(view, margin, margin, margin, margin, cv2.BORDER_REPLICATE)
+    maps = _correlated(view.astype(np.float32), memory.examples.parts[-1])
     loose = np.ones((2 * _LOOSE_PX + 1,) * 2, np.uint8)
     score = np.mean([np.asarray(cv2.dilate(one, loose)) for one in maps], axis=0)
     found = []

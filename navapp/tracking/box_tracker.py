@@ -1,8 +1,8 @@
 """The bone's box from picture to picture, with or without a pose (the paper's bounding box).
 
-Tracking-learning-detection after Kalal, Mikolajczyk, Matas (PAMI 2012): median flow follows the box,
-a detector finds it again, and it learns. It learns from frames that the judge accepted and from
-nothing else: what the box looks like in them is known, so that no mistake of its own feeds it.
+Tracking-learning-detection after Kalal, Mikolajczyk, Matas (PAMI 2012): median flow follows the
+box, a detector finds it again, and it learns. It learns from frames that the judge accepted and
+from nothing else: where the box lies in them is known, so that no mistake of its own feeds it.
 """
 
 from dataclasses import dataclass, replace

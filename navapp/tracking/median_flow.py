@@ -34,7 +34,8 @@ def median_flow(before: Grey, after: Grey, box: PictureBox) -> PictureBox | None
     """The box in the next picture; None when its points were not followed.
 
     Args:
-        before, after: (H, W) grey pictures of the same size.
+        before: (H, W) grey picture.
+        after: the next one, of the same size.
         box: in the first one.
     """
     around = _around(box, before.shape)
@@ -148,4 +149,5 @@ def _windows(picture: Grey, points: FloatArray) -> FloatArray:
     rows = (points[:, 1:] + dy).astype(np.float32)
     values = cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     windows = values.astype(np.float64)
-    return windows - windows.mean(axis=1, keepdims=True)
+    centred: FloatArray = windows - windows.mean(axis=1, keepdims=True)
+    return centred
