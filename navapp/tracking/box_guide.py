@@ -12,8 +12,6 @@ from navapp.tracking.box_tracker import BoxState, followed, placed
 from navapp.tracking.picture_box import PictureBox
 from navapp.values import Status, TrackedFrame
 
-# A bone that is hidden by more is not learned from: the hand would be learned with it.
-_MOST_HIDDEN = 0.1
 # The size of a box is known to a few percent: depth follows it only where it changed by more.
 _SAME_SIZE = 0.1
 # A bone whose box moved it by less is found from where it was last seen.
@@ -46,15 +44,15 @@ class BoxGuide:
             return followed(state, left)
         if start is None:
             return None
-        return placed(None, left, self.projected(start), learns=True)
+        return placed(None, left, self.projected(start), hidden_share=0.0)
 
     def placed(self, state: BoxState | None, left: Image, tracked: TrackedFrame) -> BoxState | None:
         """The box after a frame: the pose's projection, if there is a pose."""
         pose, verdict = tracked.left_from_bone, tracked.verdict
         if pose is None or verdict.status is Status.LOST:
             return state
-        learns = verdict.status is Status.OK and verdict.occluded_share <= _MOST_HIDDEN
-        return placed(state, left, self.projected(pose), learns=learns)
+        hidden_share = verdict.occluded_share if verdict.status is Status.OK else None
+        return placed(state, left, self.projected(pose), hidden_share)
 
     def starts(self, expected: RigidTransform, state: BoxState | None) -> list[RigidTransform]:
         """Poses from which a bone is searched: where its box lies, and where it was expected."""

@@ -18,9 +18,12 @@ from navapp.tracking.picture_box import PictureBox
 _REDUCTION = 4
 # One accepted frame of so many is learned from.
 _LEARN_EVERY = 15
+# A frame that hides so much more of the bone than another one did is not learned from: the hand
+# would be learned with it. (Tissue hides a part of it always.)
+_HAND_SHARE = 0.1
 # A box found anywhere in the picture must be so like an accepted one, in itself and beside the
 # counterexamples ...
-_FOUND = 0.38, 0.54
+_FOUND = 0.45, 0.54
 # ... one that the flow has carried along need not be as much.
 _CARRIED = 0.28, 0.48
 
@@ -33,13 +36,15 @@ class BoxState:
         picture: the newest one, grey and reduced.
         box: in that picture, px of the reduced one; None when it is not known.
         memory: what it looked like in accepted frames; None before the first.
-        n_accepted: accepted frames so far.
+        n_accepted: accepted frames so far that were learned from or might have been.
+        least_hidden: smallest share of the bone that was hidden in an accepted frame.
     """
 
     picture: Grey
     box: PictureBox | None
     memory: BoxMemory | None = None
     n_accepted: int = 0
+    least_hidden: float = 1.0
 
     @property
     def picture_box(self) -> PictureBox | None:
@@ -48,7 +53,7 @@ class BoxState:
 
 
 def placed(
-    state: BoxState | None, left: Image, box: PictureBox | None, *, learns: bool
+    state: BoxState | None, left: Image, box: PictureBox | None, hidden_share: float | None
 ) -> BoxState:
     """After a frame with a pose: its projection is the box.
 
@@ -56,16 +61,21 @@ def placed(
         state: before; None at first.
         left: (H, W) or (H, W, 3) picture of the left camera.
         box: of the pose, in that picture.
-        learns: the judge accepted the pose, and nothing hides the bone.
+        hidden_share: of the bone, when the judge accepted the pose; None otherwise.
     """
     picture = reduced(left)
-    memory, n_accepted = (None, 0) if state is None else (state.memory, state.n_accepted)
+    state = BoxState(picture, None) if state is None else state
     small = None if box is None else box.resized(1.0 / _REDUCTION)
-    if small is None or not learns:
-        return BoxState(picture, small, memory, n_accepted)
-    if memory is None or n_accepted % _LEARN_EVERY == 0:
+    state = replace(state, picture=picture, box=small)
+    if small is None or hidden_share is None:
+        return state
+    least_hidden = min(state.least_hidden, hidden_share)
+    if hidden_share > least_hidden + _HAND_SHARE:
+        return state
+    memory = state.memory
+    if memory is None or state.n_accepted % _LEARN_EVERY == 0:
         memory = taught(memory, picture, small)
-    return BoxState(picture, small, memory, n_accepted + 1)
+    return BoxState(picture, small, memory, state.n_accepted + 1, least_hidden)
 
 
 def followed(state: BoxState, left: Image) -> BoxState:
