@@ -18,7 +18,7 @@ _INSET_SHARE = 0.05
 # The box moves by less between two pictures.
 _REACH_PX, _REACH_SHARE = 16, 0.3
 _WINDOW_PX = 9
-_LEVELS = 3
+_LEVELS = 2
 # A point that does not come back to within this is not followed (a pixel of the reduced picture);
 # half of them must be.
 _BACK_PX = 1.0
@@ -26,8 +26,9 @@ _LEAST_NCC = 0.5
 # Followed points whose motions scatter by more than this share of the box follow different things.
 _LARGEST_SCATTER = 0.08
 _LEAST_POINTS = 12
-# Pictures whose mean brightness differs by less are left as they are.
+# Pictures whose brightness differs by less are left as they are.
 _SAME_LIGHT = 0.02
+_THINNED = 4
 
 
 def median_flow(before: Grey, after: Grey, box: PictureBox) -> PictureBox | None:
@@ -105,10 +106,14 @@ def _around(box: PictureBox, shape: tuple[int, ...]) -> tuple[slice, slice]:
 
 
 def _lit_as(picture: Grey, other: Grey) -> Grey:
-    """A picture as bright as another one: points are followed by their brightness."""
+    """A picture as bright as another one: points are followed by their brightness.
+
+    By the median over pixels, which a hand that comes does not change.
+    """
     import cv2
 
-    gain = cv2.mean(other)[0] / max(cv2.mean(picture)[0], 1.0)
+    some, others = (one[::_THINNED, ::_THINNED].astype(np.float64) for one in (picture, other))
+    gain = float(np.median((others + 1.0) / (some + 1.0)))
     if abs(gain - 1.0) < _SAME_LIGHT:
         return picture
     return np.asarray(cv2.convertScaleAbs(picture, alpha=gain), dtype=np.uint8)

@@ -1,6 +1,7 @@
 """The bone's box without a pose, and how soon both are found again (docs/accuracy.md).
 
-usage: python -m tests.bench.box_tracking [--first N] [--seeds N] [--frames N] [--only WORD] [--line]
+usage: python -m tests.bench.box_tracking [--first N] [--seeds N] [--frames N] [--only WORD]
+           [--line]
 
 Simulated knees, half of them left ones, in the situations of the paper and two harder ones. Each is
 registered in its first frame from its nominal pose; from then on the box is followed by pictures
