@@ -37,7 +37,7 @@ _LEAST_SCORE = 0.2
 # Nothing but the box is so like it.
 SURE = 0.6
 # Shares of the box's size by which it is moved and scaled, in turn.
-_POLISHING_STEPS = (0.04, 0.02)
+_POLISHING_STEPS = (0.04, 0.04, 0.02)
 _NEIGHBOURS = ((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))
 # A part that agrees so well tells where it lies.
 _AGREEING = 0.6

@@ -16,12 +16,16 @@ def texture(shape: tuple[int, int], sigma: float, deviation: float, seed: int) -
 
 
 def scene(
-    shift=(0.0, 0.0), scale: float = 1.0, gain: float = 1.0, hidden_share: float = 0.0, seed: int = 0
+    shift=(0.0, 0.0),
+    scale: float = 1.0,
+    gain: float = 1.0,
+    hidden_share: float = 0.0,
+    seed: int = 0,
 ) -> np.ndarray:
     """A patterned box on a duller ground; a bright hand may lie over its lower part."""
     picture = 70.0 + texture(SHAPE, 6.0, 8.0, 1) + texture(SHAPE, 1.5, 2.0, 2)
     size = (int(BOX.height), int(BOX.width))
-    thing = 130.0 + texture(size, 7.0, 35.0, 3) + texture(size, 2.5, 12.0, 4)
+    thing = 130.0 + texture(size, 4.0, 30.0, 3) + texture(size, 1.5, 12.0, 4)
     matrix = np.array([[scale, 0.0, 0.0], [0.0, scale, 0.0]])
     box = box_at(shift, scale)
     matrix[:, 2] = box.x, box.y

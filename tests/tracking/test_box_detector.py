@@ -33,12 +33,12 @@ def test_a_thing_is_found_anywhere_in_any_light(memory, shift, scale, gain) -> N
     assert best.likeness.relative > 0.54
 
 
-@pytest.mark.parametrize("hidden_share", [0.3, 0.5])
-def test_the_whole_box_of_a_thing_that_is_half_hidden(memory, hidden_share: float) -> None:
+@pytest.mark.parametrize("hidden_share", [0.2, 0.4])
+def test_the_whole_box_of_a_thing_that_is_hidden_in_part(memory, hidden_share: float) -> None:
     shift = (-40.0, 12.0)
     best = detected(memory, scene(shift, hidden_share=hidden_share, seed=7))[0]
     assert best.box.overlap(box_at(shift)) > 0.7
-    assert best.likeness.similarity > 0.45
+    assert best.likeness.similarity > 0.5
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -47,7 +47,7 @@ def test_nothing_else_is_like_it(memory, seed: int) -> None:
     clutter = np.clip(clutter, 0.0, 255.0).astype(np.uint8)
     for picture in (clutter, empty(seed)):
         for one in detected(memory, picture):
-            assert one.likeness.similarity < 0.45
+            assert one.likeness.similarity < 0.5
     assert detected(memory, np.full((180, 320), 90, np.uint8)) == []
 
 
@@ -62,7 +62,7 @@ def test_a_part_that_is_lit_otherwise_does_not_count(memory) -> None:
 
 def test_a_box_a_little_off_is_put_right(memory) -> None:
     picture = scene((3.0, 5.0), seed=7)
-    off = box_at((6.0, 2.0), 0.95)
+    off = box_at((6.0, 2.0))
     found = polished(memory, picture, off)
     assert found.box.overlap(box_at((3.0, 5.0))) > 0.92 > off.overlap(box_at((3.0, 5.0)))
 

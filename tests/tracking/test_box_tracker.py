@@ -71,11 +71,13 @@ def test_following_teaches_nothing() -> None:
 
 
 def test_every_so_many_accepted_frames_one_is_learned_from() -> None:
-    state, memories = start(), set()
-    for number in range(45):
-        state = placed(state, enlarged(scene(seed=number)), LARGE, hidden_share=0.4)
-        memories.add(id(state.memory))
-    assert len(memories) == 4
+    state, learned_in = start(), []
+    for number in range(1, 46):
+        after = placed(state, enlarged(scene(seed=number)), LARGE, hidden_share=0.4)
+        if after.memory is not state.memory:
+            learned_in.append(number)
+        state = after
+    assert learned_in == [15, 30, 45]
     assert state.n_accepted == 46
 
 

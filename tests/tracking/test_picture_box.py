@@ -16,7 +16,7 @@ def test_a_box_around_points() -> None:
 
 def test_moving_scales_about_the_middle() -> None:
     moved = A.moved(np.array([5.0, -2.0]), 2.0)
-    np.testing.assert_allclose(moved.centre, A.centre + (5.0, -2.0))
+    np.testing.assert_allclose(moved.centre, A.centre + np.array([5.0, -2.0]))
     assert (moved.width, moved.height) == (80.0, 60.0)
 
 
