@@ -37,7 +37,7 @@ from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 
-# The detector's limits were chosen on seeds 0 to 4.
+# The detector's limits were chosen on seeds 0 to 3.
 FIRST_SEED = 5
 GOAL = Goal(np.empty((0, 3)), 2.0)
 RIGHT = 0.7
