@@ -10,25 +10,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
+from navapp.tracking.box_windows import (
+    LEAST_DEVIATION,
+    ORIGINS,
+    PART_PX,
+    SIZE_PX,
+    FloatPicture,
+    Windows,
+    joined,
+    seen,
+)
 from navapp.tracking.median_flow import Grey
 from navapp.tracking.picture_box import PictureBox
 
-FloatPicture = NDArray[np.float32]
-
 MOST_EXAMPLES, MOST_COUNTEREXAMPLES = 30, 60
 
-# A box is looked at as so many pixels square, in parts that overlap a little.
-_SIZE_PX, _PART_PX, _STEP_PX = 26, 10, 8
-_ORIGINS = [(y, x) for y in range(0, 17, _STEP_PX) for x in range(0, 17, _STEP_PX)]
-# A part whose grey values deviate by less shows nothing (sensor noise of the reduced picture is
-# about a half).
-_LEAST_DEVIATION = 2.5
-# Parts of the bone become brighter together: means and deviations within these factors (log), which
-# leave room for its turning under the lamps.
-_SAME_MEAN, _SAME_DEVIATION = 0.35, 0.6
 _SCALES = (1.0, 0.9, 1.11)
 # Parts move against each other when the bone turns.
 _LOOSE_PX = 1
@@ -46,50 +44,6 @@ _LARGEST_RESCALE = 0.08
 # An example like one that is kept adds nothing.
 _KNOWN = 0.9
 _APART = 0.5
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Windows:
-    """What boxes look like, part by part.
-
-    Attributes:
-        parts: (n, parts, values) without their mean and of unit length; zeros where one is flat.
-        light: (n, parts, 2) logarithms of the mean and of the deviation of the grey values.
-    """
-
-    parts: FloatPicture
-    light: FloatPicture
-
-    def __len__(self) -> int:
-        return len(self.parts)
-
-    def selected(self, which: slice) -> "Windows":
-        """Some of them."""
-        return Windows(self.parts[which], self.light[which])
-
-    def similarity(self, window: "Windows") -> float:
-        """Mean correlation of the parts of one window with those of the nearest; 0 without any.
-
-        Parts count that agree on how much brighter or darker all has become.
-        """
-        if len(self) == 0:
-            return 0.0
-        agreement = np.maximum((window.parts * self.parts).sum(axis=2), 0.0)
-        brighter = window.light - self.light
-        # Every part's opinion is tried; (n, opinions, parts).
-        mean_off = np.abs(brighter[:, None, :, 0] - brighter[:, :, None, 0])
-        deviation_off = np.abs(brighter[:, None, :, 1] - brighter[:, :, None, 0])
-        is_one = (mean_off < _SAME_MEAN) & (deviation_off < _SAME_DEVIATION)
-        agreed = (is_one * agreement[:, None]).mean(axis=2)
-        return float(agreed.max())
-
-
-def joined(windows: Sequence[Windows]) -> Windows:
-    """All of them, in order."""
-    return Windows(
-        np.concatenate([some.parts for some in windows]),
-        np.concatenate([some.light for some in windows]),
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,9 +92,9 @@ def taught(memory: BoxMemory | None, picture: Grey, box: PictureBox) -> BoxMemor
         picture: (H, W) grey.
         box: in it.
     """
-    window = _seen(picture, box)
+    window = seen(picture, box)
     if memory is None:
-        around = joined([_seen(picture, other) for other in _around(box)])
+        around = joined([seen(picture, other) for other in _around(box)])
         memory = BoxMemory(window, around, box.width, box.height)
     elif memory.examples.similarity(window) < _KNOWN:
         # The first one, of the registration, stays.
@@ -150,7 +104,7 @@ def taught(memory: BoxMemory | None, picture: Grey, box: PictureBox) -> BoxMemor
     else:
         return replace(memory, width_px=box.width, height_px=box.height)
     mistaken = [
-        _seen(picture, found.box)
+        seen(picture, found.box)
         for found in detected(memory, picture)
         if found.box.overlap(box) < _APART
     ]
@@ -161,7 +115,7 @@ def taught(memory: BoxMemory | None, picture: Grey, box: PictureBox) -> BoxMemor
 
 def likeness(memory: BoxMemory, picture: Grey, box: PictureBox) -> Likeness:
     """How much a box of a picture looks like what was accepted."""
-    window = _seen(picture, box)
+    window = seen(picture, box)
     similarity = memory.examples.similarity(window)
     other = memory.counterexamples.similarity(window)
     total = similarity + other
@@ -211,11 +165,11 @@ def _scanned(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float
 
     width, height = scale * memory.width_px, scale * memory.height_px
     shape = np.array([picture.shape[1], picture.shape[0]])
-    size = np.round(shape * _SIZE_PX / (width, height)).astype(int)
-    size = np.maximum(size, _SIZE_PX)
+    size = np.round(shape * SIZE_PX / (width, height)).astype(int)
+    size = np.maximum(size, SIZE_PX)
     view = cv2.resize(picture, (int(size[0]), int(size[1])), interpolation=cv2.INTER_AREA)
     # A box may lie half outside the picture.
-    margin = _SIZE_PX // 2
+    margin = SIZE_PX // 2
     view = cv2.copyMakeBorder(view, margin, margin, margin, margin, cv2.BORDER_REPLICATE)
     maps = _correlated(view.astype(np.float32), memory.examples.parts[-1])
     loose = np.ones((2 * _LOOSE_PX + 1,) * 2, np.uint8)
@@ -226,10 +180,10 @@ def _scanned(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float
         if best < _LEAST_SCORE:
             break
         shift, rescale = _settled(maps, x, y)
-        middle = (np.array([x, y]) + shift - margin + 0.5 * _SIZE_PX) * shape / size - 0.5
+        middle = (np.array([x, y]) + shift - margin + 0.5 * SIZE_PX) * shape / size - 0.5
         box = PictureBox(0.0, 0.0, width, height)
         found.append((best, box.moved(middle - box.centre, rescale)))
-        reach = _SIZE_PX // 3
+        reach = SIZE_PX // 3
         score[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = 0.0
     return found
 
@@ -238,19 +192,19 @@ def _correlated(view: FloatPicture, example: FloatPicture) -> FloatPicture:
     """(parts, h, w) correlation of every part, by the corner of the box; 0 where it is flat."""
     import cv2
 
-    kernel = (_PART_PX, _PART_PX)
+    kernel = (PART_PX, PART_PX)
     mean = cv2.boxFilter(view, -1, kernel, anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
     square = cv2.sqrBoxFilter(
         view, cv2.CV_32F, kernel, anchor=(0, 0), borderType=cv2.BORDER_REPLICATE
     )
-    is_flat = square - mean * mean < _LEAST_DEVIATION**2
-    height, width = view.shape[0] - _SIZE_PX + 1, view.shape[1] - _SIZE_PX + 1
-    maps = np.zeros((len(_ORIGINS), height, width), np.float32)
-    for k, (y, x) in enumerate(_ORIGINS):
+    is_flat = square - mean * mean < LEAST_DEVIATION**2
+    height, width = view.shape[0] - SIZE_PX + 1, view.shape[1] - SIZE_PX + 1
+    maps = np.zeros((len(ORIGINS), height, width), np.float32)
+    for k, (y, x) in enumerate(ORIGINS):
         part = example[k].reshape(kernel)
         if not part.any():
             continue
-        inside = view[y : y + height + _PART_PX - 1, x : x + width + _PART_PX - 1]
+        inside = view[y : y + height + PART_PX - 1, x : x + width + PART_PX - 1]
         found = cv2.matchTemplate(inside, part, cv2.TM_CCOEFF_NORMED)
         found[is_flat[y : y + height, x : x + width]] = 0.0
         np.maximum(found, 0.0, out=maps[k])
@@ -268,56 +222,12 @@ def _settled(maps: FloatPicture, x: int, y: int) -> tuple[FloatArray, float]:
     shifts = np.column_stack([columns + x0 - x, rows + y0 - y])[agrees].astype(np.float64)
     if agrees.sum() < _LEAST_AGREEING:
         return np.zeros(2), 1.0
-    places = np.array(_ORIGINS, np.float64)[agrees][:, ::-1] + 0.5 * (_PART_PX - _SIZE_PX)
+    places = np.array(ORIGINS, np.float64)[agrees][:, ::-1] + 0.5 * (PART_PX - SIZE_PX)
     spread = places - places.mean(axis=0)
     rescale = float((spread * (shifts - shifts.mean(axis=0))).sum() / max((spread**2).sum(), 1.0))
     rescale = float(np.clip(rescale, -_LARGEST_RESCALE, _LARGEST_RESCALE))
     shift: FloatArray = np.mean(shifts - rescale * places, axis=0)
     return shift, 1.0 + rescale
-
-
-def _window(picture: Grey, box: PictureBox) -> FloatPicture:
-    """(size, size) of a box, however large; the picture's rim goes on beyond it."""
-    import cv2
-
-    scale = np.array([box.width, box.height]) / _SIZE_PX
-    # Blurred as by the resizing of a whole picture, which takes the mean of what falls together.
-    sigma = 0.5 * np.sqrt(np.maximum(scale**2 - 1.0, 1e-3))
-    low = np.floor([box.x - 4, box.y - 4]).astype(int)
-    high = np.ceil([box.x + box.width + 5, box.y + box.height + 5]).astype(int)
-    (x0, y0), (x1, y1) = np.clip(low, 0, None), np.minimum(high, picture.shape[::-1])
-    if x1 - x0 < 2 or y1 - y0 < 2:
-        return np.zeros((_SIZE_PX, _SIZE_PX), np.float32)
-    part = picture[y0:y1, x0:x1].astype(np.float32)
-    part = np.asarray(cv2.GaussianBlur(part, (0, 0), float(sigma[0]), sigmaY=float(sigma[1])))
-    matrix = np.array(
-        [
-            [scale[0], 0.0, box.x - x0 + 0.5 * scale[0]],
-            [0.0, scale[1], box.y - y0 + 0.5 * scale[1]],
-        ]
-    )
-    window = cv2.warpAffine(
-        part,
-        matrix,
-        (_SIZE_PX, _SIZE_PX),
-        flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    return np.asarray(window, dtype=np.float32)
-
-
-def _seen(picture: Grey, box: PictureBox) -> Windows:
-    """What a box looks like, as one of `Windows`."""
-    window = _window(picture, box)
-    parts = np.stack([window[y : y + _PART_PX, x : x + _PART_PX].ravel() for y, x in _ORIGINS])
-    mean = parts.mean(axis=1, keepdims=True)
-    parts = parts - mean
-    length = np.linalg.norm(parts, axis=1, keepdims=True)
-    deviation = np.maximum(length / _PART_PX, _LEAST_DEVIATION)
-    shows = length >= _LEAST_DEVIATION * _PART_PX
-    unit = np.where(shows, parts / np.maximum(length, 1e-6), 0.0).astype(np.float32)
-    light = np.log(np.hstack([np.maximum(mean, 1.0), deviation]))
-    return Windows(unit[None], light[None])
 
 
 def _around(box: PictureBox) -> Sequence[PictureBox]:
