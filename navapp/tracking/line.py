@@ -22,6 +22,7 @@ from navapp.registration import (
     find_candidates,
     tilted_starts,
 )
+from navapp.tracking.box_guide import BoxGuide
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
@@ -102,6 +103,7 @@ class Line:
         self._first_look = FirstLook(
             self._meter.rectifier, self.model, self.settings.depth_mm, aspects
         )
+        self._boxes = BoxGuide(rig, self.model)
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
         self.locator = Locator(self._meter, self.model, self._score, self.settings.locator)
@@ -115,20 +117,44 @@ class Line:
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame (the paper's intra-operative loop)."""
-        predicted = self._rectified(state.predicted(captured_ns, self.centre_mm))
+        expected = state.predicted(captured_ns, self.centre_mm)
+        predicted, boxes = self._rectified(expected), state.box
         tracked = self._lost(Reason.BONE_LOST)
+        if self.locator.is_baseline:
+            # The baseline has its box from the pictures, and its start from the box.
+            boxes = self._boxes.followed(boxes, left, state.left_from_bone)
+            expected = self._boxes.starts(expected, boxes)[0]
         if state.n_lost == 0:
-            pair, timings = self._rectified_pair(left, right, predicted, _NEAR_VIEW)
+            start = self._rectified(expected)
+            pair, timings = self._rectified_pair(left, right, start, _NEAR_VIEW)
             # What may hide the bone does not depend on where exactly it is.
-            rough = beside(lambda: self._meter.coarsely(pair, predicted))
-            fit = self.locator.locate(pair, predicted)
+            rough = beside(lambda: self._meter.coarsely(pair, start))
+            fit = self.locator.locate(pair, start)
             tracked = self._judged(pair, fit, goal, timings, predicted, rough.result())
         if tracked.verdict.status is Status.LOST:
-            pair, timings = self._rectified_pair(left, right, predicted)
-            timings = sum_timings(tracked.timings, timings)
-            fit = self.locator.search(pair, predicted, self.settings.locator.search)
-            tracked = self._judged(pair, fit, goal, timings, predicted)
-        return tracked, state.updated(tracked, captured_ns, self.centre_mm)
+            if not self.locator.is_baseline:
+                boxes = self._boxes.followed(boxes, left)
+            for place in self._boxes.starts(expected, boxes):
+                tracked = self._searched(left, right, place, predicted, goal, tracked.timings)
+                if tracked.verdict.status is not Status.LOST:
+                    break
+        boxes = self._boxes.placed(boxes, left, tracked)
+        return tracked, replace(state.updated(tracked, captured_ns, self.centre_mm), box=boxes)
+
+    def _searched(
+        self,
+        left: Image,
+        right: Image,
+        start: RigidTransform,
+        predicted: RigidTransform,
+        goal: Goal,
+        spent: LineTimings,
+    ) -> TrackedFrame:
+        """Search around a pose of the left camera; `predicted` is for the judge."""
+        pose = self._rectified(start)
+        pair, timings = self._rectified_pair(left, right, pose)
+        fit = self.locator.search(pair, pose, self.settings.locator.search)
+        return self._judged(pair, fit, goal, sum_timings(spent, timings), predicted)
 
     def register(
         self,

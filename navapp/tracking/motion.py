@@ -1,10 +1,11 @@
 """Where the bone will be: constant velocity, damped, forgotten after a loss."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform, vector_from_rotation
+from navapp.tracking.box_tracker import BoxState
 from navapp.values import Status, TrackedFrame
 
 # A patient's limb slows down: the prediction takes this part of the last velocity.
@@ -22,12 +23,14 @@ class TrackState:
         captured_ns: when that was.
         velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
         n_lost: frames lost since then.
+        box: of the bone in the newest picture, and what it looks like; None before the first.
     """
 
     left_from_bone: RigidTransform
     captured_ns: int
     velocity: FloatArray
     n_lost: int = 0
+    box: BoxState | None = None
 
     @classmethod
     def at_rest(cls, left_from_bone: RigidTransform, captured_ns: int) -> "TrackState":
@@ -46,15 +49,15 @@ class TrackState:
     def updated(
         self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
     ) -> "TrackState":
-        """After a frame: a lost one keeps the pose and forgets the velocity."""
+        """After a frame: a lost one keeps the pose and forgets the velocity; the box stays."""
         pose = tracked.left_from_bone
         if pose is None or tracked.verdict.status is Status.LOST:
-            return TrackState(self.left_from_bone, self.captured_ns, np.zeros(6), self.n_lost + 1)
+            return replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
         elapsed_ns = captured_ns - self.captured_ns
         velocity = np.zeros(6)
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
             velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
-        return TrackState(pose, captured_ns, velocity)
+        return TrackState(pose, captured_ns, velocity, 0, self.box)
 
 
 def twist_between(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> FloatArray:

@@ -249,3 +249,54 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15
     )
     assert np.abs(estimate.covariance - inside.covariance).max() > 1e-6
+
+
+def lost_far_away(a: Room, n_seen: int = 2) -> TrackState:
+    """Of a bone that was followed, then expected 70 mm from where it is, and lost."""
+    truth = a.truth(a.frames[0])
+    state = TrackState.at_rest(truth, a.frames[0].captured_ns)
+    for frame in a.frames[:n_seen]:
+        _, state = a.line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    away = truth.moved((70.0, 0, 0, 0, 0, 0), truth.apply(a.line.centre_mm))
+    return replace(state, left_from_bone=away, n_lost=5)
+
+
+def test_the_box_leads_back_to_a_lost_bone() -> None:
+    a = room()
+    state, frame = lost_far_away(a), a.frames[2]
+    found, after = a.line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    assert a.error_mm(found.left_from_bone, frame) < 1.2
+    # So far from where it was expected, it has to be confirmed by the next frame.
+    assert found.verdict.reasons == (Reason.JUMPED,)
+    assert after.n_lost == 0
+    again, _ = a.line.track(frame.left, frame.right, frame.captured_ns + 66_000_000, after, GOAL)
+    assert again.verdict.status is Status.OK
+    boxless = replace(state, box=None)
+    found, _ = a.line.track(frame.left, frame.right, frame.captured_ns, boxless, GOAL)
+    assert found.verdict.status is Status.LOST
+
+
+def test_the_box_of_a_pose_is_its_projection() -> None:
+    a = room()
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    tracked, state = a.line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    mesh = a.line.model.bone.mesh
+    pixels = a.rig.left.project(tracked.left_from_bone.apply(mesh.vertices_mm))
+    box = state.box.picture_box
+    np.testing.assert_allclose([box.x, box.y], pixels.min(axis=0), atol=0.5)
+    np.testing.assert_allclose([box.width, box.height], np.ptp(pixels, axis=0), atol=0.5)
+
+
+def test_the_baseline_follows_the_box() -> None:
+    """Its judge accepts nothing, and still its start goes with the pictures."""
+    a = room()
+    line = Line(a.rig, a.line.model.bone, LineSettings(LocatorSettings(method="icp")))
+    frame, moved = a.frames[0], 60
+    truth = a.truth(frame)
+    state = TrackState.at_rest(truth, frame.captured_ns)
+    _, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    start = state.box.picture_box
+    left, right = (np.roll(eye, moved, axis=1) for eye in (frame.left, frame.right))
+    _, state = line.track(left, right, frame.captured_ns + 66_000_000, state, GOAL)
+    assert state.box.picture_box.x == pytest.approx(start.x + moved, abs=6.0)

@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import TrackState
+from navapp.tracking.box_tracker import BoxState
 from navapp.tracking.motion import twist_between
+from navapp.tracking.picture_box import PictureBox
 from navapp.values import LineTimings, PoseEstimate, Status, TrackedFrame, Verdict
 
 CENTRE = np.array([3.0, -20.0, 15.0])
@@ -56,6 +60,13 @@ def test_a_loss_keeps_the_pose_and_forgets_the_velocity(lost: TrackedFrame) -> N
     assert state.n_lost == 2
     assert state.left_from_bone is moving.left_from_bone
     assert not state.velocity.any()
+
+
+def test_the_box_stays_through_poses_and_losses() -> None:
+    box = BoxState(np.zeros((2, 2), np.uint8), PictureBox(0.0, 0.0, 1.0, 1.0))
+    state = replace(TrackState.at_rest(START, 0), box=box)
+    assert state.updated(frame(None, Status.LOST), PERIOD_NS, CENTRE).box is box
+    assert state.updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE).box is box
 
 
 def test_the_first_pose_after_a_loss_gives_no_velocity() -> None:
