@@ -44,11 +44,28 @@ class RenderedView:
         return edge
 
 
-def render(mesh: TriangleMesh, camera_from_mesh: RigidTransform, camera: Camera) -> RenderedView:
-    """The mesh as that camera sees it, lens distortion included (exact at the vertices)."""
+def render(
+    mesh: TriangleMesh,
+    camera_from_mesh: RigidTransform,
+    camera: Camera,
+    *,
+    is_whole: bool = True,
+) -> RenderedView:
+    """The mesh as that camera sees it, lens distortion included (exact at the vertices).
+
+    Args:
+        mesh: what is seen.
+        camera_from_mesh: its pose.
+        camera: that sees it.
+        is_whole: the whole picture; otherwise only the box around the mesh, empty out of view.
+    """
     points_mm = camera_from_mesh.apply(mesh.vertices_mm)
-    whole = Box(0, 0, camera.width, camera.height)
-    return _raster(camera.project(points_mm), points_mm[:, 2], mesh.faces, whole)
+    pixels = camera.project(points_mm)
+    box = Box(0, 0, camera.width, camera.height)
+    if not is_whole:
+        around = Box.around(pixels)
+        box = Box(0, 0, 0, 0) if around is None else around.clipped(camera.width, camera.height)
+    return _raster(pixels, points_mm[:, 2], mesh.faces, box)
 
 
 def render_rectified(

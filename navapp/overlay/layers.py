@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render
+from navapp.overlay.tint_kernels import tint_pixels
 from navapp.values import Plan, StageSpec
 
 Image = NDArray[np.uint8]
@@ -36,10 +38,15 @@ class Scene:
     camera: Camera
     is_candidate: bool
 
+    @property
+    def drawn_mesh(self) -> TriangleMesh:
+        """The bone in as many triangles as a picture can show."""
+        return drawn(self.mesh)
+
     @cached_property
     def view(self) -> RenderedView:
-        """The bone as the left camera sees it, distortion included; rendered once."""
-        return render(self.mesh, self.left_from_bone, self.camera)
+        """The bone's part of the left camera's picture, distortion included; rendered once."""
+        return render(self.drawn_mesh, self.left_from_bone, self.camera, is_whole=False)
 
     @property
     def colour(self) -> tuple[int, int, int]:
@@ -51,19 +58,17 @@ def draw_bone(image: Image, scene: Scene) -> None:
     """Outline, and creases and shape as a light veil, so that the bone beneath stays visible."""
     import cv2
 
-    view = scene.view
-    mask = view.mask
-    if not mask.any():
+    view, box, mesh = scene.view, scene.view.box, scene.drawn_mesh
+    if box.is_empty:
         return
-    faces = scene.mesh.faces[view.face_index[mask]]
-    normals = scene.left_from_bone.rotate(scene.mesh.normals[faces].mean(axis=1))
+    part = image[box.y : box.y + box.height, box.x : box.x + box.width]
     # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
-    steep = 1.0 - np.clip(np.abs(normals[:, 2]), 0.0, 1.0)
-    share = (0.10 + 0.35 * steep)[:, None]
-    tinted = image[mask] * (1.0 - share) + np.array(scene.colour) * share
-    image[mask] = tinted.astype(np.uint8)
-    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    cv2.drawContours(image, contours, -1, scene.colour, 2)
+    facing = np.abs(mesh.normals @ scene.left_from_bone.rotation[2])[mesh.faces].mean(axis=1)
+    share = 0.10 + 0.35 * (1.0 - np.clip(facing, 0.0, 1.0))
+    tint_pixels(part, view.face_index, share.astype(np.float32), scene.colour)
+    mask = view.mask.astype(np.uint8)
+    contours, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(image, contours, -1, scene.colour, 2, offset=(box.x, box.y))
 
 
 def draw_targets(image: Image, scene: Scene) -> None:
@@ -133,7 +138,7 @@ def _is_drawable(pixels: NDArray[np.float64]) -> bool:
 
 
 def _is_behind(view: RenderedView, pixel: NDArray[np.float64], depth_mm: float) -> bool:
-    u, v = (int(value) for value in np.round(pixel))
+    u, v = (int(value) for value in np.round(pixel) - (view.box.x, view.box.y))
     if not (0 <= v < view.depth_mm.shape[0] and 0 <= u < view.depth_mm.shape[1]):
         return False
     surface = view.depth_mm[v, u]

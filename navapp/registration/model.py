@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh, vertex_normals
-from navapp.geometry.simplify import simplified
+from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
 from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
@@ -17,8 +17,6 @@ _MOST_VOXELS = 400_000
 _LEAST_SIGMA_MM = 1e-3
 _SMOOTHING_ROUNDS = 2
 _GRID_MARGIN_MM = 14.0
-# Drawing takes as long as there are triangles; a camera cannot tell the difference.
-_DRAWN_VERTICES, _DRAWN_WITHIN_MM = 6500, 0.1
 
 
 class RegistrationModel:
@@ -50,14 +48,14 @@ class RegistrationModel:
     @cached_property
     def drawn_mesh(self) -> TriangleMesh:
         """`seen_mesh` in fewer triangles where it has many: what is rendered."""
-        return simplified(self.seen_mesh, _DRAWN_VERTICES, _DRAWN_WITHIN_MM)
+        return drawn(self.seen_mesh)
 
     @cached_property
     def is_closed(self) -> bool:
         """What is rendered has no border and looks outward."""
-        drawn = self.drawn_mesh
-        has_border = open_border(len(drawn.vertices_mm), drawn.faces).any()
-        return not has_border and drawn.volume_mm3() > 0.0
+        mesh = self.drawn_mesh
+        has_border = open_border(len(mesh.vertices_mm), mesh.faces).any()
+        return not has_border and mesh.volume_mm3() > 0.0
 
     @cached_property
     def drawn_face_sigma_mm(self) -> FloatArray:

@@ -153,7 +153,7 @@ def use_threads(n: int) -> None:
     cv2.setNumThreads(n)
     for pool in bands._pools:
         pool.shutdown()
-    bands._pools[:] = [ThreadPoolExecutor(n)]
+    bands._pools[:] = [ThreadPoolExecutor(n, initializer=bands._mark)]
 
 
 def median_ms(steps: dict[str, Callable[[], object]], repetitions: int) -> dict[str, float]:

@@ -31,13 +31,16 @@ def peers() -> dict[str, dict[str, Peer]]:
     }
 
 
-def open3d_plane(radius_mm: float, loss_mm: float, stop: float = 1e-6) -> Peer:
+def open3d_plane(
+    radius_mm: float, loss_mm: float, stop: float = 1e-6, most_steps: int = _MAX_ITERATIONS
+) -> Peer:
     """Point-to-plane with a Tukey loss; it ends when fitness and rms change by less than `stop`."""
     import open3d
 
     registration = open3d.pipelines.registration
     loss = registration.TukeyLoss(k=loss_mm)
-    return _open3d(radius_mm, lambda: registration.TransformationEstimationPointToPlane(loss), stop)
+    estimation = registration.TransformationEstimationPointToPlane
+    return _open3d(radius_mm, lambda: estimation(loss), stop, most_steps)
 
 
 def _point(radius_mm: float) -> Peer:
@@ -47,7 +50,12 @@ def _point(radius_mm: float) -> Peer:
     return _open3d(radius_mm, registration.TransformationEstimationPointToPoint)
 
 
-def _open3d(radius_mm: float, estimation: Callable[[], Any], stop: float = 1e-6) -> Peer:
+def _open3d(
+    radius_mm: float,
+    estimation: Callable[[], Any],
+    stop: float = 1e-6,
+    most_steps: int = _MAX_ITERATIONS,
+) -> Peer:
     import open3d
 
     targets: dict[int, Any] = {}
@@ -64,7 +72,7 @@ def _open3d(radius_mm: float, estimation: Callable[[], Any], stop: float = 1e-6)
         source = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points_mm))
         found = open3d.pipelines.registration.registration_icp(
             source, targets[id(model)], radius_mm, start.inverse().matrix, estimation(),
-            open3d.pipelines.registration.ICPConvergenceCriteria(stop, stop, _MAX_ITERATIONS),
+            open3d.pipelines.registration.ICPConvergenceCriteria(stop, stop, most_steps),
         )  # fmt: skip
         return _as_pose(found.transformation, start)
 

@@ -294,3 +294,19 @@ def test_neighbours_leave_no_seam(seed):
             False,
         )
         assert (face_index >= 0).all()
+
+
+def test_the_box_around_a_mesh_shows_what_the_whole_picture_shows() -> None:
+    seen_by = camera((-0.2, 0.08, 5e-4, -4e-4, 0.0))
+    pose = RigidTransform.from_parts("left", "bone", np.eye(3), (25.0, -12.0, 300.0))
+    whole, part = (render(sphere(), pose, seen_by, is_whole=flag) for flag in (True, False))
+    box = part.box
+    rows, columns = slice(box.y, box.y + box.height), slice(box.x, box.x + box.width)
+    np.testing.assert_array_equal(part.face_index, whole.face_index[rows, columns])
+    assert part.mask.sum() == whole.mask.sum() > 100
+    assert part.face_index.size < 0.5 * whole.face_index.size
+
+
+def test_the_box_around_a_mesh_out_of_view_is_empty() -> None:
+    away = RigidTransform.from_parts("left", "bone", np.eye(3), (9000.0, 0.0, 300.0))
+    assert render(sphere(), away, camera(), is_whole=False).box.is_empty
