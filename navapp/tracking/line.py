@@ -20,6 +20,7 @@ from navapp.registration import (
     find_candidates,
     tilted_starts,
 )
+from navapp.tracking.contours import ContourMeter
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
@@ -101,6 +102,7 @@ class Line:
         )
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
+        self._contours = ContourMeter(self.model, self._geometry)
         self.locator = Locator(self._meter, self.model, self._score, self.settings.locator)
 
     @property
@@ -259,6 +261,7 @@ class Line:
         started = time.perf_counter_ns()
         found = fit.measured.disparity
         coarse_px = self._meter.coarsely(pair, fit.pose, found)
+        fit = self._contours.joined(pair, fit, coarse_px)
         view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
         verdict = self._judge.judge(
             self.model, fit.estimate, found, goal, predicted, coarse_px, view

@@ -20,7 +20,7 @@ STEREO_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 _NEARBY = replace(STEREO_SETTINGS, widest_mm=3.0)
 # On the model a kernel as narrow as the noise costs little, and keeps out tissue that lies flush
 # with the bone.
-_ON_MODEL = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
+ON_MODEL = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class Locator:
         share, probe_ms = self._meter.probed_share(expected)
         fits: list[Fit] = []
         if share >= self.settings.hidden_share:
-            first = self._fitted(self._meter.on_model(expected), pose, _ON_MODEL)
+            first = self._fitted(self._meter.on_model(expected), pose, ON_MODEL)
             first = replace(first, moved_mm=self._moved_mm(pose, first.pose))
             fits.append(self._settled(pair, first))
         if not fits or not self._is_here(fits[0], pose):
@@ -168,7 +168,7 @@ class Locator:
             expected = self._meter.expected(pair, fit.pose, self.settings.tracking)
             if expected is None:
                 break
-            finer = self._fitted(self._meter.on_model(expected), fit.pose, _ON_MODEL)
+            finer = self._fitted(self._meter.on_model(expected), fit.pose, ON_MODEL)
             timings = sum_timings(fit.timings, finer.timings)
             if Reason.TOO_FEW_POINTS in finer.estimate.reasons:
                 return replace(fit, timings=timings)
