@@ -21,16 +21,14 @@ class RidgeEdges:
         edges: (E, 2) vertices.
         faces: (E, 2) the two triangles.
         opposite: (E, 2) the third vertex of either.
-        plane_normals: (F, 3) unit, outward; 0 of a triangle without area.
-        plane_offsets_mm: (F,) n.x of the triangle's plane.
+        planes: (4, F) unit outward normal n of each triangle, 0 without area, and n.x in mm on it.
     """
 
     vertices_mm: FloatArray
     edges: IntArray
     faces: IntArray
     opposite: IntArray
-    plane_normals: FloatArray
-    plane_offsets_mm: FloatArray
+    planes: NDArray[np.float32]
 
 
 def ridge_edges(mesh: TriangleMesh) -> RidgeEdges:
@@ -53,8 +51,7 @@ def ridge_edges(mesh: TriangleMesh) -> RidgeEdges:
         np.ascontiguousarray(ends[one], dtype=np.int32),
         _pairs(face[one], face[other]),
         _pairs(third[one], third[other]),
-        normals,
-        offsets,
+        np.ascontiguousarray(np.vstack([normals.T, offsets]), dtype=np.float32),
     )
 
 

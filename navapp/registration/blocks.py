@@ -89,7 +89,8 @@ def join(
     offset = np.zeros((7, 7))
     offset[6, 6] = 1.0 / block.common_sd**2
     rows = np.column_stack([block.jacobian, np.ones(len(block.residual))])
-    step, scale = np.zeros(7), 1.0
+    step: FloatArray = np.zeros(7)
+    scale = 1.0
     for _ in range(_ROUNDS):
         rest = block.residual - rows @ step
         kernel = np.exp(-0.5 * rest**2 / (_KERNEL_SIGMAS**2 * block.variance))
@@ -98,7 +99,9 @@ def join(
         weighted = rows.T * (count / block.variance)
         information = weighted @ rows
         normal = surface / surface_scale + offset + information / scale
-        step = np.linalg.solve(normal, weighted @ block.residual / scale)
+        step = np.asarray(
+            np.linalg.solve(normal, weighted @ block.residual / scale), dtype=np.float64
+        )
     if step @ surface @ step > _CONFLICT:
         return estimate
     inverse = np.linalg.inv(normal)
@@ -106,9 +109,7 @@ def join(
     claimed = surface / surface_scale**2 + offset + information * max(scale, 1.0) / scale**2
     covariance = (inverse @ claimed @ inverse)[:6, :6]
     pose = estimate.camera_from_bone.moved(step[:6], centre_mm)
-    return replace(
-        estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T)
-    )
+    return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
 
 
 def _scale(rest: FloatArray, count: FloatArray, variance: FloatArray) -> float:

@@ -11,22 +11,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.mesh_edges import RidgeEdges, ridge_edges
+from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.blocks import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
-from navapp.tracking.contour_kernels import (
+from navapp.tracking.contour_kernels import find_steps
+from navapp.tracking.locator import ON_MODEL, Fit
+from navapp.tracking.outline_kernels import (
     Eye,
+    Ridges,
     Rim,
     find_rim,
-    find_steps,
     is_outline,
     thin_rim,
     warp_depth,
 )
-from navapp.tracking.locator import ON_MODEL, Fit
 from navapp.values import DisparityMap, Origin
 
 # Where behind the outline it is less dark than this, the edge is as often that of tissue on the
@@ -59,11 +60,12 @@ class ContourMeter:
     def __init__(self, model: RegistrationModel, geometry: RectifiedGeometry) -> None:
         self._model = model
         self._geometry = geometry
-        self._ridges: RidgeEdges = ridge_edges(model.seen_mesh)
+        found = ridge_edges(model.seen_mesh)
+        self._ridges = Ridges(
+            found.vertices_mm, found.edges, found.faces, found.opposite, found.planes
+        )
 
-    def joined(
-        self, pair: RectifiedPair, fit: Fit, coarse_px: NDArray[np.float32] | None
-    ) -> Fit:
+    def joined(self, pair: RectifiedPair, fit: Fit, coarse_px: NDArray[np.float32] | None) -> Fit:
         """A fit to the model's surface, moved to what surface and outline say together.
 
         Any other fit stays as it is: from it the outline cannot be told from what lies around.
@@ -137,11 +139,7 @@ class ContourMeter:
         depth_mm: NDArray[np.float32],
         box: Box,
     ) -> Steps:
-        ridges = self._ridges
-        rim = find_rim(
-            ridges.vertices_mm, ridges.edges, ridges.faces, ridges.opposite, ridges.plane_normals,
-            ridges.plane_offsets_mm, np.array(pose.rotation), np.array(pose.translation_mm), eye,
-        )  # fmt: skip
+        rim = find_rim(self._ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye)
         rim = thin_rim(_only(rim, is_outline(rim, depth_mm, box.x, box.y)))
         offset_px = find_steps(picture, rim, _DARKER, _MISFIT)
         is_found = np.isfinite(offset_px)
@@ -188,8 +186,10 @@ class ContourMeter:
         )
 
 
-def _only(rim: Rim, is_kept: NDArray[np.bool_]) -> Rim:
-    return Rim(*(values[is_kept] for values in rim))
+def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
+    return Rim(
+        rim.point[kept], rim.pixel[kept], rim.normal[kept], rim.length[kept], rim.vertex[kept]
+    )
 
 
 def _at(values: NDArray[Any], pixels: FloatArray, box: Box, beside: float) -> NDArray[Any]:
