@@ -39,8 +39,9 @@ _INSIDE_PX, _LEAST_INSIDE = np.arange(4, 13), 0.4
 _BESIDE_PX, _NEARER_PX = 9, 1.0
 # Of an edge's place: sampling, texture up to the rim.
 _EDGE_SIGMA_PX = 0.15
-# A camera's tone curve moves all edges towards the dark.
-_COMMON_SD_PX = 0.15
+# The tone curve of video cameras moves all edges towards the dark by about so much, a linear one
+# does not.
+_COMMON_SD_PX = 0.3
 # Errors go together over a matching window as well as along a rim.
 _CORRELATION_PX = 11.0
 
