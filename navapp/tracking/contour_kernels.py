@@ -1,6 +1,5 @@
 """Compiled search for edges along the normals of an outline: where one picture has it."""
 
-import math
 
 import numpy as np
 from numba import njit
@@ -13,10 +12,8 @@ _STEP_PX, _SIGMA_PX = 0.5, 0.8
 _TAPS = 6
 _SEARCH, _NEAR_ENOUGH = 9, 4
 _HALF = _SEARCH + _TAPS
-# The step between two levels is told from so many samples on either side; the levels themselves
-# from the outer ones.
+# The levels on either side of an edge, from so many samples, the ones next to it left out.
 _FLANK, _LEVEL_FROM = 8, 4
-_WIDTHS_PX = np.array([0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4, 1.7, 2.0, 2.5])
 
 
 def _derivative() -> NDArray[np.float64]:
@@ -26,15 +23,7 @@ def _derivative() -> NDArray[np.float64]:
     return slope
 
 
-def _steps() -> NDArray[np.float64]:
-    """(widths, samples) of a falling step blurred by each width, mean-free."""
-    at = _STEP_PX * np.arange(-_FLANK, _FLANK + 1) / _WIDTHS_PX[:, None]
-    shapes = 0.5 - 0.5 * np.vectorize(math.erf)(at / math.sqrt(2.0))
-    centred: NDArray[np.float64] = shapes - shapes.mean(axis=1, keepdims=True)
-    return centred
-
-
-DERIVATIVE, STEPS = _derivative(), _steps()
+DERIVATIVE = _derivative()
 
 
 @njit(cache=True, nogil=True)
@@ -94,50 +83,29 @@ def strongest_edge(profile: NDArray[np.float64]) -> float:
 
 
 @njit(cache=True, nogil=True)
-def step_quality(profile: NDArray[np.float64]) -> tuple[float, float]:
-    """How much darker it is behind an edge, and how unlike a blurred step the profile is.
+def missing_share(profile: NDArray[np.float64]) -> float:
+    """Share of the level inside an edge that is missing outside.
 
     Args:
-        profile: (2 K + 1,) grey values across the edge, from inside to outside, its middle on it.
-
-    Returns:
-        Share of the inner level that is missing outside; rms of what the best step leaves over the
-        height of that step.
+        profile: grey values across the edge, from inside to outside, its middle on it.
     """
-    n = 2 * _FLANK + 1
-    inside, outside, mean = 0.0, 0.0, 0.0
-    for k in range(n):
-        mean += profile[k] / n
-        if k <= _FLANK - _LEVEL_FROM:
-            inside += profile[k] / (_FLANK - _LEVEL_FROM + 1)
-        elif k >= _FLANK + _LEVEL_FROM:
-            outside += profile[k] / (_FLANK - _LEVEL_FROM + 1)
-    squares = 0.0
-    for k in range(n):
-        squares += (profile[k] - mean) ** 2
-    misfit = np.inf
-    for s in range(STEPS.shape[0]):
-        cross, own = 0.0, 0.0
-        for k in range(n):
-            cross += STEPS[s, k] * profile[k]
-            own += STEPS[s, k] ** 2
-        height = cross / own
-        rest = max(squares - height * cross, 0.0)
-        misfit = min(misfit, np.sqrt(rest / n) / max(abs(height), 1.0))
-    return (inside - outside) / max(inside, 1.0), misfit
+    middle = profile.shape[0] // 2
+    inside = profile[: middle - _LEVEL_FROM + 1].mean()
+    outside = profile[middle + _LEVEL_FROM :].mean()
+    share: float = (inside - outside) / max(inside, 1.0)
+    return share
 
 
 @njit(cache=True, nogil=True)
 def find_steps(
-    picture: NDArray[np.uint8], rim: Rim, darker: float, misfit: float
+    picture: NDArray[np.uint8], rim: Rim, darker: float
 ) -> NDArray[np.float64]:
-    """(N,) px from each point to the picture's edge along the normal; NaN without a plain step.
+    """(N,) px from each point to the picture's edge along the normal; NaN without one.
 
     Args:
         picture: (h, w).
         rim: of the eye that took it.
         darker: least share of the level inside that is missing outside.
-        misfit: most that a blurred step may leave, in heights of it.
     """
     wide, flank = np.empty(2 * _HALF + 1), np.empty(2 * _FLANK + 1)
     offset = np.full(rim.pixel.shape[0], np.nan)
@@ -150,7 +118,6 @@ def find_steps(
         at = strongest_edge(wide)
         if np.isnan(at) or not sample_across(picture, (x + at * ux, y + at * uy), (ux, uy), flank):
             continue
-        missing, left_over = step_quality(flank)
-        if missing >= darker and left_over <= misfit:
+            if missing_share(flank) >= darker:
             offset[i] = at
     return offset

@@ -31,8 +31,8 @@ from navapp.tracking.outline_kernels import (
 from navapp.values import DisparityMap, Origin
 
 # Where behind the outline it is less dark than this, the edge is as often that of tissue on the
-# bone; a plain step leaves so little (both from simulated knees: docs/registration.md).
-_DARKER, _MISFIT = 0.7, 0.06
+# bone (from simulated knees: docs/registration.md).
+_DARKER = 0.7
 # Inside the outline the bone itself has to be measured, at these distances and so often.
 _INSIDE_PX, _LEAST_INSIDE = np.arange(4, 13), 0.4
 # Beside it nothing may be nearer by this much.
@@ -142,7 +142,7 @@ class ContourMeter:
     ) -> Steps:
         rim = find_rim(self._ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye)
         rim = thin_rim(_only(rim, is_outline(rim, depth_mm, box.x, box.y)))
-        offset_px = find_steps(picture, rim, _DARKER, _MISFIT)
+        offset_px = find_steps(picture, rim, _DARKER)
         is_found = np.isfinite(offset_px)
         return Steps(_only(rim, is_found), offset_px[is_found], eye)
 

@@ -4,7 +4,7 @@ usage: python -m tests.bench.outline [--seeds N] [--first SEED]
 
 One frame of each of N simulated knees (every fourth with a hand and an instrument in the view).
 The first table sorts the strongest edge near each point of the outline, at the true pose, by how
-dark it is behind it and by how well a blurred step explains it; the second joins surface and
+dark it is behind it; the second joins surface and
 outline, started next to the truth. The truth only starts and scores.
 """
 
@@ -20,7 +20,7 @@ from navapp.evaluation import mean_tre_mm
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.tracking import Goal, Line
-from navapp.tracking.contour_kernels import sample_across, step_quality, strongest_edge
+from navapp.tracking.contour_kernels import missing_share, sample_across, strongest_edge
 from navapp.tracking.line import _NEAR_VIEW
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
 from navapp.values import predicted_tre_mm, visible_vertices
@@ -28,7 +28,7 @@ from tests.bench.first_registration import Case, simulated
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
 DARKER = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 1.01)
-PLAIN, NEAR_PX = 0.06, 0.5
+NEAR_PX = 0.5
 START_OFF_MM, START_OFF_DEG = 0.25, 0.25
 
 
@@ -38,7 +38,6 @@ class Edge:
 
     offset_px: float
     darker: float
-    misfit: float
 
 
 def main() -> int:
@@ -54,8 +53,8 @@ def main() -> int:
         line = Line(case.rig, case.bone)
         edges += edges_of(case, line)
         rows += joined(case, line, seed)
-    print("| darker behind by | edges | within 0.5 px | of plain steps | median px | MAD px |")
-    print("|---|---|---|---|---|---|")
+    print("| darker behind by | edges | within 0.5 px | median px | MAD px |")
+    print("|---|---|---|---|---|")
     for low, high in pairwise(DARKER):
         print(row(low, high, [edge for edge in edges if low <= edge.darker < high]))
     print("\n| estimate | frames | TRE median | worst | bound median | holds |")
@@ -84,7 +83,7 @@ def edges_of(case: Case, line: Line) -> Iterator[Edge]:
         at = strongest_edge(wide)
         middle = pixel + at * normal
         if not np.isnan(at) and sample_across(pair.left, tuple(middle), tuple(normal), flank):
-            yield Edge(at, *step_quality(flank))
+            yield Edge(at, missing_share(flank))
 
 
 def outline(
@@ -126,13 +125,12 @@ def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, fl
 def row(low: float, high: float, edges: list[Edge]) -> str:
     """Of the first table."""
     offset = np.array([edge.offset_px for edge in edges])
-    is_plain = np.array([edge.misfit <= PLAIN for edge in edges])
     is_near = np.abs(offset) < NEAR_PX
-    middle = np.median(offset[is_near & is_plain])
-    spread = 1.4826 * np.median(np.abs(offset[is_near & is_plain] - middle))
+    middle = np.median(offset[is_near])
+    spread = 1.4826 * np.median(np.abs(offset[is_near] - middle))
     return (
         f"| {low:.1f} to {min(high, 1.0):.1f} | {len(edges)} | {100 * is_near.mean():.0f} % | "
-        f"{100 * is_near[is_plain].mean():.0f} % | {middle:+.2f} | {spread:.2f} |"
+        f"{middle:+.2f} | {spread:.2f} |"
     )
 
 
