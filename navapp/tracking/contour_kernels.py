@@ -1,6 +1,5 @@
 """Compiled search for edges along the normals of an outline: where one picture has it."""
 
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -97,9 +96,7 @@ def missing_share(profile: NDArray[np.float64]) -> float:
 
 
 @njit(cache=True, nogil=True)
-def find_steps(
-    picture: NDArray[np.uint8], rim: Rim, darker: float
-) -> NDArray[np.float64]:
+def find_steps(picture: NDArray[np.uint8], rim: Rim, darker: float) -> NDArray[np.float64]:
     """(N,) px from each point to the picture's edge along the normal; NaN without one.
 
     Args:
@@ -118,6 +115,6 @@ def find_steps(
         at = strongest_edge(wide)
         if np.isnan(at) or not sample_across(picture, (x + at * ux, y + at * uy), (ux, uy), flank):
             continue
-            if missing_share(flank) >= darker:
+        if missing_share(flank) >= darker:
             offset[i] = at
     return offset
