@@ -43,8 +43,15 @@ def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
 
 
 def beside(job: Callable[[], _Answer]) -> "Future[_Answer]":
-    """Begin a job on a thread of the pool; its halves are run one after the other there."""
-    return pool().submit(job)
+    """Begin a job on a thread of the pool; a thread of the pool does it itself, at once."""
+    if not getattr(_here, "is_of_pool", False):
+        return pool().submit(job)
+    done: Future[_Answer] = Future()
+    try:
+        done.set_result(job())
+    except Exception as error:
+        done.set_exception(error)
+    return done
 
 
 def in_row_bands(height: int, job: Callable[[int, int], object], every: int = 8) -> None:

@@ -13,7 +13,7 @@ from navapp.values import LineTimings, PoseEstimate, Reason
 
 # On the model a kernel as narrow as the noise costs little, and keeps out tissue that lies flush
 # with the bone.
-_ON_MODEL = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
+ON_MODEL = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Follower:
                     break
                 timings = sum_timings(timings, LineTimings(stereo_ms=expected.render_ms))
             measured = (self._meter.on_model if is_near else self._meter.sampled)(expected)
-            found = fitted(measured, self._model, pose, _ON_MODEL)
+            found = fitted(measured, self._model, pose, ON_MODEL)
             timings = sum_timings(timings, found.timings)
             is_elsewhere = not is_near and measured.answered_share < least_share
             if is_elsewhere or Reason.TOO_FEW_POINTS in found.estimate.reasons:

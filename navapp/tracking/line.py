@@ -23,6 +23,7 @@ from navapp.registration import (
     tilted_starts,
 )
 from navapp.tracking.box_guide import BoxGuide
+from navapp.tracking.contours import ContourMeter
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
@@ -106,6 +107,7 @@ class Line:
         self._boxes = BoxGuide(rig, self.model)
         is_accepted = rig.quality is None or rig.quality.is_accepted
         self._judge = Judge(self._geometry, is_accepted)
+        self._contours = ContourMeter(self.model, self._geometry)
         self.locator = Locator(self._meter, self.model, self._score, self.settings.locator)
 
     @property
@@ -291,6 +293,7 @@ class Line:
         started = time.perf_counter_ns()
         found = fit.measured.disparity
         coarse_px = self._rough_px(pair, fit, rough)
+        fit = self._contours.joined(pair, fit, coarse_px)
         view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
         verdict = self._judge.judge(
             self.model, fit.estimate, found, goal, predicted, coarse_px, view

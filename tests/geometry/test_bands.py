@@ -69,3 +69,21 @@ def test_halves_of_a_job_beside_do_not_wait_for_others():
     for job in jobs:
         job.result(20.0)
     assert sorted(done) == ["a"] * 4 + ["b"] * 4
+
+
+def test_a_thread_of_the_pool_does_what_it_begins_beside():
+    def job():
+        return threading.current_thread().name, beside(lambda: threading.current_thread().name)
+
+    jobs = [beside(job) for _ in range(4)]
+    for one in jobs:
+        name, inner = one.result(20.0)
+        assert inner.result(20.0) == name
+
+
+def test_an_error_of_what_it_does_itself_is_told_as_well():
+    def fails():
+        raise ValueError("inner")
+
+    with pytest.raises(ValueError, match="inner"):
+        beside(lambda: beside(fails)).result(20.0).result(20.0)

@@ -46,6 +46,17 @@ def test_following_twice_gives_the_same_bits() -> None:
         assert one.left_from_bone.matrix.tobytes() == other.left_from_bone.matrix.tobytes()
 
 
+def test_the_outline_enters_the_pose_that_is_handed_out(monkeypatch) -> None:
+    a = room()
+    frame = a.frames[0]
+    with_it = follow(a, a.line)[0][0][1]
+    monkeypatch.setattr(a.line._contours, "joined", lambda pair, fit, coarse_px: fit)
+    without = follow(a, a.line)[0][0][1]
+    assert np.trace(with_it.estimate.covariance) < np.trace(without.estimate.covariance)
+    assert with_it.verdict.predicted_tre_mm < without.verdict.predicted_tre_mm
+    assert a.error_mm(with_it.left_from_bone, frame) < with_it.verdict.predicted_tre_mm
+
+
 @pytest.mark.slow
 def test_grey_pictures_do_as_well() -> None:
     a = room(is_grey=True, n_frames=2)

@@ -1,0 +1,138 @@
+"""What edges along the model's outline are worth, printed as the tables of docs/registration.md.
+
+usage: python -m tests.bench.outline [--seeds N] [--first SEED]
+
+One frame of each of N simulated knees (every fourth with a hand and an instrument in the view).
+The first table sorts the strongest edge near each point of the outline, at the true pose, by how
+dark it is behind it; the second joins surface and
+outline, started next to the truth. The truth only starts and scores.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from navapp.evaluation import mean_tre_mm
+from navapp.geometry.transform import RigidTransform
+from navapp.geometry.zbuffer import RenderedView
+from navapp.tracking import Goal, Line
+from navapp.tracking.contour_kernels import missing_share, sample_across, strongest_edge
+from navapp.tracking.line import _NEAR_VIEW
+from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
+from navapp.values import predicted_tre_mm, visible_vertices
+from tests.bench.first_registration import Case, simulated
+
+GOAL = Goal(np.empty((0, 3)), 2.0)
+DARKER = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 1.01)
+NEAR_PX = 0.5
+START_OFF_MM, START_OFF_DEG = 0.25, 0.25
+
+
+@dataclass(frozen=True)
+class Edge:
+    """The strongest edge near a point of the outline."""
+
+    offset_px: float
+    darker: float
+
+
+def main() -> int:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first", type=int, default=501)
+    options = parser.parse_args()
+    edges: list[Edge] = []
+    rows: list[tuple[float, float, float, float]] = []
+    for seed in range(options.first, options.first + options.seeds):
+        case = simulated(seed)
+        line = Line(case.rig, case.bone)
+        edges += edges_of(case, line)
+        rows += joined(case, line, seed)
+    print("| darker behind by | edges | within 0.5 px | median px | MAD px |")
+    print("|---|---|---|---|---|")
+    for low, high in pairwise(DARKER):
+        print(row(low, high, [edge for edge in edges if low <= edge.darker < high]))
+    print("\n| estimate | frames | TRE median | worst | bound median | holds |")
+    print("|---|---|---|---|---|---|")
+    for name, column in (("surface alone", 0), ("surface and outline", 2)):
+        error, bound = np.array(rows)[:, column], np.array(rows)[:, column + 1]
+        print(
+            f"| {name} | {len(rows)} | {np.median(error):.3f} mm | {error.max():.3f} mm | "
+            f"{np.median(bound):.2f} mm | {100 * np.mean(error <= bound):.0f} % |"
+        )
+    return 0
+
+
+def edges_of(case: Case, line: Line) -> Iterator[Edge]:
+    """Of the left picture, at the true pose."""
+    frame = case.frames[0]
+    true = line._rectified(frame.true)
+    pair, _ = line._rectified_pair(frame.left, frame.right, true, _NEAR_VIEW)
+    expected = line._meter.expected(pair, true, line.settings.locator.tracking)
+    if expected is None:
+        return
+    wide, flank = np.empty(31), np.empty(17)
+    for pixel, normal in outline(line, true, expected.view):
+        if not sample_across(pair.left, tuple(pixel), tuple(normal), wide):
+            continue
+        at = strongest_edge(wide)
+        middle = pixel + at * normal
+        if not np.isnan(at) and sample_across(pair.left, tuple(middle), tuple(normal), flank):
+            yield Edge(at, missing_share(flank))
+
+
+def outline(
+    line: Line, pose: RigidTransform, view: RenderedView
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Pixel and normal of each point of it in the left picture."""
+    geometry = line._geometry
+    eye = Eye(0.0, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
+    rim = find_rim(
+        line._contours._ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye
+    )
+    seen = is_outline(rim, view.depth_mm, view.box.x, view.box.y)
+    rim = thin_rim(Rim(*(part[seen] for part in rim)))
+    yield from zip(rim.pixel, rim.normal, strict=True)
+
+
+def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, float, float]]:
+    """Error and bound of the surface alone, then of both; nothing when the bone is not found."""
+    frame, rng = case.frames[0], np.random.default_rng([seed, 3])
+    true = line._rectified(frame.true)
+    off = np.concatenate(
+        [rng.normal(0.0, START_OFF_MM, 3), np.radians(rng.normal(0.0, START_OFF_DEG, 3))]
+    )
+    start = true.moved(off, true.apply(line.centre_mm))
+    pair, _ = line._rectified_pair(frame.left, frame.right, start, _NEAR_VIEW)
+    fit = line.locator.locate(pair, start)
+    if fit is None or fit.measured.view is None:
+        return
+    coarse_px = line._meter.coarsely(pair, fit.pose, fit.measured.disparity)
+    answer: list[float] = []
+    for one in (fit, line._contours.joined(pair, fit, coarse_px)):
+        mesh = line.model.bone.mesh
+        targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
+        bound_mm = predicted_tre_mm(one.estimate, line.centre_mm, targets[:: len(targets) // 200])
+        answer += [mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
+    yield answer[0], answer[1], answer[2], answer[3]
+
+
+def row(low: float, high: float, edges: list[Edge]) -> str:
+    """Of the first table."""
+    offset = np.array([edge.offset_px for edge in edges])
+    is_near = np.abs(offset) < NEAR_PX
+    middle = np.median(offset[is_near])
+    spread = 1.4826 * np.median(np.abs(offset[is_near] - middle))
+    return (
+        f"| {low:.1f} to {min(high, 1.0):.1f} | {len(edges)} | {100 * is_near.mean():.0f} % | "
+        f"{middle:+.2f} | {spread:.2f} |"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

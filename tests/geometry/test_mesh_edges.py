@@ -1,0 +1,41 @@
+"""Edges over which a mesh bends outward."""
+
+import numpy as np
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh_edges import ridge_edges
+
+CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+# Two triangles a side, counter-clockwise from outside.
+SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+CUBE = TriangleMesh(
+    CORNERS, np.array([[s[0], s[a], s[b]] for s in SIDES for a, b in ((1, 2), (2, 3))])
+)
+
+
+def test_a_cube_has_its_twelve_edges_and_no_diagonal() -> None:
+    assert CUBE.volume_mm3() > 0.0
+    found = ridge_edges(CUBE)
+    assert len(found.edges) == 12
+    length = np.linalg.norm(CORNERS[found.edges[:, 0]] - CORNERS[found.edges[:, 1]], axis=1)
+    np.testing.assert_allclose(length, 1.0)
+
+
+def test_the_triangles_of_an_edge_hold_it_and_their_third_vertex() -> None:
+    found = ridge_edges(CUBE)
+    for edge, faces, opposite in zip(found.edges, found.faces, found.opposite, strict=True):
+        for face, third in zip(faces, opposite, strict=True):
+            assert set(CUBE.faces[face]) == {*edge, third}
+
+
+def test_planes_go_through_their_triangles_and_look_outward() -> None:
+    normals, offsets = np.split(ridge_edges(CUBE).planes, [3])
+    corners = CORNERS[CUBE.faces]
+    np.testing.assert_allclose(np.einsum("kf,fck->fc", normals, corners).T, offsets[[0] * 3])
+    assert (normals.T @ np.full(3, 0.5) < offsets[0]).all()
+
+
+def test_grooves_and_open_borders_are_left_out() -> None:
+    assert len(ridge_edges(CUBE.flipped()).edges) == 0
+    without_a_side = TriangleMesh(CORNERS, CUBE.faces[2:])
+    assert len(ridge_edges(without_a_side).edges) == 8

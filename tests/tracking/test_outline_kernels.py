@@ -1,0 +1,118 @@
+"""Where one eye should see a model end, against plain numpy and against geometry."""
+
+from functools import cache
+
+import numpy as np
+
+from navapp.geometry.mesh_edges import ridge_edges
+from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.tracking.outline_kernels import (
+    Eye,
+    Ridges,
+    Rim,
+    find_rim,
+    is_outline,
+    thin_rim,
+    warp_depth,
+)
+from tests.geometry.shapes import sphere
+from tests.reference import outline_reference as reference
+from tests.registration.shapes import GEOMETRY, TRUE, femur
+
+LEFT = Eye(0.0, GEOMETRY.focal_px, GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
+RIGHT = LEFT._replace(x_mm=GEOMETRY.baseline_mm)
+
+
+def ridges_of(mesh) -> Ridges:
+    found = ridge_edges(mesh)
+    return Ridges(found.vertices_mm, found.edges, found.faces, found.opposite, found.planes)
+
+
+@cache
+def rim_of(eye: Eye) -> Rim:
+    return find_rim(
+        ridges_of(femur().mesh), np.array(TRUE.rotation), np.array(TRUE.translation_mm), eye
+    )
+
+
+@cache
+def left_view():
+    box = projected_box(femur().mesh, TRUE, GEOMETRY).grown(16)
+    return render_rectified(femur().mesh, TRUE, GEOMETRY, box)
+
+
+def test_the_rim_is_that_of_the_reference() -> None:
+    ridges = ridges_of(femur().mesh)
+    for eye in (LEFT, RIGHT):
+        rim = rim_of(eye)
+        point, pixel, normal, length, found = reference.rim(*ridges, TRUE, eye)
+        is_kept = length >= 1e-3
+        np.testing.assert_allclose(rim.point, point[is_kept], atol=1e-9)
+        np.testing.assert_allclose(rim.pixel, pixel[is_kept], atol=1e-9)
+        np.testing.assert_allclose(rim.normal, normal[is_kept], atol=1e-9)
+        np.testing.assert_allclose(rim.length, length[is_kept], atol=1e-9)
+        np.testing.assert_array_equal(rim.vertex, ridges.edges[found[is_kept], 0])
+
+
+def test_rays_to_the_rim_of_a_ball_touch_it() -> None:
+    ball = sphere(20.0, 48)
+    eye_mm = np.array([RIGHT.x_mm, 0.0, 0.0])
+    rim = find_rim(ridges_of(ball), np.eye(3), np.array([10.0, -5.0, 450.0]), RIGHT)
+    ray = rim.point - eye_mm
+    ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+    arm = np.array([10.0, -5.0, 450.0]) - eye_mm
+    distance = np.linalg.norm(arm - (ray @ arm)[:, None] * ray, axis=1)
+    assert len(rim.point) > 60
+    np.testing.assert_allclose(distance, 20.0, atol=0.12)
+    outward = rim.pixel - rim.pixel.mean(axis=0)
+    assert ((outward * rim.normal).sum(axis=1) > 0.0).all()
+
+
+def test_what_is_seen_of_the_rim_is_that_of_the_reference() -> None:
+    rim, view = rim_of(LEFT), left_view()
+    found = is_outline(rim, view.depth_mm, view.box.x, view.box.y)
+    expected = reference.is_outline(
+        rim.pixel, rim.normal, rim.point[:, 2], view.depth_mm, view.box.x, view.box.y
+    )
+    np.testing.assert_array_equal(found, expected)
+    assert 0.1 < found.mean() < 0.9
+
+
+def test_the_seen_rim_runs_along_the_silhouette() -> None:
+    rim, view = rim_of(LEFT), left_view()
+    seen = rim.pixel[is_outline(rim, view.depth_mm, view.box.x, view.box.y)]
+    rows, columns = np.nonzero(view.silhouette())
+    border = np.column_stack([columns + view.box.x, rows + view.box.y])
+    apart = np.linalg.norm(border[:, None] - seen[None], axis=2).min(axis=1)
+    assert np.quantile(apart, 0.9) < 4.0
+
+
+def test_the_warped_buffer_is_that_of_the_reference() -> None:
+    view = left_view()
+    warped = np.full((view.box.height, view.box.width + 80), np.nan, dtype=np.float32)
+    first = view.box.x - 270
+    warp_depth(view.depth_mm, view.box.x, RIGHT, warped, first)
+    expected = reference.warped(view.depth_mm, view.box.x, RIGHT, warped.shape[1], first)
+    assert np.isfinite(warped).mean() > 0.2
+    # A pixel that falls on a border may round to either side.
+    is_same = np.isclose(warped, expected, rtol=1e-6, equal_nan=True)
+    assert is_same.mean() > 0.9999
+
+
+def test_thinned_points_are_outermost_with_the_normals_of_the_reference() -> None:
+    view, rim = left_view(), rim_of(LEFT)
+    rim = Rim(*(part[is_outline(rim, view.depth_mm, view.box.x, view.box.y)] for part in rim))
+    thinned = thin_rim(rim)
+    unit, is_outermost = reference.smoothed(rim.pixel, rim.normal, rim.length)
+    index = [int(np.flatnonzero((rim.pixel == pixel).all(axis=1))[0]) for pixel in thinned.pixel]
+    assert is_outermost[index].all()
+    np.testing.assert_allclose(thinned.normal, unit[index], atol=1e-9)
+    # Nothing of the outline is left without a point nearby.
+    apart = np.linalg.norm(rim.pixel[is_outermost][:, None] - thinned.pixel[None], axis=2)
+    assert len(thinned.pixel) < len(rim.pixel)
+    assert apart.min(axis=1).max() < 4.3
+
+
+def test_an_empty_rim_stays_empty() -> None:
+    none = Rim(*(part[:0] for part in rim_of(LEFT)))
+    assert len(thin_rim(none).pixel) == 0
