@@ -24,6 +24,7 @@ from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
 from navapp.tracking.motion import TrackState
+from navapp.tracking.pair_doubts import with_pair_doubts
 from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import (
     AspectGraph,
@@ -263,6 +264,7 @@ class Line:
         verdict = self._judge.judge(
             self.model, fit.estimate, found, goal, predicted, coarse_px, view
         )
+        verdict = with_pair_doubts(verdict, pair, found, fit.pose.apply(self.centre_mm)[2])
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         name = self.model.bone.name
