@@ -25,6 +25,7 @@ from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Fit, Locator, LocatorSettings, sum_timings
 from navapp.tracking.motion import TrackState
 from navapp.tracking.pair_doubts import with_pair_doubts
+from navapp.tracking.recovery import starts_after_loss
 from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import (
     AspectGraph,
@@ -122,9 +123,21 @@ class Line:
         if tracked.verdict.status is Status.LOST:
             pair, timings = self._rectified_pair(left, right, predicted)
             timings = sum_timings(tracked.timings, timings)
-            fit = self.locator.search(pair, predicted, self.settings.locator.search)
+            fit = self._found_again(pair, predicted, state.n_lost)
             tracked = self._judged(pair, fit, goal, timings, predicted)
         return tracked, state.updated(tracked, captured_ns, self.centre_mm)
+
+    def _found_again(self, pair: RectifiedPair, pose: RigidTransform, n_lost: int) -> Fit | None:
+        """Around an expected pose; or in every other lost frame further off, from a few starts."""
+        starts = starts_after_loss(pose, self.centre_mm, n_lost)
+        measured = self._meter.freely(pair, pose, _WIDE_VIEW) if starts else None
+        if measured is None or len(measured.cloud) == 0 or self.locator.is_baseline:
+            return self.locator.search(pair, pose, self.settings.locator.search)
+        started = time.perf_counter_ns()
+        poses = self._coarse(measured, starts, lambda share: None)
+        coarse = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
+        best = self.locator.settle(pair, measured, poses[0] if poses else pose)
+        return replace(best, timings=sum_timings(best.timings, coarse))
 
     def register(
         self,
