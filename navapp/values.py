@@ -197,6 +197,10 @@ class Reason(Enum):
     CARTILAGE_UNCERTAIN = "the plan knows the cartilage too roughly"
     TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
     JUMPED = "the pose jumped further than a patient moves"
+    ROWS_DISAGREE = "the cameras' rows do not agree: has the rig moved?"
+    PICTURE_DARK = "one picture is dark or blocked"
+    PICTURE_OVEREXPOSED = "one picture is overexposed"
+    PICTURES_UNLIKE = "one picture is blurred or covered"
     RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
     OUT_OF_VIEW = "the bone is outside the picture"
     # of the session
@@ -228,6 +232,10 @@ _REMEDIES = {
     Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",
+    Reason.ROWS_DISAGREE: "hold still; if it stays, calibrate the rig again",
+    Reason.PICTURE_DARK: "uncover both cameras, or check the light",
+    Reason.PICTURE_OVEREXPOSED: "turn the light or the exposure down",
+    Reason.PICTURES_UNLIKE: "clean and uncover both cameras",
     Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",
     Reason.OUT_OF_VIEW: "bring the bone back into both pictures",
     Reason.NOT_NAVIGATING: "register, then accept the candidate",

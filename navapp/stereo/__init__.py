@@ -9,17 +9,21 @@ from navapp.stereo.chains import (
     match_surface,
     smoothed,
 )
+from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.surface import reproject
 
 __all__ = [
+    "PictureHealth",
     "RefineSettings",
     "StereoAnswer",
+    "StereoHealth",
     "match_baseline",
     "match_coarsely",
     "match_on_support",
     "match_scene",
     "match_surface",
+    "measure_health",
     "refine",
     "refine_samples",
     "reproject",

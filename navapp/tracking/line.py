@@ -29,6 +29,8 @@ from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS, Locator, LocatorSettings
 from navapp.tracking.motion import TrackState
+from navapp.tracking.pair_doubts import with_pair_doubts
+from navapp.tracking.recovery import starts_after_loss
 from navapp.tracking.surface_meter import Margins, Measurement, RoughMap, SurfaceMeter
 from navapp.values import (
     AspectGraph,
@@ -137,26 +139,27 @@ class Line:
             if not self.locator.is_baseline:
                 boxes = self._boxes.followed(boxes, left)
             for place in self._boxes.starts(expected, boxes):
-                tracked = self._searched(left, right, place, predicted, goal, tracked.timings)
+                pose = self._rectified(place)
+                pair, timings = self._rectified_pair(left, right, pose)
+                timings = sum_timings(tracked.timings, timings)
+                fit = self._found_again(pair, pose, state.n_lost)
+                tracked = self._judged(pair, fit, goal, timings, predicted)
                 if tracked.verdict.status is not Status.LOST:
                     break
         boxes = self._boxes.placed(boxes, left, tracked)
         return tracked, replace(state.updated(tracked, captured_ns, self.centre_mm), box=boxes)
 
-    def _searched(
-        self,
-        left: Image,
-        right: Image,
-        start: RigidTransform,
-        predicted: RigidTransform,
-        goal: Goal,
-        spent: LineTimings,
-    ) -> TrackedFrame:
-        """Search around a pose of the left camera; `predicted` is for the judge."""
-        pose = self._rectified(start)
-        pair, timings = self._rectified_pair(left, right, pose)
-        fit = self.locator.search(pair, pose, self.settings.locator.search)
-        return self._judged(pair, fit, goal, sum_timings(spent, timings), predicted)
+    def _found_again(self, pair: RectifiedPair, pose: RigidTransform, n_lost: int) -> Fit | None:
+        """Around an expected pose; or in every other lost frame further off, from a few starts."""
+        starts = starts_after_loss(pose, self.centre_mm, n_lost)
+        measured = self._meter.freely(pair, pose, _WIDE_VIEW) if starts else None
+        if measured is None or len(measured.cloud) == 0 or self.locator.is_baseline:
+            return self.locator.search(pair, pose, self.settings.locator.search)
+        started = time.perf_counter_ns()
+        poses = self._coarse(measured, starts, lambda share: None)
+        coarse = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
+        best = self.locator.settle(pair, measured, poses[0] if poses else pose)
+        return replace(best, timings=sum_timings(best.timings, coarse))
 
     def register(
         self,
@@ -298,6 +301,7 @@ class Line:
         verdict = self._judge.judge(
             self.model, fit.estimate, found, goal, predicted, coarse_px, view
         )
+        verdict = with_pair_doubts(verdict, pair, found, fit.pose.apply(self.centre_mm)[2])
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         name = self.model.bone.name

@@ -6,12 +6,24 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform, vector_from_rotation
 from navapp.tracking.box_tracker import BoxState
-from navapp.values import Status, TrackedFrame
+from navapp.values import Reason, Status, TrackedFrame
 
 # A patient's limb slows down: the prediction takes this part of the last velocity.
 _DAMPING = 0.7
 # A gap longer than this says nothing about the velocity any more.
 _MAX_GAP_NS = 400_000_000
+# What speaks against a pose's place, not against its accuracy.
+_AGAINST = frozenset(
+    {
+        Reason.COVERAGE_LOW,
+        Reason.SEEN_THROUGH,
+        Reason.SURFACE_MISFIT,
+        Reason.OUTLIERS,
+        Reason.NOT_CONVERGED,
+        Reason.AMBIGUOUS,
+        Reason.DEGENERATE,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,9 +61,15 @@ class TrackState:
     def updated(
         self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
     ) -> "TrackState":
-        """After a frame: a lost one keeps the pose and forgets the velocity; the box stays."""
+        """After a frame: a lost one, or one that found something else, keeps the pose.
+
+        The box stays.
+        """
         pose = tracked.left_from_bone
-        if pose is None or tracked.verdict.status is Status.LOST:
+        verdict = tracked.verdict
+        # What lies far from where it was expected, and fits badly too, is something else.
+        is_elsewhere = Reason.JUMPED in verdict.reasons and _AGAINST.intersection(verdict.reasons)
+        if pose is None or verdict.status is Status.LOST or is_elsewhere:
             return replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
         elapsed_ns = captured_ns - self.captured_ns
         velocity = np.zeros(6)

@@ -8,7 +8,7 @@ from navapp.tracking import TrackState
 from navapp.tracking.box_tracker import BoxState
 from navapp.tracking.motion import twist_between
 from navapp.tracking.picture_box import PictureBox
-from navapp.values import LineTimings, PoseEstimate, Status, TrackedFrame, Verdict
+from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
 CENTRE = np.array([3.0, -20.0, 15.0])
 START = RigidTransform.from_parts(
@@ -106,3 +106,24 @@ def test_the_twist_between_two_poses_moves_one_to_the_other() -> None:
     other = moved(START, 20.0 * STEP)
     twist = twist_between(START, other, CENTRE)
     np.testing.assert_allclose(moved(START, twist).matrix, other.matrix, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("reasons", "is_taken"),
+    [
+        ((Reason.JUMPED,), True),
+        ((Reason.COVERAGE_LOW,), True),
+        ((Reason.JUMPED, Reason.CARTILAGE_UNCERTAIN), True),
+        ((Reason.JUMPED, Reason.COVERAGE_LOW), False),
+        ((Reason.DEGENERATE, Reason.JUMPED), False),
+    ],
+)
+def test_something_else_far_away_is_not_followed(
+    reasons: tuple[Reason, ...], is_taken: bool
+) -> None:
+    far = moved(START, (20.0, 0.0, 0.0, 0.0, 0.2, 0.0))
+    found = frame(far, Status.DEGRADED)
+    found = replace(found, verdict=Verdict(Status.DEGRADED, 0.2, reasons))
+    state = TrackState.at_rest(START, 0).updated(found, PERIOD_NS, CENTRE)
+    assert state.left_from_bone is (far if is_taken else START)
+    assert state.n_lost == (0 if is_taken else 1)

@@ -1,0 +1,130 @@
+"""Whether a stereo pair can be trusted: rows that agree, light, sharpness.
+
+Matching looks along rows only. What it finds is right as long as the cameras still stand to each
+other as they were calibrated; the rows tell, and nothing of the fit has looked at them.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.stereo.health_kernels import measure_rows
+from navapp.values import DisparityMap, Origin
+
+# Windows of 9 pixels that do not overlap, so that their noise is their own.
+_STRIDE_PX, _RADIUS_PX = 10, 4
+_MOST_POINTS, _FEWEST_POINTS = 128, 12
+# A window that tells its row to no better than this has no texture across the row.
+_WORST_SIGMA_PX = 0.3
+# A linear step is exact near its end only.
+_MOST_STEPS, _SETTLED_PX = 4, 0.05
+_LARGEST_PX = 3.0
+# Texture of a twentieth is below one grey level here; and what a sensor clips to.
+_DARK_LEVEL, _SATURATED_LEVEL = 16, 250
+_ROWS_APART, _COLUMNS_APART = 2, 4
+_MEDIAN_TO_MEAN, _MAD_TO_SIGMA = 1.2533, 1.4826
+
+
+@dataclass(frozen=True, slots=True)
+class PictureHealth:
+    """Light and sharpness of one picture around the bone.
+
+    Attributes:
+        dark_share: of pixels too dark to show a bone's texture.
+        saturated_share: of pixels that the sensor clipped.
+        detail: rms difference of pixels two rows apart over the mean grey level.
+    """
+
+    dark_share: float
+    saturated_share: float
+    detail: float
+
+
+@dataclass(frozen=True, slots=True)
+class StereoHealth:
+    """What a pair says of its own cameras.
+
+    Attributes:
+        left: picture of the left camera.
+        right: of the right one, where it shows the same.
+        row_offset_px: how much lower the right picture shows what the left one shows; NaN when too
+            few points tell.
+        row_offset_sigma_px: its standard error.
+        n_points: that told.
+        correlation: median over their windows, of both pictures' grey values.
+    """
+
+    left: PictureHealth
+    right: PictureHealth
+    row_offset_px: float = math.nan
+    row_offset_sigma_px: float = math.nan
+    n_points: int = 0
+    correlation: float = math.nan
+
+
+def measure_health(
+    pair: RectifiedPair, found: DisparityMap | None, expected_px: float
+) -> StereoHealth:
+    """Health of a pair.
+
+    Args:
+        pair: rectified grey pictures.
+        found: disparity that was matched in it; without one its rows are not compared.
+        expected_px: disparity of what is looked at: where the right picture shows the box.
+    """
+    box = pair.box
+    if found is not None:
+        box = Box(found.x, found.y, found.disparity_px.shape[1], found.disparity_px.shape[0])
+    partner = Box(box.x - round(expected_px), box.y, box.width, box.height)
+    left, right = _picture_health(pair.left, box), _picture_health(pair.right, partner)
+    if found is None:
+        return StereoHealth(left, right)
+    offset_px, sigma_px, n_points, correlation = _rows(pair, found)
+    return StereoHealth(left, right, offset_px, sigma_px, n_points, correlation)
+
+
+def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, float]:
+    """Median row offset, its standard error, number of points, median correlation.
+
+    Steps are repeated from the common offset: single windows are too noisy to follow.
+    """
+    n_matched = np.count_nonzero(found.origin == Origin.MATCHED)
+    stride_px = max(_STRIDE_PX, math.ceil((n_matched / _MOST_POINTS) ** 0.5))
+    answers = np.empty((2 * _MOST_POINTS, 3))
+    offset_px = 0.0
+    for _ in range(_MOST_STEPS):
+        n = measure_rows(
+            pair.left, pair.right, found.disparity_px, found.origin, (found.x, found.y),
+            (stride_px, _RADIUS_PX), offset_px, answers,
+        )  # fmt: skip
+        told = answers[:n][answers[:n, 1] < _WORST_SIGMA_PX]
+        if len(told) < _FEWEST_POINTS:
+            return math.nan, math.nan, len(told), math.nan
+        before_px, offset_px = offset_px, float(np.median(told[:, 0]))
+        if abs(offset_px) > _LARGEST_PX:
+            return math.nan, math.nan, len(told), math.nan
+        if abs(offset_px - before_px) < _SETTLED_PX:
+            break
+    spread_px = _MAD_TO_SIGMA * float(np.median(np.abs(told[:, 0] - offset_px)))
+    sigma_px = _MEDIAN_TO_MEAN * spread_px / math.sqrt(len(told))
+    return offset_px, sigma_px, len(told), float(np.median(told[:, 2]))
+
+
+def _picture_health(picture: Image, box: Box) -> PictureHealth:
+    """Of the part of the box that lies in the picture; of nothing, all dark."""
+    inside = box.clipped(picture.shape[1], picture.shape[0])
+    part = picture[
+        inside.y : inside.y + inside.height : _ROWS_APART,
+        inside.x : inside.x + inside.width : _COLUMNS_APART,
+    ]
+    if part.size == 0 or part.shape[0] < 2:
+        return PictureHealth(1.0, 0.0, 0.0)
+    step = np.diff(part.astype(np.float32), axis=0).ravel()
+    rms = math.sqrt(float(step @ step) / len(step))
+    return PictureHealth(
+        float((part < _DARK_LEVEL).mean()),
+        float((part >= _SATURATED_LEVEL).mean()),
+        rms / max(float(part.mean()), 1.0),
+    )

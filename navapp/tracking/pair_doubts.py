@@ -1,0 +1,61 @@
+"""What the two pictures themselves say against a pose: cameras that moved, no light, a cover."""
+
+from dataclasses import replace
+
+from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
+from navapp.stereo import PictureHealth, StereoHealth, measure_health
+from navapp.values import DisparityMap, Reason, Status, Verdict
+
+# What a moved rig may cost: where an OK pose has to be right to.
+_COST_MM = 0.5
+_SURE_SIGMAS = 3.0
+# A bone fills half of its box and more; what lies around it may be black.
+_UNUSABLE_SHARE = 0.7
+# Noise alone keeps two sharp pictures of one scene within a few per cent of each other.
+_UNLIKE_RATIO = 2.0
+
+
+def with_pair_doubts(
+    verdict: Verdict, pair: RectifiedPair, found: DisparityMap, depth_mm: float
+) -> Verdict:
+    """A verdict, with what its pair of pictures has against it: that comes first, as the cause.
+
+    Args:
+        verdict: of the judge.
+        pair: rectified.
+        found: disparity that was matched in it.
+        depth_mm: of the bone.
+    """
+    geometry = pair.geometry
+    health = measure_health(pair, found, geometry.disparity_px(depth_mm))
+    doubts = pair_doubts(health, geometry, depth_mm)
+    if not doubts:
+        return verdict
+    status = Status.DEGRADED if verdict.status is Status.OK else verdict.status
+    return replace(verdict, status=status, reasons=(*doubts, *verdict.reasons))
+
+
+def pair_doubts(
+    health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float
+) -> tuple[Reason, ...]:
+    """What the health of a pair has against any pose at a depth.
+
+    Rows tell of turns about the line between the cameras, and those alone cost little. But what
+    turned a camera about that line turned it as far about others, and a turn that moves a picture
+    sideways by v px moves the measured depth by z^2 / (f B) v.
+    """
+    mm_per_px = depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
+    offset_px = abs(health.row_offset_px)
+    is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
+    both = (health.left, health.right)
+    is_dark = any(one.dark_share > _UNUSABLE_SHARE for one in both)
+    is_clipped = any(one.saturated_share > _UNUSABLE_SHARE for one in both)
+    doubts = [Reason.PICTURE_DARK] * is_dark + [Reason.PICTURE_OVEREXPOSED] * is_clipped
+    if not doubts:
+        doubts += [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
+    doubts += [Reason.ROWS_DISAGREE] * int(is_sure and mm_per_px * offset_px > _COST_MM)
+    return tuple(doubts)
+
+
+def _are_unlike(left: PictureHealth, right: PictureHealth) -> bool:
+    return max(left.detail, right.detail) > _UNLIKE_RATIO * min(left.detail, right.detail)

@@ -1,0 +1,121 @@
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.stereo import measure_health
+from navapp.values import DisparityMap, Origin
+from tests.stereo.pairs import HEIGHT, WIDTH, geometry, texture
+
+BOX = Box(90, 10, 210, 96)
+DISPARITY_PX = 40.25
+
+
+def pair(row_offset_px: float = 0.0, noise: float = 1.5) -> RectifiedPair:
+    """A textured plane; the right picture shows it lower by so much."""
+    rng = np.random.default_rng(3)
+    fine = texture(4 * WIDTH, 4 * HEIGHT, 5)
+    fine = cv2.GaussianBlur(fine, (0, 0), 4.0)
+    fine = 128.0 + 40.0 * (fine - fine.mean()) / fine.std()
+
+    def seen(shift_x: float, shift_y: float) -> np.ndarray:
+        columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+        x = (4.0 * (columns + shift_x)).astype(np.float32)
+        y = (4.0 * (rows - shift_y)).astype(np.float32)
+        values = cv2.remap(fine.astype(np.float32), x, y, cv2.INTER_CUBIC)
+        return (values + rng.normal(0.0, noise, values.shape)).clip(0, 255).astype(np.uint8)
+
+    return RectifiedPair(seen(0.0, 0.0), seen(DISPARITY_PX, row_offset_px), geometry(), BOX)
+
+
+def matched(share: float = 0.7) -> DisparityMap:
+    is_matched = np.random.default_rng(1).random((BOX.height, BOX.width)) < share
+    return DisparityMap(
+        np.where(is_matched, DISPARITY_PX, np.nan).astype(np.float32),
+        np.where(is_matched, 0.1, np.nan).astype(np.float32),
+        np.where(is_matched, Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8),
+        BOX.x,
+        BOX.y,
+    )
+
+
+@pytest.mark.parametrize("row_offset_px", [0.0, 0.2, -0.5, 1.0, -1.5])
+def test_the_row_offset_is_found_within_its_own_error(row_offset_px: float) -> None:
+    health = measure_health(pair(row_offset_px), matched(), DISPARITY_PX)
+    assert 0.0 < health.row_offset_sigma_px < 0.02
+    assert health.row_offset_px == pytest.approx(
+        row_offset_px, abs=4.0 * health.row_offset_sigma_px
+    )
+    assert health.n_points > 60
+    assert health.correlation > 0.95
+
+
+def test_the_standard_error_is_that_of_repeated_noise() -> None:
+    sharp = measure_health(pair(noise=1.0), matched(), DISPARITY_PX)
+    noisy = measure_health(pair(noise=6.0), matched(), DISPARITY_PX)
+    assert noisy.row_offset_sigma_px > 2.0 * sharp.row_offset_sigma_px
+    assert abs(noisy.row_offset_px) < 4.0 * noisy.row_offset_sigma_px
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_too_few_points_say_nothing_of_the_rows(share: float) -> None:
+    health = measure_health(pair(0.5), matched(share), DISPARITY_PX)
+    assert np.isnan(health.row_offset_px)
+    assert np.isnan(health.row_offset_sigma_px)
+
+
+def test_without_a_map_the_light_is_measured_alone() -> None:
+    known = measure_health(pair(), matched(), DISPARITY_PX)
+    health = measure_health(pair(), None, DISPARITY_PX)
+    assert (health.left, health.right) == (known.left, known.right)
+    assert np.isnan(health.row_offset_px)
+    assert health.n_points == 0
+
+
+@pytest.mark.parametrize(("level", "dark", "saturated"), [(3, 1.0, 0.0), (255, 0.0, 1.0)])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_dark_or_bright_picture_is_seen(
+    side: str, level: int, dark: float, saturated: float
+) -> None:
+    good = pair()
+    bad = replace(good, **{side: np.full_like(good.left, level)})
+    health = measure_health(bad, matched(), DISPARITY_PX)
+    one = getattr(health, side)
+    assert (one.dark_share, one.saturated_share, one.detail) == (dark, saturated, 0.0)
+    other = health.right if side == "left" else health.left
+    assert other.dark_share < 0.02
+    assert other.saturated_share < 0.02
+
+
+def test_the_right_picture_is_looked_at_where_it_shows_the_box() -> None:
+    good = pair()
+    right = np.zeros_like(good.right)
+    first = BOX.x - round(DISPARITY_PX)
+    right[:, first : first + BOX.width] = good.right[:, first : first + BOX.width]
+    health = measure_health(replace(good, right=right), matched(), DISPARITY_PX)
+    assert health.right.dark_share < 0.02
+
+
+def test_a_blurred_picture_has_less_detail() -> None:
+    good = pair()
+    blurred = replace(good, right=cv2.GaussianBlur(good.right, (0, 0), 3.0))
+    health = measure_health(blurred, matched(), DISPARITY_PX)
+    same = measure_health(good, matched(), DISPARITY_PX)
+    assert same.right.detail == pytest.approx(same.left.detail, rel=0.05)
+    assert health.right.detail < 0.5 * health.left.detail
+
+
+def test_light_and_gain_do_not_change_the_detail() -> None:
+    good = pair(noise=0.0)
+    half = replace(good, right=(good.right // 2).astype(np.uint8))
+    health = measure_health(half, matched(), DISPARITY_PX)
+    assert health.right.detail == pytest.approx(health.left.detail, rel=0.1)
+    assert abs(health.row_offset_px) < 0.02
+
+
+def test_a_box_beside_the_pictures_is_dark() -> None:
+    away = replace(pair(), box=Box(WIDTH + 5, 0, 50, 50))
+    health = measure_health(away, None, DISPARITY_PX)
+    assert health.left.dark_share == 1.0

@@ -1,0 +1,86 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.stereo import PictureHealth, StereoHealth
+from navapp.tracking import Line, TrackState
+from navapp.tracking.pair_doubts import pair_doubts
+from navapp.values import Reason, Status
+from tests.registration.shapes import GEOMETRY
+from tests.tracking.rooms import GOAL, room
+
+GOOD = PictureHealth(0.05, 0.0, 0.15)
+DEPTH_MM = 450.0
+# Half a millimetre of depth.
+LIMIT_PX = 0.5 * GEOMETRY.focal_px * GEOMETRY.baseline_mm / DEPTH_MM**2
+
+
+def doubts(health: StereoHealth) -> tuple[Reason, ...]:
+    return pair_doubts(health, GEOMETRY, DEPTH_MM)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rows_that_cost_half_a_millimetre_are_doubted(sign: float) -> None:
+    assert doubts(StereoHealth(GOOD, GOOD, sign * 0.95 * LIMIT_PX, 0.01, 100)) == ()
+    found = doubts(StereoHealth(GOOD, GOOD, sign * 1.05 * LIMIT_PX, 0.01, 100))
+    assert found == (Reason.ROWS_DISAGREE,)
+
+
+def test_rows_are_doubted_only_beyond_their_own_noise() -> None:
+    assert doubts(StereoHealth(GOOD, GOOD, 2.0 * LIMIT_PX, LIMIT_PX, 12)) == ()
+    assert doubts(StereoHealth(GOOD, GOOD, 3.2 * LIMIT_PX, LIMIT_PX, 12)) == (Reason.ROWS_DISAGREE,)
+    assert doubts(StereoHealth(GOOD, GOOD)) == ()
+
+
+@pytest.mark.parametrize(
+    ("bad", "reason"),
+    [
+        (PictureHealth(0.8, 0.0, 0.2), Reason.PICTURE_DARK),
+        (PictureHealth(0.0, 0.8, 0.01), Reason.PICTURE_OVEREXPOSED),
+        (PictureHealth(0.0, 0.0, 0.07), Reason.PICTURES_UNLIKE),
+        (PictureHealth(0.6, 0.3, 0.14), None),
+    ],
+)
+def test_an_unusable_picture_is_named(bad: PictureHealth, reason: Reason | None) -> None:
+    expected = () if reason is None else (reason,)
+    assert doubts(StereoHealth(bad, GOOD)) == expected
+    assert doubts(StereoHealth(GOOD, bad)) == expected
+
+
+def tracked(line: Line, *, dark: str = "") -> tuple[Status, tuple[Reason, ...]]:
+    a = room()
+    frame = a.frames[0]
+    if dark:
+        frame = replace(frame, **{dark: np.zeros_like(frame.left)})
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    verdict = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)[0].verdict
+    return verdict.status, verdict.reasons
+
+
+def turned(rig: StereoRig, row_offset_px: float) -> StereoRig:
+    """A calibration that is off by a turn of the right camera about the line between both."""
+    turn = rotation_from_vector((row_offset_px / rig.right.focal_px, 0.0, 0.0))
+    right_from_left = rig.right_from_left
+    moved = RigidTransform.from_parts(
+        "right", "left", turn @ right_from_left.rotation, turn @ right_from_left.translation_mm
+    )
+    return replace(rig, right_from_left=moved)
+
+
+@pytest.mark.parametrize("row_offset_px", [0.5, -1.0])
+def test_a_rig_that_moved_is_never_ok(row_offset_px: float) -> None:
+    a = room()
+    assert tracked(a.line) == (Status.OK, ())
+    status, reasons = tracked(Line(turned(a.rig, row_offset_px), a.line.model.bone))
+    assert status is not Status.OK
+    assert reasons[0] is Reason.ROWS_DISAGREE
+
+
+@pytest.mark.parametrize("eye", ["left", "right"])
+def test_a_dark_picture_is_the_first_reason(eye: str) -> None:
+    status, reasons = tracked(room().line, dark=eye)
+    assert status is Status.LOST
+    assert reasons[0] is Reason.PICTURE_DARK
