@@ -192,6 +192,7 @@ class Reason(Enum):
     OUTLIERS = "too many points fit no surface of the model"
     NOT_CONVERGED = "the estimate did not settle"
     AMBIGUOUS = "a different pose fits as well"
+    CUES_DISAGREE = "surface and outline do not agree"
     DEGENERATE = "the seen surface leaves a direction free"
     POSE_UNCERTAIN = "the seen surface fixes the pose too loosely"
     CARTILAGE_UNCERTAIN = "the plan knows the cartilage too roughly"
@@ -227,6 +228,7 @@ _REMEDIES = {
     Reason.OUTLIERS: "clear the view of the bone; register again",
     Reason.NOT_CONVERGED: "hold still, or register again",
     Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
+    Reason.CUES_DISAGREE: "check that this is the right bone and plan; register again",
     Reason.DEGENERATE: "expose more of the bone",
     Reason.POSE_UNCERTAIN: "expose more of the bone",
     Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",

@@ -1,4 +1,4 @@
-"""The same surface in fewer triangles, within a guaranteed distance."""
+"""The same surface in fewer triangles: no vertex of the old one lies far from the new one."""
 
 from functools import lru_cache
 
@@ -33,21 +33,14 @@ def simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> Triangl
     """
     while 0 < n_vertices < len(mesh.vertices_mm):
         candidate = _collapsed(mesh, n_vertices)
-        if candidate is not None and distance_mm(mesh, candidate, within_mm).max() <= within_mm:
+        if candidate is not None and is_within(mesh, candidate, within_mm):
             return candidate
         n_vertices *= 2
     return mesh
 
 
-def distance_mm(mesh: TriangleMesh, surface: TriangleMesh, doubted_mm: float = 0.0) -> FloatArray:
-    """(V,) distance of a mesh's used vertices from another surface; never too small.
-
-    Args:
-        mesh: whose vertices.
-        surface: from where.
-        doubted_mm: up to this a distance may be too large: a large triangle lies nearer than its
-            middle tells.
-    """
+def is_within(mesh: TriangleMesh, surface: TriangleMesh, distance_mm: float) -> bool:
+    """Whether no vertex that a mesh uses lies further from another surface."""
     from scipy.spatial import cKDTree
 
     points = mesh.vertices_mm[np.unique(mesh.faces)]
@@ -57,10 +50,14 @@ def distance_mm(mesh: TriangleMesh, surface: TriangleMesh, doubted_mm: float = 0
     nearest = np.full(len(points), np.inf)
     for triangle in near.reshape(len(points), n_near).T:
         np.minimum(nearest, _to_triangles_mm(points, corners[triangle]), out=nearest)
-    for index in np.flatnonzero(nearest > doubted_mm):
+    # A large triangle lies nearer than its middle tells: those in doubt are asked of all. The worst
+    # first, so that a surface that is too far away is soon found out.
+    in_doubt = np.flatnonzero(nearest > distance_mm)
+    for index in in_doubt[np.argsort(-nearest[in_doubt])]:
         point = np.broadcast_to(points[index], (len(corners), 3))
-        nearest[index] = _to_triangles_mm(point, corners).min()
-    return nearest
+        if _to_triangles_mm(point, corners).min() > distance_mm:
+            return False
+    return True
 
 
 def _collapsed(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh | None:

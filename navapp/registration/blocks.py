@@ -7,18 +7,24 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 from navapp.registration.step_kernels import noise_under_kernel_mm2
-from navapp.values import PoseEstimate
+from navapp.values import PoseEstimate, Reason
 
 # A residual further off than this, in sigma of itself and of the pose, belongs to something else.
 _GATE_SIGMAS = 3.0
-# Width of the kernel in sigma: 97 % of the efficiency of least squares (docs/registration.md).
+# Width of the kernel in sigma: 97 % of the efficiency of least squares (as `BimccSettings`).
 _KERNEL_SIGMAS = 2.5
 _ROUNDS = 6
-# Chi-square of 6 degrees of freedom at 95 %: blocks that pull further apart contradict each other.
-_CONFLICT = 12.59
+# Chi-square of 6 degrees of freedom: blocks that pull further apart than 95 % are not joined; that
+# they contradict each other is said at 99.9 %.
+_APART, _CONFLICT = 12.59, 22.46
 # What a block's residuals say of its noise counts beside what it claims, which counts as so many.
 _CLAIM_COUNT = 6.0
+# Of a right pose's residuals nearly all are near. Those of a wrong one that happen to be small
+# agree with it as well: they must not speak for the rest.
+_LEAST_NEAR = 0.5
 _FEWEST = 6.0
+# Residuals that show nothing at all (drawn data) still leave a scale.
+_LEAST_RATIO2 = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +77,9 @@ def join(
         centre_mm: (3,) the model's centre at that pose, in the camera's frame.
 
     Returns:
-        The estimate as it was when the block says too little or contradicts it.
+        The estimate as it was when the block says too little; with the reason that the cues
+        disagree when the block contradicts it: most of it is further off than the estimate allows,
+        or all of it pulls away.
 
     Both blocks claim a noise and show one in their residuals. The pose is found with the noise they
     show, so that a block that claims too much of itself does not outweigh one that claims too
@@ -80,9 +88,13 @@ def join(
     Source: Gauss-Newton on the sum of squares, kernel weights as in `step_kernels.weigh`; variance
     components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
     """
-    block = block.only(near(block, estimate.covariance))
-    if float((1.0 / block.n_sharing).sum()) < _FEWEST:
+    is_near = near(block, estimate.covariance)
+    count_all, count_near = (float((1.0 / block.n_sharing[kept]).sum()) for kept in (..., is_near))
+    if count_all < _FEWEST:
         return estimate
+    if count_near < max(_LEAST_NEAR * count_all, _FEWEST):
+        return _contradicted(estimate)
+    block = block.only(is_near)
     surface = np.zeros((7, 7))
     surface[:6, :6] = np.linalg.inv(estimate.covariance)
     surface_scale = min(_shown(_rms_ratio2(estimate), kernel_sigmas), 1.0)
@@ -102,14 +114,19 @@ def join(
         step = np.asarray(
             np.linalg.solve(normal, weighted @ block.residual / scale), dtype=np.float64
         )
-    if step @ surface @ step > _CONFLICT:
-        return estimate
+    apart = float(step @ surface @ step)
+    if apart > _APART:
+        return _contradicted(estimate) if apart > _CONFLICT else estimate
     inverse = np.linalg.inv(normal)
     # A block that shows more noise than it claims is believed.
     claimed = surface / surface_scale**2 + offset + information * max(scale, 1.0) / scale**2
     covariance = (inverse @ claimed @ inverse)[:6, :6]
     pose = estimate.camera_from_bone.moved(step[:6], centre_mm)
     return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
+
+
+def _contradicted(estimate: PoseEstimate) -> PoseEstimate:
+    return replace(estimate, reasons=(*estimate.reasons, Reason.CUES_DISAGREE))
 
 
 def _scale(rest: FloatArray, count: FloatArray, variance: FloatArray) -> float:
@@ -125,4 +142,4 @@ def _shown(ratio2: float, kernel_sigmas: float) -> float:
 
 
 def _rms_ratio2(estimate: PoseEstimate) -> float:
-    return (estimate.rms_mm / estimate.expected_rms_mm) ** 2
+    return max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_RATIO2)

@@ -118,6 +118,8 @@ class Follower:
             elif is_near:
                 break
             is_near |= moved_mm < settings.near_mm or n_rounds >= settings.max_sampled
+        if fit is not None and fit.moved_mm >= settings.near_mm:
+            fit = replace(fit, estimate=with_reason(fit.estimate, Reason.NOT_CONVERGED))
         return fit, timings
 
 
@@ -132,6 +134,11 @@ def fitted(
     estimate = fit_bimcc(measured.scene, model, start, settings)
     estimate_ms = (time.perf_counter_ns() - started) / 1e6
     return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
+
+
+def with_reason(estimate: PoseEstimate, reason: Reason) -> PoseEstimate:
+    """The same estimate, doubted once more."""
+    return replace(estimate, reasons=(*estimate.reasons, reason))
 
 
 def moved_surface_mm(

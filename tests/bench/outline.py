@@ -112,7 +112,7 @@ def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, fl
     fit = line.locator.locate(pair, start)
     if fit is None or fit.measured.view is None:
         return
-    coarse_px = line._meter.coarsely(pair, fit.pose, fit.measured.disparity)
+    coarse_px = line._rough_px(pair, fit, None)
     answer: list[float] = []
     for one in (fit, line._contours.joined(pair, fit, coarse_px)):
         mesh = line.model.bone.mesh

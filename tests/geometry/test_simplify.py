@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry import TriangleMesh
-from navapp.geometry.simplify import distance_mm, simplified
+from navapp.geometry.simplify import is_within, simplified
 from tests.geometry.shapes import sphere
 
 SPHERE = sphere(30.0, 40)
@@ -15,14 +15,15 @@ def test_a_simpler_mesh_stays_within_the_distance_and_closed() -> None:
     assert len(simple.vertices_mm) < 0.4 * len(SPHERE.vertices_mm)
     radii = np.linalg.norm(simple.vertices_mm, axis=1)
     np.testing.assert_allclose(radii, 30.0, atol=0.5)
-    assert distance_mm(SPHERE, simple).max() <= 0.5
+    assert is_within(SPHERE, simple, 0.5)
     assert simple.volume_mm3() == pytest.approx(SPHERE.volume_mm3(), rel=0.02)
 
 
 def test_a_narrow_distance_keeps_more_vertices() -> None:
     loose, narrow = simplified(SPHERE, 100, 5.0), simplified(SPHERE, 100, 0.05)
     assert len(loose.vertices_mm) < len(narrow.vertices_mm) <= len(SPHERE.vertices_mm)
-    assert distance_mm(SPHERE, narrow).max() <= 0.05
+    assert is_within(SPHERE, narrow, 0.05)
+    assert not is_within(SPHERE, loose, 0.05)
 
 
 def test_a_small_mesh_stays_as_it_is() -> None:
@@ -33,7 +34,7 @@ def test_a_surface_far_from_the_origin_is_simplified_as_well() -> None:
     far = TriangleMesh(SPHERE.vertices_mm + np.array([4000.0, -3000.0, 5000.0]), SPHERE.faces)
     simple = simplified(far, 300, 0.5)
     assert len(simple.vertices_mm) < 0.4 * len(far.vertices_mm)
-    assert distance_mm(far, simple).max() <= 0.5
+    assert is_within(far, simple, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -49,8 +50,9 @@ def test_a_surface_far_from_the_origin_is_simplified_as_well() -> None:
 def test_distance_from_a_triangle(point: tuple[float, float, float], expected_mm: float) -> None:
     triangle = TriangleMesh(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
     corners = np.array(point) + np.array([[0.0, 0, 0], [1e-9, 0, 0], [0, 1e-9, 0]])
-    found = distance_mm(TriangleMesh(corners, np.array([[0, 1, 2]])), triangle)
-    np.testing.assert_allclose(found, expected_mm, atol=1e-6)
+    mesh = TriangleMesh(corners, np.array([[0, 1, 2]]))
+    assert is_within(mesh, triangle, expected_mm + 1e-6)
+    assert not is_within(mesh, triangle, expected_mm - 1e-6)
 
 
 def test_a_large_triangle_near_a_point_is_not_overlooked() -> None:
@@ -61,5 +63,6 @@ def test_a_large_triangle_near_a_point_is_not_overlooked() -> None:
     vertices = np.concatenate([large, *crumbs])
     surface = TriangleMesh(vertices, np.arange(3 * (n + 1), dtype=np.int32).reshape(-1, 3))
     point = np.array([[3.0, -300.0, 1.0], [3.1, -300.0, 1.0], [3.0, -300.1, 1.0]])
-    found = distance_mm(TriangleMesh(point, np.array([[0, 1, 2]])), surface)
-    np.testing.assert_allclose(found, 1.0)
+    mesh = TriangleMesh(point, np.array([[0, 1, 2]]))
+    assert is_within(mesh, surface, 1.0 + 1e-9)
+    assert not is_within(mesh, surface, 1.0 - 1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.registration.blocks import ResidualBlock, join, near
-from navapp.values import PoseEstimate
+from navapp.values import PoseEstimate, Reason
 from tests.registration.shapes import TRUE
 
 CENTRE_MM = np.array([5.0, -3.0, 470.0])
@@ -94,9 +94,29 @@ def test_residuals_of_something_else_are_left_out() -> None:
     assert (np.abs(robust - clean) < 0.5 * SIGMAS).all()
 
 
-def test_a_block_that_contradicts_the_surface_changes_nothing() -> None:
-    far = block_of(5.0 * SIGMAS, n=2000)
-    assert join(SURFACE, WIDE, far, CENTRE_MM) is SURFACE
+@pytest.mark.parametrize("n", [100, 400, 2000])
+@pytest.mark.parametrize("n_sigmas", [8.0, 12.0, 15.0, 20.0, 30.0])
+def test_a_block_that_contradicts_the_surface_moves_nothing_and_is_told(
+    n: int, n_sigmas: float
+) -> None:
+    """However many of its residuals happen to be small."""
+    joined = join(SURFACE, WIDE, block_of(n_sigmas * SIGMAS, n=n), CENTRE_MM)
+    assert joined.camera_from_bone is SURFACE.camera_from_bone
+    np.testing.assert_array_equal(joined.covariance, SURFACE.covariance)
+    assert joined.reasons == (Reason.CUES_DISAGREE,)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_blocks_that_agree_are_not_doubted(seed: int) -> None:
+    joined = join(SURFACE, WIDE, block_of(drawn(seed), n=60, seed=seed), CENTRE_MM)
+    assert joined.reasons == ()
+
+
+def test_a_surface_without_residuals_is_survived() -> None:
+    joined = join(
+        estimate_of(SURFACE.covariance, rms_ratio=0.0), 1.2, block_of(drawn(3)), CENTRE_MM
+    )
+    assert np.isfinite(joined.covariance).all()
 
 
 def test_a_block_that_says_too_little_changes_nothing() -> None:

@@ -6,6 +6,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.tracking.follower import Follower, FollowerSettings
 from navapp.tracking.locator import LocatorSettings
 from navapp.tracking.surface_meter import Measurement
+from navapp.values import Reason
 from tests.registration.shapes import TRUE
 from tests.tracking.test_locator import (
     MODEL,
@@ -117,3 +118,17 @@ def test_a_matching_without_points_does_not_replace_a_fit(
     assert fit.n_rounds == 2
     assert not fit.estimate.reasons
     assert error_mm(fit.pose) < 0.1
+
+
+def test_a_bone_that_never_rests_has_not_settled() -> None:
+    class Wanders(FakeMeter):
+        """The bone runs ahead of every look."""
+
+        def _near_the_model(self, what: str, *given) -> Measurement:
+            self.true = moved((0.5 * (-1.0) ** len(self.asked), 0.0, 0.0), (0.0,) * 3)
+            return super()._near_the_model(what, *given)
+
+    fit, _ = follower(Wanders()).follow(PAIR, TRUE)
+    assert Reason.NOT_CONVERGED in fit.estimate.reasons
+    fit, _ = follower(FakeMeter()).follow(PAIR, NEAR)
+    assert Reason.NOT_CONVERGED not in fit.estimate.reasons
