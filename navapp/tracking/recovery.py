@@ -59,9 +59,8 @@ class Recovery:
         Returns:
             None out of view.
         """
-        locator = self._locator
+        locator, centre_mm = self._locator, self._model.centre_mm
         # The baseline has the expected pose and nothing else.
-        centre_mm = self._model.centre_mm
         starts = [] if locator.is_baseline else starts_after_loss(pose, centre_mm, n_lost)
         measured = self._meter.freely(pair, pose, WIDE_VIEW) if starts else None
         if measured is None or len(measured.cloud) == 0:
