@@ -24,6 +24,10 @@ Method = Literal["bimcc", "icp"]
 # Points that were measured freely know their noise, but not all of their errors.
 STEREO_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 _NEARBY = replace(STEREO_SETTINGS, widest_mm=3.0)
+# Rectified around an expected bone: a little more than is matched when it is there, for it may have
+# moved; much more when it has to be searched.
+NEAR_VIEW = Margins(box_px=56, band_mm=60.0)
+WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,19 @@ around it lead to the bone, and a frame has no time for all of them: each other 
 part that is spread over all directions, until every start had its turn.
 """
 
+import time
+from dataclasses import replace
+
 import numpy as np
 
-from navapp.geometry.transform import RigidTransform
-from navapp.registration import tilted_starts
+from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import RegistrationModel, find_candidates, tilted_starts
+from navapp.tracking.fit_judge import FitJudge
+from navapp.tracking.follower import Fit, sum_timings
+from navapp.tracking.locator import WIDE_VIEW, Locator
+from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values import LineTimings
 
 # Steps along each axis, and the tilts of each: (mm, ((deg, how many), ...)).
 _RINGS = (
@@ -18,8 +27,63 @@ _RINGS = (
 _PARTS = 10
 
 
+class Recovery:
+    """Looks for one bone that was lost; holds only what is constant."""
+
+    def __init__(
+        self,
+        meter: SurfaceMeter,
+        model: RegistrationModel,
+        locator: Locator,
+        fit_judge: FitJudge,
+    ) -> None:
+        """Join what measures, locates and judges.
+
+        Args:
+            meter: measures surfaces.
+            model: of the bone.
+            locator: of the bone.
+            fit_judge: tells how much a pose explains.
+        """
+        self._meter, self._model = meter, model
+        self._locator, self._fit_judge = locator, fit_judge
+
+    def found_again(self, pair: RectifiedPair, pose: RigidTransform, n_lost: int) -> Fit | None:
+        """Around an expected pose; or in every other lost frame further off, from a few starts.
+
+        Args:
+            pair: pictures, rectified widely around that pose.
+            pose: expected, in the rectified camera.
+            n_lost: frames lost before this one.
+
+        Returns:
+            None out of view.
+        """
+        locator, centre_mm = self._locator, self._model.centre_mm
+        # The baseline has the expected pose and nothing else.
+        starts = [] if locator.is_baseline else starts_after_loss(pose, centre_mm, n_lost)
+        measured = self._meter.freely(pair, pose, WIDE_VIEW) if starts else None
+        if measured is None or len(measured.cloud) == 0:
+            return locator.search(pair, pose, locator.settings.search)
+        started = time.perf_counter_ns()
+        best = self._best(measured, starts) or pose
+        coarse = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
+        fit = locator.settle(pair, measured, best)
+        return replace(fit, timings=sum_timings(fit.timings, coarse))
+
+    def _best(self, measured: Measurement, starts: list[RigidTransform]) -> RigidTransform | None:
+        """Of the poses that starts lead to, the one that explains most."""
+        found = find_candidates(
+            measured.scene,
+            self._model,
+            starts,
+            lambda pose: self._fit_judge.explained(pose, measured),
+        )
+        return found[0].scene_from_bone if found else None
+
+
 def starts_after_loss(
-    last: RigidTransform, centre_mm: np.ndarray, n_lost: int
+    last: RigidTransform, centre_mm: FloatArray, n_lost: int
 ) -> list[RigidTransform]:
     """What to start from besides the last pose; nothing in every other frame.
 
@@ -34,7 +98,7 @@ def starts_after_loss(
     return _all_starts(last, last.apply(centre_mm))[part::_PARTS]
 
 
-def _all_starts(last: RigidTransform, place_mm: np.ndarray) -> list[RigidTransform]:
+def _all_starts(last: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
     """Tilts of the last pose where it was, and a step away along each axis."""
     axes = np.vstack([np.eye(3), -np.eye(3)])
     starts = []

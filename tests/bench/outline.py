@@ -21,7 +21,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.tracking import Goal, Line
 from navapp.tracking.contour_kernels import missing_share, sample_across, strongest_edge
-from navapp.tracking.line import _NEAR_VIEW
+from navapp.tracking.locator import NEAR_VIEW
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
 from navapp.values import predicted_tre_mm, visible_vertices
 from tests.bench.first_registration import Case, simulated
@@ -72,7 +72,7 @@ def edges_of(case: Case, line: Line) -> Iterator[Edge]:
     """Of the left picture, at the true pose."""
     frame = case.frames[0]
     true = line._rectified(frame.true)
-    pair, _ = line._rectified_pair(frame.left, frame.right, true, _NEAR_VIEW)
+    pair, _ = line._rectified_pair(frame.left, frame.right, true, NEAR_VIEW)
     expected = line._meter.expected(pair, true, line.settings.locator.tracking)
     if expected is None:
         return
@@ -90,10 +90,13 @@ def outline(
     line: Line, pose: RigidTransform, view: RenderedView
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pixel and normal of each point of it in the left picture."""
-    geometry = line._geometry
+    geometry = line._meter.geometry
     eye = Eye(0.0, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
     rim = find_rim(
-        line._contours._ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye
+        line._fit_judge._contours._ridges,
+        np.array(pose.rotation),
+        np.array(pose.translation_mm),
+        eye,
     )
     seen = is_outline(rim, view.depth_mm, view.box.x, view.box.y)
     rim = thin_rim(Rim(*(part[seen] for part in rim)))
@@ -108,13 +111,13 @@ def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, fl
         [rng.normal(0.0, START_OFF_MM, 3), np.radians(rng.normal(0.0, START_OFF_DEG, 3))]
     )
     start = true.moved(off, true.apply(line.centre_mm))
-    pair, _ = line._rectified_pair(frame.left, frame.right, start, _NEAR_VIEW)
+    pair, _ = line._rectified_pair(frame.left, frame.right, start, NEAR_VIEW)
     fit = line.locator.locate(pair, start)
     if fit is None or fit.measured.view is None:
         return
-    coarse_px = line._rough_px(pair, fit, None)
+    rough_px = line._fit_judge.rough_px(pair, fit)
     answer: list[float] = []
-    for one in (fit, line._contours.joined(pair, fit, coarse_px)):
+    for one in (fit, line._fit_judge._contours.joined(pair, fit, rough_px)):
         mesh = line.model.bone.mesh
         targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
         bound_mm = predicted_tre_mm(one.estimate, line.centre_mm, targets[:: len(targets) // 200])

@@ -150,8 +150,8 @@ def guided(sequence: Sequence, n_seeds: int) -> None:
                     continue
                 after.append(tre_mm(fit.pose, scene.pose, sequence.mesh))
                 if after[-1] > _CAUGHT_MM:
-                    verdict = line._judged(fit, _GOAL, LineTimings()).verdict
-                    n_silent += verdict.status is not Status.LOST
+                    judged = line._fit_judge.judged(scene.pair, fit, _GOAL, LineTimings())
+                    n_silent += judged.verdict.status is not Status.LOST
                 signed.append(np.median(depth_error_mm(scene, fit.measured.disparity, sequence)))
         report_guided(f"{sequence.name} {angle_deg:g} deg {length_mm:g} mm", before, after, signed)
         if n_silent:

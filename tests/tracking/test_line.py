@@ -1,17 +1,12 @@
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from navapp.geometry.rig import RigQuality
-from navapp.preop import build_aspects
-from navapp.registration import estimate_at
 from navapp.tracking import Line, LineSettings, LocatorSettings, TrackState
-from navapp.tracking.first_look import doubted
-from navapp.tracking.locator import STEREO_SETTINGS
-from navapp.values import Prior, Reason, Status, visible_vertices
-from tests.tracking.rooms import GOAL, Room, cone, room
+from navapp.values import Prior, Reason, Status
+from tests.tracking.rooms import GOAL, Room, room
 
 
 def follow(a: Room, line: Line, start_off=(0.0,) * 6):
@@ -44,17 +39,6 @@ def test_following_twice_gives_the_same_bits() -> None:
     first, second = follow(a, a.line)[0], follow(a, a.line)[0]
     for (_, one), (_, other) in zip(first, second, strict=True):
         assert one.left_from_bone.matrix.tobytes() == other.left_from_bone.matrix.tobytes()
-
-
-def test_the_outline_enters_the_pose_that_is_handed_out(monkeypatch) -> None:
-    a = room()
-    frame = a.frames[0]
-    with_it = follow(a, a.line)[0][0][1]
-    monkeypatch.setattr(a.line._contours, "joined", lambda pair, fit, coarse_px: fit)
-    without = follow(a, a.line)[0][0][1]
-    assert np.trace(with_it.estimate.covariance) < np.trace(without.estimate.covariance)
-    assert with_it.verdict.predicted_tre_mm < without.verdict.predicted_tre_mm
-    assert a.error_mm(with_it.left_from_bone, frame) < with_it.verdict.predicted_tre_mm
 
 
 @pytest.mark.slow
@@ -113,116 +97,6 @@ def test_a_bone_out_of_view_is_lost_and_said_so(shift) -> None:
     assert [f.verdict.status for f in found] == [Status.LOST]
 
 
-def test_the_first_registration_finds_the_bone_from_the_rough_prior() -> None:
-    a = room()
-    frame, told = a.frames[0], []
-    found = a.line.register(frame.left, frame.right, a.prior, GOAL, told.append)
-    assert a.error_mm(a.prior.left_from_bone["femur"], frame) > 5.0
-    assert a.error_mm(found[0].left_from_bone, frame) < 1.2
-    assert found[0].verdict.status is Status.OK
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-
-
-def test_a_registration_can_be_stopped() -> None:
-    a = room()
-
-    class StoppedError(Exception):
-        pass
-
-    def stop(share: float) -> None:
-        if share > 0.1:
-            raise StoppedError
-
-    with pytest.raises(StoppedError):
-        a.line.register(a.frames[0].left, a.frames[0].right, a.prior, GOAL, stop)
-
-
-def test_without_a_start_for_this_bone_there_is_no_candidate() -> None:
-    a = room()
-    assert a.line.register(a.frames[0].left, a.frames[0].right, Prior(), GOAL) == []
-
-
-@lru_cache(maxsize=1)
-def line_with_aspects() -> Line:
-    a = room()
-    bone = a.line.model.bone
-    axis, half_angle_deg = cone()
-    return Line(a.rig, bone, aspects=build_aspects(bone, axis, half_angle_deg))
-
-
-def drawn_box(a: Room) -> tuple[int, int, int, int]:
-    """Roughly what is seen of the bone, in the left picture."""
-    truth = a.truth(a.frames[0])
-    mesh = a.line.model.bone.mesh
-    seen = mesh.vertices_mm[visible_vertices(mesh, truth)]
-    bare = seen[seen[:, 2] < mesh.vertices_mm[:, 2].min() + 60.0]
-    pixels = a.rig.left.project(truth.apply(bare))
-    x, y = pixels.min(axis=0) - np.array([12.0, -8.0])
-    width, height = np.ptp(pixels, axis=0) + np.array([15.0, -20.0])
-    return int(x), int(y), int(width), int(height)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("is_in_box", [True, False])
-def test_the_first_registration_finds_the_bone_without_a_pose(is_in_box: bool) -> None:
-    a = room()
-    axis, half_angle_deg = cone()
-    frame, told = a.frames[0], []
-    prior = Prior({}, axis, half_angle_deg, drawn_box(a) if is_in_box else None)
-    found = line_with_aspects().register(frame.left, frame.right, prior, GOAL, told.append)
-    assert a.error_mm(found[0].left_from_bone, frame) < 1.0
-    assert found[0].verdict.status is Status.OK
-    assert found[0].left_from_bone.name == "left_from_femur"
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-
-
-@pytest.mark.slow
-def test_a_box_alone_will_do_on_grey_pictures_and_without_aspects() -> None:
-    a = room(is_grey=True, n_frames=2)
-    frame = a.frames[0]
-    prior = Prior({}, None, 180.0, drawn_box(a))
-    found = a.line.register(frame.left, frame.right, prior, GOAL)
-    assert a.error_mm(found[0].left_from_bone, frame) < 1.0
-
-
-@pytest.mark.parametrize("box", [(5000, 5000, 100, 100), (0, 0, 150, 150)])
-def test_a_box_beside_the_bone_gives_no_ok(box: tuple[int, int, int, int]) -> None:
-    a = room()
-    frame = a.frames[0]
-    axis, half_angle_deg = cone()
-    prior = Prior({}, axis, half_angle_deg, box)
-    found = line_with_aspects().register(frame.left, frame.right, prior, GOAL)
-    assert found
-    assert all(one.verdict.status is not Status.OK for one in found)
-
-
-def test_a_different_pose_that_explains_as_much_makes_the_best_a_guess() -> None:
-    a = room()
-    frame = a.frames[0]
-    truth = a.truth(frame)
-    line = a.line
-    pair, _ = line._rectified_pair(frame.left, frame.right, line._rectified(truth))
-    pose = line._rectified(truth)
-    fit = line.locator.search(pair, pose, line.settings.locator.tracking)
-    turned = fit.pose.moved((0, 0, 0, 0, 0, 0.4), fit.pose.apply(line.centre_mm))
-    other = replace(fit, estimate=replace(fit.estimate, camera_from_bone=turned))
-    best, second = doubted([other, fit], [0.5, 0.52], line.model)
-    assert best.pose is fit.pose
-    assert second is other
-    assert Reason.AMBIGUOUS in best.estimate.reasons
-    assert doubted([other, fit], [0.3, 0.52], line.model)[0] is fit
-    assert doubted([fit, fit], [0.5, 0.52], line.model)[0] is fit
-
-
-def test_the_baseline_needs_a_pose() -> None:
-    a = room()
-    line = Line(a.rig, a.line.model.bone, LineSettings(LocatorSettings(method="icp")))
-    prior = Prior({}, None, 180.0, drawn_box(a))
-    assert line.register(a.frames[0].left, a.frames[0].right, prior, GOAL) == []
-
-
 def test_a_pose_is_assessed_where_it_stands() -> None:
     a = room()
     frame = a.frames[0]
@@ -242,24 +116,6 @@ def test_a_rig_that_was_not_accepted_never_gives_ok() -> None:
     for _, tracked in follow(a, line)[0]:
         assert tracked.verdict.status is not Status.OK
         assert Reason.RIG_NOT_ACCEPTED in tracked.verdict.reasons
-
-
-def test_the_covariance_turns_with_the_camera_frame() -> None:
-    """Handed out in the left camera before rectification, which is a pure rotation."""
-    a = room()
-    frame = a.frames[0]
-    line, truth = a.line, a.truth(frame)
-    estimate = line.assess(frame.left, frame.right, truth, GOAL).estimate
-    rectified_from_left = line._geometry.rectified_from_left
-    pair, _ = line._rectified_pair(frame.left, frame.right, line._rectified(truth))
-    pose = rectified_from_left @ truth
-    measured = line._meter.freely(pair, pose, line.settings.locator.tracking)
-    inside = estimate_at(measured.scene, line.model, pose, STEREO_SETTINGS)
-    turn = np.kron(np.eye(2), rectified_from_left.rotation)
-    np.testing.assert_allclose(
-        turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15
-    )
-    assert np.abs(estimate.covariance - inside.covariance).max() > 1e-6
 
 
 def lost_far_away(a: Room, n_seen: int = 2) -> TrackState:

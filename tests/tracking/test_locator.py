@@ -326,10 +326,11 @@ def seen_knee():
     """A frame's pair, the true pose in the rectified camera, a locator and what it asks for."""
     a = room()
     frame, line = a.frames[0], a.line
-    true = line._geometry.rectified_from_left @ a.truth(frame)
+    true = line._rectified(a.truth(frame))
     pair, _ = line._rectified_pair(frame.left, frame.right, true)
     meter = Listening(line._meter)
-    return pair, true, Locator(meter, line.model, line._score, LocatorSettings()), meter.asked
+    locator = Locator(meter, line.model, line._fit_judge.score, LocatorSettings())
+    return pair, true, locator, meter.asked
 
 
 def surface_error_mm(pose: RigidTransform, true: RigidTransform) -> float:

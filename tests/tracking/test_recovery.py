@@ -1,8 +1,10 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotation_from_vector
-from navapp.tracking.recovery import starts_after_loss
+from navapp.tracking.recovery import Recovery, starts_after_loss
 
 CENTRE = np.array([3.0, -20.0, 15.0])
 LAST = RigidTransform.from_parts(
@@ -48,3 +50,14 @@ def test_all_directions_are_looked_in() -> None:
     shifts = [start.apply(CENTRE) - LAST.apply(CENTRE) for part in cycle() for start in part]
     for axis in np.vstack([np.eye(3), -np.eye(3)]):
         assert max(shift @ axis for shift in shifts) == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize(("is_baseline", "n_lost"), [(True, 1), (False, 2)])
+def test_what_does_not_look_further_off_searches_where_it_was(is_baseline, n_lost) -> None:
+    """And measures nothing beside: a meter would be asked in vain."""
+    settings = SimpleNamespace(search="margins")
+    locator = SimpleNamespace(
+        is_baseline=is_baseline, settings=settings, search=lambda *given: given
+    )
+    recovery = Recovery(None, SimpleNamespace(centre_mm=CENTRE), locator, None)
+    assert recovery.found_again("pair", LAST, n_lost) == ("pair", LAST, "margins")

@@ -1,0 +1,119 @@
+"""A fit becomes an answer: joined with the outline, judged, and told in the left camera."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import RegistrationModel
+from navapp.tracking.contours import ContourMeter
+from navapp.tracking.follower import Fit, sum_timings
+from navapp.tracking.judge import Goal, Judge
+from navapp.tracking.pair_doubts import with_pair_doubts
+from navapp.tracking.surface_meter import Measurement, RoughMap, SurfaceMeter
+from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
+
+# A model that moved by less looks the same.
+_SAME_VIEW_MM = 0.05
+
+
+class FitJudge:
+    """Judges fits of one bone under one rig; holds only what is constant."""
+
+    def __init__(
+        self, meter: SurfaceMeter, model: RegistrationModel, is_rig_accepted: bool
+    ) -> None:
+        """Join what is judged and what tells what hides it.
+
+        Args:
+            meter: measures surfaces.
+            model: of the bone.
+            is_rig_accepted: the rig's calibration is good enough for an OK.
+        """
+        self._meter = meter
+        self._model = model
+        self._judge = Judge(meter.geometry, is_rig_accepted)
+        self._contours = ContourMeter(model, meter.geometry)
+
+    def judged(
+        self,
+        pair: RectifiedPair,
+        fit: Fit | None,
+        goal: Goal,
+        timings: LineTimings,
+        predicted: RigidTransform | None = None,
+        rough: RoughMap | None = None,
+    ) -> TrackedFrame:
+        """The answer that a fit gives, in the left camera before rectification.
+
+        Args:
+            pair: that it was fitted in.
+            fit: of the bone; None out of view.
+            goal: of the stage.
+            timings: of what came before the fit.
+            predicted: pose expected by the motion model, in the rectified camera.
+            rough: whatever lies around the bone; matched anew where it does not reach.
+        """
+        if fit is None:
+            return self.lost(Reason.OUT_OF_VIEW, timings)
+        started = time.perf_counter_ns()
+        found = fit.measured.disparity
+        rough_px = self.rough_px(pair, fit, rough)
+        fit = self._contours.joined(pair, fit, rough_px)
+        view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
+        verdict = self._judge.judge(
+            self._model, fit.estimate, found, goal, predicted, rough_px, view
+        )
+        depth_mm = fit.pose.apply(self._model.centre_mm)[2]
+        verdict = with_pair_doubts(verdict, pair, found, depth_mm)
+        judge_ms = (time.perf_counter_ns() - started) / 1e6
+        timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
+        estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
+        return TrackedFrame(self._model.bone.name, estimate, verdict, timings)
+
+    def lost(self, reason: Reason, timings: LineTimings | None = None) -> TrackedFrame:
+        """The answer when there is no fit to judge."""
+        verdict = Verdict(Status.LOST, None, (reason,))
+        return TrackedFrame(self._model.bone.name, None, verdict, timings or LineTimings())
+
+    def score(self, fit: Fit) -> float:
+        """How much of the model a fit explains; 0 without a covariance."""
+        is_fixed = np.isfinite(fit.estimate.covariance).all()
+        return self.explained(fit.pose, fit.measured) if is_fixed else 0.0
+
+    def explained(self, pose: RigidTransform, measured: Measurement) -> float:
+        """How much of the model, at a pose in the rectified camera, a measurement explains."""
+        found = self._judge.agreement(self._model, pose, measured.disparity)
+        return found.coverage * found.inlier_share
+
+    def rough_px(
+        self, pair: RectifiedPair, fit: Fit, rough: RoughMap | None = None
+    ) -> NDArray[np.float32] | None:
+        """(h, w) rough disparity over the box of a fit; None out of view or depth.
+
+        Args:
+            pair: that it was fitted in.
+            fit: of the bone.
+            rough: known already; matched anew when it does not reach over all of the box.
+        """
+        found = fit.measured.disparity
+        height, width = found.disparity_px.shape
+        box = Box(found.x, found.y, width, height)
+        known_px = None if rough is None else rough.over(box)
+        if known_px is not None:
+            return known_px
+        rough = self._meter.coarsely(pair, fit.pose, box)
+        return None if rough is None else rough.disparity_px
+
+    def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
+        """The same estimate in the left camera before rectification: a pure rotation."""
+        left_from_rectified = self._meter.geometry.rectified_from_left.inverse()
+        turn = np.kron(np.eye(2), left_from_rectified.rotation)
+        return replace(
+            estimate,
+            camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
+            covariance=turn @ estimate.covariance @ turn.T,
+        )

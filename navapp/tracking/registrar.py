@@ -1,0 +1,175 @@
+"""The first registration: from a rough pose, a box or a cone to judged poses, best first."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from navapp.geometry.rectification import Image, RectifiedPair
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import RegistrationModel, distinct, find_candidates, tilted_starts
+from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
+from navapp.tracking.fit_judge import FitJudge
+from navapp.tracking.follower import Fit
+from navapp.tracking.judge import Goal
+from navapp.tracking.locator import WIDE_VIEW, Locator
+from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values import LineTimings, Prior, Reason, Status, TrackedFrame
+
+# Near starts come first, which is so much of the work of both lists.
+_NEAR_SHARE = 0.1
+# Tilts and shifts of a rough pose: (deg, how many).
+_NEAR_TILTS = (15.0, 12)
+_FAR_TILTS = ((15.0, 12), (28.0, 20))
+_FAR_SHIFT_MM = 8.0
+# Candidates of a search everywhere that explain less than this share of the best are left out.
+_REFINED_SHARE = 0.5
+
+
+class Registrar:
+    """Finds one bone under one rig for the first time; holds only what is constant."""
+
+    def __init__(
+        self,
+        meter: SurfaceMeter,
+        model: RegistrationModel,
+        locator: Locator,
+        fit_judge: FitJudge,
+        first_look: FirstLook,
+        n_refined: int,
+    ) -> None:
+        """Join what measures, locates and judges.
+
+        Args:
+            meter: measures surfaces.
+            model: of the bone.
+            locator: of the bone.
+            fit_judge: of its fits.
+            first_look: tells where the bone may be without a pose.
+            n_refined: so many answers of a search are refined.
+        """
+        self._meter, self._model = meter, model
+        self._locator, self._fit_judge = locator, fit_judge
+        self._first_look, self._n_refined = first_look, n_refined
+
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None],
+    ) -> list[TrackedFrame]:
+        """Distinct candidates, best first; see `Line.register`."""
+        start = prior.left_from_bone.get(self._model.bone.name)
+        if start is None:
+            return self._anywhere(left, right, prior, goal, on_progress)
+        rough = self._meter.geometry.rectified_from_left @ start
+        pair, timings = self._meter.rectified(left, right, rough, WIDE_VIEW)
+        return self._around(pair, rough, goal, timings, on_progress)
+
+    def _around(
+        self,
+        pair: RectifiedPair,
+        rough: RigidTransform,
+        goal: Goal,
+        timings: LineTimings,
+        on_progress: Callable[[float], None],
+    ) -> list[TrackedFrame]:
+        """Around a rough pose: from near starts, and from far ones when those give no OK."""
+        locator = self._locator
+        measured = self._meter.freely(
+            pair, rough, locator.settings.search, is_baseline=locator.is_baseline
+        )
+        if measured is None or len(measured.cloud) == 0:
+            return [self._fit_judge.lost(Reason.NO_SURFACE)]
+        if locator.is_baseline:
+            # The paper's baseline has its start and nothing else.
+            fit = locator.settle(pair, measured, rough)
+            return [self._fit_judge.judged(pair, fit, goal, timings)]
+
+        def looked_from(starts: list[RigidTransform], done: float, share: float) -> list[Fit]:
+            poses = self._coarse(measured, starts, lambda part: on_progress(done + share * part))
+            return [locator.settle(pair, measured, pose) for pose in poses]
+
+        centre_mm = rough.apply(self._model.centre_mm)
+        fits = looked_from(near_starts(rough, centre_mm), 0.0, _NEAR_SHARE)
+        answers = self._ranked(pair, fits, goal, timings)
+        if not answers or answers[0].verdict.status is not Status.OK:
+            fits += looked_from(far_starts(rough, centre_mm), _NEAR_SHARE, 1.0 - _NEAR_SHARE)
+            answers = self._ranked(pair, fits, goal, timings)
+        on_progress(1.0)
+        return answers
+
+    def _anywhere(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None],
+    ) -> list[TrackedFrame]:
+        """Without a pose to start from; the paper's baseline cannot."""
+        if not prior.starts(self._model.bone.name) or self._locator.is_baseline:
+            return []
+        started = time.perf_counter_ns()
+        pair, candidates = self._first_look.candidates(left, right, prior, on_progress)
+        timings = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
+        poses = poses_to_refine(candidates, self._n_refined, _REFINED_SHARE)
+        found = [self._from_candidate(pair, pose) for pose in poses]
+        fits = [fit for fit in found if fit is not None]
+        if not fits:
+            return [self._fit_judge.lost(Reason.NO_SURFACE, timings)]
+        return self._ranked(pair, fits, goal, timings)
+
+    def _from_candidate(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
+        """What explains more: the model matched where it is expected, or what lies around it.
+
+        Clutter around a bone can pull it away from where the first finds it.
+        """
+        locator = self._locator
+        fits = (locator.locate(pair, pose), locator.search(pair, pose, locator.settings.search))
+        found = (fit for fit in fits if fit is not None)
+        return max(found, key=self._fit_judge.score, default=None)
+
+    def _coarse(
+        self,
+        measured: Measurement,
+        starts: list[RigidTransform],
+        on_progress: Callable[[float], None],
+    ) -> list[RigidTransform]:
+        """The best distinct poses that starts lead to."""
+        found = find_candidates(
+            measured.scene,
+            self._model,
+            starts,
+            lambda pose: self._fit_judge.explained(pose, measured),
+            on_progress,
+        )
+        return [candidate.scene_from_bone for candidate in found[: self._n_refined]]
+
+    def _ranked(
+        self, pair: RectifiedPair, fits: list[Fit], goal: Goal, timings: LineTimings
+    ) -> list[TrackedFrame]:
+        """Distinct answers, best first; a guess is called one."""
+        fits = doubted(fits, [self._fit_judge.score(fit) for fit in fits], self._model)
+        kept = distinct([fit.pose for fit in fits], self._model.centre_mm)
+        return [
+            self._fit_judge.judged(pair, fit, goal, timings) for fit in fits if fit.pose in kept
+        ]
+
+
+def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """A rough pose, and tilts of it about a place in the camera's frame."""
+    return tilted_starts(rough, centre_mm, *_NEAR_TILTS)
+
+
+def far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """Tilts of a rough pose and of what it becomes when shifted along each axis."""
+    starts = []
+    for shift in (np.zeros(3), *(_FAR_SHIFT_MM * np.eye(3)), *(-_FAR_SHIFT_MM * np.eye(3))):
+        moved = rough.moved(np.concatenate([shift, np.zeros(3)]), centre_mm)
+        starts.append(moved)
+        for tilt_deg, n_tilts in _FAR_TILTS:
+            starts += tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
+    return starts
