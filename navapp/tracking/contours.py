@@ -19,7 +19,7 @@ from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.blocks import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.contour_kernels import find_steps
-from navapp.tracking.follower import ON_MODEL, Fit
+from navapp.tracking.follower import ON_MODEL, Fit, moved_surface_mm
 from navapp.tracking.outline_kernels import (
     Eye,
     Ridges,
@@ -82,7 +82,9 @@ class ContourMeter:
             return fit
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
-        return replace(fit, estimate=join(estimate, ON_MODEL.n_sigmas, block, centre_mm))
+        joined = join(estimate, ON_MODEL.n_sigmas, block, centre_mm)
+        moved_mm = moved_surface_mm(self._model, fit.pose, joined.camera_from_bone)
+        return replace(fit, estimate=joined, moved_mm=fit.moved_mm + moved_mm)
 
     def block(
         self,

@@ -14,6 +14,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.agreement import Agreement, compare
+from navapp.tracking.motion import twist_between
 from navapp.values import (
     DisparityMap,
     PoseEstimate,
@@ -41,7 +42,7 @@ class JudgeLimits:
         spread_ok: spread of all differences over the sigma that they claim.
         rms_ratio_ok, rms_ratio_lost: rms of the fit's residual over what its sigma predicts.
         cartilage_sd_ok: rms standard deviation, mm, of the cartilage over the seen surface.
-        jump_mm: largest motion of the bone's centre from the prediction.
+        jump_mm, jump_deg: largest motion of the bone's centre from the prediction, and turn.
         max_bound_targets: targets used for the predicted error.
     """
 
@@ -58,6 +59,7 @@ class JudgeLimits:
     rms_ratio_lost: float = 2.0
     cartilage_sd_ok: float = 0.45
     jump_mm: float = 12.0
+    jump_deg: float = 10.0
     max_bound_targets: int = 200
 
 
@@ -174,8 +176,11 @@ class Judge:
     ) -> bool:
         if predicted is None:
             return False
-        moved = estimate.camera_from_bone.apply(model.centre_mm) - predicted.apply(model.centre_mm)
-        return bool(np.linalg.norm(moved) > self._limits.jump_mm)
+        shift_mm, turn_rad = np.split(
+            twist_between(predicted, estimate.camera_from_bone, model.centre_mm), 2
+        )
+        is_far = np.linalg.norm(shift_mm) > self._limits.jump_mm
+        return bool(is_far or np.linalg.norm(turn_rad) > np.radians(self._limits.jump_deg))
 
     def _render(
         self, model: RegistrationModel, pose: RigidTransform, measured: DisparityMap

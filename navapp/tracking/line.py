@@ -32,6 +32,8 @@ from navapp.values import (
     TrackedFrame,
 )
 
+_BEST_FIRST = (Status.OK, Status.DEGRADED, Status.LOST)
+
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
@@ -108,16 +110,37 @@ class Line:
         if tracked.verdict.status is Status.LOST:
             if not self.locator.is_baseline:
                 boxes = self._boxes.followed(boxes, left)
-            for place in self._boxes.starts(expected, boxes):
-                pose = self._rectified(place)
-                pair, timings = self._rectified_pair(left, right, pose)
-                timings = sum_timings(tracked.timings, timings)
-                fit = self._recovery.found_again(pair, pose, state.n_lost)
-                tracked = self._fit_judge.judged(pair, fit, goal, timings, predicted)
-                if tracked.verdict.status is not Status.LOST:
-                    break
-        boxes = self._boxes.placed(boxes, left, tracked)
-        return tracked, replace(state.updated(tracked, captured_ns, self.centre_mm), box=boxes)
+            places = self._boxes.starts(expected, boxes)
+            tracked = self._searched(left, right, places, predicted, state.n_lost, tracked, goal)
+        after = state.updated(tracked, captured_ns, self.centre_mm)
+        # What is not followed does not place the box either.
+        boxes = self._boxes.placed(boxes, left, tracked) if after.n_lost == 0 else boxes
+        return tracked, replace(after, box=boxes)
+
+    def _searched(
+        self,
+        left: Image,
+        right: Image,
+        places: list[RigidTransform],
+        predicted: RigidTransform,
+        n_lost: int,
+        lost: TrackedFrame,
+        goal: Goal,
+    ) -> TrackedFrame:
+        """The best answer of a search around poses, far around the first of them; the first OK."""
+        answers, timings = [lost], lost.timings
+        for number, place in enumerate(places):
+            pose = self._rectified(place)
+            pair, rectified = self._rectified_pair(left, right, pose)
+            fit = self._recovery.found_again(pair, pose, 0 if number else n_lost)
+            timings = sum_timings(timings, rectified)
+            answers.append(self._fit_judge.judged(pair, fit, goal, timings, predicted))
+            timings = answers[-1].timings
+            if answers[-1].verdict.status is Status.OK:
+                break
+        # Of equals, what came later knows more.
+        best = min(reversed(answers), key=lambda one: _BEST_FIRST.index(one.verdict.status))
+        return replace(best, timings=timings)
 
     def register(
         self,

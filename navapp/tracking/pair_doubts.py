@@ -1,5 +1,6 @@
 """What the two pictures themselves say against a pose: cameras that moved, no light, a cover."""
 
+import math
 from dataclasses import replace
 
 from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
@@ -29,6 +30,7 @@ def with_pair_doubts(
     geometry = pair.geometry
     health = measure_health(pair, found, geometry.disparity_px(depth_mm))
     doubts = pair_doubts(health, geometry, depth_mm)
+    verdict = replace(verdict, predicted_tre_mm=_widened_mm(verdict, health, geometry, depth_mm))
     if not doubts:
         return verdict
     status = Status.DEGRADED if verdict.status is Status.OK else verdict.status
@@ -44,17 +46,31 @@ def pair_doubts(
     turned a camera about that line turned it as far about others, and a turn that moves a picture
     sideways by v px moves the measured depth by z^2 / (f B) v.
     """
-    mm_per_px = depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
-    offset_px = abs(health.row_offset_px)
-    is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
     both = (health.left, health.right)
     is_dark = any(one.dark_share > _UNUSABLE_SHARE for one in both)
     is_clipped = any(one.saturated_share > _UNUSABLE_SHARE for one in both)
     doubts = [Reason.PICTURE_DARK] * is_dark + [Reason.PICTURE_OVEREXPOSED] * is_clipped
     if not doubts:
         doubts += [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
-    doubts += [Reason.ROWS_DISAGREE] * int(is_sure and mm_per_px * offset_px > _COST_MM)
+    doubts += [Reason.ROWS_DISAGREE] * int(_row_cost_mm(health, geometry, depth_mm) > _COST_MM)
     return tuple(doubts)
+
+
+def _row_cost_mm(health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float) -> float:
+    """What rows that surely disagree may cost in depth; 0 when noise explains them."""
+    offset_px = abs(health.row_offset_px)
+    if not offset_px > _SURE_SIGMAS * health.row_offset_sigma_px:
+        return 0.0
+    return offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
+
+
+def _widened_mm(
+    verdict: Verdict, health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float
+) -> float | None:
+    """The predicted error with what is known against the rig."""
+    if verdict.predicted_tre_mm is None:
+        return None
+    return math.hypot(verdict.predicted_tre_mm, _row_cost_mm(health, geometry, depth_mm))
 
 
 def _are_unlike(left: PictureHealth, right: PictureHealth) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, find_candidates, tilted_starts
+from navapp.tracking.first_look import doubted, poses_to_refine
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.locator import WIDE_VIEW, Locator
@@ -25,6 +26,8 @@ _RINGS = (
     (40.0, ((20.0, 6), (35.0, 8))),
 )
 _PARTS = 10
+# So many of the answers are measured exactly, if they explain so much of what the best does.
+_N_SETTLED, _SETTLED_SHARE = 2, 0.7
 
 
 class Recovery:
@@ -66,20 +69,24 @@ class Recovery:
         if measured is None or len(measured.cloud) == 0:
             return locator.search(pair, pose, locator.settings.search)
         started = time.perf_counter_ns()
-        best = self._best(measured, starts) or pose
+        poses = self._best(measured, starts) or [pose]
         coarse = LineTimings(estimate_ms=(time.perf_counter_ns() - started) / 1e6)
-        fit = locator.settle(pair, measured, best)
-        return replace(fit, timings=sum_timings(fit.timings, coarse))
+        fits = [locator.settle(pair, measured, one) for one in poses]
+        for fit in fits:
+            coarse = sum_timings(coarse, fit.timings)
+        # Far from where it was, a bone may look like itself in several ways.
+        best = doubted(fits, [self._fit_judge.score(fit) for fit in fits], self._model)[0]
+        return replace(best, timings=coarse)
 
-    def _best(self, measured: Measurement, starts: list[RigidTransform]) -> RigidTransform | None:
-        """Of the poses that starts lead to, the one that explains most."""
+    def _best(self, measured: Measurement, starts: list[RigidTransform]) -> list[RigidTransform]:
+        """Of the poses that starts lead to, those that explain most."""
         found = find_candidates(
             measured.scene,
             self._model,
             starts,
             lambda pose: self._fit_judge.explained(pose, measured),
         )
-        return found[0].scene_from_bone if found else None
+        return poses_to_refine(found, _N_SETTLED, _SETTLED_SHARE)
 
 
 def starts_after_loss(

@@ -137,6 +137,12 @@ def test_a_jump_from_the_prediction_is_doubted() -> None:
     assert verdict.reasons == (Reason.JUMPED,)
 
 
+def test_a_turn_in_place_is_a_jump_as_well() -> None:
+    turned, little = disturbed(MODEL, 12.0, 1.0, 4), disturbed(MODEL, 8.0, 1.0, 4)
+    assert verdict_on(predicted=little).status is Status.OK
+    assert verdict_on(predicted=turned).reasons == (Reason.JUMPED,)
+
+
 def test_an_unknown_map_is_lost() -> None:
     unknown = DisparityMap(
         np.full_like(MAP.disparity_px, np.nan), MAP.sigma_px,

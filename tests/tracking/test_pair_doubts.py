@@ -84,3 +84,21 @@ def test_a_dark_picture_is_the_first_reason(eye: str) -> None:
     status, reasons = tracked(room().line, dark=eye)
     assert status is Status.LOST
     assert reasons[0] is Reason.PICTURE_DARK
+
+
+@pytest.mark.slow
+def test_rows_that_surely_disagree_widen_the_predicted_error() -> None:
+    """Too little for a doubt, but it may cost that much."""
+    a, offset_px = room(), 0.2
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    rigs = (a.rig, turned(a.rig, offset_px))
+    lines = [Line(rig, a.line.model.bone) for rig in rigs]
+    given = (frame.left, frame.right, frame.captured_ns, state, GOAL)
+    right, turned_by = (line.track(*given)[0].verdict for line in lines)
+    geometry = a.line._meter.geometry
+    depth_mm = float((a.truth(frame).apply(a.line.centre_mm))[2])
+    cost_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
+    expected_mm = float(np.hypot(right.predicted_tre_mm, cost_mm))
+    assert turned_by.predicted_tre_mm == pytest.approx(expected_mm, rel=0.25)
+    assert turned_by.predicted_tre_mm > 1.2 * right.predicted_tre_mm
