@@ -14,15 +14,13 @@ _GATE_SIGMAS = 3.0
 # Width of the kernel in sigma: 97 % of the efficiency of least squares (as `BimccSettings`).
 _KERNEL_SIGMAS = 2.5
 _ROUNDS = 6
-# Chi-square of 6 degrees of freedom: blocks that pull further apart than 95 % are not joined; that
-# they contradict each other is said at 99.9 %.
-_APART, _CONFLICT = 12.59, 22.46
+# Chi-square of 6 degrees of freedom at 95 %: blocks that pull further apart are not joined.
+_APART = 12.59
 # What a block's residuals say of its noise counts beside what it claims, which counts as so many.
 _CLAIM_COUNT = 6.0
-# Of a right pose's residuals nearly all are near (0.74 at the least on simulated knees), but for
-# one by chance. Those of a wrong one that happen to be small agree with it as well: they must not
-# speak for the rest.
-_MOST_FAR, _BY_CHANCE = 0.35, 1.0
+# Those residuals of a wrong pose that happen to be small agree with it: they must not speak for the
+# rest. Of a right one 0.56 were near at the least (simulated knee, its rim covered by tissue).
+_MOST_FAR, _BY_CHANCE = 0.5, 1.0
 _FEWEST = 6.0
 # Residuals that show nothing at all (drawn data) still leave a scale.
 _LEAST_RATIO2 = 1e-4
@@ -78,9 +76,8 @@ def join(
         centre_mm: (3,) the model's centre at that pose, in the camera's frame.
 
     Returns:
-        The estimate as it was when the block says too little; with the reason that the cues
-        disagree when the block contradicts it: too much of it is further off than the estimate
-        allows, or all of it pulls away.
+        The estimate as it was when the block says too little or pulls too far away; with the reason
+        that the cues disagree when too much of the block is further off than the estimate allows.
 
     Both blocks claim a noise and show one in their residuals. The pose is found with the noise they
     show, so that a block that claims too much of itself does not outweigh one that claims too
@@ -117,9 +114,8 @@ def join(
         step = np.asarray(
             np.linalg.solve(normal, weighted @ block.residual / scale), dtype=np.float64
         )
-    apart = float(step @ surface @ step)
-    if apart > _APART:
-        return _contradicted(estimate) if apart > _CONFLICT else estimate
+    if step @ surface @ step > _APART:
+        return estimate
     inverse = np.linalg.inv(normal)
     # A block that shows more noise than it claims is believed.
     claimed = surface / surface_scale**2 + offset + information * max(scale, 1.0) / scale**2
