@@ -63,9 +63,10 @@ bench-peers: setup  ## stereo beside OpenCV's contributed filters, registration 
 	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	    opencv-contrib-python-headless==5.0.0.93 small_gicp==1.0.1 open3d-cpu \
-	    numpy numba scipy pydantic platformdirs
+	    numpy numba scipy pydantic platformdirs fast-simplification
 	@$(PEERS)/bin/python -m tests.bench.stereo_speed
 	@$(PEERS)/bin/python -m tests.bench.occlusion_speed
+	@$(PEERS)/bin/python -m tests.bench.line_speed --frames 30
 	@$(PEERS)/bin/python -m tests.bench.registration --speed --seeds 10
 
 system-deps:    ## Debian packages for everything beyond the simulated session
