@@ -5,7 +5,7 @@ Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectificati
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from types import MappingProxyType
 from typing import Literal
@@ -277,6 +277,10 @@ class PoseEstimate:
     iterations: int
     is_converged: bool
     reasons: tuple[Reason, ...] = ()
+
+    def doubted(self, reason: Reason) -> "PoseEstimate":
+        """The same estimate with one more reason against it."""
+        return replace(self, reasons=(*self.reasons, reason))
 
 
 class Status(Enum):

@@ -1,4 +1,4 @@
-"""Edges that two triangles of a mesh share: where its outline can run."""
+"""Edges of a mesh and the triangles on both sides: where it ends, where its outline can run."""
 
 from dataclasses import dataclass
 
@@ -35,24 +35,42 @@ def ridge_edges(mesh: TriangleMesh) -> RidgeEdges:
     """Edges of a mesh that two triangles share and that are not grooves."""
     corners = np.array(mesh.vertices_mm)
     normals, offsets = _planes(corners, mesh.faces)
-    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
+    halves = paired_half_edges(mesh.faces)
+    one, other = halves[halves[:, 1] >= 0].T
     third = np.concatenate([mesh.faces[:, 2], mesh.faces[:, 0], mesh.faces[:, 1]])
     face = np.tile(np.arange(len(mesh.faces), dtype=np.int32), 3)
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    key = low.astype(np.int64) * max(len(corners), 1) + high
-    order = np.argsort(key, kind="stable")
-    first = np.flatnonzero(key[order][1:] == key[order][:-1])
-    one, other = order[first], order[first + 1]
     beyond = np.einsum("ij,ij->i", normals[face[one]], corners[third[other]]) - offsets[face[one]]
     is_ridge = beyond < 0.0
     one, other = one[is_ridge], other[is_ridge]
     return RidgeEdges(
         corners,
-        np.ascontiguousarray(ends[one], dtype=np.int32),
+        np.ascontiguousarray(half_edges(mesh.faces)[one], dtype=np.int32),
         _pairs(face[one], face[other]),
         _pairs(third[one], third[other]),
         np.ascontiguousarray(np.vstack([normals.T, offsets]), dtype=np.float32),
     )
+
+
+def half_edges(faces: IntArray) -> IntArray:
+    """(3 F, 2) first and second vertex: the first edge of every triangle, then the second, ..."""
+    ends: IntArray = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    return ends
+
+
+def paired_half_edges(faces: IntArray) -> NDArray[np.int64]:
+    """(E, 2) the two `half_edges` of every edge, of triangles h % F; -1 where there is one only.
+
+    Edges of more than two triangles keep the first two.
+    """
+    ends = np.sort(half_edges(faces), axis=1)
+    order = np.lexsort((ends[:, 1], ends[:, 0]))
+    ends = ends[order]
+    is_first = np.ones(len(ends), dtype=bool)
+    is_first[1:] = (ends[1:] != ends[:-1]).any(axis=1)
+    first = np.flatnonzero(is_first)
+    is_double = np.diff(np.append(first, len(ends))) >= 2
+    other = np.where(is_double, order[np.minimum(first + 1, len(ends) - 1)], -1)
+    return np.column_stack([order[first], other])
 
 
 def _planes(corners: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh_edges import half_edges, paired_half_edges
 from navapp.geometry.transform import FloatArray
 
 # A flat piece at least so large is the cap of a cut shaft: no bone is as flat.
@@ -49,7 +50,7 @@ def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
         mesh: of a bone.
         is_wanted: (V,) where creases are looked for.
     """
-    edges = np.unique(np.sort(_edges(mesh.faces), axis=1), axis=0)
+    edges, _ = _face_pairs(mesh.faces)
     normals = _smoothed(mesh, edges)
     offset = mesh.vertices_mm[edges[:, 1]] - mesh.vertices_mm[edges[:, 0]]
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
@@ -93,22 +94,11 @@ def _smoothed(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
     return normals
 
 
-def _edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
-    return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-
-
 def _face_pairs(faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """(E, 2) edges, and (E, 2) the faces on both sides of each; -1 where there is none."""
-    edges = np.sort(_edges(faces), axis=1)
-    face = np.tile(np.arange(len(faces)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, face = edges[order], face[order]
-    is_first = np.ones(len(edges), dtype=bool)
-    is_first[1:] = (edges[1:] != edges[:-1]).any(axis=1)
-    first = np.flatnonzero(is_first)
-    is_double = np.diff(np.append(first, len(edges))) >= 2
-    other = np.where(is_double, face[np.minimum(first + 1, len(edges) - 1)], -1)
-    return edges[first], np.column_stack([face[first], other])
+    halves = paired_half_edges(faces)
+    edges = np.sort(half_edges(faces)[halves[:, 0]], axis=1)
+    return edges, np.where(halves >= 0, halves % len(faces), -1)
 
 
 def _is_cap(mesh: TriangleMesh, faces_of_pair: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ from navapp.registration.multi_start import (
     explained_share,
     find_candidates,
     is_same_pose,
+    scattered_starts,
     tilted_starts,
 )
 from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
@@ -36,5 +37,6 @@ __all__ = [
     "is_same_pose",
     "register",
     "register_landmarks",
+    "scattered_starts",
     "tilted_starts",
 ]

@@ -91,7 +91,7 @@ def join(
     if count_all < _FEWEST:
         return estimate
     if count_all - count_near > _MOST_FAR * count_all + _BY_CHANCE:
-        return _contradicted(estimate)
+        return estimate.doubted(Reason.CUES_DISAGREE)
     if count_near < _FEWEST:
         return estimate
     block = block.only(is_near)
@@ -122,10 +122,6 @@ def join(
     covariance = (inverse @ claimed @ inverse)[:6, :6]
     pose = estimate.camera_from_bone.moved(step[:6], centre_mm)
     return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
-
-
-def _contradicted(estimate: PoseEstimate) -> PoseEstimate:
-    return replace(estimate, reasons=(*estimate.reasons, Reason.CUES_DISAGREE))
 
 
 def _scale(rest: FloatArray, count: FloatArray, variance: FloatArray) -> float:

@@ -50,6 +50,33 @@ def tilted_starts(
     return starts
 
 
+def scattered_starts(
+    pose: RigidTransform,
+    centre_mm: FloatArray,
+    step_mm: float,
+    tilts: Sequence[tuple[float, int]],
+    *,
+    has_middle: bool = True,
+) -> list[RigidTransform]:
+    """A pose shifted along each axis of the scene and back, and tilts of each.
+
+    Args:
+        pose: `scene_from_bone`.
+        centre_mm: (3,) what it is tilted about, in the scene's frame.
+        step_mm: length of the shifts.
+        tilts: angle in degrees and number, of each kind of tilt.
+        has_middle: the pose itself, not shifted, is the first.
+    """
+    axes = np.vstack([np.zeros((1, 3)) if has_middle else np.empty((0, 3)), np.eye(3), -np.eye(3)])
+    starts = []
+    for shift in step_mm * axes:
+        moved = pose.moved(np.concatenate([shift, np.zeros(3)]), centre_mm)
+        starts.append(moved)
+        for tilt_deg, n_tilts in tilts:
+            starts += tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
+    return starts
+
+
 def find_candidates(
     scene: Scene,
     model: RegistrationModel,

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.mesh_edges import half_edges, paired_half_edges
 from navapp.geometry.transform import FloatArray
 
 _MAX_NEIGHBOURS = 12
@@ -46,10 +47,9 @@ def neighbour_table(
 
 def open_border(n_points: int, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
     """(V,) vertices on an edge of one triangle only: there the model ends, not the bone."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
+    halves = paired_half_edges(faces)
     is_border = np.zeros(n_points, dtype=bool)
-    is_border[unique[counts == 1].ravel()] = True
+    is_border[half_edges(faces)[halves[halves[:, 1] < 0, 0]].ravel()] = True
     return is_border
 
 

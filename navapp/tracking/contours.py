@@ -163,8 +163,8 @@ class ContourMeter:
         share = (_at(measured.origin, inner, box, 0) == Origin.MATCHED).mean(axis=1)
         is_free = share >= _LEAST_INSIDE
         if coarse_px is not None:
-            beside = _at(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
-            is_free &= ~(beside > geometry.disparity_map_px(rim.point[:, 2]) + _NEARER_PX)
+            next_px = _at(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
+            is_free &= ~(next_px > geometry.disparity_map_px(rim.point[:, 2]) + _NEARER_PX)
         return Steps(_only(rim, is_free), steps.offset_px[is_free], steps.eye)
 
     def _residuals(self, steps: Steps, pose: RigidTransform) -> ResidualBlock:
@@ -196,12 +196,12 @@ def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
     )
 
 
-def _at(values: NDArray[Any], pixels: FloatArray, box: Box, beside: float) -> NDArray[Any]:
-    """Values (h, w) of a box at pixels (..., 2) of the picture, rounded; `beside` out of it."""
+def _at(values: NDArray[Any], pixels: FloatArray, box: Box, elsewhere: float) -> NDArray[Any]:
+    """Values (h, w) of a box at pixels (..., 2) of the picture, rounded; `elsewhere` out of it."""
     column = np.floor(pixels[..., 0] + 0.5).astype(int) - box.x
     row = np.floor(pixels[..., 1] + 0.5).astype(int) - box.y
     height, width = values.shape
     inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    answer = np.full(column.shape, beside, dtype=values.dtype)
+    answer = np.full(column.shape, elsewhere, dtype=values.dtype)
     answer[inside] = values[row[inside], column[inside]]
     return answer

@@ -115,8 +115,7 @@ def doubted(fits: list[Fit], scores: list[float], model: RegistrationModel) -> l
     )
     if not is_guess:
         return ranked
-    reasons = (*best.estimate.reasons, Reason.AMBIGUOUS)
-    return [replace(best, estimate=replace(best.estimate, reasons=reasons)), *ranked[1:]]
+    return [replace(best, estimate=best.estimate.doubted(Reason.AMBIGUOUS)), *ranked[1:]]
 
 
 def poses_to_refine(

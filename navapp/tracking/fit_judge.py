@@ -1,6 +1,7 @@
 """A fit becomes an answer: joined with the outline, judged, and told in the left camera."""
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rectification import Box, RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import RegistrationModel
+from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
@@ -88,6 +89,21 @@ class FitJudge:
         """How much of the model, at a pose in the rectified camera, a measurement explains."""
         found = self._judge.agreement(self._model, pose, measured.disparity)
         return found.coverage * found.inlier_share
+
+    def led_to(
+        self,
+        measured: Measurement,
+        starts: Sequence[RigidTransform],
+        on_progress: Callable[[float], None] = lambda share: None,
+    ) -> list[Candidate]:
+        """Distinct poses that starts lead to on a measured surface, by what they explain of it."""
+        return find_candidates(
+            measured.scene,
+            self._model,
+            starts,
+            lambda pose: self.explained(pose, measured),
+            on_progress,
+        )
 
     def rough_px(
         self, pair: RectifiedPair, fit: Fit, rough: RoughMap | None = None

@@ -119,7 +119,7 @@ class Follower:
                 break
             is_near |= moved_mm < settings.near_mm or n_rounds >= settings.max_sampled
         if fit is not None and fit.moved_mm >= settings.near_mm:
-            fit = replace(fit, estimate=with_reason(fit.estimate, Reason.NOT_CONVERGED))
+            fit = replace(fit, estimate=fit.estimate.doubted(Reason.NOT_CONVERGED))
         return fit, timings
 
 
@@ -134,11 +134,6 @@ def fitted(
     estimate = fit_bimcc(measured.scene, model, start, settings)
     estimate_ms = (time.perf_counter_ns() - started) / 1e6
     return Fit(estimate, measured, replace(measured.timings, estimate_ms=estimate_ms))
-
-
-def with_reason(estimate: PoseEstimate, reason: Reason) -> PoseEstimate:
-    """The same estimate, doubted once more."""
-    return replace(estimate, reasons=(*estimate.reasons, reason))
 
 
 def moved_surface_mm(

@@ -8,11 +8,9 @@ part that is spread over all directions, until every start had its turn.
 import time
 from dataclasses import replace
 
-import numpy as np
-
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import RegistrationModel, find_candidates, tilted_starts
+from navapp.registration import RegistrationModel, scattered_starts
 from navapp.tracking.first_look import doubted, poses_to_refine
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit, sum_timings
@@ -80,12 +78,7 @@ class Recovery:
 
     def _best(self, measured: Measurement, starts: list[RigidTransform]) -> list[RigidTransform]:
         """Of the poses that starts lead to, those that explain most."""
-        found = find_candidates(
-            measured.scene,
-            self._model,
-            starts,
-            lambda pose: self._fit_judge.explained(pose, measured),
-        )
+        found = self._fit_judge.led_to(measured, starts)
         return poses_to_refine(found, _N_SETTLED, _SETTLED_SHARE)
 
 
@@ -107,13 +100,7 @@ def starts_after_loss(
 
 def _all_starts(last: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
     """Tilts of the last pose where it was, and a step away along each axis."""
-    axes = np.vstack([np.eye(3), -np.eye(3)])
-    starts = []
-    for number, (step_mm, tilts) in enumerate(_RINGS):
-        steps_mm = [np.zeros(3)] * (number == 0) + list(step_mm * axes)
-        for step in steps_mm:
-            moved = last.moved(np.concatenate([step, np.zeros(3)]), place_mm)
-            starts.append(moved)
-            for tilt_deg, n_tilts in tilts:
-                starts += tilted_starts(moved, place_mm + step, tilt_deg, n_tilts)[1:]
+    starts: list[RigidTransform] = []
+    for step_mm, tilts in _RINGS:
+        starts += scattered_starts(last, place_mm, step_mm, tilts, has_middle=not starts)
     return starts

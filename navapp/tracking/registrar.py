@@ -3,11 +3,9 @@
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import RegistrationModel, distinct, find_candidates, tilted_starts
+from navapp.registration import RegistrationModel, distinct, scattered_starts, tilted_starts
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit
@@ -139,13 +137,7 @@ class Registrar:
         on_progress: Callable[[float], None],
     ) -> list[RigidTransform]:
         """The best distinct poses that starts lead to."""
-        found = find_candidates(
-            measured.scene,
-            self._model,
-            starts,
-            lambda pose: self._fit_judge.explained(pose, measured),
-            on_progress,
-        )
+        found = self._fit_judge.led_to(measured, starts, on_progress)
         return [candidate.scene_from_bone for candidate in found[: self._n_refined]]
 
     def _ranked(
@@ -166,10 +158,4 @@ def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTrans
 
 def far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
     """Tilts of a rough pose and of what it becomes when shifted along each axis."""
-    starts = []
-    for shift in (np.zeros(3), *(_FAR_SHIFT_MM * np.eye(3)), *(-_FAR_SHIFT_MM * np.eye(3))):
-        moved = rough.moved(np.concatenate([shift, np.zeros(3)]), centre_mm)
-        starts.append(moved)
-        for tilt_deg, n_tilts in _FAR_TILTS:
-            starts += tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
-    return starts
+    return scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)

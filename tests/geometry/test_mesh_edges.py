@@ -3,7 +3,7 @@
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import ridge_edges
+from navapp.geometry.mesh_edges import half_edges, paired_half_edges, ridge_edges
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 # Two triangles a side, counter-clockwise from outside.
@@ -39,3 +39,22 @@ def test_grooves_and_open_borders_are_left_out() -> None:
     assert len(ridge_edges(CUBE.flipped()).edges) == 0
     without_a_side = TriangleMesh(CORNERS, CUBE.faces[2:])
     assert len(ridge_edges(without_a_side).edges) == 8
+
+
+def test_every_edge_has_its_half_edges_once() -> None:
+    faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]], dtype=np.int32)
+    ends, halves = half_edges(faces), paired_half_edges(faces)
+    edges = [tuple(sorted(ends[one])) for one in halves[:, 0]]
+    assert sorted(edges) == [(0, 1), (0, 2), (1, 2), (1, 3), (1, 4), (2, 3), (3, 4)]
+    shared = {edge for edge, other in zip(edges, halves[:, 1], strict=True) if other >= 0}
+    assert shared == {(1, 2), (1, 3)}
+    for one, other in halves[halves[:, 1] >= 0]:
+        assert one % len(faces) != other % len(faces)
+        assert set(ends[one]) == set(ends[other])
+
+
+def test_an_edge_of_three_triangles_keeps_two() -> None:
+    faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], dtype=np.int32)
+    halves = paired_half_edges(faces)
+    assert len(halves) == 7
+    assert (halves[:, 1] >= 0).sum() == 1
