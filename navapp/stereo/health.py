@@ -21,6 +21,9 @@ _WORST_SIGMA_PX = 0.3
 # A linear step is exact near its end only.
 _MOST_STEPS, _SETTLED_PX = 4, 0.05
 _LARGEST_PX = 3.0
+# Windows that share less than half of their variance do not show the same: steps between them end
+# anywhere.
+_LEAST_CORRELATION = 0.7
 # Texture of a twentieth is below one grey level here; and what a sensor clips to.
 _DARK_LEVEL, _SATURATED_LEVEL = 16, 250
 _ROWS_APART, _COLUMNS_APART = 2, 4
@@ -50,10 +53,11 @@ class StereoHealth:
         left: picture of the left camera.
         right: of the right one, where it shows the same.
         row_offset_px: how much lower the right picture shows what the left one shows; NaN when too
-            few points tell.
+            few points tell, or when it is too far off to be told.
         row_offset_sigma_px: its standard error.
         n_points: that told.
-        correlation: median over their windows, of both pictures' grey values.
+        correlation: median over their windows, of both pictures' grey values; 0 when the rows are
+            further off than is looked for.
     """
 
     left: PictureHealth
@@ -62,6 +66,11 @@ class StereoHealth:
     row_offset_sigma_px: float = math.nan
     n_points: int = 0
     correlation: float = math.nan
+
+    @property
+    def has_lost_rows(self) -> bool:
+        """Points matched along the rows, but what is around them differs: the rows are far off."""
+        return self.correlation < _LEAST_CORRELATION
 
 
 def measure_health(
@@ -104,12 +113,15 @@ def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, 
             return math.nan, math.nan, len(told), math.nan
         before_px, offset_px = offset_px, float(np.median(told[:, 0]))
         if abs(offset_px) > _LARGEST_PX:
-            return math.nan, math.nan, len(told), math.nan
+            return math.nan, math.nan, len(told), 0.0
         if abs(offset_px - before_px) < _SETTLED_PX:
             break
+    correlation = float(np.median(told[:, 2]))
+    if correlation < _LEAST_CORRELATION:
+        return math.nan, math.nan, len(told), correlation
     spread_px = _MAD_TO_SIGMA * float(np.median(np.abs(told[:, 0] - offset_px)))
     sigma_px = _MEDIAN_TO_MEAN * spread_px / math.sqrt(len(told))
-    return offset_px, sigma_px, len(told), float(np.median(told[:, 2]))
+    return offset_px, sigma_px, len(told), correlation
 
 
 def _picture_health(picture: Image, box: Box) -> PictureHealth:

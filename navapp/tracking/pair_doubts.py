@@ -52,7 +52,8 @@ def pair_doubts(
     doubts = [Reason.PICTURE_DARK] * is_dark + [Reason.PICTURE_OVEREXPOSED] * is_clipped
     if not doubts:
         doubts += [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
-    doubts += [Reason.ROWS_DISAGREE] * int(_row_cost_mm(health, geometry, depth_mm) > _COST_MM)
+    is_off = health.has_lost_rows or bool(_row_cost_mm(health, geometry, depth_mm) > _COST_MM)
+    doubts += [Reason.ROWS_DISAGREE] * is_off
     return tuple(doubts)
 
 

@@ -52,6 +52,18 @@ def test_the_row_offset_is_found_within_its_own_error(row_offset_px: float) -> N
     assert health.correlation > 0.95
 
 
+@pytest.mark.parametrize("row_offset_px", [2.5, -2.9, 4.0, 6.0, -8.0])
+def test_rows_that_are_far_off_give_no_number_and_are_told(row_offset_px: float) -> None:
+    health = measure_health(pair(row_offset_px), matched(), DISPARITY_PX)
+    assert np.isnan(health.row_offset_px) or abs(health.row_offset_px - row_offset_px) < 0.1
+    assert np.isnan(health.row_offset_px) == health.has_lost_rows
+
+
+def test_rows_that_agree_are_not_lost() -> None:
+    assert not measure_health(pair(1.5), matched(), DISPARITY_PX).has_lost_rows
+    assert not measure_health(pair(), matched(0.0), DISPARITY_PX).has_lost_rows
+
+
 def test_the_standard_error_is_that_of_repeated_noise() -> None:
     sharp = measure_health(pair(noise=1.0), matched(), DISPARITY_PX)
     noisy = measure_health(pair(noise=6.0), matched(), DISPARITY_PX)

@@ -33,6 +33,8 @@ def test_rows_are_doubted_only_beyond_their_own_noise() -> None:
     assert doubts(StereoHealth(GOOD, GOOD, 2.0 * LIMIT_PX, LIMIT_PX, 12)) == ()
     assert doubts(StereoHealth(GOOD, GOOD, 3.2 * LIMIT_PX, LIMIT_PX, 12)) == (Reason.ROWS_DISAGREE,)
     assert doubts(StereoHealth(GOOD, GOOD)) == ()
+    lost = StereoHealth(GOOD, GOOD, n_points=90, correlation=0.1)
+    assert doubts(lost) == (Reason.ROWS_DISAGREE,)
 
 
 @pytest.mark.parametrize(
