@@ -1,0 +1,40 @@
+"""What flows between the steps of the line: plain values, no behaviour beyond small derivations.
+
+Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectification, OpenCV axes.
+"""
+
+from navapp.values.bones import AspectGraph, BoneModel, Side, visible_vertices
+from navapp.values.measured import DisparityMap, Origin, SurfaceCloud
+from navapp.values.pictures import OverlayMode, OverlayPicture
+from navapp.values.plans import Plan, Prior, StageSpec
+from navapp.values.verdicts import (
+    LineTimings,
+    PoseEstimate,
+    Reason,
+    Status,
+    TrackedFrame,
+    Verdict,
+    predicted_tre_mm,
+)
+
+__all__ = [
+    "AspectGraph",
+    "BoneModel",
+    "DisparityMap",
+    "LineTimings",
+    "Origin",
+    "OverlayMode",
+    "OverlayPicture",
+    "Plan",
+    "PoseEstimate",
+    "Prior",
+    "Reason",
+    "Side",
+    "StageSpec",
+    "Status",
+    "SurfaceCloud",
+    "TrackedFrame",
+    "Verdict",
+    "predicted_tre_mm",
+    "visible_vertices",
+]

@@ -1,0 +1,103 @@
+"""Bones of a plan: surface, cartilage, and what of them is an edge to the eye."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import FloatArray, RigidTransform, read_only
+
+Side = Literal["left", "right"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoneModel:
+    """A bone as planned, in plan coordinates (LPS, mm).
+
+    Attributes:
+        name: `femur`, `tibia`, `patella`.
+        mesh: surface with outward normals.
+        side: of the patient; None when unknown.
+        cartilage_mm: (V,) mean thickness of what the camera sees above the bone.
+        cartilage_sd_mm: (V,) its standard deviation.
+        is_removed: (V,) parts that a stage has cut away.
+        version: counts the changes by stages.
+
+    Raises:
+        ValueError: not one value per vertex, or cartilage that is negative or not finite.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    side: Side | None = None
+    cartilage_mm: FloatArray = field(default_factory=lambda: np.empty(0))
+    cartilage_sd_mm: FloatArray = field(default_factory=lambda: np.empty(0))
+    is_removed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
+    version: int = 0
+
+    def __post_init__(self) -> None:
+        n = len(self.mesh.vertices_mm)
+        for name, kind in (
+            ("cartilage_mm", float),
+            ("cartilage_sd_mm", float),
+            ("is_removed", bool),
+        ):
+            values = getattr(self, name)
+            values = read_only(values if len(values) else np.zeros(n), kind)
+            if values.shape != (n,):
+                raise ValueError(f"{self.name}: {name} needs one value per vertex")
+            if kind is float and not (np.isfinite(values) & (values >= 0.0)).all():
+                raise ValueError(f"{self.name}: {name} must be finite and not negative")
+            object.__setattr__(self, name, values)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AspectGraph:
+    """A bone's edges from many sides: what a camera would see of its outline and creases.
+
+    The points of a view are in an order in which the first n are spread evenly over it, for every
+    n: a coarser level of the view is its first points.
+
+    Attributes:
+        bone: name of the bone.
+        directions: (V, 3) unit, from the bone towards the camera, in bone coordinates.
+        starts: (V + 1,) int64; view k has the points starts[k] to starts[k + 1].
+        points_mm: (N, 3) on the edges, in bone coordinates.
+        tangents: (N, 3) unit, along the edge.
+
+    Raises:
+        ValueError: shapes that do not belong together, or values that are not finite.
+    """
+
+    bone: str
+    directions: FloatArray
+    starts: NDArray[np.int64]
+    points_mm: FloatArray
+    tangents: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("directions", "points_mm", "tangents"):
+            values = read_only(getattr(self, name))
+            if values.ndim != 2 or values.shape[1] != 3 or not np.isfinite(values).all():
+                raise ValueError(f"{name} of an aspect graph must be finite and of shape (N, 3)")
+            object.__setattr__(self, name, values)
+        starts = read_only(self.starts, np.int64)
+        is_whole = starts.shape == (len(self.directions) + 1,) and starts[0] == 0
+        if not is_whole or (np.diff(starts) < 0).any() or starts[-1] != len(self.points_mm):
+            raise ValueError("starts of an aspect graph must divide its points among its views")
+        if self.tangents.shape != self.points_mm.shape:
+            raise ValueError("an aspect graph needs one tangent a point")
+        object.__setattr__(self, "starts", starts)
+
+    def __len__(self) -> int:
+        return len(self.directions)
+
+
+def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
+    """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
+    positions = left_from_bone.apply(mesh.vertices_mm)
+    towards = np.einsum("ij,ij->i", left_from_bone.rotate(mesh.normals), positions)
+    facing: NDArray[np.bool_] = towards < -0.2 * np.linalg.norm(positions, axis=1)
+    return facing

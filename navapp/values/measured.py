@@ -1,0 +1,87 @@
+"""What stereo measures: disparity and the surface that it means."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray
+
+
+class Origin(IntEnum):
+    """Where a disparity comes from."""
+
+    UNKNOWN = 0
+    MATCHED = 1
+    FILLED_BORDER = 2
+    FILLED_INTERIOR = 3
+    MISMATCH_FILLED = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisparityMap:
+    """Disparity of the rectified left view inside a box.
+
+    Attributes:
+        disparity_px: (h, w) float32, NaN where unknown.
+        sigma_px: (h, w) float32 standard deviation, NaN where unknown.
+        origin: (h, w) uint8 of `Origin`.
+        x, y: place of the box's first pixel in the rectified picture.
+    """
+
+    disparity_px: NDArray[np.float32]
+    sigma_px: NDArray[np.float32]
+    origin: NDArray[np.uint8]
+    x: int
+    y: int
+
+    @property
+    def matched_share(self) -> float:
+        """Share of pixels with a measured disparity."""
+        return float((self.origin == Origin.MATCHED).mean()) if self.origin.size else 0.0
+
+    def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
+        """The map, unknown beside a mask (h, w)."""
+        unknown = np.float32(np.nan)
+        return DisparityMap(
+            np.where(stays, self.disparity_px, unknown),
+            np.where(stays, self.sigma_px, unknown),
+            np.where(stays, self.origin, np.uint8(Origin.UNKNOWN)),
+            self.x,
+            self.y,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceCloud:
+    """Points seen by the stereo camera, in the rectified left camera.
+
+    Attributes:
+        points_mm: (N, 3).
+        sigma_ray_mm: (N,) standard deviation along the ray through the point.
+        pixels: (N, 2) int32 column and row in the rectified left view.
+        origin: (N,) uint8 of `Origin`.
+        stride_px: distance of neighbouring points in the picture.
+    """
+
+    points_mm: FloatArray
+    sigma_ray_mm: FloatArray
+    pixels: NDArray[np.int32]
+    origin: NDArray[np.uint8]
+    stride_px: int = 1
+
+    def __len__(self) -> int:
+        return len(self.points_mm)
+
+    def selected(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> "SurfaceCloud":
+        """A part of the cloud; points are taken to be spread evenly over it."""
+        n_kept = int(mask.sum()) if mask.dtype == np.bool_ else len(mask)
+        thinning = (len(self) / n_kept) ** 0.5 if n_kept else 1.0
+        return SurfaceCloud(
+            self.points_mm[mask],
+            self.sigma_ray_mm[mask],
+            self.pixels[mask],
+            self.origin[mask],
+            max(1, round(self.stride_px * thinning)),
+        )

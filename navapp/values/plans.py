@@ -1,0 +1,108 @@
+"""A pre-operative plan, a surgical stage, and where a first registration may start."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.values.bones import BoneModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """The rough start that an operator can give; any part may be absent.
+
+    Attributes:
+        left_from_bone: bone name -> rough pose.
+        approach_axis: unit vector in femur coordinates from the bone towards the cameras.
+        approach_half_angle_deg: of the cone around it.
+        box: x, y, width, height in the left picture, px.
+    """
+
+    left_from_bone: Mapping[str, RigidTransform] = field(default_factory=dict)
+    approach_axis: FloatArray | None = None
+    approach_half_angle_deg: float = 180.0
+    box: tuple[int, int, int, int] | None = None
+
+    def starts(self, bone: str) -> bool:
+        """Whether it says anything of where a bone is."""
+        return (
+            bone in self.left_from_bone or self.box is not None or self.axis_for(bone) is not None
+        )
+
+    def axis_for(self, bone: str) -> FloatArray | None:
+        """The approach axis in a bone's coordinates: known for the femur only."""
+        return self.approach_axis if bone == "femur" else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A pre-operative plan.
+
+    Attributes:
+        bones: name -> model.
+        targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
+        curves: name -> (N, 3) polylines beside the femur (vessels, nerves), mm.
+        digest: hash of the content.
+        name: for people.
+    """
+
+    bones: Mapping[str, BoneModel]
+    targets: Mapping[str, FloatArray] = field(default_factory=dict)
+    curves: Mapping[str, FloatArray] = field(default_factory=dict)
+    digest: str = ""
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
+        object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
+        object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
+        if not self.digest:
+            object.__setattr__(self, "digest", _digest(self))
+
+    def targets_of(self, names: tuple[str, ...]) -> FloatArray:
+        """(N, 3) target points of those names that the plan has; may be empty."""
+        found = [self.targets[name].reshape(-1, 3) for name in names if name in self.targets]
+        return np.concatenate(found) if found else np.empty((0, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class StageSpec:
+    """One surgical stage, as a row of the table in `navapp.control.stages`."""
+
+    number: int
+    name: str
+    bone: str
+    tolerance_mm: float
+    tolerance_deg: float
+    targets: tuple[str, ...]
+    layers: tuple[str, ...]
+    gates: tuple[str, ...]
+    measurements: tuple[str, ...] = ()
+
+
+def _digest(plan: Plan) -> str:
+    """Hash of everything in a plan that changes what is shown."""
+    digest = hashlib.sha256()
+
+    def add(label: str, array: NDArray[np.generic]) -> None:
+        # With its length, so that the same bytes cut elsewhere are something else.
+        digest.update(f"{label}:{array.size}:".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+
+    for name in sorted(plan.bones):
+        bone = plan.bones[name]
+        digest.update(f"bone {name}:{bone.side}:{bone.version}".encode())
+        add("vertices", bone.mesh.vertices_mm)
+        add("faces", bone.mesh.faces)
+        add("cartilage", bone.cartilage_mm)
+        add("its deviation", bone.cartilage_sd_mm)
+        add("removed", bone.is_removed)
+    for kind, points_by_name in (("target", plan.targets), ("curve", plan.curves)):
+        for name in sorted(points_by_name):
+            add(f"{kind} {name}", np.asarray(points_by_name[name], dtype=np.float64))
+    return digest.hexdigest()[:12]

@@ -1,0 +1,213 @@
+"""A pose, what stands behind it, and what the judge says of it."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+
+
+class Reason(Enum):
+    """Why a pose is not good, or why nothing is shown. The value is the phrase for people."""
+
+    # of the judge
+    NO_SURFACE = "no surface was measured where the bone should be"
+    TOO_FEW_POINTS = "too few points on the bone"
+    COVERAGE_LOW = "too little of the bone is seen"
+    SEEN_THROUGH = "something is seen where the bone should be in the way"
+    SURFACE_MISFIT = "surface does not fit the model"
+    OUTLIERS = "too many points fit no surface of the model"
+    NOT_CONVERGED = "the estimate did not settle"
+    AMBIGUOUS = "a different pose fits as well"
+    CUES_DISAGREE = "surface and outline do not agree"
+    DEGENERATE = "the seen surface leaves a direction free"
+    POSE_UNCERTAIN = "the seen surface fixes the pose too loosely"
+    CARTILAGE_UNCERTAIN = "the plan knows the cartilage too roughly"
+    TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
+    JUMPED = "the pose jumped further than a patient moves"
+    ROWS_DISAGREE = "the cameras' rows do not agree: has the rig moved?"
+    PICTURE_DARK = "one picture is dark or blocked"
+    PICTURE_OVEREXPOSED = "one picture is overexposed"
+    PICTURES_UNLIKE = "one picture is blurred or covered"
+    RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
+    OUT_OF_VIEW = "the bone is outside the picture"
+    # of the session
+    NOT_NAVIGATING = "no registration has been accepted"
+    BONE_LOST = "the bone is lost"
+    BLANKED = "blanked by the operator"
+    CAMERA_SILENT = "the camera sends no picture"
+    DEVICE_FAULT = "a device has failed"
+    POSE_TOO_OLD = "the pose is too old"
+    STAGE_WITHOUT_BONE = "the plan has no model of this stage's bone"
+
+    @property
+    def remedy(self) -> str:
+        """What the operator can do."""
+        return _REMEDIES[self]
+
+
+_REMEDIES = {
+    Reason.NO_SURFACE: "aim the cameras at the bone, or check the light",
+    Reason.TOO_FEW_POINTS: "clear the view, or check the light",
+    Reason.COVERAGE_LOW: "move the instrument or hand away",
+    Reason.SEEN_THROUGH: "check that this is the right bone and plan; register again",
+    Reason.SURFACE_MISFIT: "check that this is the right bone and plan; register again",
+    Reason.OUTLIERS: "clear the view of the bone; register again",
+    Reason.NOT_CONVERGED: "hold still, or register again",
+    Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
+    Reason.CUES_DISAGREE: "check that this is the right bone and plan; register again",
+    Reason.DEGENERATE: "expose more of the bone",
+    Reason.POSE_UNCERTAIN: "expose more of the bone",
+    Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",
+    Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
+    Reason.JUMPED: "wait for the next frames, or register again",
+    Reason.ROWS_DISAGREE: "hold still; if it stays, calibrate the rig again",
+    Reason.PICTURE_DARK: "uncover both cameras, or check the light",
+    Reason.PICTURE_OVEREXPOSED: "turn the light or the exposure down",
+    Reason.PICTURES_UNLIKE: "clean and uncover both cameras",
+    Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",
+    Reason.OUT_OF_VIEW: "bring the bone back into both pictures",
+    Reason.NOT_NAVIGATING: "register, then accept the candidate",
+    Reason.BONE_LOST: "clear the view; it is searched for where it was last seen",
+    Reason.BLANKED: "press the show key to leave blank",
+    Reason.CAMERA_SILENT: "check the camera's cable",
+    Reason.DEVICE_FAULT: "see the events, then check the device",
+    Reason.POSE_TOO_OLD: "wait for the next frame",
+    Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseEstimate:
+    """A bone's pose and how well the measurement fixes it.
+
+    Attributes:
+        camera_from_bone: source the bone's name; target `left_rect` inside the line, `left` (before
+            rectification) when it leaves it.
+        covariance: (6, 6) of the twist (translation mm first, rotation rad second), applied from
+            the left about the mean of the model's vertices.
+        n_points: points that entered.
+        inlier_share: their share within three sigma of the surface.
+        rms_mm: weighted rms of the point-to-plane residual of those.
+        expected_rms_mm: what the measurement's own sigma predicts for it.
+        iterations: of the solver.
+        is_converged: the solver met its step limit.
+        reasons: what the solver itself has against the result.
+    """
+
+    camera_from_bone: RigidTransform
+    covariance: FloatArray
+    n_points: int
+    inlier_share: float
+    rms_mm: float
+    expected_rms_mm: float
+    iterations: int
+    is_converged: bool
+    reasons: tuple[Reason, ...] = ()
+
+    def doubted(self, reason: Reason) -> "PoseEstimate":
+        """The same estimate with one more reason against it."""
+        return replace(self, reasons=(*self.reasons, reason))
+
+
+class Status(Enum):
+    """The judge's word on a pose."""
+
+    OK = "OK"
+    DEGRADED = "DEGRADED"
+    LOST = "LOST"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The judge's answer for one frame.
+
+    Attributes:
+        status: only OK may be shown.
+        predicted_tre_mm: 95 % bound of the mean error over the stage's targets, or over the visible
+            vertices when the plan names no targets; None without a pose.
+        reasons: why it is not OK.
+        coverage: share of the visible model that was measured and fits.
+        occluded_share: share of the visible model that something nearer hides.
+        inlier_share: share of the measured, not hidden model pixels that fit.
+        rms_mm, expected_rms_mm: of the residual.
+    """
+
+    status: Status
+    predicted_tre_mm: float | None = None
+    reasons: tuple[Reason, ...] = ()
+    coverage: float = 0.0
+    occluded_share: float = 0.0
+    inlier_share: float = 0.0
+    rms_mm: float | None = None
+    expected_rms_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LineTimings:
+    """How long the parts of one frame took, in real time."""
+
+    rectify_ms: float = 0.0
+    stereo_ms: float = 0.0
+    fill_ms: float = 0.0
+    estimate_ms: float = 0.0
+    judge_ms: float = 0.0
+    overlay_ms: float = 0.0
+
+    @property
+    def total_ms(self) -> float:
+        """Sum."""
+        measured_ms = self.rectify_ms + self.stereo_ms + self.fill_ms
+        return measured_ms + self.estimate_ms + self.judge_ms + self.overlay_ms
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedFrame:
+    """What the line answers for one frame and one bone."""
+
+    bone: str
+    estimate: PoseEstimate | None
+    verdict: Verdict
+    timings: LineTimings
+
+    @property
+    def left_from_bone(self) -> RigidTransform | None:
+        """The pose, when there is one."""
+        return None if self.estimate is None else self.estimate.camera_from_bone
+
+
+def predicted_tre_mm(
+    estimate: PoseEstimate, centre_mm: FloatArray, targets_mm: FloatArray
+) -> float:
+    """95 % bound of the mean error over target points of a bone.
+
+    Args:
+        estimate: pose and covariance.
+        centre_mm: (3,) mean of the model's vertices, in bone coordinates.
+        targets_mm: (N, 3) in bone coordinates.
+
+    The mean length is at most the root mean square, whose square is a weighted sum of chi-squares:
+    here one chi-square of the same mean and variance (Welch 1938, Satterthwaite 1946).
+
+    Source: e(p) = J x, J = [I | -[p - c]x], x ~ N(0, S); mean |e|^2 = x^T M x, M = mean J^T J.
+    """
+    from scipy.special import chdtri
+
+    if len(targets_mm) == 0:
+        raise ValueError("no targets to predict an error for")
+    offsets = (targets_mm - centre_mm) @ estimate.camera_from_bone.rotation.T
+    jacobian = np.zeros((len(offsets), 3, 6))
+    jacobian[:, :, :3] = np.eye(3)
+    x, y, z = offsets.T
+    # -[p - c]x, row by row.
+    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+    mean_square = np.einsum("nki,nkj->ij", jacobian, jacobian) / len(jacobian)
+    errors = estimate.covariance @ mean_square
+    first, second = float(np.trace(errors)), float(np.trace(errors @ errors))
+    if first <= 0.0:
+        return 0.0
+    freedom = first**2 / second
+    return float(np.sqrt(first / freedom * chdtri(freedom, 0.05)))
