@@ -1,0 +1,1 @@
+"""From pictures of a target to a judged stereo rig."""

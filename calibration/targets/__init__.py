@@ -1,0 +1,1 @@
+"""Targets: what is printed on them, and where pictures show it."""
