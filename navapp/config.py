@@ -162,6 +162,19 @@ class TrackingSection(Section):
     """icp is the paper's baseline."""
 
 
+class CalibrationSection(Section):
+    """Calibration of the stereo rig."""
+
+    stop_capture_mm: Positive = 0.15
+    """A capture may end when half of the working volume has a predicted 95 % error below."""
+    accept_mm: Positive = 0.40
+    """A rig is accepted when nearly all of the working volume has a predicted 95 % error below."""
+    working_depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (350.0, 550.0)
+    """Nearest and farthest surface of the working volume."""
+    valid_days: Annotated[int, Field(gt=0)] = 180
+    """A rig is refused when it is older."""
+
+
 class StagesSection(Section):
     """The surgical stages."""
 
@@ -193,7 +206,7 @@ class Configuration(Section):
     stereo: EmptySection = EmptySection()
     registration: EmptySection = EmptySection()
     tracking: TrackingSection = TrackingSection()
-    calibration: EmptySection = EmptySection()
+    calibration: CalibrationSection = CalibrationSection()
     overlay: EmptySection = EmptySection()
     stages: StagesSection = StagesSection()
     recording: RecordingSection = RecordingSection()

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.rig.bundle import Bundle, solve_bundle
+from calibration.rig.parameters import N_COEFFICIENTS, RigModel, packed
 from calibration.rig.start import start_poses
 from calibration.targets.boards import Board
 from calibration.targets.pairs import SeenPair
+from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 
 N_FOLDS = 5
@@ -93,3 +95,13 @@ def is_better(simple: HeldOut, richer: HeldOut) -> bool:
     gain = simple.costs - richer.costs
     error = gain.std(ddof=1) / np.sqrt(len(gain))
     return bool(gain.mean() > max(2.0 * error, 0.01 * simple.costs.mean()))
+
+
+def look_at_rig(board: Board, pairs: Sequence[SeenPair], rig: StereoRig) -> float:
+    """Root mean square distance px between marks seen and predicted, for a rig of a file."""
+    n_used = max(rig.left.distortion.size, rig.right.distortion.size)
+    n = next(one for one in N_COEFFICIENTS if one >= n_used)
+    model = RigModel(n, 0, rig.width, rig.height)
+    shared = packed(model, rig)
+    poses = start_poses(board, pairs, model, shared)
+    return solve_bundle(board, pairs, model, shared, poses, is_fixed=True).rms_px

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from calibration.rig.bundle import Bundle, projected
-from calibration.rig.parameters import RigModel, unpacked
+from calibration.rig.parameters import RigModel
 from calibration.rig.start import vector_of
 from calibration.rig.uncertainty import bounds_mm, triangulation_slopes, working_points_mm
 from calibration.targets.boards import Board
@@ -94,7 +94,8 @@ def information(
 
     None when one of the cameras sees too little of it.
     """
-    normal, mixed, own = 0.0, 0.0, 0.0
+    n = model.n_rig
+    normal, mixed, own = np.zeros((n, n)), np.zeros((n, 6)), np.zeros((6, 6))
     for number in range(2):
         pixels, by_rig, by_pose, _ = projected(board.points_mm, pose, model, shared, number)
         limit = (model.width - _EDGE_PX, model.height - _EDGE_PX)
@@ -103,8 +104,10 @@ def information(
             return None
         rows = np.repeat(is_seen, 2)
         a, b = by_rig[rows] / sigma_px, by_pose[rows] / sigma_px
-        normal, mixed, own = normal + a.T @ a, mixed + a.T @ b, own + b.T @ b
-    reduced: FloatArray = normal - mixed @ np.linalg.solve(own, np.transpose(mixed))
+        normal += a.T @ a
+        mixed += a.T @ b
+        own += b.T @ b
+    reduced: FloatArray = normal - mixed @ np.linalg.solve(own, mixed.T)
     return reduced
 
 
@@ -112,7 +115,6 @@ def candidates(
     board: Board, model: RigModel, shared: FloatArray, depth_mm: tuple[float, float]
 ) -> list[FloatArray]:
     """(6,) poses all over the working volume, tilted to all sides."""
-    rig = unpacked(model, shared)
     middle = board.points_mm.mean(axis=0)
     poses = []
     for share in _DEPTH_SHARES:
@@ -130,7 +132,6 @@ def candidates(
                     pose[:3, :3] = rotation
                     pose[:3, 3] = place - rotation @ middle
                     poses.append(vector_of(pose))
-    del rig
     return poses
 
 

@@ -30,7 +30,7 @@ class Limits:
         worst_held_out: held-out over solved residuals.
         accept_mm: largest predicted 95 % error in the working volume.
         known_share: largest difference from a length that is known.
-        depth_mm: nearest and farthest surface of the working volume.
+        depth_mm: nearest and farthest surface of the working volume; None: where the board was.
     """
 
     fewest_pairs: int = 8
@@ -40,7 +40,7 @@ class Limits:
     worst_held_out: float = 1.5
     accept_mm: float = 0.40
     known_share: float = 0.02
-    depth_mm: tuple[float, float] = (350.0, 550.0)
+    depth_mm: tuple[float, float] | None = (350.0, 550.0)
 
 
 @dataclass(frozen=True, slots=True)

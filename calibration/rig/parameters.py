@@ -14,8 +14,8 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
-# Coefficients of OpenCV's polynomial: k1 k2 p1 p2, with k3, with k4 k5 k6.
-N_COEFFICIENTS = (4, 5, 8)
+# Coefficients of OpenCV's polynomial: k1 k2 p1 p2, with k3, with k4 k5 k6, with thin prisms.
+N_COEFFICIENTS = (4, 5, 8, 12)
 
 
 @dataclass(frozen=True, slots=True)

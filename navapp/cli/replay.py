@@ -136,7 +136,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.operators import RecordedOperator
     from navapp.control.stages import stage_by_name
-    from navapp.geometry.rig import read_rig
+    from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan
     from navapp.values import Prior
 

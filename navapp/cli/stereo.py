@@ -163,7 +163,7 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
         Rectifier,
         luma,
     )
-    from navapp.geometry.rig import read_rig
+    from navapp.geometry.rig_files import read_rig
     from navapp.geometry.transform import RigidTransform
 
     if left.shape != right.shape:

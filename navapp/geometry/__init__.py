@@ -3,7 +3,8 @@
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair, Rectifier
-from navapp.geometry.rig import RigQuality, StereoRig, read_rig, write_rig
+from navapp.geometry.rig import RigQuality, StereoRig
+from navapp.geometry.rig_files import read_rig, write_rig
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 
 __all__ = [

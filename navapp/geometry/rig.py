@@ -1,27 +1,14 @@
-"""A calibrated stereo rig and its file (OpenCV YAML)."""
+"""A calibrated stereo rig."""
 
 import hashlib
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from datetime import date
 
 import numpy as np
 
-from navapp.errors import RigError
 from navapp.geometry.camera import Camera
-from navapp.geometry.ply import write_whole
-from navapp.geometry.transform import RigidTransform
-
-# What other programs call the same thing; the first name is ours.
-_SYNONYMS = {
-    "K1": ("K1", "M1", "cameraMatrix1", "camera_matrix_1"),
-    "D1": ("D1", "distCoeffs1", "distortion_coefficients_1"),
-    "K2": ("K2", "M2", "cameraMatrix2", "camera_matrix_2"),
-    "D2": ("D2", "distCoeffs2", "distortion_coefficients_2"),
-    "R": ("R",),
-    "T": ("T",),
-}
+from navapp.geometry.transform import FloatArray, RigidTransform
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +19,23 @@ class RigQuality:
         is_accepted: it met its limits.
         reasons: why not, otherwise empty.
         uncertainty_mm: predicted 95 % error of a triangulated point in the working volume.
+        made_on, expires_on: days of the calibration and of its end; None when nobody said.
+        figures: what was measured, by name (`rms_px`, `holdout_rms_px`, `coverage_left`, ...).
+        covariance: (n, n) of the solved numbers: fx fy cx cy and the distortion of the left and of
+            the right camera, rotation vector and translation in mm of `right_from_left`.
     """
 
     is_accepted: bool
     reasons: tuple[str, ...] = ()
     uncertainty_mm: float | None = None
+    made_on: date | None = None
+    expires_on: date | None = None
+    figures: Mapping[str, float] = field(default_factory=dict)
+    covariance: FloatArray | None = field(default=None, compare=False)
+
+    def has_expired(self, today: date) -> bool:
+        """Whether its time is over."""
+        return self.expires_on is not None and today > self.expires_on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,164 +100,3 @@ class StereoRig:
             self.quality,
             self.name,
         )
-
-
-def read_rig(path: str | Path) -> StereoRig:
-    """Read a rig from OpenCV YAML, XML or JSON storage; lengths are taken as mm.
-
-    Raises:
-        RigError: missing, damaged, incomplete or impossible.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise RigError(
-            f"rig file {path} does not exist",
-            subject=str(path),
-            remedy="give the OpenCV YAML file that the calibration wrote",
-        )
-    values = _read_storage(path)
-    width, height = values.get("image_width"), values.get("image_height")
-    missing = [key for key in _SYNONYMS if key not in values]
-    if width is None or height is None:
-        missing.insert(0, "image_width and image_height")
-    if missing or width is None or height is None:
-        raise RigError(
-            f"rig file {path} lacks {', '.join(missing)}",
-            subject=str(path),
-            remedy="it needs K1 D1 K2 D2 R T, image_width and image_height (OpenCV's names)",
-        )
-    try:
-        return StereoRig(
-            Camera(values["K1"], values["D1"], int(width), int(height)),
-            Camera(values["K2"], values["D2"], int(width), int(height)),
-            RigidTransform.from_parts("right", "left", values["R"], values["T"]),
-            (str(values.get("serial_left", "")), str(values.get("serial_right", ""))),
-            _quality(values),
-            str(values.get("rig_name", path.stem)),
-        )
-    except (ValueError, TypeError, OverflowError) as error:
-        raise RigError(
-            f"rig file {path} describes no possible rig ({error})",
-            subject=str(path),
-            remedy="calibrate again or restore the file",
-        ) from error
-
-
-def write_rig(path: str | Path, rig: StereoRig) -> None:
-    """Write OpenCV YAML 1.0, whole or not at all.
-
-    The quality record comes first: a file that is cut short later on loses numbers that it cannot
-    be read without, never just the verdict.
-    """
-    import cv2
-
-    # OpenCV 5 writes YAML 1.2 unless asked; older readers know 1.0 only.
-    yaml_format = getattr(cv2, "FILE_STORAGE_FORMAT_YAML_1_0", cv2.FILE_STORAGE_FORMAT_YAML)
-    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | yaml_format)
-    storage.write("rig_name", rig.name)
-    storage.write("rig_id", rig.rig_id)
-    storage.write("serial_left", rig.serials[0])
-    storage.write("serial_right", rig.serials[1])
-    if rig.quality is not None:
-        _write_quality(storage, rig.quality)
-    storage.write("image_width", rig.width)
-    storage.write("image_height", rig.height)
-    for index, camera in ((1, rig.left), (2, rig.right)):
-        storage.write(f"K{index}", np.array(camera.matrix))
-        # One-dimensional arrays would come back in another form: write a row.
-        storage.write(
-            f"D{index}",
-            np.array(camera.distortion if camera.distortion.size else np.zeros(5)).reshape(1, -1),
-        )
-    storage.write("R", np.array(rig.right_from_left.rotation))
-    storage.write("T", np.array(rig.right_from_left.translation_mm).reshape(3, 1))
-    write_whole(path, storage.releaseAndGetString().encode("utf-8"))
-
-
-def _write_quality(storage: Any, quality: RigQuality) -> None:
-    import cv2
-
-    storage.write("accepted", int(quality.is_accepted))
-    storage.startWriteStruct("reasons", cv2.FILE_NODE_SEQ)
-    for reason in quality.reasons:
-        storage.write("", reason)
-    storage.endWriteStruct()
-    storage.write(
-        "uncertainty_mm", -1.0 if quality.uncertainty_mm is None else quality.uncertainty_mm
-    )
-
-
-def _quality(values: dict[str, Any]) -> RigQuality | None:
-    if "accepted" not in values:
-        return None
-    uncertainty_mm = float(values.get("uncertainty_mm", -1.0))
-    known = uncertainty_mm >= 0.0 and math.isfinite(uncertainty_mm)
-    return RigQuality(
-        int(values["accepted"]) == 1,
-        tuple(values.get("reasons", ())),
-        uncertainty_mm if known else None,
-    )
-
-
-def _read_storage(path: Path) -> dict[str, Any]:
-    """Every known entry of an OpenCV storage file, under our names."""
-    import cv2
-
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        if not storage.isOpened():
-            raise ValueError("not an OpenCV storage file")
-        values = {**_read_matrices(storage), **_read_scalars(storage)}
-        storage.release()
-    except (cv2.error, SystemError, ValueError) as error:
-        raise RigError(
-            f"rig file {path} is damaged or not an OpenCV storage file",
-            subject=str(path),
-            remedy="restore it or calibrate again",
-        ) from error
-    return values
-
-
-# A node must stay in a variable: the storage frees the ones that nobody holds.
-
-
-def _read_matrices(storage: Any) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for name, synonyms in _SYNONYMS.items():
-        for synonym in synonyms:
-            node = storage.getNode(synonym)
-            if not node.empty() and node.mat() is not None:
-                values[name] = np.asarray(node.mat(), dtype=np.float64)
-                break
-    return values
-
-
-def _read_scalars(storage: Any) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    for name in ("size", "image_size"):
-        node = storage.getNode(name)
-        if node.empty():
-            continue
-        size = [_number(node.at(i)) for i in range(node.size())] if node.isSeq() else node.mat()
-        size = np.asarray(size, dtype=np.float64).reshape(-1)
-        if size.size != 2:
-            raise ValueError(f"{name} is not a width and a height")
-        values["image_width"], values["image_height"] = size
-    for name in ("image_width", "image_height", "accepted", "uncertainty_mm"):
-        node = storage.getNode(name)
-        if not node.empty():
-            values[name] = _number(node)
-    for name in ("serial_left", "serial_right", "rig_name"):
-        node = storage.getNode(name)
-        if not node.empty() and node.isString():
-            values[name] = node.string()
-    node = storage.getNode("reasons")
-    if not node.empty() and node.isSeq():
-        values["reasons"] = [node.at(i).string() for i in range(node.size())]
-    return values
-
-
-def _number(node: Any) -> float:
-    if not (node.isInt() or node.isReal()):
-        raise ValueError("a number was expected")
-    return float(node.real())

@@ -21,7 +21,8 @@ import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.ply import read_ply
-from navapp.geometry.rig import StereoRig, read_rig
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.stereo import measure_health
 from navapp.tracking import Goal, Line, TrackState

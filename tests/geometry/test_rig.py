@@ -6,7 +6,8 @@ import pytest
 
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
-from navapp.geometry.rig import RigQuality, StereoRig, read_rig, write_rig
+from navapp.geometry.rig import RigQuality, StereoRig
+from navapp.geometry.rig_files import read_rig, write_rig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from tests.geometry.shapes import STRONG, camera, toed_in_rig
 

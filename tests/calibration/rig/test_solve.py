@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.rig.judge import Limits
+from calibration.rig.lengths import triangulated_mm
 from calibration.rig.solve import solve_rig
 from calibration.rig.uncertainty import working_points_mm
 from calibration.rig.views import Fault
@@ -29,8 +30,6 @@ SIZE = (WIDTH, HEIGHT)
 def triangulation_error_mm(solved, true, points_mm):
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    from calibration.rig.solve import triangulated_mm
-
     return np.linalg.norm(triangulated_mm(solved, left, right) - points_mm, axis=1)
 
 
@@ -176,8 +175,10 @@ def test_views_set_aside_judge(world):
     aside = drawn_pairs(true, rng, 4, noise_px=0.02)
     found = solve_rig(BOARD, pairs, SIZE, aside=aside)
     assert found.held_out_rms_px == pytest.approx(0.02 * 2**0.5, rel=0.15)
-    worse = [SeenPair(one.index, replace(one.left, pixels=one.left.pixels + np.array([0.0, 2.0])), one.right)
-             for one in aside]  # fmt: skip
+    worse = [
+        replace(one, left=replace(one.left, pixels=one.left.pixels + np.array([0.0, 2.0])))
+        for one in aside
+    ]
     _, reasons = reasons_of(pairs, aside=worse)
     assert any("held-out" in reason for reason in reasons)
 

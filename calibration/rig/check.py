@@ -1,0 +1,82 @@
+"""A rig as it is, on new views of the board."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.rig.folds import look_at_rig
+from calibration.rig.lengths import epipolar_px, length_ratios
+from calibration.targets.boards import Board
+from calibration.targets.pairs import SeenPair
+from navapp.errors import ResultError
+from navapp.geometry.rig import StereoRig
+
+# A rig that has not moved leaves no more than this beyond what it left when it was made, and
+# measures the board to a thousandth: half a millimetre at the bone.
+_WORST_OFFSET_PX, _WORST_LENGTH = 0.15, 0.001
+_WORST_RMS = 2.0
+_ROUGH_RMS_PX = 0.6
+_N_SIGMAS = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class RigCheck:
+    """What new views say of a rig.
+
+    Attributes:
+        n_pairs: that saw the board.
+        rms_px: of marks seen less predicted, only the board's poses solved for.
+        epipolar_rms_px: of right marks from the left ones' lines.
+        epipolar_offset_px: their median: cameras that turned against each other.
+        length_mean: triangulated over true length on the board.
+        length_error: its standard error.
+        reasons: why the rig should not be used; empty when it may.
+    """
+
+    n_pairs: int
+    rms_px: float
+    epipolar_rms_px: float
+    epipolar_offset_px: float
+    length_mean: float
+    length_error: float
+    reasons: tuple[str, ...]
+
+
+def check_rig(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> RigCheck:
+    """Judge a rig by views that it was not solved with.
+
+    Raises:
+        ResultError: no view shows the board to both cameras.
+    """
+    if not pairs:
+        raise ResultError(
+            "the board is not seen by both cameras in any pair",
+            remedy="compare the board with its file, and show it whole and sharp",
+        )
+    rms_px = look_at_rig(board, pairs, rig)
+    across = epipolar_px(rig, pairs)
+    ratios = length_ratios(board, rig, pairs)
+    mean = float(np.mean(ratios)) if len(ratios) else float("nan")
+    # Lengths of one view share its errors: as many are independent as there are views.
+    error = float(np.std(ratios)) / len(pairs) ** 0.5 if len(ratios) else float("nan")
+    offset = float(np.median(across))
+    reasons = []
+    known = None if rig.quality is None else rig.quality.figures.get("holdout_rms_px")
+    worst_px = _ROUGH_RMS_PX if known is None else max(_WORST_RMS * known, known + _WORST_OFFSET_PX)
+    if rms_px > worst_px:
+        usual = "" if known is None else f", it left {known:.3f} px when it was made"
+        reasons.append(f"the marks fit badly ({rms_px:.3f} px{usual})")
+    if abs(offset) > _WORST_OFFSET_PX:
+        reasons.append(
+            f"the right picture shows everything {abs(offset):.2f} px too "
+            f"{'low' if offset > 0 else 'high'}: the cameras have turned"
+        )
+    if abs(mean - 1.0) > _WORST_LENGTH + _N_SIGMAS * error:
+        reasons.append(
+            f"a length of 100 mm on the board is measured as {100.0 * mean:.2f} mm: the cameras "
+            "have turned, or the board is not as large as its file says"
+        )
+    return RigCheck(
+        len(pairs), rms_px, float(np.sqrt(np.mean(across**2))), offset, mean, error, tuple(reasons)
+    )

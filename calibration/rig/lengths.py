@@ -1,0 +1,61 @@
+"""What a rig measures: distances across the epipolar lines, and lengths on the board."""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from calibration.targets.boards import Board
+from calibration.targets.pairs import SeenPair
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray
+
+
+def epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
+    """(N,) signed distances of the right marks from the lines of the left ones, px."""
+    rotation, t = rig.right_from_left.rotation, rig.right_from_left.translation_mm
+    cross = np.array([[0.0, -t[2], t[1]], [t[2], 0.0, -t[0]], [-t[1], t[0], 0.0]])
+    distances = []
+    for pair in pairs:
+        _, left, right = pair.common()
+        lines = rig.left.rays(left) @ (cross @ rotation).T
+        rays = rig.right.rays(right)
+        distances.append(
+            (lines * rays).sum(axis=1) / np.hypot(lines[:, 0], lines[:, 1]) * rig.right.focal_px
+        )
+    return np.concatenate(distances)
+
+
+def triangulated_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
+    """(n, 3) points in the left camera's frame, half-way between both rays."""
+    a = rig.left.rays(left_px)
+    b = rig.right_from_left.inverse().rotate(rig.right.rays(right_px))
+    centre = rig.right_from_left.inverse().translation_mm
+    aa, bb, ab = (a * a).sum(axis=1), (b * b).sum(axis=1), (a * b).sum(axis=1)
+    ac, bc = a @ centre, b @ centre
+    scale = aa * bb - ab**2
+    s, t = (bb * ac - ab * bc) / scale, (ab * ac - aa * bc) / scale
+    middle: FloatArray = 0.5 * (a * s[:, None] + b * t[:, None] + centre)
+    return middle
+
+
+def length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
+    """Triangulated over true distance, for the far corners of what is seen of the board."""
+    ratios = []
+    for pair in pairs:
+        ids, left, right = pair.common()
+        if len(ids) < 4:
+            continue
+        true_mm, found_mm = board.points_mm[ids], triangulated_mm(rig, left, right)
+        x, y = true_mm[:, 0], true_mm[:, 1]
+        far = {
+            int(np.argmin(x + y)),
+            int(np.argmax(x + y)),
+            int(np.argmin(x - y)),
+            int(np.argmax(x - y)),
+        }
+        for i, j in combinations(sorted(far), 2):
+            ratios.append(
+                np.linalg.norm(found_mm[i] - found_mm[j]) / np.linalg.norm(true_mm[i] - true_mm[j])
+            )
+    return np.array(ratios)

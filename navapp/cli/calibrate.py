@@ -1,0 +1,35 @@
+"""`navapp calibrate`: a stereo rig that knows how good it is."""
+
+import argparse
+import importlib
+from typing import Any
+
+from navapp.cli.diagnostics import Diagnostics
+
+# What can be calibrated -> module with `add_parser(subparsers)` and `run(options, diagnostics)`.
+_PARTS = {"stereo": "calibrate_stereo", "check": "calibrate_check"}
+
+_EXAMPLE = """\
+examples:
+  navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
+  navapp calibrate check rig.yml today/ --board board.json
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the verb and its parts."""
+    parser = subparsers.add_parser(
+        "calibrate",
+        help="solve a stereo rig from pictures of a board, or check one",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parts = parser.add_subparsers(dest="part", metavar="PART", required=True)
+    for module in _PARTS.values():
+        importlib.import_module(f"navapp.cli.{module}").add_parser(parts)
+
+
+def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Do the part that was asked for; the exit code."""
+    module = importlib.import_module(f"navapp.cli.{_PARTS[options.part]}")
+    return int(module.run(options, diagnostics))

@@ -1,0 +1,89 @@
+"""`navapp calibrate check`: how good a rig is today, on new pictures of the board."""
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from navapp.cli.board_pairs import read_pairs
+from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import ResultError, RigError
+
+if TYPE_CHECKING:
+    from calibration.rig.check import RigCheck
+
+_EXAMPLE = """\
+example: navapp calibrate check rig.yml today/ --board board.json
+
+A few pairs are enough: the board near and far, tilted, in the middle and at the edges.
+"""
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the part."""
+    parser = subparsers.add_parser(
+        "check",
+        help="how good a rig is today, on new pictures of the board",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("rig", metavar="RIG", help="rig file")
+    parser.add_argument("images", metavar="IMAGES", help="folder of new pairs")
+    parser.add_argument("--board", required=True, metavar="BOARD.json", help="what they show")
+    parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
+
+
+def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Judge; the exit code."""
+    from calibration.rig.check import check_rig
+    from calibration.targets.boards import read_board
+    from navapp.geometry.rig_files import read_rig
+
+    check_writable(options.json)
+    rig, board = read_rig(options.rig), read_board(options.board)
+    pairs = read_pairs(options.images, board, diagnostics)
+    if pairs.size != (rig.width, rig.height):
+        raise RigError(
+            f"the pictures are {pairs.size[0]}x{pairs.size[1]}, rig {options.rig} is "
+            f"{rig.width}x{rig.height}",
+            subject=options.rig,
+            remedy="check the rig with pictures of its own cameras",
+        )
+    found = check_rig(board, rig, pairs.seen)
+    write_json(options.json, "calibrate check", _content(found, len(pairs.unseen)))
+    if options.json != "-":
+        _tell(found, diagnostics)
+    if found.reasons:
+        raise ResultError(
+            f"the rig is not what it was: {'; '.join(found.reasons)}",
+            remedy="calibrate again",
+        )
+    return 0
+
+
+def _content(found: "RigCheck", n_unseen: int) -> dict[str, Any]:
+    return {
+        "accepted": not found.reasons,
+        "reasons": list(found.reasons),
+        "rms_px": found.rms_px,
+        "epipolar_rms_px": found.epipolar_rms_px,
+        "epipolar_offset_px": found.epipolar_offset_px,
+        "length_100_mm": {
+            "mean": 100.0 * found.length_mean,
+            "standard_error": 100.0 * found.length_error,
+        },
+        "views_used": found.n_pairs,
+        "views_not_seen": n_unseen,
+    }
+
+
+def _tell(found: "RigCheck", diagnostics: Diagnostics) -> None:
+    diagnostics.say(
+        f"{found.n_pairs} pairs: rms {found.rms_px:.3f} px, across the lines "
+        f"{found.epipolar_rms_px:.3f} px (offset {found.epipolar_offset_px:+.3f} px)"
+    )
+    if np.isfinite(found.length_mean):
+        diagnostics.say(
+            f"a length of 100 mm on the board is measured as {100.0 * found.length_mean:.2f} +- "
+            f"{100.0 * found.length_error:.2f} mm"
+        )
