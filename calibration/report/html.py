@@ -30,7 +30,7 @@ def write_report(path: str | Path, found: Calibration, limits: Limits) -> None:
 def page(found: Calibration, limits: Limits) -> str:
     """The report as HTML."""
     name = escape(found.rig.name or "stereo rig")
-    middle_mm = float(np.mean(limits.depth_mm))
+    middle_mm = float(np.mean(found.depth_mm))
     parts = [
         f"<h1>Calibration of {name}</h1>",
         _verdict(found),
@@ -90,7 +90,7 @@ def _verdict(found: Calibration) -> str:
 
 def _figures(found: Calibration, limits: Limits) -> list[tuple[str, str, str]]:
     ratios, bounds = found.length_ratios, found.bounds_mm
-    near, far = limits.depth_mm
+    near, far = found.depth_mm
     rows = [
         (
             "predicted error at the working volume",

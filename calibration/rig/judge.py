@@ -59,27 +59,36 @@ class Coverage:
     tilts_deg: FloatArray
 
 
-def coverage(board: Board, pairs: Sequence[SeenPair], solved: Bundle, limits: Limits) -> Coverage:
+def shown_depth_mm(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> tuple[float, float]:
+    """Nearest and farthest mark that the left camera saw."""
+    depths = [
+        (board.points_mm[pair.left.ids] @ pose[:3, :3].T + pose[:3, 3])[:, 2]
+        for pair, pose in zip(pairs, map(matrix_of, solved.poses), strict=True)
+    ]
+    return float(min(one.min() for one in depths)), float(max(one.max() for one in depths))
+
+
+def coverage(
+    board: Board, pairs: Sequence[SeenPair], solved: Bundle, working_depth_mm: tuple[float, float]
+) -> Coverage:
     """How well the views cover what the rig will be used for."""
     size = (solved.model.width, solved.model.height)
     rig = unpacked(solved.model, solved.shared)
-    points_mm = working_points_mm(solved.model, solved.shared, limits.depth_mm)
+    points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm)
     needed = (rig.left.project(points_mm), rig.right.project(rig.right_from_left.apply(points_mm)))
     shares = []
     for side, wanted in zip(("left", "right"), needed, strict=True):
         asked = occupied(wanted, size)
         marked = occupied(np.vstack([getattr(pair, side).pixels for pair in pairs]), size)
         shares.append(float((marked & asked).sum() / max(asked.sum(), 1)))
-    depths, tilts = [], []
+    tilts = []
     for pair, vector in zip(pairs, solved.poses, strict=True):
         pose = matrix_of(vector)
-        seen_mm = board.points_mm[pair.left.ids] @ pose[:3, :3].T + pose[:3, 3]
-        depths += [seen_mm[:, 2].min(), seen_mm[:, 2].max()]
-        line = seen_mm.mean(axis=0)
+        line = pose[:3, :3] @ board.points_mm[pair.left.ids].mean(axis=0) + pose[:3, 3]
         cosine = abs(pose[:3, 2] @ line) / np.linalg.norm(line)
         tilts.append(np.degrees(np.arccos(min(cosine, 1.0))))
-    depth_mm = (float(min(depths)), float(max(depths)))
-    return Coverage(shares[0], shares[1], depth_mm, np.array(tilts))
+    shown_mm = shown_depth_mm(board, pairs, solved)
+    return Coverage(shares[0], shares[1], shown_mm, np.array(tilts))
 
 
 def occupied(pixels: FloatArray, size: tuple[int, int]) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.rig.bundle import Bundle, solve_bundle
 from calibration.rig.folds import N_FOLDS, HeldOut, hold_out, is_better, look_at
-from calibration.rig.judge import Coverage, Limits, coverage, refusals
+from calibration.rig.judge import Coverage, Limits, coverage, refusals, shown_depth_mm
 from calibration.rig.lengths import epipolar_px, length_ratios
 from calibration.rig.parameters import RigModel, packed, unpacked
 from calibration.rig.start import start_poses, start_rig
@@ -40,6 +40,7 @@ class Calibration:
         held_out_rms_px: of views that were set aside, or of `held_out`.
         bounds_mm: (n,) predicted 95 % errors of points of the working volume.
         points_mm: (n, 3) these points, in the left camera's frame.
+        depth_mm: nearest and farthest surface of that volume.
         covered: where and how the board was shown.
         epipolar_rms_px: distance of the right marks from the left marks' lines.
         length_ratios: of triangulated to true distances between marks of a view, all views.
@@ -54,6 +55,7 @@ class Calibration:
     held_out_rms_px: float
     bounds_mm: FloatArray
     points_mm: FloatArray
+    depth_mm: tuple[float, float]
     covered: Coverage
     epipolar_rms_px: float
     length_ratios: FloatArray
@@ -90,9 +92,10 @@ def solve_rig(
     kept, solved, more = work.cleaned(_without(pairs, dropped))
     dropped += more
     solved, held_out = work.chosen(kept, solved)
-    points_mm = working_points_mm(solved.model, solved.shared, limits.depth_mm)
+    depth_mm = limits.depth_mm or shown_depth_mm(board, kept, solved)
+    points_mm = working_points_mm(solved.model, solved.shared, depth_mm)
     bounds = _bounds(solved, held_out, points_mm)
-    covered = coverage(board, kept, solved, limits)
+    covered = coverage(board, kept, solved, depth_mm)
     judged = look_at(board, aside, solved).rms_px if aside else held_out.rms_px
     worst_mm = float(np.quantile(bounds, 0.95)) if len(bounds) else np.inf
     reasons = [
@@ -107,7 +110,7 @@ def solve_rig(
     on_progress(1.0)
     return Calibration(
         replace(rig, quality=quality), board, kept, dropped, solved, held_out, judged, bounds,
-        points_mm, covered, float(np.sqrt(np.mean(epipolar**2))), ratios,
+        points_mm, depth_mm, covered, float(np.sqrt(np.mean(epipolar**2))), ratios,
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """`navapp calibrate stereo`: a rig from pictures of a board."""
 
 import argparse
+import math
 from dataclasses import replace
 from datetime import date, timedelta
 from pathlib import Path
@@ -74,6 +75,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     pairs = read_pairs(options.images, board, diagnostics)
     aside = read_pairs(options.holdout, board, diagnostics).seen if options.holdout else []
     limits = Limits(accept_mm=section.accept_mm, depth_mm=section.working_depth_mm)
+    if board.spacing_mm == 1.0:
+        diagnostics.warn("the board's unit is its own square: limits in mm are not checked")
+        limits = replace(limits, accept_mm=math.inf, depth_mm=None)
     found = solve_rig(
         board, pairs.seen, pairs.size, limits=limits, aside=aside, known_distance_mm=known_mm,
         on_progress=lambda share: diagnostics.progress("solving", share),
