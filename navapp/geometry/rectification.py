@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from navapp.errors import RigError
 from navapp.geometry.bands import in_row_bands
+from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
+from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -48,6 +50,11 @@ class Box:
     def is_empty(self) -> bool:
         """No pixel is inside."""
         return self.width <= 0 or self.height <= 0
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Its rows and columns, to index a picture with; it must be clipped."""
+        return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
 
     def overlap(self, other: "Box") -> float:
         """Intersection over union, 0 to 1."""
@@ -134,27 +141,25 @@ class Rectifier:
     """Rectifies the pictures of one rig; the maps are made once.
 
     Source: Bouguet's method as in OpenCV's `stereoRectify`, zero disparity at infinity.
+
+    Attributes:
+        rig: whose pictures are rectified.
+        interpolation: between pixels.
+        given: R1, R2 (3, 3) and P1, P2 (3, 4) that another program has rectified with, instead of
+            ours.
+
+    Raises:
+        RigError: the right camera does not stand to the right of the left one.
     """
 
     rig: StereoRig
+    interpolation: Interpolation = "cubic"
+    given: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
     _solved: tuple[Any, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        import cv2
-
         rig = self.rig
-        size = (rig.width, rig.height)
-        r1, r2, p1, p2, *_ = cv2.stereoRectify(
-            np.array(rig.left.matrix),
-            np.array(rig.left.distortion),
-            np.array(rig.right.matrix),
-            np.array(rig.right.distortion),
-            size,
-            np.array(rig.right_from_left.rotation),
-            np.array(rig.right_from_left.translation_mm).reshape(3, 1),
-            flags=cv2.CALIB_ZERO_DISPARITY,
-            alpha=-1,
-        )
+        r1, r2, p1, p2 = _solve(rig) if self.given is None else self.given
         if p2[0, 3] >= 0.0 or abs(p2[1, 3]) > 1e-9:
             raise RigError(
                 f"rig {rig.name}: the right camera must stand to the right of the left one",
@@ -189,27 +194,8 @@ class Rectifier:
 
         Fixed-point maps differ by up to 2 grey levels.
         """
-        import cv2
-
         r1, r2, p1, p2 = self._solved
-        size = (self.rig.width, self.rig.height)
-        left = cv2.initUndistortRectifyMap(
-            np.array(self.rig.left.matrix),
-            np.array(self.rig.left.distortion),
-            r1,
-            p1,
-            size,
-            cv2.CV_32FC1,
-        )
-        right = cv2.initUndistortRectifyMap(
-            np.array(self.rig.right.matrix),
-            np.array(self.rig.right.distortion),
-            r2,
-            p2,
-            size,
-            cv2.CV_32FC1,
-        )
-        return (*left, *right)
+        return (*lens_maps(self.rig.left, r1, p1), *lens_maps(self.rig.right, r2, p2))
 
     def rectify(
         self,
@@ -247,11 +233,35 @@ class Rectifier:
             last = inside.x + inside.width - math.floor(band_px[0]) + _TAPS
             in_left, in_right = inside, replace(inside, x=first, width=last - first)
         return RectifiedPair(
-            resampled(left, left_x, left_y, in_left),
-            resampled(right, right_x, right_y, in_right),
+            resampled(left, left_x, left_y, in_left, self.interpolation),
+            resampled(right, right_x, right_y, in_right, self.interpolation),
             self.geometry,
             inside,
         )
+
+
+def undistorted(picture: Image, camera: Camera, interpolation: Interpolation = "cubic") -> Image:
+    """The picture (H, W) or (H, W, 3) as the same camera without distortion sees it; else 0."""
+    columns, rows = lens_maps(camera, np.eye(3), camera.matrix)
+    return resampled(picture, columns, rows, interpolation=interpolation)
+
+
+def _solve(rig: StereoRig) -> tuple[Any, Any, Any, Any]:
+    """R1, R2, P1, P2."""
+    import cv2
+
+    r1, r2, p1, p2, *_ = cv2.stereoRectify(
+        np.array(rig.left.matrix),
+        np.array(rig.left.distortion),
+        np.array(rig.right.matrix),
+        np.array(rig.right.distortion),
+        (rig.width, rig.height),
+        np.array(rig.right_from_left.rotation),
+        np.array(rig.right_from_left.translation_mm).reshape(3, 1),
+        flags=cv2.CALIB_ZERO_DISPARITY,
+        alpha=-1,
+    )
+    return r1, r2, p1, p2
 
 
 def luma(picture: Image) -> Image:
@@ -268,6 +278,7 @@ def resampled(
     columns: NDArray[np.float32],
     rows: NDArray[np.float32],
     part: Box | None = None,
+    interpolation: Interpolation = "cubic",
 ) -> Image:
     """The picture at real places (h, w), cubic over six pixels; 0 outside it, and outside a part.
 
@@ -277,6 +288,10 @@ def resampled(
     """
     from navapp.geometry.resample_kernels import resample_rows
 
+    height, width = columns.shape
+    inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
+    if interpolation == "bilinear":
+        return bilinear(picture, columns, rows, inside.slices)
     if picture.ndim == 3:
         n_channels = picture.shape[2]
         return np.dstack(
@@ -284,8 +299,6 @@ def resampled(
         )
     picture = np.ascontiguousarray(picture)
     values = np.zeros(columns.shape, dtype=np.uint8)
-    height, width = columns.shape
-    inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
     top, span = inside.y, (inside.x, inside.x + inside.width)
     in_row_bands(
         inside.height,
