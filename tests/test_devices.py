@@ -2,6 +2,7 @@
 
 import importlib.metadata
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -77,6 +78,15 @@ def test_an_installed_camera_is_opened_and_reopened(camera, tmp_path) -> None:
 def test_an_installed_camera_of_another_size_is_refused_and_closed(camera, tmp_path) -> None:
     with pytest.raises(RigError, match="64x48, the rig was calibrated at 128x96"):
         open_live(acme(tmp_path, 128, 96), is_headless=True)
+    assert is_closed(camera)
+
+
+def test_a_camera_of_another_rig_is_refused_and_closed(camera, tmp_path) -> None:
+    settings = acme(tmp_path)
+    strangers = replace(plain_rig(64, 48), serials=("OTHER-L", "OTHER-R"))
+    write_rig(tmp_path / "rig.yml", strangers)
+    with pytest.raises(WrongDevice, match="the rig was calibrated with OTHER-L and OTHER-R"):
+        open_live(settings, is_headless=True)
     assert is_closed(camera)
 
 

@@ -4,6 +4,7 @@ import argparse
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import date
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,21 @@ def check_accepted(rig: StereoRig, is_allowed: bool, diagnostics: Diagnostics) -
             remedy="calibrate again, or add --allow-unaccepted: no frame is OK then",
         )
     diagnostics.warn(f"rig {rig.name} was not accepted ({why}): no frame will be OK")
+
+
+def check_not_expired(rig: StereoRig, today: date) -> None:
+    """Refuse to work with a rig whose time is over; what was recorded with it stays good.
+
+    Raises:
+        RigError: expired.
+    """
+    if rig.quality is None or not rig.quality.has_expired(today):
+        return
+    raise RigError(
+        f"rig {rig.name} expired on {rig.quality.expires_on}",
+        subject=rig.name,
+        remedy="calibrate again: cameras move with time, and nothing shows it",
+    )
 
 
 def check_start(prior: Prior, stage: StageSpec) -> None:

@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -115,7 +116,7 @@ def _prepare(
     configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> _Session:
     """Read everything that is given, then open the devices; closed again when that is refused."""
-    from navapp.cli.headless import check_accepted, check_start
+    from navapp.cli.headless import check_accepted, check_not_expired, check_start
     from navapp.cli.prior_files import read_prior
     from navapp.cli.simulated_patient import built_in_plan, nominal_prior
     from navapp.control.stages import stage_by_name
@@ -130,6 +131,7 @@ def _prepare(
     opened = open_live(configuration, is_headless=options.headless)
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
+        check_not_expired(opened.rig, date.today())
         check_accepted(opened.rig, options.allow_unaccepted, diagnostics)
         if opened.simulation is not None:
             plan = plan or built_in_plan(opened.simulation)

@@ -39,7 +39,7 @@ def read_rig(path: str | Path) -> StereoRig:
             subject=str(path),
             remedy="give the OpenCV YAML file that the calibration wrote",
         )
-    _check_hash(path)
+    is_sealed = _is_sealed(path)
     values = _read_storage(path)
     width, height = values.get("image_width"), values.get("image_height")
     missing = [key for key in _SYNONYMS if key not in values]
@@ -66,7 +66,8 @@ def read_rig(path: str | Path) -> StereoRig:
             subject=str(path),
             remedy="calibrate again or restore the file",
         ) from error
-    if values.get("rig_id", rig.rig_id) != rig.rig_id:
+    # Only our own files name their rig, and they all end with a hash.
+    if "rig_id" in values and not (is_sealed and values["rig_id"] == rig.rig_id):
         raise _changed(path)
     return rig
 
@@ -75,7 +76,7 @@ def write_rig(path: str | Path, rig: StereoRig) -> None:
     """Write OpenCV YAML 1.0, or XML for a name that ends so; whole or not at all.
 
     The quality record comes first: a file that is cut short later on loses numbers that it cannot
-    be read without, never just the verdict. YAML ends with a hash of all lines before.
+    be read without, never just the verdict. The last line is a hash of all lines before.
     """
     import cv2
 
@@ -102,19 +103,20 @@ def write_rig(path: str | Path, rig: StereoRig) -> None:
     storage.write("R", np.array(rig.right_from_left.rotation))
     storage.write("T", np.array(rig.right_from_left.translation_mm).reshape(3, 1))
     content = storage.releaseAndGetString().encode("utf-8")
-    if not is_xml:
-        content += f'{_HASH_KEY}: "{hashlib.sha256(content).hexdigest()}"\n'.encode()
-    write_whole(path, content)
+    seal = f'{_HASH_KEY}: "{hashlib.sha256(content).hexdigest()}"'
+    write_whole(path, content + (f"<!-- {seal} -->\n" if is_xml else f"{seal}\n").encode())
 
 
-def _check_hash(path: Path) -> None:
-    """Refuse a file whose last line does not fit the lines before; others have no such line."""
+def _is_sealed(path: Path) -> bool:
+    """Whether the last line is a hash; refused when it does not fit the lines before."""
+    # Line ends change on the way through mail and other systems, which alters nothing.
     lines = path.read_bytes().replace(b"\r\n", b"\n").splitlines(keepends=True)
-    if not lines or not lines[-1].startswith(_HASH_KEY.encode()):
-        return
+    if not lines or _HASH_KEY.encode() not in lines[-1]:
+        return False
     found = hashlib.sha256(b"".join(lines[:-1])).hexdigest()
     if found.encode() not in lines[-1]:
         raise _changed(path)
+    return True
 
 
 def _changed(path: Path) -> RigError:
@@ -229,6 +231,9 @@ def _read_scalars(storage: Any) -> dict[str, Any]:
     node = storage.getNode("reasons")
     if not node.empty() and node.isSeq():
         values["reasons"] = [node.at(i).string() for i in range(node.size())]
+    elif node.isString():
+        # A sequence of one is no sequence in XML.
+        values["reasons"] = [node.string()]
     return values
 
 

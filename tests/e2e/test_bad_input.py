@@ -2,6 +2,8 @@
 
 import json
 import os
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import cv2
@@ -16,6 +18,8 @@ from navapp.preop import write_plan
 from navapp.values import Plan
 from sim_devices.rigs import default_rig
 from tests.bones import femur_model
+from tests.sim_devices.plain_world import plain_rig
+from tests.test_devices import Entry, announce
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +100,29 @@ def test_a_rig_that_was_not_accepted(pairs, rig, plan, prior, capsys) -> None:
     )
     write_rig(rig, bad)
     refused(replay(pairs, rig, plan, prior), capsys, 3, "too few views", "--allow-unaccepted")
+
+
+def expire(rig: Path, width: int, height: int) -> None:
+    over = RigQuality(True, made_on=date(2020, 1, 1), expires_on=date(2020, 6, 29))
+    write_rig(rig, replace(plain_rig(width, height), quality=over, name="bench"))
+
+
+def test_an_expired_rig_starts_no_session(rig, plan, prior, tmp_path, monkeypatch, capsys) -> None:
+    entry = Entry()
+    announce(monkeypatch, [entry])
+    expire(rig, 64, 48)
+    settings = tmp_path / "navapp.toml"
+    settings.write_text('[camera]\nbackend = "acme"\n', encoding="utf-8")
+    arguments = ["--config", str(settings), "run", "--headless", "--rig", str(rig)]
+    arguments += ["--plan", str(plan), "--prior", str(prior), "--allow-unaccepted"]
+    refused(arguments, capsys, 3, "rig bench expired on 2020-06-29", "calibrate again")
+
+
+def test_what_was_recorded_with_a_rig_may_be_replayed_after_its_time(
+    pairs, rig, plan, prior, capsys
+) -> None:
+    expire(rig, 320, 180)
+    refused(replay(pairs, rig, plan, prior), capsys, 4, "no frame was OK")
 
 
 def test_unequal_counts(pairs, rig, plan, prior, capsys) -> None:
