@@ -1,4 +1,4 @@
-"""`navapp calibrate`: a stereo rig that knows how good it is."""
+"""`navapp calibrate`: a stereo rig that knows how good it is, and the tip of a tool."""
 
 import argparse
 import importlib
@@ -7,12 +7,17 @@ from typing import Any
 from navapp.cli.diagnostics import Diagnostics
 
 # What can be calibrated -> module with `add_parser(subparsers)` and `run(options, diagnostics)`.
-_PARTS = {"stereo": "calibrate_stereo", "check": "calibrate_check"}
+_PARTS = {
+    "stereo": "calibrate_stereo",
+    "check": "calibrate_check",
+    "pivot": "calibrate_pivot",
+}
 
 _EXAMPLE = """\
 examples:
   navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
   navapp calibrate check rig.yml today/ --board board.json
+  navapp calibrate pivot poses.csv
 """
 
 
@@ -20,7 +25,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the verb and its parts."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="solve a stereo rig from pictures of a board, or check one",
+        help="a stereo rig from pictures of a board, its check, a tool's tip",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
