@@ -105,13 +105,13 @@ def solve_pivot(tracker_from_tool: ArrayLike) -> Pivot:
     robust = _fit(poses, is_used.astype(np.float64))
     squares = float((robust.residuals_mm[is_used] ** 2).sum())
     sigma_mm = float(np.sqrt(squares / (3 * np.count_nonzero(is_used) - 6)))
-    covariance: FloatArray = sigma_mm**2 * np.linalg.inv(_information(poses[is_used]))
+    covariance = sigma_mm**2 * np.linalg.inv(_information(poses[is_used]))
     return Pivot(
         linear,
         robust,
         is_used,
         sigma_mm,
-        covariance,
+        np.asarray(covariance, dtype=np.float64),
         _half_angle_deg(poses[is_used], robust.tip_mm),
         gain,
     )
