@@ -152,6 +152,28 @@ def board_from(content: dict[str, Any]) -> Board:
     return Board(kind, columns, _count(content, "circles_y", _FEWEST_CIRCLES), spacing_mm, mark_mm)
 
 
+def keys_of(board: Board) -> dict[str, Any]:
+    """The keys of a target's file, so that `board_from` gives the target again."""
+    if not board.has_squares:
+        return {
+            "type": board.kind,
+            "circles_x": board.columns,
+            "circles_y": board.rows,
+            "spacing_mm": board.spacing_mm,
+            "diameter_mm": board.mark_mm,
+        }
+    keys: dict[str, Any] = {
+        "type": board.kind,
+        "squares_x": board.columns,
+        "squares_y": board.rows,
+        "square_mm": board.spacing_mm,
+    }
+    if board.kind == "charuco":
+        keys |= {"marker_mm": board.mark_mm, "dictionary": board.dictionary}
+        keys |= {"legacy_pattern": True} if board.is_legacy else {}
+    return keys
+
+
 def _board_of_squares(kind: BoardKind, content: dict[str, Any]) -> Board:
     columns = _count(content, "squares_x", _FEWEST_SQUARES)
     rows = _count(content, "squares_y", _FEWEST_SQUARES)

@@ -8,6 +8,7 @@ from navapp.cli.diagnostics import Diagnostics
 
 # What can be calibrated -> module with `add_parser(subparsers)` and `run(options, diagnostics)`.
 _PARTS = {
+    "board": "calibrate_board",
     "stereo": "calibrate_stereo",
     "check": "calibrate_check",
     "pivot": "calibrate_pivot",
@@ -15,6 +16,7 @@ _PARTS = {
 
 _EXAMPLE = """\
 examples:
+  navapp calibrate board --board board.json --out board.pdf
   navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
   navapp calibrate check rig.yml today/ --board board.json
   navapp calibrate pivot poses.csv
@@ -25,7 +27,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the verb and its parts."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="a stereo rig from pictures of a board, its check, a tool's tip",
+        help="a board to print, a stereo rig from its pictures, its check, a tool's tip",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
