@@ -78,11 +78,26 @@ def write_ros(folder: Path, rig: StereoRig) -> None:
         raise RigError(
             f"{folder} exists already", subject=str(folder), remedy="name a new folder for the pair"
         )
+    texts = {
+        f"{side}.yaml": yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
+        for side, content in zip(_SIDES, contents, strict=True)
+    }
+    try:
+        _write_folder(folder, texts)
+    except OSError as error:
+        raise RigError(
+            f"folder {folder} cannot be written ({error.strerror})",
+            subject=str(folder),
+            remedy="name a new folder in one that exists and that you may write to",
+        ) from error
+
+
+def _write_folder(folder: Path, texts: dict[str, str]) -> None:
+    """All files of a new folder, or nothing."""
     made = Path(tempfile.mkdtemp(dir=folder.resolve().parent, prefix=f".{folder.name}."))
     try:
-        for side, content in zip(_SIDES, contents, strict=True):
-            text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None)
-            write_whole(made / f"{side}.yaml", text.encode("utf-8"))
+        for name, text in texts.items():
+            write_whole(made / name, text.encode("utf-8"))
         made.chmod(0o755)
         os.replace(made, folder)
     except BaseException:

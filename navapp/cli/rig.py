@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.geometry.camera import Camera
@@ -65,10 +64,9 @@ def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from calibration.exchange.formats import format_of_name, lost, read_any, write_as
 
     form = options.to or format_of_name(options.out)
+    # A ROS pair is a folder, which its writer looks at.
     if form != "ros":
         check_writable(options.out)
-    elif options.out in (".", ""):
-        raise UsageError("OUT is no new folder", remedy="name a new folder for the pair")
     rig, before = read_any(options.rig)
     write_as(form, options.out, rig)
     warnings = lost(rig, form)

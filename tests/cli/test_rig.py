@@ -92,6 +92,7 @@ def test_that_a_rig_was_refused_is_not_lost_silently(tmp_path, capsys) -> None:
         ("a.yml", ["--to", "opencv-xml"], 2, "does not suit opencv-xml"),
         ("a.yml", ["--to", "ros"], 2, "does not suit ros"),
         ("none/a.yml", [], 3, "does not exist"),
+        ("none/pair", [], 3, "cannot be written"),
     ],
 )
 def test_what_cannot_be_written_is_one_sentence(
