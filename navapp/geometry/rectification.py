@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.errors import RigError
-from navapp.geometry.bands import in_row_bands
+from navapp.geometry.bands import beside, in_row_bands
+from navapp.geometry.float_lane_kernels import LANES, lanes_for
+from navapp.geometry.resample_kernels import Places, resample_rows
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -238,7 +240,6 @@ class Rectifier:
                 )
         if left.shape != right.shape:
             raise ValueError("one picture of the pair is grey and the other coloured")
-        left_x, left_y, right_x, right_y = self.maps
         whole = Box(0, 0, self.rig.width, self.rig.height)
         inside = whole if box is None else box.clipped(whole.width, whole.height)
         in_left, in_right = whole, whole
@@ -246,12 +247,16 @@ class Rectifier:
             first = inside.x - math.ceil(band_px[1]) - _TAPS
             last = inside.x + inside.width - math.floor(band_px[0]) + _TAPS
             in_left, in_right = inside, replace(inside, x=first, width=last - first)
-        return RectifiedPair(
-            resampled(left, left_x, left_y, in_left),
-            resampled(right, right_x, right_y, in_right),
-            self.geometry,
-            inside,
-        )
+        for_left, for_right = self._places
+        of_right = beside(lambda: resampled(right, for_right, in_right))
+        of_left = resampled(left, for_left, in_left)
+        return RectifiedPair(of_left, of_right.result(), self.geometry, inside)
+
+    @cached_property
+    def _places(self) -> tuple[Places, Places]:
+        """Where the rectified pixels lie in the left and in the right picture."""
+        left_x, left_y, right_x, right_y = self.maps
+        return find_places(left_x, left_y), find_places(right_x, right_y)
 
 
 def luma(picture: Image) -> Image:
@@ -263,34 +268,49 @@ def luma(picture: Image) -> Image:
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
-def resampled(
-    picture: Image,
-    columns: NDArray[np.float32],
-    rows: NDArray[np.float32],
-    part: Box | None = None,
-) -> Image:
+def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> Places:
+    """Where to look for pixels (h, w), from smooth maps of both coordinates; columns grow in them.
+
+    The other picture has the same size.
+    """
+    height, width = columns.shape
+    at = np.arange(width)
+    crossings = np.empty((height, width), dtype=np.float32)
+    for y in range(height):
+        crossings[y] = np.interp(at, np.maximum.accumulate(columns[y]), rows[y])
+    is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
+    steps, lines = _blocks(np.floor(columns) - at), _blocks(np.floor(crossings))
+    in_step = ((steps == steps[..., :1]) | (steps == steps[..., -1:])).all(axis=2)
+    in_row = (lines == lines[..., :1]).all(axis=2)
+    return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
+
+
+def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(h, blocks, LANES) of (h, w); a cut block is filled up with numbers that are not the same."""
+    height, width = values.shape
+    full = np.full((height, lanes_for(width)), np.nan, dtype=np.float32)
+    full[:, :width] = values
+    return full.reshape(height, -1, LANES)
+
+
+def resampled(picture: Image, places: Places, part: Box | None = None) -> Image:
     """The picture at real places (h, w), cubic over six pixels; 0 outside it, and outside a part.
 
     Linear interpolation, and less so a cubic over four pixels, blurs by where a pixel falls;
     OpenCV's cubic (a = -0.75) bends a ramp: all tilt a disparity that is measured to a part of a
     pixel.
     """
-    from navapp.geometry.resample_kernels import resample_rows
-
     if picture.ndim == 3:
-        n_channels = picture.shape[2]
-        return np.dstack(
-            [resampled(picture[..., k], columns, rows, part) for k in range(n_channels)]
-        )
+        return np.dstack([resampled(picture[..., k], places, part) for k in range(3)])
     picture = np.ascontiguousarray(picture)
-    values = np.zeros(columns.shape, dtype=np.uint8)
-    height, width = columns.shape
+    values = np.zeros(places.columns.shape, dtype=np.uint8)
+    height, width = values.shape
     inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
+    if inside.is_empty:
+        return values
     top, span = inside.y, (inside.x, inside.x + inside.width)
     in_row_bands(
         inside.height,
-        lambda first, last: resample_rows(
-            picture, columns, rows, (top + first, top + last), span, values
-        ),
+        lambda first, last: resample_rows(picture, places, (top + first, top + last), span, values),
     )
     return values
