@@ -277,12 +277,20 @@ def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> Plac
     at = np.arange(width)
     crossings = np.empty((height, width), dtype=np.float32)
     for y in range(height):
-        crossings[y] = np.interp(at, np.maximum.accumulate(columns[y]), rows[y])
+        # Interpolation looks beyond either end.
+        reached, found = (np.pad(line[y], 1, _goes_on) for line in (columns, rows))
+        crossings[y] = np.interp(at, np.maximum.accumulate(reached), found)
     is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
     steps, lines = _blocks(np.floor(columns) - at), _blocks(np.floor(crossings))
     in_step = ((steps == steps[..., :1]) | (steps == steps[..., -1:])).all(axis=2)
     in_row = (lines == lines[..., :1]).all(axis=2)
     return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
+
+
+def _goes_on(line: NDArray[np.float32], *_: object) -> None:
+    """Straight on at either end of a line, by so many pixels as interpolation asks for."""
+    line[0] = line[1] + _TAPS * (line[1] - line[2])
+    line[-1] = line[-2] + _TAPS * (line[-2] - line[-3])
 
 
 def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
