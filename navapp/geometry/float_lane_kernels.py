@@ -133,6 +133,16 @@ def whole(_: Any, lanes: Any) -> Any:
     return _LANES_TYPE(lanes), generate
 
 
+@intrinsic
+def lane_numbers(_: Any) -> Any:
+    """0, 1, 2 and so on."""
+
+    def generate(__: Any, ___: Any, ____: Any, _____: Any) -> Any:
+        return ir.Constant(_VECTOR, [float(number) for number in range(LANES)])
+
+    return _LANES_TYPE(), generate
+
+
 def _of_two(operate: Callable[[Any, Any, Any], Any], doc: str) -> Any:
     def declare(_: Any, first: Any, second: Any) -> Any:
         def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:

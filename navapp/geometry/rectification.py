@@ -219,6 +219,8 @@ class Rectifier:
         right: Image,
         box: Box | None = None,
         band_px: tuple[float, float] | None = None,
+        *,
+        is_grey: bool = False,
     ) -> RectifiedPair:
         """Rectify both pictures; `box` (in the rectified left view) is passed on clipped.
 
@@ -228,6 +230,7 @@ class Rectifier:
             box: region of interest; None is the whole picture.
             band_px: smallest and largest disparity. With it only the box, and what it reaches in
                 the right picture, is rectified; the rest stays 0.
+            is_grey: of coloured pictures only the luma.
 
         Raises:
             ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
@@ -248,9 +251,15 @@ class Rectifier:
             last = inside.x + inside.width - math.floor(band_px[0]) + _TAPS
             in_left, in_right = inside, replace(inside, x=first, width=last - first)
         for_left, for_right = self._places
-        of_right = beside(lambda: resampled(right, for_right, in_right))
-        of_left = resampled(left, for_left, in_left)
-        return RectifiedPair(of_left, of_right.result(), self.geometry, inside)
+
+        def of(picture: Image, places: Places, part: Box) -> Image:
+            grey = luma_for(picture, places, part) if is_grey else picture
+            return resampled(grey, places, part)
+
+        of_right = beside(lambda: of(right, for_right, in_right))
+        return RectifiedPair(
+            of(left, for_left, in_left), of_right.result(), self.geometry, inside
+        )
 
     @cached_property
     def _places(self) -> tuple[Places, Places]:
@@ -266,6 +275,37 @@ def luma(picture: Image) -> Image:
     if picture.ndim == 2:
         return picture
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def luma_for(picture: Image, places: Places, part: Box) -> Image:
+    """The grey picture where a part of its rectified one asks for it; anything elsewhere."""
+    import cv2
+
+    if picture.ndim == 2:
+        return picture
+    grey = np.empty(picture.shape[:2], dtype=np.uint8)
+    asked = _reached(places, part)
+    if not asked.is_empty:
+        rows, columns = (
+            slice(asked.y, asked.y + asked.height),
+            slice(asked.x, asked.x + asked.width),
+        )
+        cv2.cvtColor(picture[rows, columns], cv2.COLOR_BGR2GRAY, dst=grey[rows, columns])
+    return grey
+
+
+def _reached(places: Places, part: Box) -> Box:
+    """What of the other picture a part of the rectified one is made of."""
+    height, width = places.columns.shape
+    inside = part.clipped(width, height)
+    if inside.is_empty:
+        return inside
+    low, high = inside.y, inside.y + inside.height - 1
+    ends = places.columns[low : high + 1, [inside.x, inside.x + inside.width - 1]]
+    first, last = np.clip([ends.min() - _TAPS, ends.max() + _TAPS], 0, width - 1).astype(int)
+    curves = places.rows[[low, high], first : last + 1]
+    top, bottom = np.clip([curves.min() - _TAPS, curves.max() + _TAPS], 0, height - 1).astype(int)
+    return Box(int(first), int(top), int(last - first + 1), int(bottom - top + 1))
 
 
 def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> Places:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, luma
+from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import RenderedView, box_around, render_rectified
+from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     RefineSettings,
@@ -132,7 +132,7 @@ class SurfaceMeter:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         started = time.perf_counter_ns()
         box, band_px = self._region(around, margins) or (None, None)
-        pair = self.rectifier.rectify(luma(left), luma(right), box, band_px)
+        pair = self.rectifier.rectify(left, right, box, band_px, is_grey=True)
         return pair, LineTimings(rectify_ms=_ms_since(started))
 
     def freely(
@@ -230,13 +230,11 @@ class SurfaceMeter:
         self, pose: RigidTransform, margins: Margins
     ) -> tuple[Box, tuple[float, float]] | None:
         """Box and disparity band around the model at a pose; None out of view or out of depth."""
-        hull_mm = pose.apply(self._model.hull_mm)
-        box = box_around(hull_mm, self.geometry)
+        box, (nearest_mm, farthest_mm) = bounds_of(self._model.hull_mm, pose, self.geometry)
         if box is None:
             return None
-        depths = hull_mm[:, 2]
-        near = max(float(depths.min()) - margins.band_mm, self._depth_mm[0])
-        far = min(float(depths.max()) + margins.band_mm, self._depth_mm[1])
+        near = max(nearest_mm - margins.band_mm, self._depth_mm[0])
+        far = min(farthest_mm + margins.band_mm, self._depth_mm[1])
         if near >= far:
             return None
         grown = box.grown(margins.box_px).clipped(self.geometry.width, self.geometry.height)
