@@ -14,6 +14,7 @@ counts.
 import argparse
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -23,6 +24,7 @@ from drivers.frames import StereoFrame
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedPair, Rectifier, luma
+from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import projected_box
 from navapp.overlay.layers import Scene, draw_bone
@@ -30,6 +32,7 @@ from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, Line, TrackState
 from navapp.values import BoneModel, Plan, StageSpec, Status
 from sim_devices.camera import SimulatedCamera
+from sim_devices.rigs import default_rig
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
@@ -42,16 +45,24 @@ _GOAL = Goal(np.empty((0, 3)), 2.0)
 _DISPARITIES, _POINTS = 96, 3000
 _RADIUS_MM, _LOSS_MM, _STOP, _ICP_STEPS = 5.0, 2.0, 1e-6, 30
 _SPARE_PX = 16
+_ZOOM = 1.6
 
 # One frame's way: a frame's number to its pose and the times of its parts in ms.
 Way = Callable[[int], tuple[RigidTransform, dict[str, float]]]
+
+
+def _long_lenses() -> StereoRig:
+    """The simulated rig, with lenses that show the bone in a box of about 420 px."""
+    rig, scale = default_rig(), np.array([[_ZOOM, 1.0, 1.0], [1.0, _ZOOM, 1.0], [1.0, 1.0, 1.0]])
+    left, right = (replace(one, matrix=one.matrix * scale) for one in (rig.left, rig.right))
+    return replace(rig, left=left, right=right)
 
 
 class Recording:
     """Frames of one knee with their truth."""
 
     def __init__(self, seed: int, n_frames: int) -> None:
-        world = World(Scenario(seed=seed, motion="breathing"))
+        world = World(Scenario(seed=seed, motion="breathing"), _long_lenses())
         camera = SimulatedCamera(
             world, ManualClock(), is_stepped=True, sensor=SensorModel(seed=seed)
         )  # fmt: skip

@@ -50,14 +50,27 @@ def test_the_lower_half_begins_at_a_multiple(every):
 
 
 def test_a_job_beside_runs_on_its_own_and_its_error_is_told():
-    name = beside(lambda: threading.current_thread().name).result(20.0)
-    assert name != threading.current_thread().name
+    meeting = threading.Barrier(2, timeout=20.0)
+    job = beside(lambda: (meeting.wait(), threading.current_thread().name)[1])
+    meeting.wait()
+    assert job.result() != threading.current_thread().name
 
     def fails():
         raise ValueError("beside")
 
     with pytest.raises(ValueError, match="beside"):
-        beside(fails).result(20.0)
+        beside(fails).result()
+
+
+def test_a_job_that_the_helper_has_no_time_for_is_done_by_who_asks():
+    is_over = threading.Event()
+    busy = beside(lambda: is_over.wait(20.0))
+    while not busy._begun.running():
+        is_over.wait(0.001)
+    waiting = beside(lambda: threading.current_thread().name)
+    assert waiting.result() == threading.current_thread().name
+    is_over.set()
+    assert busy.result()
 
 
 def test_halves_of_a_job_beside_do_not_wait_for_others():
@@ -67,18 +80,22 @@ def test_halves_of_a_job_beside_do_not_wait_for_others():
         for _ in range(4)
     ]
     for job in jobs:
-        job.result(20.0)
+        job.result()
     assert sorted(done) == ["a"] * 4 + ["b"] * 4
 
 
-def test_a_thread_of_the_pool_does_what_it_begins_beside():
-    def job():
-        return threading.current_thread().name, beside(lambda: threading.current_thread().name)
+def test_the_helper_does_what_it_begins_beside():
+    meeting = threading.Barrier(2, timeout=20.0)
 
-    jobs = [beside(job) for _ in range(4)]
-    for one in jobs:
-        name, inner = one.result(20.0)
-        assert inner.result(20.0) == name
+    def job():
+        meeting.wait()
+        here = threading.current_thread().name
+        return here, beside(lambda: threading.current_thread().name).result()
+
+    begun = beside(job)
+    meeting.wait()
+    name, inner = begun.result()
+    assert inner == name != threading.current_thread().name
 
 
 def test_an_error_of_what_it_does_itself_is_told_as_well():
@@ -86,4 +103,4 @@ def test_an_error_of_what_it_does_itself_is_told_as_well():
         raise ValueError("inner")
 
     with pytest.raises(ValueError, match="inner"):
-        beside(lambda: beside(fails)).result(20.0).result(20.0)
+        beside(lambda: beside(fails).result()).result()
