@@ -14,7 +14,7 @@ from navapp.stereo.matching.gradient import GradientSettings, match_gradient, sm
 from navapp.stereo.occlusion.classify import classify, seen_from_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
-from navapp.stereo.subpixel.coarse_to_fine import refine_surface, without_steps
+from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
 from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
 from navapp.stereo.subpixel.refine import refine
 from navapp.values import DisparityMap, LineTimings
@@ -130,10 +130,14 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray
         unknown when the pictures hardly agree.
     """
     pair = _clipped(pair)
-    coarse = _coarse(pair, band_px)
-    if not coarse.agreement >= _LEAST_AGREEMENT:
-        return np.full(coarse.surface_px.shape, np.nan, dtype=np.float32)
-    return coarse.surface_px
+    is_half = _is_wide(pair, band_px)
+    small = halved(pair, band_px) if is_half else pair
+    band_px = (band_px[0] / 2.0, band_px[1] / 2.0) if is_half else band_px
+    found = match_census(small, band_px, _SURFACE_CENSUS)
+    if not found.agreement >= _LEAST_AGREEMENT:
+        return np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
+    surface_px = calmed(found.left.disparity_px)
+    return doubled_disparity(surface_px, pair.box) if is_half else surface_px
 
 
 def match_on_support(
@@ -233,8 +237,11 @@ class _Coarse:
 
 
 def _coarse(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
-    n_cells = pair.box.width * pair.box.height * (band_px[1] - band_px[0])
-    return (_coarse_at_half if n_cells > _FEW_CELLS else _coarse_at_full)(pair, band_px)
+    return (_coarse_at_half if _is_wide(pair, band_px) else _coarse_at_full)(pair, band_px)
+
+
+def _is_wide(pair: RectifiedPair, band_px: tuple[float, float]) -> bool:
+    return pair.box.width * pair.box.height * (band_px[1] - band_px[0]) > _FEW_CELLS
 
 
 def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
@@ -245,7 +252,7 @@ def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coars
 
 def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
     low, high = band_px
-    found = match_census(halved(pair), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
+    found = match_census(halved(pair, band_px), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
     surface_px = doubled_disparity(without_steps(found.left.disparity_px), pair.box)
     right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
     right_px = np.float32(2.0) * doubled(found.right_px, right)
