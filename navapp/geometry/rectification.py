@@ -257,9 +257,7 @@ class Rectifier:
             return resampled(grey, places, part)
 
         of_right = beside(lambda: of(right, for_right, in_right))
-        return RectifiedPair(
-            of(left, for_left, in_left), of_right.result(), self.geometry, inside
-        )
+        return RectifiedPair(of(left, for_left, in_left), of_right.result(), self.geometry, inside)
 
     @cached_property
     def _places(self) -> tuple[Places, Places]:

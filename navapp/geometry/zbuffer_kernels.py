@@ -74,6 +74,20 @@ def bounds_of_points(
 
 
 @njit(cache=True, nogil=True)
+def known_range(values: NDArray[np.float32]) -> tuple[float, float]:
+    """Least and largest of (h, w) numbers that are known; infinite and the wrong way round without
+    any."""
+    least, largest = np.float32(np.inf), np.float32(-np.inf)
+    for y in range(values.shape[0]):
+        for x in range(values.shape[1]):
+            value = values[y, x]
+            # Comparisons with NaN are false.
+            least = value if value < least else least
+            largest = value if value > largest else largest
+    return float(least), float(largest)
+
+
+@njit(cache=True, nogil=True)
 def raster_nearest(
     pixels: NDArray[np.float64],
     depths: NDArray[np.float64],

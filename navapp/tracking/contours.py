@@ -16,6 +16,7 @@ from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
+from navapp.geometry.zbuffer_kernels import known_range
 from navapp.registration.blocks import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.contour_kernels import find_steps
@@ -126,9 +127,10 @@ class ContourMeter:
 
     def _seen_from_right(self, view: RenderedView, right: Eye) -> tuple[NDArray[np.float32], Box]:
         depth, box = view.depth_mm, view.box
-        if not np.isfinite(depth).any():
+        nearest_mm, farthest_mm = known_range(depth)
+        if nearest_mm > farthest_mm:
             return depth, box
-        near, far = (self._geometry.disparity_px(float(f(depth))) for f in (np.nanmin, np.nanmax))
+        near, far = (self._geometry.disparity_px(z) for z in (nearest_mm, farthest_mm))
         x = box.x - math.ceil(near)
         width = box.width + math.ceil(near) - math.floor(far)
         warped = np.full((box.height, width), np.nan, dtype=np.float32)

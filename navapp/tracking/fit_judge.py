@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import beside
 from navapp.geometry.rectification import Box, RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
+from navapp.stereo import measure_health
 from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
@@ -61,15 +63,17 @@ class FitJudge:
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
-        found = fit.measured.disparity
+        found, geometry = fit.measured.disparity, pair.geometry
+        depth_mm = float(fit.pose.apply(self._model.centre_mm)[2])
+        # What the pictures say of their cameras does not ask for the pose.
+        health = beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm)))
         rough_px = self.rough_px(pair, fit, rough)
         fit = self._contours.joined(pair, fit, rough_px)
         view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
         verdict = self._judge.judge(
             self._model, fit.estimate, found, goal, predicted, rough_px, view
         )
-        depth_mm = fit.pose.apply(self._model.centre_mm)[2]
-        verdict = with_pair_doubts(verdict, pair, found, depth_mm)
+        verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)

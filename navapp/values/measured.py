@@ -39,7 +39,8 @@ class DisparityMap:
     @property
     def matched_share(self) -> float:
         """Share of pixels with a measured disparity."""
-        return float((self.origin == Origin.MATCHED).mean()) if self.origin.size else 0.0
+        n_matched = np.count_nonzero(self.origin == Origin.MATCHED)
+        return float(n_matched / self.origin.size) if self.origin.size else 0.0
 
     def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
         """The map, unknown beside a mask (h, w)."""

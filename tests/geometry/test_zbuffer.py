@@ -44,9 +44,7 @@ def drawn(pixels, depths, faces, width, height, bands=None):
     codes = np.full(inverse_depth.shape, -1, dtype=np.int32)
     depth, face_index = (np.empty((height, width), dtype=kind) for kind in (np.float32, np.int32))
     for band in bands or [(0, height)]:
-        raster_nearest(
-            pixels, depths, faces, inverse_depth, codes.view(np.float32), band, False
-        )
+        raster_nearest(pixels, depths, faces, inverse_depth, codes.view(np.float32), band, False)
         tell_depth(inverse_depth, codes, band, depth, face_index)
     np.testing.assert_array_equal(np.isnan(depth), face_index < 0)
     return np.where(face_index < 0, 0.0, 1.0 / depth), face_index
