@@ -319,7 +319,8 @@ def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> Plac
         reached, found = (np.pad(line[y], 1, _goes_on) for line in (columns, rows))
         crossings[y] = np.interp(at, np.maximum.accumulate(reached), found)
     is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
-    steps, lines = _blocks(np.floor(columns) - at), _blocks(np.floor(crossings))
+    steps = _blocks(np.floor(columns) - at.astype(np.float32))
+    lines = _blocks(np.floor(crossings))
     in_step = ((steps == steps[..., :1]) | (steps == steps[..., -1:])).all(axis=2)
     in_row = (lines == lines[..., :1]).all(axis=2)
     return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
@@ -350,7 +351,7 @@ def resampled(picture: Image, places: Places, part: Box | None = None) -> Image:
         return np.dstack([resampled(picture[..., k], places, part) for k in range(3)])
     picture = np.ascontiguousarray(picture)
     values = np.zeros(places.columns.shape, dtype=np.uint8)
-    height, width = values.shape
+    height, width = places.columns.shape
     inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
     if inside.is_empty:
         return values

@@ -91,7 +91,7 @@ def value_across(crossed: NDArray[np.float32], place: np.float32) -> np.float32:
     """Value at a place of a row; its column 0 lies at `_BEFORE`."""
     column = int(place)
     taps = weights_at(place - np.float32(column))
-    total = taps[0] * crossed[column]
+    total: np.float32 = taps[0] * crossed[column]
     for k in range(1, N_TAPS):
         total += taps[k] * crossed[column + k]
     return total
@@ -102,7 +102,7 @@ def value_down(picture: NDArray[np.uint8], place: np.float32, x: int) -> np.floa
     """Value at a place of a picture's column; beyond its edge the edge goes on."""
     last, row = picture.shape[0] - 1, int(np.floor(place))
     taps = weights_at(place - np.float32(row))
-    total = taps[0] * np.float32(picture[min(max(row - _BEFORE, 0), last), x])
+    total: np.float32 = taps[0] * np.float32(picture[min(max(row - _BEFORE, 0), last), x])
     for k in range(1, N_TAPS):
         total += taps[k] * np.float32(picture[min(max(row - _BEFORE + k, 0), last), x])
     return total

@@ -126,8 +126,8 @@ class RigidTransform:
 
 
 def _is_rotation(rows: list[list[float]]) -> bool:
-    """Whether the first three of rows are a rotation's, to the last digits; plain numbers are
-    sooner done with than arrays of nine."""
+    """Whether the first three of four rows are a rotation's, to the last digits."""
+    # Plain numbers are sooner done with than arrays of nine.
     (a, b, c, _), (d, e, f, _), (g, h, i, _) = rows[:3]
     off = (
         a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0,

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
-from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.camera import Camera
+from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform

@@ -75,8 +75,7 @@ def bounds_of_points(
 
 @njit(cache=True, nogil=True)
 def known_range(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Least and largest of (h, w) numbers that are known; infinite and the wrong way round without
-    any."""
+    """Least and largest of (h, w) numbers that are known; of none, infinity and its negative."""
     least, largest = np.float32(np.inf), np.float32(-np.inf)
     for y in range(values.shape[0]):
         for x in range(values.shape[1]):

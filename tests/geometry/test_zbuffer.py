@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
@@ -10,8 +11,13 @@ from navapp.geometry.zbuffer import (
     render_rectified,
     unhidden_vertices,
 )
-from navapp.geometry.float_lane_kernels import LANES
-from navapp.geometry.zbuffer_kernels import raster_nearest, tell_depth
+from navapp.geometry.zbuffer_kernels import (
+    bounds_of_points,
+    known_range,
+    project_points,
+    raster_nearest,
+    tell_depth,
+)
 from tests.geometry.shapes import STRONG, camera, cube, sphere
 from tests.reference import zbuffer_reference
 
@@ -316,3 +322,28 @@ def test_the_box_around_a_mesh_shows_what_the_whole_picture_shows() -> None:
 def test_the_box_around_a_mesh_out_of_view_is_empty() -> None:
     away = RigidTransform.from_parts("left", "bone", np.eye(3), (9000.0, 0.0, 300.0))
     assert render(sphere(), away, camera(), is_whole=False).box.is_empty
+
+
+def test_points_are_projected_as_the_geometry_says():
+    rng = np.random.default_rng(5)
+    points = rng.uniform((-60.0, -40.0, -90.0), (60.0, 40.0, 300.0), (200, 3))
+    tilted = pose((0.2, -0.1, 0.3), (4.0, -7.0, 30.0))
+    moved = tilted.apply(points)
+    pixels, depths = np.empty((200, 2)), np.empty(200)
+    centre = (GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
+    place = (tilted.rotation, tilted.translation_mm, GEOMETRY.focal_px, centre)
+    project_points(points, *place, pixels, depths)
+    expected = GEOMETRY.project(moved)
+    assert np.isnan(expected).any()
+    np.testing.assert_allclose(pixels, expected, rtol=1e-9)
+    np.testing.assert_allclose(depths, moved[:, 2], rtol=1e-9)
+    limits = bounds_of_points(points, *place)
+    low, high = np.nanmin(expected, axis=0), np.nanmax(expected, axis=0)
+    np.testing.assert_allclose(limits[:4], [*low, *high], rtol=1e-9)
+    np.testing.assert_allclose(limits[4:], [moved[:, 2].min(), moved[:, 2].max()], rtol=1e-9)
+
+
+def test_the_range_is_that_of_what_is_known():
+    values = np.array([[np.nan, 3.0, -1.0], [7.0, np.nan, 2.0]], dtype=np.float32)
+    assert known_range(values) == (-1.0, 7.0)
+    assert known_range(np.full((2, 3), np.nan, np.float32)) == (np.inf, -np.inf)

@@ -348,13 +348,15 @@ def tell_row(
 def supported_spans(
     support: NDArray[np.float32], stride: int, rows: tuple[int, int]
 ) -> NDArray[np.int32]:
-    """(n, 2) first column of the windows of some rows that stand for a supported pixel, and after
-    the last; 0 and 0 without any.
+    """Columns of the windows of some rows that stand for a supported pixel.
 
     Args:
         support: (h, w) disparity px, NaN without.
         stride: px; a window stands for so many pixels each way from its own on.
         rows: first, and after the last.
+
+    Returns:
+        (n, 2) first column, and after the last; 0 and 0 without any.
     """
     height, width = support.shape
     spans = np.zeros((rows[1] - rows[0], 2), dtype=np.int32)
@@ -426,7 +428,8 @@ def refine_rows(
         window: radius px; stride px of the windows that are solved; least number of pixels.
         rows: first, and after the last; the first is a multiple of the stride.
         refined: (h, w) in place, the new offset px; the window's mean where it cannot tell, and
-            anything where there is no support. With a stride, what one window says stands for the pixels up to the next.
+            anything where there is no support. With a stride, what one window says stands for the
+            pixels up to the next.
         quality: (h / stride, w / stride, 4) in place, of the windows that are solved: step px (NaN
             where the window cannot tell), sigma px, correlation, roughness px.
     """
