@@ -140,9 +140,11 @@ def moved_surface_mm(
     model: RegistrationModel, before: RigidTransform, after: RigidTransform
 ) -> float:
     """Mean displacement of the corners around the bone's surface."""
-    points_mm = model.hull_mm
-    moved = after.apply(points_mm) - before.apply(points_mm)
-    return float(np.linalg.norm(moved, axis=1).mean())
+    turned, shifted_mm = (
+        after.rotation - before.rotation, after.translation_mm - before.translation_mm
+    )  # fmt: skip
+    moved = model.hull_mm @ turned.T + shifted_mm
+    return float(np.sqrt(np.einsum("ij,ij->i", moved, moved)).mean())
 
 
 def sum_timings(a: LineTimings, b: LineTimings) -> LineTimings:
