@@ -18,6 +18,7 @@ from navapp.values import DisparityMap, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
+from tests.knees import femur_of
 
 SEQUENCES = ("registration", "patient", "instrument")
 _ERODED_PX = 6
@@ -73,8 +74,7 @@ def sequences(folder: Path) -> Iterator[Sequence]:
 def simulated_sequence(name: str) -> Sequence:
     """One of the simulated sequences."""
     world = World(_SIMULATED[name])
-    bone = world.anatomy.bones["femur"]
-    mesh = TriangleMesh(bone.vertices_mm, bone.faces)
+    mesh = femur_of(world).mesh
     return Sequence(f"simulated/{name}", list(_simulated(world, mesh)), mesh, world.rig)
 
 

@@ -20,22 +20,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivers.clock import ManualClock
 from drivers.frames import StereoFrame
 from navapp.evaluation import mean_tre_mm
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Goal, Line, LineSettings, LocatorSettings, TrackState
 from navapp.tracking.box_guide import BoxGuide
 from navapp.tracking.box_tracker import followed, placed
 from navapp.tracking.picture_box import PictureBox
-from navapp.values import BoneModel, Prior, Status
-from sim_devices.camera import NOMINAL_EXPOSURE_MS, SimulatedCamera
+from navapp.values import Status
+from sim_devices.camera import NOMINAL_EXPOSURE_MS
 from sim_devices.motion import smooth_step
 from sim_devices.scenario import InstrumentKind, MotionKind, Scenario
-from sim_devices.sensor import SensorModel
-from sim_devices.truth import TruthOracle
 from sim_devices.world import World
+from tests.knees import SimulatedKnee
 
 # The detector's limits were chosen on seeds 0 to 3.
 FIRST_SEED = 5
@@ -80,52 +77,43 @@ class LeavingWorld(World):
 
 @dataclass
 class Scene:
-    """A knee, its camera and the truth for judging."""
+    """A knee and the line that follows it."""
 
     seed: int
     situation: Situation
-    world: World = field(init=False)
+    knee: SimulatedKnee = field(init=False)
     line: Line = field(init=False)
     guide: BoxGuide = field(init=False)
 
     def __post_init__(self) -> None:
         kind = LeavingWorld if self.situation.is_leaving else World
-        self.world = kind(
-            Scenario(
-                seed=self.seed,
-                side="left" if self.seed % 2 else "right",
-                motion=self.situation.motion,
-                instrument=self.situation.instrument,
-            )
+        scenario = Scenario(
+            seed=self.seed,
+            side="left" if self.seed % 2 else "right",
+            motion=self.situation.motion,
+            instrument=self.situation.instrument,
         )
-        bone = self.world.anatomy.bones["femur"]
-        mesh = TriangleMesh(bone.vertices_mm, bone.faces)
-        self.bone = BoneModel("femur", mesh, self.world.scenario.side)
-        self.line = Line(self.world.rig, self.bone)
-        self.guide = BoxGuide(self.world.rig, self.line.model)
+        self.knee = SimulatedKnee(kind(scenario))
+        self.line = Line(self.knee.rig, self.knee.bone)
+        self.guide = BoxGuide(self.knee.rig, self.line.model)
 
     def frames(self, n_frames: int) -> Iterator[tuple[StereoFrame, RigidTransform]]:
         """Frames with the true pose in each."""
-        sensor = SensorModel(seed=self.seed)
-        camera = SimulatedCamera(self.world, ManualClock(), is_stepped=True, sensor=sensor)
-        camera.open()
-        oracle = TruthOracle(self.world, camera.world_time_ns)
         for number in range(n_frames):
             if self.situation.has_changing_light:
                 factor = 1.0 + 0.5 * np.sin(number / 6.0)
-                camera.set("exposure_ms", NOMINAL_EXPOSURE_MS * factor)
-            frame = camera.read(1.0)
-            yield frame, oracle.left_from_body("femur", frame.captured_ns)
+                self.knee.camera.set("exposure_ms", NOMINAL_EXPOSURE_MS * factor)
+            frame = self.knee.camera.read(1.0)
+            yield frame, self.knee.truth(frame)
 
     def registered(self, frame: StereoFrame) -> RigidTransform | None:
         """The first pose, found from the nominal one."""
-        prior = Prior({"femur": self.world.nominal_left_from_femur})
-        found = self.line.register(frame.left, frame.right, prior, GOAL)
+        found = self.line.register(frame.left, frame.right, self.knee.prior, GOAL)
         return found[0].left_from_bone if found else None
 
     def overlap(self, box: PictureBox | None, truth: RigidTransform) -> tuple[float, float]:
         """Of a box with the true one, -1 without a box; and how much of that is in the picture."""
-        width, height = self.world.rig.width, self.world.rig.height
+        width, height = self.knee.rig.width, self.knee.rig.height
         true_box = self.guide.projected(truth)
         assert true_box is not None
         seen = true_box.seen_share(width, height)
@@ -191,7 +179,7 @@ def follow_pose(scene: Scene, n_frames: int) -> str:
         was_away = was_away or seen < AWAY
         pose = answer.left_from_bone
         if pose is not None and status is Status.OK:
-            wrong = max(wrong, mean_tre_mm(pose, truth, scene.bone, np.empty((0, 3))))
+            wrong = max(wrong, mean_tre_mm(pose, truth, scene.knee.bone, np.empty((0, 3))))
         if was_away and seen >= LEAST_SEEN and back == "never":
             n_back += 1
             if status is Status.OK:
@@ -201,7 +189,7 @@ def follow_pose(scene: Scene, n_frames: int) -> str:
 
 def follow_baseline(scene: Scene, n_frames: int) -> str:
     """Share of right boxes of the baseline, whose judge accepts next to nothing."""
-    line = Line(scene.world.rig, scene.bone, LineSettings(LocatorSettings(method="icp")))
+    line = Line(scene.knee.rig, scene.knee.bone, LineSettings(LocatorSettings(method="icp")))
     state, overlaps, n_ok = None, [], 0
     for frame, truth in scene.frames(n_frames):
         if state is None:
