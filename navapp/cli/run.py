@@ -14,9 +14,10 @@ from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
-    from navapp.control.controller import SessionController, SessionHooks
+    from navapp.control.controller import SessionController
     from navapp.control.operators import ScriptStep
     from navapp.control.results import FrameListener, FrameResult
+    from navapp.control.session import SessionHooks
     from navapp.devices import OpenedDevices
     from navapp.values import Plan, Prior, StageSpec
 
@@ -176,7 +177,7 @@ def _listening(
 ) -> "SessionHooks":
     """Who is told: the caller, the simulated room, and the recorder when there is one."""
     from navapp.cli.session_folder import discard_if_empty, start_recording
-    from navapp.control.controller import SessionHooks
+    from navapp.control.session import SessionHooks
 
     configuration, opened = session.configuration, session.opened
     hooks = SessionHooks(

@@ -11,9 +11,10 @@ from drivers.fixed_mirror import FixedMirror
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionController, SessionHooks, SessionOptions
+from navapp.control.controller import SessionController, SessionOptions
 from navapp.control.executors import Executor, InlineExecutor
 from navapp.control.results import FrameResult
+from navapp.control.session import SessionHooks
 from navapp.control.states import Command, Event, Snapshot
 from navapp.errors import DeviceError, DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera

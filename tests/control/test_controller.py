@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from drivers.interfaces import PowerState
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionHooks, SessionOptions
+from navapp.control.controller import SessionOptions
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.interlocks import navigable
 from navapp.control.recorder import RecordingStopped
+from navapp.control.session import SessionHooks
 from navapp.control.states import (
     Accept,
     Blank,
@@ -632,8 +633,6 @@ def test_closing_is_dark_offline_and_works_twice(bench: Bench) -> None:
 
 
 def test_commands_are_told_before_they_act_with_their_frame(monkeypatch) -> None:
-    from navapp.control.controller import SessionHooks
-
     told: list[tuple[str, int]] = []
     hooks = SessionHooks(on_command=(lambda c, s: told.append((type(c).__name__, s)),))
     bench = Bench(monkeypatch, hooks=hooks)
@@ -779,7 +778,7 @@ def test_a_recording_that_stops_is_an_alarm_and_not_the_end(monkeypatch) -> None
         raise RecordingStopped("recording stopped: the disk is full")
 
     bench = Bench(monkeypatch)
-    bench.controller._hooks = replace(bench.controller._hooks, on_frame=(stop,))
+    bench.controller._session.hooks = replace(bench.controller._session.hooks, on_frame=(stop,))
     bench.frames(2)
     assert bench.state == "ready"
     assert [e.level for e in bench.events if e.kind == "recording"] == [EventLevel.ALARM] * 2

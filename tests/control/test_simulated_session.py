@@ -8,10 +8,11 @@ from drivers.clock import ManualClock, SystemClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionController, SessionHooks
+from navapp.control.controller import SessionController
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.operators import ScriptedOperator
 from navapp.control.runner import SessionRunner, run_headless
+from navapp.control.session import SessionHooks
 from navapp.control.states import Accept, Propose, Register, Reject
 from navapp.errors import WrongDevice
 from navapp.values import Plan, Status
