@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.tracking.contours import ContourMeter
@@ -115,9 +115,7 @@ class FitJudge:
             fit: of the bone.
             rough: known already; matched anew when it does not reach over all of the box.
         """
-        found = fit.measured.disparity
-        height, width = found.disparity_px.shape
-        box = Box(found.x, found.y, width, height)
+        box = fit.measured.disparity.box
         known_px = None if rough is None else rough.over(box)
         if known_px is not None:
             return known_px

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedGeometry
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
@@ -185,10 +185,8 @@ class Judge:
     def _render(
         self, model: RegistrationModel, pose: RigidTransform, measured: DisparityMap
     ) -> RenderedView:
-        height, width = measured.disparity_px.shape
-        box = Box(measured.x, measured.y, width, height)
         return render_rectified(
-            model.drawn_mesh, pose, self._geometry, box, is_closed=model.is_closed
+            model.drawn_mesh, pose, self._geometry, measured.box, is_closed=model.is_closed
         )
 
     def _bound_mm(

@@ -2,14 +2,14 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from navapp.geometry import Box, RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
+from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.zbuffer import projected_box
@@ -148,7 +148,7 @@ def fit_error_mm(scene: Scene, found: DisparityMap, mesh: TriangleMesh) -> float
 def on_bone(scene: Scene, found: DisparityMap) -> DisparityMap:
     """Only what was matched on the bone, over the scene's box."""
     box = scene.pair.box
-    inside = Box(found.x - box.x, found.y - box.y, *found.origin.shape[::-1])
+    inside = replace(found.box, x=found.x - box.x, y=found.y - box.y)
     part = inside.clipped(box.width, box.height)
     here = np.s_[part.y : part.y + part.height, part.x : part.x + part.width]
     x, y = part.x - inside.x, part.y - inside.y

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.geometry import Box
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration import RegistrationModel
 from navapp.tracking.agreement import Agreement, compare
@@ -29,8 +28,7 @@ BONE = femur()
 MODEL = RegistrationModel(BONE)
 MAP = measured_map(BONE)
 HEIGHT, WIDTH = MAP.disparity_px.shape
-BOX = Box(MAP.x, MAP.y, WIDTH, HEIGHT)
-VIEW = render_rectified(MODEL.drawn_mesh, TRUE, GEOMETRY, BOX)
+VIEW = render_rectified(MODEL.drawn_mesh, TRUE, GEOMETRY, MAP.box)
 EXPECTED_PX = GEOMETRY.disparity_map_px(VIEW.depth_mm)
 SEEN = VIEW.mask
 
@@ -122,7 +120,9 @@ def test_wider_differences_than_claimed_show_in_the_spread() -> None:
 
 def test_a_view_without_the_model_agrees_with_nothing() -> None:
     empty = RenderedView(
-        np.full((HEIGHT, WIDTH), np.nan, np.float32), np.full((HEIGHT, WIDTH), -1, np.int32), BOX
+        np.full((HEIGHT, WIDTH), np.nan, np.float32),
+        np.full((HEIGHT, WIDTH), -1, np.int32),
+        MAP.box,
     )
     found = compare(empty, MODEL, MAP, GEOMETRY)
     assert found.n_visible == 0
