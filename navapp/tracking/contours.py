@@ -75,7 +75,7 @@ class ContourMeter:
         Args:
             pair: that it was fitted in.
             fit: of the bone.
-            coarse_px: (h, w) rough disparity of whatever lies in its box.
+            coarse_px: (h, w) coarse disparity of whatever lies in its box.
         """
         estimate, view = fit.estimate, fit.measured.view
         if view is None or not np.isfinite(estimate.covariance).all():
@@ -101,7 +101,7 @@ class ContourMeter:
             pose: the rectified left camera from the bone.
             view: the model at that pose, or next to it.
             measured: on the model, in the view's box.
-            coarse_px: (h, w) rough disparity of whatever lies in that box.
+            coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
         left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
         in_right = beside(

@@ -14,7 +14,7 @@ from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.pair_doubts import with_pair_doubts
-from navapp.tracking.surface_meter import Measurement, RoughMap, SurfaceMeter
+from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
 # A model that moved by less looks the same.
@@ -46,7 +46,7 @@ class FitJudge:
         goal: Goal,
         timings: LineTimings,
         predicted: RigidTransform | None = None,
-        rough: RoughMap | None = None,
+        coarse: CoarseMap | None = None,
     ) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
 
@@ -56,17 +56,17 @@ class FitJudge:
             goal: of the stage.
             timings: of what came before the fit.
             predicted: pose expected by the motion model, in the rectified camera.
-            rough: whatever lies around the bone; matched anew where it does not reach.
+            coarse: whatever lies around the bone; matched anew where it does not reach.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
         found = fit.measured.disparity
-        rough_px = self.rough_px(pair, fit, rough)
-        fit = self._contours.joined(pair, fit, rough_px)
+        coarse_px = self.coarse_px(pair, fit, coarse)
+        fit = self._contours.joined(pair, fit, coarse_px)
         view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
         verdict = self._judge.judge(
-            self._model, fit.estimate, found, goal, predicted, rough_px, view
+            self._model, fit.estimate, found, goal, predicted, coarse_px, view
         )
         depth_mm = fit.pose.apply(self._model.centre_mm)[2]
         verdict = with_pair_doubts(verdict, pair, found, depth_mm)
@@ -105,22 +105,22 @@ class FitJudge:
             on_progress,
         )
 
-    def rough_px(
-        self, pair: RectifiedPair, fit: Fit, rough: RoughMap | None = None
+    def coarse_px(
+        self, pair: RectifiedPair, fit: Fit, coarse: CoarseMap | None = None
     ) -> NDArray[np.float32] | None:
-        """(h, w) rough disparity over the box of a fit; None out of view or depth.
+        """(h, w) coarse disparity over the box of a fit; None out of view or depth.
 
         Args:
             pair: that it was fitted in.
             fit: of the bone.
-            rough: known already; matched anew when it does not reach over all of the box.
+            coarse: known already; matched anew when it does not reach over all of the box.
         """
         box = fit.measured.disparity.box
-        known_px = None if rough is None else rough.over(box)
+        known_px = None if coarse is None else coarse.over(box)
         if known_px is not None:
             return known_px
-        rough = self._meter.coarsely(pair, fit.pose, box)
-        return None if rough is None else rough.disparity_px
+        coarse = self._meter.coarsely(pair, fit.pose, box)
+        return None if coarse is None else coarse.disparity_px
 
     def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""

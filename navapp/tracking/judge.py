@@ -112,7 +112,7 @@ class Judge:
             measured: disparity over the bone's box.
             goal: of the stage.
             predicted: pose expected by the motion model, for the jump test.
-            coarse_px: (h, w) rough disparity of whatever is in that box: what hides the bone, and
+            coarse_px: (h, w) coarse disparity of whatever is in that box: what hides the bone, and
                 what is seen through the model.
             view: the model in that box at the pose, or next to it; rendered when absent.
         """

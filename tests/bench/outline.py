@@ -115,9 +115,9 @@ def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, fl
     fit = line.locator.locate(pair, start)
     if fit is None or fit.measured.view is None:
         return
-    rough_px = line._fit_judge.rough_px(pair, fit)
+    coarse_px = line._fit_judge.coarse_px(pair, fit)
     answer: list[float] = []
-    for one in (fit, line._fit_judge._contours.joined(pair, fit, rough_px)):
+    for one in (fit, line._fit_judge._contours.joined(pair, fit, coarse_px)):
         mesh = line.model.bone.mesh
         targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
         bound_mm = predicted_tre_mm(one.estimate, line.centre_mm, targets[:: len(targets) // 200])
