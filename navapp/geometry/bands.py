@@ -1,8 +1,9 @@
 """Jobs side by side, on the two threads of one shared pool."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 _Answer = TypeVar("_Answer")
@@ -42,8 +43,24 @@ def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
             raise error
 
 
-def beside(job: Callable[[], _Answer]) -> "Future[_Answer]":
-    """Begin a job on a thread of the pool; a thread of the pool does it itself, at once."""
+@contextmanager
+def beside(job: Callable[[], _Answer]) -> Iterator["Future[_Answer]"]:
+    """A job on a thread of the pool while the caller goes on; it is over when the block is left.
+
+    A thread of the pool does it itself, at once. Its error is raised at the end of the block at the
+    latest; an error of the block itself goes before it.
+    """
+    future = _begun(job)
+    try:
+        yield future
+    except BaseException:
+        if not future.cancel():
+            future.exception()
+        raise
+    future.result()
+
+
+def _begun(job: Callable[[], _Answer]) -> "Future[_Answer]":
     if not getattr(_here, "is_of_pool", False):
         return pool().submit(job)
     done: Future[_Answer] = Future()

@@ -104,10 +104,10 @@ class ContourMeter:
             coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
         left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
-        in_right = beside(
+        with beside(
             lambda: self._steps(pair.right, right, pose, *self._seen_from_right(view, right))
-        )
-        in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
+        ) as in_right:
+            in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
         blocks = [
             self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
             for steps in (in_left, in_right.result())
