@@ -131,6 +131,7 @@ class Tally:
     n_beside: int = 0
     n_away: int = 0
     ms: list[float] = field(default_factory=list)
+    searching_ms: list[float] = field(default_factory=list)
 
 
 def follow_box(scene: Scene, n_frames: int, tally: Tally) -> None:
@@ -142,9 +143,10 @@ def follow_box(scene: Scene, n_frames: int, tally: Tally) -> None:
             assert start is not None
             state = placed(None, frame.left, scene.guide.projected(start), hidden_share=0.0)
             continue
+        times = tally.searching_ms if state.box is None else tally.ms
         started = time.perf_counter()
         state = followed(state, frame.left)
-        tally.ms.append(1e3 * (time.perf_counter() - started))
+        times.append(1e3 * (time.perf_counter() - started))
         overlap, seen = scene.overlap(state.picture_box, truth)
         if seen < AWAY:
             was_away = True
@@ -214,8 +216,8 @@ def main() -> int:
     parser.add_argument("--line", action="store_true", help="the whole line as well")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
-    print("| situation | frames | right | no box | wrong box | overlap median | found again after | box while away | ms |")  # fmt: skip  # noqa: E501
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| situation | frames | right | no box | wrong box | overlap median | found again after | box while away | ms | ms without a box before |")  # fmt: skip  # noqa: E501
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for name, situation in SITUATIONS.items():
         if options.only not in name:
             continue
@@ -239,9 +241,11 @@ def row(name: str, tally: Tally) -> str:
     shares = [100.0 * np.mean(which) for which in (right, none, ~right & ~none)]
     back = f"{max(tally.n_frames_back):.0f} (worst)" if tally.n_frames_back else "-"
     away = f"{tally.n_beside} of {tally.n_away}" if tally.n_away else "-"
+    searching = f"{np.median(tally.searching_ms):.1f}" if tally.searching_ms else "-"
     return (
         f"| {name} | {len(overlaps)} | " + " | ".join(f"{share:.1f} %" for share in shares)
-        + f" | {np.median(overlaps):.2f} | {back} | {away} | {np.median(tally.ms):.1f} |"
+        + f" | {np.median(overlaps):.2f} | {back} | {away} | {np.median(tally.ms):.1f}"
+        + f" | {searching} |"
     )  # fmt: skip
 
 
