@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import Box
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import (
     BoneModel,
@@ -236,6 +237,11 @@ def test_the_matched_share_counts_measured_pixels_only():
     assert disparity.matched_share == 0.5
     nothing = np.empty((0, 0))
     assert dataclasses.replace(disparity, origin=nothing.astype(np.uint8)).matched_share == 0.0
+
+
+def test_a_map_knows_its_place_in_the_picture():
+    wide = np.zeros((2, 5), dtype=np.float32)
+    assert DisparityMap(wide, wide, wide.astype(np.uint8), 3, 4).box == Box(3, 4, 5, 2)
 
 
 def test_a_part_of_a_cloud_keeps_its_columns_together():

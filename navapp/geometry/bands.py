@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Generic, TypeVar
+from typing import Generic, Self, TypeVar
 
 _Answer = TypeVar("_Answer")
 
@@ -25,19 +25,36 @@ def pool() -> ThreadPoolExecutor:
 
 
 class Job(Generic[_Answer]):
-    """A job that the helper may have begun; who asks for it first does it."""
+    """A job that the helper may have begun; who asks for it first does it.
+
+    As a context it is over, or never begun, when its block is left: an error of the block goes
+    before its own, and an answer that nobody asked for is waited for.
+    """
 
     def __init__(self, work: Callable[[], _Answer]) -> None:
         self._work = work
         # The helper itself has nobody beside it.
         is_alone = getattr(_here, "is_alone", False)
         self._begun: Future[_Answer] | None = None if is_alone else pool().submit(work)
+        self._taken: list[_Answer] = []
 
     def result(self) -> _Answer:
-        """The answer, or what went wrong, raised. To be asked for once."""
-        if self._begun is None or self._begun.cancel():
-            return self._work()
-        return self._begun.result()
+        """The answer, or what went wrong, raised."""
+        if not self._taken:
+            if self._begun is None or self._begun.cancel():
+                self._taken.append(self._work())
+            else:
+                self._taken.append(self._begun.result())
+        return self._taken[0]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.result()
+        elif self._begun is not None and not self._begun.cancel():
+            self._begun.exception()
 
 
 def beside(work: Callable[[], _Answer]) -> Job[_Answer]:

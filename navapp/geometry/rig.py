@@ -10,8 +10,8 @@ import numpy as np
 
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
-from navapp.geometry.ply import write_whole
 from navapp.geometry.transform import RigidTransform
+from navapp.geometry.whole_files import write_whole
 
 # What other programs call the same thing; the first name is ours.
 _SYNONYMS = {

@@ -17,6 +17,7 @@ from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
 from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
 from navapp.stereo.subpixel.refine import refine
+from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, LineTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
@@ -34,12 +35,6 @@ _NOT_CONFIRMED = (
     "the surface is not where the pose says: is the pose right, are the pictures swapped?"
 )
 
-_SUPPORT_SIGMA_PX = 2.0
-# Further away than this, a refined value is not the same surface's any more.
-_CLOSE_PX = 1.0
-# A window over an edge mixes two surfaces: there the coarse value stands.
-_WINDOW_PX = 11
-_SAME_SURFACE_PX = 3.0
 _WIDE_SEARCH_PX = 160
 
 # A claimed sigma below this says no more.
@@ -92,7 +87,7 @@ def match_scene(
     found = match_census(pair, band_px, _settings_for(band_px))
     if not found.agreement >= _LEAST_AGREEMENT:
         return _nothing(pair, _why(found.agreement), started)
-    left = _refined(pair, found.left)
+    left = refine_scene(pair, found.left)
     evidence = _Evidence(found.right_px, found.right_x0, found.confidence)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
     return _answer(pair, left, evidence, fill, started)
@@ -264,31 +259,6 @@ def _by_sigma(left: DisparityMap) -> NDArray[np.float32]:
     """(h, w) confidence, 0 to 1: the smaller the claimed sigma, the larger; 0 where unmatched."""
     sigma_px = np.maximum(left.sigma_px, _BEST_SIGMA_PX)
     return np.nan_to_num(_BEST_SIGMA_PX / sigma_px).astype(np.float32)
-
-
-def _refined(pair: RectifiedPair, coarse: DisparityMap) -> DisparityMap:
-    """Sub-pixel values where they settle close to the coarse ones, the coarse ones elsewhere."""
-    # Smoothed only to make a support: a map that was smoothed itself would be tilted.
-    finer = refine(pair, smooth_known(coarse.disparity_px, _SUPPORT_SIGMA_PX))
-    with np.errstate(invalid="ignore"):
-        is_finer = np.abs(finer.disparity_px - coarse.disparity_px) < _CLOSE_PX
-    is_finer &= _local_range_px(coarse.disparity_px) < _SAME_SURFACE_PX
-    return replace(
-        coarse,
-        disparity_px=np.where(is_finer, finer.disparity_px, coarse.disparity_px),
-        sigma_px=np.where(is_finer, finer.sigma_px, coarse.sigma_px),
-    )
-
-
-def _local_range_px(disparity_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Largest minus smallest known disparity in each pixel's window."""
-    import cv2
-
-    window = np.ones((_WINDOW_PX, _WINDOW_PX), dtype=np.uint8)
-    known = np.isfinite(disparity_px)
-    largest = cv2.dilate(np.where(known, disparity_px, np.float32(-1e6)), window)
-    smallest = cv2.erode(np.where(known, disparity_px, np.float32(1e6)), window)
-    return np.asarray(largest - smallest, dtype=np.float32)
 
 
 def _settings_for(band_px: tuple[float, float]) -> CensusSettings:

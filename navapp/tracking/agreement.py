@@ -14,10 +14,10 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.agreement_kernels import (
+    COARSELY_FURTHER,
+    COARSELY_NEARER,
     FURTHER,
     NEARER,
-    ROUGHLY_FURTHER,
-    ROUGHLY_NEARER,
     Comparison,
     classify_pixels,
     gather_open,
@@ -81,7 +81,7 @@ def compare(
         model: for what its surface is uncertain by.
         measured: disparity over the view's box; only matched pixels count.
         geometry: of the rectified pair.
-        coarse_px: (h, w) rough disparity of whatever is there, where `measured` is silent.
+        coarse_px: (h, w) coarse disparity of whatever is there, where `measured` is silent.
     """
     classes = np.empty(view.face_index.shape, dtype=np.uint8)
     deviation, sigma = (np.empty(classes.shape, dtype=np.float32) for _ in range(2))
@@ -98,10 +98,10 @@ def compare(
     if n_visible == 0:
         return NO_AGREEMENT
     is_hidden, is_behind = (np.zeros(classes.shape, dtype=np.bool_) for _ in range(2))
-    for kind in (NEARER, ROUGHLY_NEARER):
+    for kind in (NEARER, COARSELY_NEARER):
         mark_large(classes, kind, _LEAST_REGION_PX2, is_hidden)
     inner = np.where(_without_rim(view.mask), classes, np.uint8(0))
-    for kind in (FURTHER, ROUGHLY_FURTHER):
+    for kind in (FURTHER, COARSELY_FURTHER):
         mark_large(inner, kind, _LEAST_REGION_PX2, is_behind)
     room = classes[::_SPREAD_STRIDE_PX, ::_SPREAD_STRIDE_PX].size
     deviations, sigmas = (np.empty(room, dtype=np.float32) for _ in range(2))

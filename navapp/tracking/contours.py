@@ -76,7 +76,7 @@ class ContourMeter:
         Args:
             pair: that it was fitted in.
             fit: of the bone.
-            coarse_px: (h, w) rough disparity of whatever lies in its box.
+            coarse_px: (h, w) coarse disparity of whatever lies in its box.
         """
         estimate, view = fit.estimate, fit.measured.view
         if view is None or not np.isfinite(estimate.covariance).all():
@@ -102,13 +102,13 @@ class ContourMeter:
             pose: the rectified left camera from the bone.
             view: the model at that pose, or next to it.
             measured: on the model, in the view's box.
-            coarse_px: (h, w) rough disparity of whatever lies in that box.
+            coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
         left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
-        in_right = beside(
+        with beside(
             lambda: self._steps(pair.right, right, pose, *self._seen_from_right(view, right))
-        )
-        in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
+        ) as in_right:
+            in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
         blocks = [
             self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
             for steps in (in_left, in_right.result())

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import beside
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
@@ -16,7 +16,7 @@ from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.pair_doubts import with_pair_doubts
-from navapp.tracking.surface_meter import Measurement, RoughMap, SurfaceMeter
+from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
 # A model that moved by less looks the same.
@@ -48,7 +48,7 @@ class FitJudge:
         goal: Goal,
         timings: LineTimings,
         predicted: RigidTransform | None = None,
-        rough: RoughMap | None = None,
+        coarse: CoarseMap | None = None,
     ) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
 
@@ -58,7 +58,7 @@ class FitJudge:
             goal: of the stage.
             timings: of what came before the fit.
             predicted: pose expected by the motion model, in the rectified camera.
-            rough: whatever lies around the bone; matched anew where it does not reach.
+            coarse: whatever lies around the bone; matched anew where it does not reach.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
@@ -66,14 +66,14 @@ class FitJudge:
         found, geometry = fit.measured.disparity, pair.geometry
         depth_mm = float(fit.pose.apply(self._model.centre_mm)[2])
         # What the pictures say of their cameras does not ask for the pose.
-        health = beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm)))
-        rough_px = self.rough_px(pair, fit, rough)
-        fit = self._contours.joined(pair, fit, rough_px)
-        view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
-        verdict = self._judge.judge(
-            self._model, fit.estimate, found, goal, predicted, rough_px, view
-        )
-        verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
+        with beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm))) as health:
+            coarse_px = self.coarse_px(pair, fit, coarse)
+            fit = self._contours.joined(pair, fit, coarse_px)
+            view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
+            verdict = self._judge.judge(
+                self._model, fit.estimate, found, goal, predicted, coarse_px, view
+            )
+            verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
@@ -109,24 +109,22 @@ class FitJudge:
             on_progress,
         )
 
-    def rough_px(
-        self, pair: RectifiedPair, fit: Fit, rough: RoughMap | None = None
+    def coarse_px(
+        self, pair: RectifiedPair, fit: Fit, coarse: CoarseMap | None = None
     ) -> NDArray[np.float32] | None:
-        """(h, w) rough disparity over the box of a fit; None out of view or depth.
+        """(h, w) coarse disparity over the box of a fit; None out of view or depth.
 
         Args:
             pair: that it was fitted in.
             fit: of the bone.
-            rough: known already; matched anew when it does not reach over all of the box.
+            coarse: known already; matched anew when it does not reach over all of the box.
         """
-        found = fit.measured.disparity
-        height, width = found.disparity_px.shape
-        box = Box(found.x, found.y, width, height)
-        known_px = None if rough is None else rough.over(box)
+        box = fit.measured.disparity.box
+        known_px = None if coarse is None else coarse.over(box)
         if known_px is not None:
             return known_px
-        rough = self._meter.coarsely(pair, fit.pose, box)
-        return None if rough is None else rough.disparity_px
+        coarse = self._meter.coarsely(pair, fit.pose, box)
+        return None if coarse is None else coarse.disparity_px
 
     def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""

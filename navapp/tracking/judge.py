@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedGeometry
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
@@ -112,7 +112,7 @@ class Judge:
             measured: disparity over the bone's box.
             goal: of the stage.
             predicted: pose expected by the motion model, for the jump test.
-            coarse_px: (h, w) rough disparity of whatever is in that box: what hides the bone, and
+            coarse_px: (h, w) coarse disparity of whatever is in that box: what hides the bone, and
                 what is seen through the model.
             view: the model in that box at the pose, or next to it; rendered when absent.
         """
@@ -185,10 +185,8 @@ class Judge:
     def _render(
         self, model: RegistrationModel, pose: RigidTransform, measured: DisparityMap
     ) -> RenderedView:
-        height, width = measured.disparity_px.shape
-        box = Box(measured.x, measured.y, width, height)
         return render_rectified(
-            model.drawn_mesh, pose, self._geometry, box, is_closed=model.is_closed
+            model.drawn_mesh, pose, self._geometry, measured.box, is_closed=model.is_closed
         )
 
     def _bound_mm(

@@ -104,9 +104,9 @@ class Line:
             start = self._rectified(expected)
             pair, timings = self._rectified_pair(left, right, start, NEAR_VIEW)
             # What may hide the bone does not depend on where exactly it is.
-            rough = beside(lambda: self._meter.coarsely(pair, start))
-            fit = self.locator.locate(pair, start)
-            tracked = self._fit_judge.judged(pair, fit, goal, timings, predicted, rough.result())
+            with beside(lambda: self._meter.coarsely(pair, start)) as coarse:
+                fit = self.locator.locate(pair, start)
+            tracked = self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse.result())
         if tracked.verdict.status is Status.LOST:
             if not self.locator.is_baseline:
                 boxes = self._boxes.followed(boxes, left)

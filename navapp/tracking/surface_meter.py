@@ -92,7 +92,7 @@ class Expected:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RoughMap:
+class CoarseMap:
     """What lies where, to about a pixel.
 
     Attributes:
@@ -162,8 +162,8 @@ class SurfaceMeter:
 
     def coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
-    ) -> RoughMap | None:
-        """Whatever lies in a box, roughly; None out of view or depth.
+    ) -> CoarseMap | None:
+        """Whatever lies in a box, as a coarse map; None out of view or depth.
 
         Args:
             pair: pictures.
@@ -174,7 +174,7 @@ class SurfaceMeter:
         if region is None:
             return None
         around = box or region[0]
-        return RoughMap(match_coarsely(replace(pair, box=around), region[1]), around)
+        return CoarseMap(match_coarsely(replace(pair, box=around), region[1]), around)
 
     def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins

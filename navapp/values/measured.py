@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.rectification import Box
 from navapp.geometry.transform import FloatArray
 
 
@@ -35,6 +36,12 @@ class DisparityMap:
     origin: NDArray[np.uint8]
     x: int
     y: int
+
+    @property
+    def box(self) -> Box:
+        """Where it lies in the rectified picture."""
+        height, width = self.disparity_px.shape
+        return Box(self.x, self.y, width, height)
 
     @property
     def matched_share(self) -> float:

@@ -20,10 +20,8 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from drivers.clock import ManualClock
 from drivers.frames import StereoFrame
 from navapp.evaluation import mean_tre_mm
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -31,16 +29,14 @@ from navapp.geometry.zbuffer import projected_box
 from navapp.overlay.layers import Scene, draw_bone
 from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, Line, TrackState
-from navapp.values import BoneModel, Plan, StageSpec, Status
-from sim_devices.camera import SimulatedCamera
+from navapp.values import Plan, StageSpec, Status
 from sim_devices.rigs import default_rig
 from sim_devices.scenario import Scenario
-from sim_devices.sensor import SensorModel
-from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 from tests.bench.occlusion_speed import use_threads
 from tests.bench.registration_peers import open3d_plane
 from tests.bench.stereo_speed import peer_chain
+from tests.knees import SimulatedKnee
 
 _GOAL = Goal(np.empty((0, 3)), 2.0)
 _DISPARITIES, _POINTS = 96, 3000
@@ -63,17 +59,10 @@ class Recording:
     """Frames of one knee with their truth."""
 
     def __init__(self, seed: int, n_frames: int) -> None:
-        world = World(Scenario(seed=seed, motion="breathing"), _long_lenses())
-        camera = SimulatedCamera(
-            world, ManualClock(), is_stepped=True, sensor=SensorModel(seed=seed)
-        )  # fmt: skip
-        camera.open()
-        self.frames: list[StereoFrame] = [camera.read(1.0) for _ in range(n_frames)]
-        oracle = TruthOracle(world, camera.world_time_ns)
-        self.poses = [oracle.left_from_body("femur", f.captured_ns) for f in self.frames]
-        self.rig = world.rig
-        bone = world.anatomy.bones["femur"]
-        self.bone = BoneModel("femur", TriangleMesh(bone.vertices_mm, bone.faces))
+        knee = SimulatedKnee(World(Scenario(seed=seed, motion="breathing"), _long_lenses()))
+        self.frames = knee.frames(n_frames)
+        self.poses = [knee.truth(frame) for frame in self.frames]
+        self.rig, self.bone = knee.rig, knee.bone
 
     def overlay(self, number: int, pose: RigidTransform) -> None:
         """Draw the bone over a copy of the left picture."""

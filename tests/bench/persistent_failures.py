@@ -16,17 +16,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.clock import ManualClock
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import Line, TrackState
 from navapp.values import BoneModel, Status, TrackedFrame
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.camera import SimulatedCamera
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
 from tests.bench.provoked import GOAL
+from tests.knees import femur_of, nominal_prior, stepped_camera
 
 # Not the seeds of any test or default, nor of the other benches.
 FIRST_SEED = 161
@@ -47,8 +46,7 @@ class Room:
         """The knee of a seed, moving."""
         side = "left" if seed % 2 else "right"
         world = World(Scenario(seed=seed, side=side, motion="patient"))
-        mesh = world.anatomy.bones["femur"]
-        return cls(world, BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), side))
+        return cls(world, femur_of(world))
 
 
 class Loop:
@@ -126,12 +124,8 @@ def followed(
 ) -> Iterator[tuple[TrackedFrame, float]]:
     """Answers, and how far they are off."""
     world = loop.world
-    camera = SimulatedCamera(
-        loop, ManualClock(), is_stepped=True, rate_hz=_RATE_HZ,
-        sensor=SensorModel(seed=world.scenario.seed),
-    )  # fmt: skip
-    camera.open()
-    line = Line(world.rig, bone)
+    camera = stepped_camera(loop, SensorModel(seed=world.scenario.seed), _RATE_HZ)
+    line, own = Line(world.rig, bone), femur_of(world)
     state: TrackState | None = None
     for _ in range(n_frames):
         frame = camera.read(1.0)
@@ -143,19 +137,12 @@ def followed(
             state = TrackState.at_rest(truth, frame.captured_ns)
         if state is None:
             nominal = world.nominal_left_from_femur
-            tracked = line.register(left, right, _prior(world), GOAL)[0]
+            tracked = line.register(left, right, nominal_prior(world), GOAL)[0]
             state = TrackState.at_rest(tracked.left_from_bone or nominal, frame.captured_ns)
         else:
             tracked, state = line.track(left, right, frame.captured_ns, state, GOAL)
         pose = tracked.left_from_bone
-        own = BoneModel("femur", world.anatomy.bones["femur"])
         yield tracked, np.nan if pose is None else mean_tre_mm(pose, truth, own, np.empty((0, 3)))
-
-
-def _prior(world: World):
-    from navapp.values import Prior
-
-    return Prior({"femur": world.nominal_left_from_femur})
 
 
 def main() -> int:
