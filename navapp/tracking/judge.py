@@ -28,6 +28,8 @@ from navapp.values import (
 # Errors of a cartilage's thickness go together over much of a bone: no number of points averages
 # them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
 _COMMON_ERROR = 2.0
+# What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
+OK_ERROR_MM = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +67,18 @@ class JudgeLimits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """What the judge measures a pose against: the stage's targets and tolerance."""
+    """What the judge measures a pose against.
+
+    Attributes:
+        targets_mm: (N, 3) of the stage, in bone coordinates.
+        tolerance_mm: of the stage: all that is known against the pose must stay below it.
+        seen_mm: what is seen must fix the pose at least so well. What the plan's own cartilage may
+            cost goes on top, in squares: no better view mends it.
+    """
 
     targets_mm: FloatArray
     tolerance_mm: float
+    seen_mm: float = OK_ERROR_MM
 
 
 class Judge:
@@ -123,9 +133,11 @@ class Judge:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
         is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
-        bound_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
-        bound_mm = float(np.hypot(bound_mm, _COMMON_ERROR * cartilage_mm))
+        by_plan_mm = _COMMON_ERROR * cartilage_mm
+        by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
+        bound_mm = float(np.hypot(by_view_mm, by_plan_mm))
         doubts = self._doubts(estimate, agreement)
+        doubts += [Reason.POSE_UNCERTAIN] * bool(by_view_mm > np.hypot(goal.seen_mm, by_plan_mm))
         doubts += [Reason.CARTILAGE_UNCERTAIN] * (cartilage_mm > self._limits.cartilage_sd_ok)
         doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > goal.tolerance_mm)
         doubts += [Reason.JUMPED] * self._has_jumped(model, estimate, predicted)

@@ -4,6 +4,7 @@
 terminal; what is remembered between frames is handed in and out as a `TrackState`.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -164,16 +165,19 @@ class Line:
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
     ) -> TrackedFrame:
-        """Judge a pose as it stands, without moving it, by the surface that is seen there."""
+        """Judge a pose as it stands, without moving it, by the surface that is seen there.
+
+        Measured freely, a surface tells whether the pose is the right one, but fixes it less well
+        than a bone that is followed: only the stage's tolerance counts.
+        """
         pose = self._rectified(left_from_bone)
         pair, timings = self._rectified_pair(left, right, pose, NEAR_VIEW)
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._fit_judge.lost(Reason.OUT_OF_VIEW)
         estimate = estimate_at(measured.scene, self.model, pose, STEREO_SETTINGS)
-        return self._fit_judge.judged(
-            pair, Fit(estimate, measured, measured.timings), goal, timings
-        )
+        fit = Fit(estimate, measured, measured.timings)
+        return self._fit_judge.judged(pair, fit, replace(goal, seen_mm=math.inf), timings)
 
     def _rectified_pair(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins = WIDE_VIEW

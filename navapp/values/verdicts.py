@@ -58,7 +58,7 @@ _REMEDIES = {
     Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
     Reason.CUES_DISAGREE: "check that this is the right bone and plan; register again",
     Reason.DEGENERATE: "expose more of the bone",
-    Reason.POSE_UNCERTAIN: "expose more of the bone",
+    Reason.POSE_UNCERTAIN: "move the instrument or hand away, or expose more of the bone",
     Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",
