@@ -169,13 +169,20 @@ class Judge:
         doubts += [Reason.RIG_NOT_ACCEPTED] * (not self._is_rig_accepted)
         return doubts
 
-    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+    def is_elsewhere(self, agreement: Agreement) -> bool:
+        """So little of the model agrees that the bone is not there."""
         limits = self._limits
         return (
             agreement.open_coverage < limits.coverage_lost
             or agreement.coverage < limits.seen_lost
             or agreement.behind_share > limits.behind_lost
             or agreement.inlier_share < limits.inlier_lost
+        )
+
+    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+        limits = self._limits
+        return (
+            self.is_elsewhere(agreement)
             or estimate.rms_mm / estimate.expected_rms_mm > limits.rms_ratio_lost
             or Reason.TOO_FEW_POINTS in estimate.reasons
         )

@@ -30,6 +30,8 @@ class Reason(Enum):
     PICTURE_DARK = "one picture is dark or blocked"
     PICTURE_OVEREXPOSED = "one picture is overexposed"
     PICTURES_UNLIKE = "one picture is blurred or covered"
+    PICTURES_SWAPPED = "left and right pictures are swapped"
+    OTHER_SIDE = "the other side's bone fits better: is it the other knee's plan?"
     RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
     OUT_OF_VIEW = "the bone is outside the picture"
     # of the session
@@ -66,6 +68,8 @@ _REMEDIES = {
     Reason.PICTURE_DARK: "uncover both cameras, or check the light",
     Reason.PICTURE_OVEREXPOSED: "turn the light or the exposure down",
     Reason.PICTURES_UNLIKE: "clean and uncover both cameras",
+    Reason.PICTURES_SWAPPED: "swap the cameras' cables, or their names in the settings",
+    Reason.OTHER_SIDE: "check the patient, the side and the plan; load the right one",
     Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",
     Reason.OUT_OF_VIEW: "bring the bone back into both pictures",
     Reason.NOT_NAVIGATING: "register, then accept the candidate",
@@ -76,6 +80,10 @@ _REMEDIES = {
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }
+
+
+# What stays wrong until somebody mends it.
+_FOR_GOOD = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -143,6 +151,11 @@ class Verdict:
     rms_mm: float | None = None
     expected_rms_mm: float | None = None
 
+    @property
+    def cause(self) -> Reason | None:
+        """What is wrong for good, when that was found out."""
+        return next((reason for reason in self.reasons if reason in _FOR_GOOD), None)
+
 
 @dataclass(frozen=True, slots=True)
 class LineTimings:
@@ -175,6 +188,13 @@ class TrackedFrame:
     def left_from_bone(self) -> RigidTransform | None:
         """The pose, when there is one."""
         return None if self.estimate is None else self.estimate.camera_from_bone
+
+    def because(self, cause: Reason | None) -> "TrackedFrame":
+        """The same answer with the cause of its failure in front; an OK has none."""
+        if cause is None or self.verdict.status is Status.OK:
+            return self
+        others = tuple(reason for reason in self.verdict.reasons if reason is not cause)
+        return replace(self, verdict=replace(self.verdict, reasons=(cause, *others)))
 
 
 def predicted_tre_mm(
