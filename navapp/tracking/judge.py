@@ -4,6 +4,7 @@ A wrong pose is worse than none. The judge therefore looks at what did not enter
 of the model that should be seen was measured and agrees, not only how well paired points agree.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,7 @@ from navapp.values import (
 _COMMON_ERROR = 2.0
 # What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
 OK_ERROR_MM = 0.5
+_SURE_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,6 +139,7 @@ class Judge:
         by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
         bound_mm = float(np.hypot(by_view_mm, by_plan_mm))
         doubts = self._doubts(estimate, agreement)
+        doubts += [Reason.SIZE_DIFFERS] * _has_another_size(estimate, by_plan_mm)
         doubts += [Reason.POSE_UNCERTAIN] * bool(by_view_mm > np.hypot(goal.seen_mm, by_plan_mm))
         doubts += [Reason.CARTILAGE_UNCERTAIN] * (cartilage_mm > self._limits.cartilage_sd_ok)
         doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > goal.tolerance_mm)
@@ -224,6 +227,15 @@ class Judge:
             return float("inf")
         step = max(1, len(targets_mm) // self._limits.max_bound_targets)
         return predicted_tre_mm(estimate, model.centre_mm, targets_mm[::step])
+
+
+def _has_another_size(estimate: PoseEstimate, by_plan_mm: float) -> bool:
+    """The bone surely is of another size than the model, and that costs more than is promised.
+
+    Errors of a cartilage's thickness that go together look the same.
+    """
+    sigma_mm = math.hypot(estimate.size_sigma_mm, by_plan_mm)
+    return abs(estimate.size_mm) > max(OK_ERROR_MM, _SURE_SIGMAS * sigma_mm)
 
 
 def _rms(values: FloatArray) -> float:

@@ -1,5 +1,6 @@
 """A pose, what stands behind it, and what the judge says of it."""
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -17,6 +18,7 @@ class Reason(Enum):
     COVERAGE_LOW = "too little of the bone is seen"
     SEEN_THROUGH = "something is seen where the bone should be in the way"
     SURFACE_MISFIT = "surface does not fit the model"
+    SIZE_DIFFERS = "the bone seen has another size than the model"
     OUTLIERS = "too many points fit no surface of the model"
     NOT_CONVERGED = "the estimate did not settle"
     AMBIGUOUS = "a different pose fits as well"
@@ -55,6 +57,7 @@ _REMEDIES = {
     Reason.COVERAGE_LOW: "move the instrument or hand away",
     Reason.SEEN_THROUGH: "check that this is the right bone and plan; register again",
     Reason.SURFACE_MISFIT: "check that this is the right bone and plan; register again",
+    Reason.SIZE_DIFFERS: "check that this is the right plan, and its scale",
     Reason.OUTLIERS: "clear the view of the bone; register again",
     Reason.NOT_CONVERGED: "hold still, or register again",
     Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
@@ -102,6 +105,9 @@ class PoseEstimate:
         iterations: of the solver.
         is_converged: the solver met its step limit.
         reasons: what the solver itself has against the result.
+        size_mm: by how much the bone seems larger than the model, at the rms distance of what is
+            seen from its middle; told by the surface alone.
+        size_sigma_mm: standard deviation of that.
     """
 
     camera_from_bone: RigidTransform
@@ -113,6 +119,8 @@ class PoseEstimate:
     iterations: int
     is_converged: bool
     reasons: tuple[Reason, ...] = ()
+    size_mm: float = 0.0
+    size_sigma_mm: float = math.inf
 
     def doubted(self, reason: Reason) -> "PoseEstimate":
         """The same estimate with one more reason against it."""
