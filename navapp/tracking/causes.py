@@ -61,10 +61,13 @@ class Causes:
             cause = self.of_loss(left, right, around)
             if cause is not None:
                 return cause
-        if around is None or not _UNFIT.intersection(failed.verdict.reasons):
+        reasons = failed.verdict.reasons
+        if around is None or not _UNFIT.intersection(reasons):
             return None
         pair, _ = self._meter.rectified(left, right, around, WIDE_VIEW)
-        return self._of_misfit(pair, around, on_progress)
+        cause = self._of_misfit(pair, around, on_progress)
+        # Nothing has shown yet that the plan is of this bone: that comes before what is not seen.
+        return cause or (Reason.SURFACE_MISFIT if Reason.SURFACE_MISFIT in reasons else None)
 
     def of_loss(self, left: Image, right: Image, around: RigidTransform | None) -> Reason | None:
         """Whether the pictures are swapped, around a pose or in the whole view."""

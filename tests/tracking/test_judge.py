@@ -137,6 +137,37 @@ def test_what_the_plans_cartilage_costs_is_not_held_against_the_view() -> None:
     assert verdict.predicted_tre_mm > 2.0 * 0.35
 
 
+def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL) -> Verdict:
+    estimate = estimate_at(scene_of(MAP), model, TRUE, STEREO_SETTINGS)
+    estimate = replace(estimate, size_mm=size_mm, size_sigma_mm=sigma_mm)
+    return Judge(GEOMETRY, True).judge(model, estimate, MAP, Goal(NO_TARGETS, 3.0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_bone_of_another_size_is_doubted_when_that_is_sure_and_costs_much(sign: float) -> None:
+    assert judged_with_size(sign * 0.6, 0.1).reasons == (Reason.SIZE_DIFFERS,)
+    assert judged_with_size(sign * 0.6, 0.1).status is Status.DEGRADED
+    assert judged_with_size(sign * 0.4, 0.1).reasons == ()
+    assert judged_with_size(sign * 0.6, 0.25).reasons == ()
+    assert judged_with_size(sign * 0.6, np.inf).reasons == ()
+
+
+def test_cartilage_that_the_plan_knows_roughly_may_look_like_another_size() -> None:
+    sd_mm = np.full(len(BONE.mesh.vertices_mm), 0.35)
+    model = RegistrationModel(replace(BONE, cartilage_sd_mm=sd_mm))
+    assert judged_with_size(1.0, 0.1, model).reasons == ()
+
+
+def test_the_right_bone_has_the_right_size_and_a_larger_one_has_not() -> None:
+    mesh = BONE.mesh
+    for size, reasons in ((1.0, False), (0.95, True)):
+        scaled = mesh.centroid_mm + size * (mesh.vertices_mm - mesh.centroid_mm)
+        model = RegistrationModel(replace(BONE, mesh=replace(mesh, vertices_mm=scaled)))
+        fitted = fit_bimcc(scene_of(MAP), model, TRUE, STEREO_SETTINGS)
+        verdict = verdict_on(fitted.camera_from_bone, model=model)
+        assert (Reason.SIZE_DIFFERS in verdict.reasons) == reasons
+
+
 def test_targets_far_from_the_seen_surface_are_less_certain() -> None:
     estimate = estimate_at(scene_of(MAP), MODEL, TRUE, STEREO_SETTINGS)
     judge = Judge(GEOMETRY, True)
