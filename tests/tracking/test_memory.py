@@ -45,4 +45,6 @@ def test_growth_is_the_slope_after_the_first_tenth() -> None:
     warming_up = np.where(frames < 200.0, -9000.0, 0.0)
     found = growth_of(frames, 4e5 + 0.25 * frames + noise + warming_up)
     assert abs(found.kib_per_1000 - 250.0) < 3.0 * found.sigma_kib_per_1000 < 60.0
-    assert growth_of(frames, np.full(frames.shape, 4e5)).kib_per_1000 == pytest.approx(0.0, abs=1e-6)
+    assert growth_of(frames, np.full(frames.shape, 4e5)).kib_per_1000 == pytest.approx(
+        0.0, abs=1e-6
+    )
