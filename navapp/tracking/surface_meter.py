@@ -143,7 +143,7 @@ class SurfaceMeter:
         near_mm, far_mm = self._depth_mm
         everything = None, (self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm))
         box, band_px = region or everything
-        return self.rectifier.rectify(luma(left), luma(right), box, band_px), band_px
+        return self.rectifier.rectify(left, right, box, band_px, is_grey=True), band_px
 
     def freely(
         self,
