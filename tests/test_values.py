@@ -274,3 +274,15 @@ def test_a_frame_without_an_estimate_has_no_pose():
     assert lost.left_from_bone is None
     found = dataclasses.replace(lost, estimate=estimate(np.eye(6)))
     assert found.left_from_bone is POSE
+
+
+def test_the_cause_comes_first_and_once_and_an_ok_has_none():
+    verdict = Verdict(PoseStatus.LOST, None, (Reason.TOO_FEW_POINTS,))
+    lost = TrackedFrame("femur", None, verdict, LineTimings())
+    assert lost.because(None) is lost
+    named = lost.because(Reason.PICTURES_SWAPPED)
+    assert named.verdict.reasons == (Reason.PICTURES_SWAPPED, Reason.TOO_FEW_POINTS)
+    assert named.because(Reason.PICTURES_SWAPPED).verdict.reasons == named.verdict.reasons
+    assert (verdict.cause, named.verdict.cause) == (None, Reason.PICTURES_SWAPPED)
+    fine = dataclasses.replace(lost, verdict=Verdict(PoseStatus.OK, 0.1))
+    assert fine.because(Reason.OTHER_SIDE) is fine

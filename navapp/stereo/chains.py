@@ -24,7 +24,7 @@ Smoothing = Literal["none", "gaussian", "wls"]
 
 # Below this share of left-right agreement the two pictures do not show the same scene that way
 # round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
-_LEAST_AGREEMENT = 0.15
+_LEAST_AGREEMENT, _MOST_AGREE = 0.15, 0.5
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
 _NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
 # Chance and repeated texture confirm a few per cent of any support, in specks.
@@ -133,6 +133,23 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray
         return np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
     surface_px = calmed(found.left.disparity_px)
     return doubled_disparity(surface_px, pair.box) if is_half else surface_px
+
+
+def are_swapped(
+    given: RectifiedPair, band_px: tuple[float, float], exchanged: RectifiedPair
+) -> bool:
+    """Whether two pictures show one scene the other way round only.
+
+    Exchanged, disparities have the other sign: the band that holds the scene holds nothing.
+
+    Args:
+        given: as the pictures came.
+        band_px: smallest and largest disparity of the scene around the box.
+        exchanged: the same, left called right before they were rectified.
+    """
+    if _coarse(_clipped(given), band_px).agreement >= _LEAST_AGREEMENT:
+        return False
+    return _coarse(_clipped(exchanged), band_px).agreement >= _MOST_AGREE
 
 
 def match_on_support(

@@ -94,6 +94,11 @@ class FitJudge:
         found = self._judge.agreement(self._model, pose, measured.disparity)
         return found.coverage * found.inlier_share
 
+    def is_there(self, fit: Fit) -> bool:
+        """Whether so much of the model agrees with what it was fitted to that it may be there."""
+        found = self._judge.agreement(self._model, fit.pose, fit.measured.disparity)
+        return not self._judge.is_elsewhere(found)
+
     def led_to(
         self,
         measured: Measurement,

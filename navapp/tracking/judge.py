@@ -4,6 +4,7 @@ A wrong pose is worse than none. The judge therefore looks at what did not enter
 of the model that should be seen was measured and agrees, not only how well paired points agree.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,9 @@ from navapp.values import (
 # Errors of a cartilage's thickness go together over much of a bone: no number of points averages
 # them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
 _COMMON_ERROR = 2.0
+# What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
+OK_ERROR_MM = 0.5
+_SURE_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +69,18 @@ class JudgeLimits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """What the judge measures a pose against: the stage's targets and tolerance."""
+    """What the judge measures a pose against.
+
+    Attributes:
+        targets_mm: (N, 3) of the stage, in bone coordinates.
+        tolerance_mm: of the stage: all that is known against the pose must stay below it.
+        seen_mm: what is seen must fix the pose at least so well. What the plan's own cartilage may
+            cost goes on top, in squares: no better view mends it.
+    """
 
     targets_mm: FloatArray
     tolerance_mm: float
+    seen_mm: float = OK_ERROR_MM
 
 
 class Judge:
@@ -123,9 +135,12 @@ class Judge:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
         is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
-        bound_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
-        bound_mm = float(np.hypot(bound_mm, _COMMON_ERROR * cartilage_mm))
+        by_plan_mm = _COMMON_ERROR * cartilage_mm
+        by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
+        bound_mm = float(np.hypot(by_view_mm, by_plan_mm))
         doubts = self._doubts(estimate, agreement)
+        doubts += [Reason.SIZE_DIFFERS] * _has_another_size(estimate, by_plan_mm)
+        doubts += [Reason.POSE_UNCERTAIN] * bool(by_view_mm > np.hypot(goal.seen_mm, by_plan_mm))
         doubts += [Reason.CARTILAGE_UNCERTAIN] * (cartilage_mm > self._limits.cartilage_sd_ok)
         doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > goal.tolerance_mm)
         doubts += [Reason.JUMPED] * self._has_jumped(model, estimate, predicted)
@@ -157,13 +172,20 @@ class Judge:
         doubts += [Reason.RIG_NOT_ACCEPTED] * (not self._is_rig_accepted)
         return doubts
 
-    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+    def is_elsewhere(self, agreement: Agreement) -> bool:
+        """So little of the model agrees that the bone is not there."""
         limits = self._limits
         return (
             agreement.open_coverage < limits.coverage_lost
             or agreement.coverage < limits.seen_lost
             or agreement.behind_share > limits.behind_lost
             or agreement.inlier_share < limits.inlier_lost
+        )
+
+    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+        limits = self._limits
+        return (
+            self.is_elsewhere(agreement)
             or estimate.rms_mm / estimate.expected_rms_mm > limits.rms_ratio_lost
             or Reason.TOO_FEW_POINTS in estimate.reasons
         )
@@ -203,6 +225,15 @@ class Judge:
             return float("inf")
         step = max(1, len(targets_mm) // self._limits.max_bound_targets)
         return predicted_tre_mm(estimate, model.centre_mm, targets_mm[::step])
+
+
+def _has_another_size(estimate: PoseEstimate, by_plan_mm: float) -> bool:
+    """The bone surely is of another size than the model, and that costs more than is promised.
+
+    Errors of a cartilage's thickness that go together look the same.
+    """
+    sigma_mm = math.hypot(estimate.size_sigma_mm, by_plan_mm)
+    return abs(estimate.size_mm) > max(OK_ERROR_MM, _SURE_SIGMAS * sigma_mm)
 
 
 def _rms(values: FloatArray) -> float:

@@ -4,6 +4,7 @@
 terminal; what is remembered between frames is handed in and out as a `TrackState`.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -13,6 +14,7 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, estimate_at
 from navapp.tracking.box_guide import BoxGuide
+from navapp.tracking.causes import Causes
 from navapp.tracking.first_look import FirstLook
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit, sum_timings
@@ -32,6 +34,8 @@ from navapp.values import (
     TrackedFrame,
 )
 
+# It is asked so often, counted in lost frames, whether the pictures are swapped.
+_LOST_BETWEEN = 10
 _BEST_FIRST = (Status.OK, Status.DEGRADED, Status.LOST)
 
 
@@ -82,7 +86,10 @@ class Line:
         first_look = FirstLook(meter.rectifier, self.model, depth_mm, aspects)
         self._meter, self._fit_judge, self._boxes = meter, judge, BoxGuide(rig, self.model)
         self._recovery = Recovery(meter, self.model, self.locator, judge)
-        self._registrar = Registrar(meter, self.model, self.locator, judge, first_look, n_refined)
+        self._causes = Causes(meter, self.model, judge)
+        self._registrar = Registrar(
+            meter, self.model, self.locator, judge, first_look, self._causes, n_refined
+        )
 
     @property
     def centre_mm(self) -> FloatArray:
@@ -112,6 +119,7 @@ class Line:
                 boxes = self._boxes.followed(boxes, left)
             places = self._boxes.starts(expected, boxes)
             tracked = self._searched(left, right, places, predicted, state.n_lost, tracked, goal)
+        tracked = tracked.because(self._cause(left, right, predicted, state, tracked))
         after = state.updated(tracked, captured_ns, self.centre_mm)
         # What is not followed does not place the box either.
         boxes = self._boxes.placed(boxes, left, tracked) if after.n_lost == 0 else boxes
@@ -164,16 +172,34 @@ class Line:
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
     ) -> TrackedFrame:
-        """Judge a pose as it stands, without moving it, by the surface that is seen there."""
+        """Judge a pose as it stands, without moving it, by the surface that is seen there.
+
+        Measured freely, a surface tells whether the pose is the right one, but fixes it less well
+        than a bone that is followed: only the stage's tolerance counts.
+        """
         pose = self._rectified(left_from_bone)
         pair, timings = self._rectified_pair(left, right, pose, NEAR_VIEW)
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._fit_judge.lost(Reason.OUT_OF_VIEW)
         estimate = estimate_at(measured.scene, self.model, pose, STEREO_SETTINGS)
-        return self._fit_judge.judged(
-            pair, Fit(estimate, measured, measured.timings), goal, timings
-        )
+        fit = Fit(estimate, measured, measured.timings)
+        return self._fit_judge.judged(pair, fit, replace(goal, seen_mm=math.inf), timings)
+
+    def _cause(
+        self,
+        left: Image,
+        right: Image,
+        expected: RigidTransform,
+        state: TrackState,
+        tracked: TrackedFrame,
+    ) -> Reason | None:
+        """What is wrong for good: as known, or looked for anew in some of the lost frames."""
+        is_lost = tracked.verdict.status is Status.LOST
+        is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
+        if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
+            return state.cause
+        return self._causes.of_loss(left, right, expected)
 
     def _rectified_pair(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins = WIDE_VIEW

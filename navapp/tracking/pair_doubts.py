@@ -5,10 +5,9 @@ from dataclasses import replace
 
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.stereo import PictureHealth, StereoHealth
+from navapp.tracking.judge import OK_ERROR_MM
 from navapp.values import Reason, Status, Verdict
 
-# What a moved rig may cost: where an OK pose has to be right to.
-_COST_MM = 0.5
 _SURE_SIGMAS = 3.0
 # A bone fills half of its box and more; what lies around it may be black.
 _UNUSABLE_SHARE = 0.7
@@ -50,7 +49,7 @@ def pair_doubts(
     doubts = [Reason.PICTURE_DARK] * is_dark + [Reason.PICTURE_OVEREXPOSED] * is_clipped
     if not doubts:
         doubts += [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
-    is_off = health.has_lost_rows or bool(_row_cost_mm(health, geometry, depth_mm) > _COST_MM)
+    is_off = health.has_lost_rows or bool(_row_cost_mm(health, geometry, depth_mm) > OK_ERROR_MM)
     doubts += [Reason.ROWS_DISAGREE] * is_off
     return tuple(doubts)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, distinct, scattered_starts, tilted_starts
+from navapp.tracking.causes import Causes
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit
@@ -34,6 +35,7 @@ class Registrar:
         locator: Locator,
         fit_judge: FitJudge,
         first_look: FirstLook,
+        causes: Causes,
         n_refined: int,
     ) -> None:
         """Join what measures, locates and judges.
@@ -44,11 +46,12 @@ class Registrar:
             locator: of the bone.
             fit_judge: of its fits.
             first_look: tells where the bone may be without a pose.
+            causes: tells what is wrong for good when the bone is not found.
             n_refined: so many answers of a search are refined.
         """
         self._meter, self._model = meter, model
         self._locator, self._fit_judge = locator, fit_judge
-        self._first_look, self._n_refined = first_look, n_refined
+        self._first_look, self._causes, self._n_refined = first_look, causes, n_refined
 
     def register(
         self,
@@ -61,10 +64,17 @@ class Registrar:
         """Distinct candidates, best first; see `Line.register`."""
         start = prior.left_from_bone.get(self._model.bone.name)
         if start is None:
-            return self._anywhere(left, right, prior, goal, on_progress)
-        rough = self._meter.geometry.rectified_from_left @ start
-        pair, timings = self._meter.rectified(left, right, rough, WIDE_VIEW)
-        return self._around(pair, rough, goal, timings, on_progress)
+            answers = self._anywhere(left, right, prior, goal, on_progress)
+            start = answers[0].left_from_bone if answers else None
+        else:
+            rough = self._meter.geometry.rectified_from_left @ start
+            pair, timings = self._meter.rectified(left, right, rough, WIDE_VIEW)
+            answers = self._around(pair, rough, goal, timings, on_progress)
+        if not answers or answers[0].verdict.status is Status.OK or self._locator.is_baseline:
+            return answers
+        around = None if start is None else self._meter.geometry.rectified_from_left @ start
+        cause = self._causes.of_failure(left, right, around, answers[0], on_progress)
+        return [answer.because(cause) for answer in answers]
 
     def _around(
         self,

@@ -135,6 +135,16 @@ class SurfaceMeter:
         pair = self.rectifier.rectify(left, right, box, band_px, is_grey=True)
         return pair, LineTimings(rectify_ms=_ms_since(started))
 
+    def surroundings(
+        self, left: Image, right: Image, around: RigidTransform | None
+    ) -> tuple[RectifiedPair, tuple[float, float]]:
+        """Both pictures around a pose, and the disparities there; the whole view without one."""
+        region = None if around is None else self._region(around, _AROUND)
+        near_mm, far_mm = self._depth_mm
+        everything = None, (self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm))
+        box, band_px = region or everything
+        return self.rectifier.rectify(left, right, box, band_px, is_grey=True), band_px
+
     def freely(
         self,
         pair: RectifiedPair,
