@@ -16,6 +16,7 @@ from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.pair_doubts import with_pair_doubts
+from navapp.tracking.smooth_misfit import with_smooth_misfit
 from navapp.tracking.surface_meter import Measurement, RoughMap, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
@@ -69,6 +70,8 @@ class FitJudge:
         health = beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm)))
         rough_px = self.rough_px(pair, fit, rough)
         fit = self._contours.joined(pair, fit, rough_px)
+        if fit.measured.view is not None:
+            fit = replace(fit, estimate=with_smooth_misfit(fit.estimate))
         view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
         verdict = self._judge.judge(
             self._model, fit.estimate, found, goal, predicted, rough_px, view
