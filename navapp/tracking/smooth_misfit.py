@@ -29,6 +29,11 @@ def shown_ratio2(estimate: PoseEstimate) -> float:
     return float(noise_under_kernel_mm2(estimate.rms_mm**2, 1.0, kernel_mm)) / claimed_mm**2
 
 
+def is_misfit(estimate: PoseEstimate) -> bool:
+    """Whether residuals of a fit on the model have more in common than they have noise."""
+    return shown_ratio2(estimate) > _LARGEST_RATIO2
+
+
 def with_smooth_misfit(estimate: PoseEstimate) -> PoseEstimate:
     """An estimate on the model with what its residuals show beyond noise in its covariance.
 
@@ -36,8 +41,7 @@ def with_smooth_misfit(estimate: PoseEstimate) -> PoseEstimate:
     matching window: with e the ratio of its variance to the one that is claimed, the covariance
     grows by 1 + e (l_free / l_model)^2. When it is as large as the noise, the surface does not fit.
     """
-    ratio2 = shown_ratio2(estimate)
-    excess = max(0.0, ratio2 - _NOISE_RATIO**2)
+    excess = max(0.0, shown_ratio2(estimate) - _NOISE_RATIO**2)
     growth = 1.0 + excess * (FREE_CORRELATION_PX / MODEL_CORRELATION_PX) ** 2
     widened = replace(estimate, covariance=growth * estimate.covariance)
-    return widened.doubted(Reason.SURFACE_MISFIT) if ratio2 > _LARGEST_RATIO2 else widened
+    return widened.doubted(Reason.SURFACE_MISFIT) if is_misfit(estimate) else widened

@@ -143,6 +143,11 @@ class Verdict:
     rms_mm: float | None = None
     expected_rms_mm: float | None = None
 
+    @property
+    def rank(self) -> int:
+        """Of its status: 0 is the best."""
+        return list(Status).index(self.status)
+
 
 @dataclass(frozen=True, slots=True)
 class LineTimings:
