@@ -16,6 +16,7 @@ from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.pair_doubts import with_pair_doubts
+from navapp.tracking.smooth_misfit import with_smooth_misfit
 from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
@@ -69,6 +70,8 @@ class FitJudge:
         with beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm))) as health:
             coarse_px = self.coarse_px(pair, fit, coarse)
             fit = self._contours.joined(pair, fit, coarse_px)
+            if fit.measured.view is not None:
+                fit = replace(fit, estimate=with_smooth_misfit(fit.estimate))
             view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
             verdict = self._judge.judge(
                 self._model, fit.estimate, found, goal, predicted, coarse_px, view

@@ -148,7 +148,7 @@ class Judge:
         return Verdict(
             Status.LOST if is_lost else (Status.DEGRADED if doubts else Status.OK),
             bound_mm,
-            tuple(doubts),
+            tuple(dict.fromkeys(doubts)),
             agreement.coverage,
             agreement.hidden_share,
             agreement.inlier_share,

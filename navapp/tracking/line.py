@@ -5,7 +5,7 @@ terminal; what is remembered between frames is handed in and out as a `TrackStat
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from navapp.geometry.bands import beside
@@ -14,13 +14,14 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, estimate_at
 from navapp.tracking.box_guide import BoxGuide
+from navapp.tracking.buried import BuriedBone
 from navapp.tracking.causes import Causes
 from navapp.tracking.first_look import FirstLook
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal
 from navapp.tracking.locator import NEAR_VIEW, STEREO_SETTINGS, WIDE_VIEW, Locator, LocatorSettings
-from navapp.tracking.motion import TrackState
+from navapp.tracking.motion import TrackState, is_place_doubted
 from navapp.tracking.recovery import Recovery
 from navapp.tracking.registrar import Registrar
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
@@ -36,7 +37,6 @@ from navapp.values import (
 
 # It is asked so often, counted in lost frames, whether the pictures are swapped.
 _LOST_BETWEEN = 10
-_BEST_FIRST = (Status.OK, Status.DEGRADED, Status.LOST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +86,17 @@ class Line:
         first_look = FirstLook(meter.rectifier, self.model, depth_mm, aspects)
         self._meter, self._fit_judge, self._boxes = meter, judge, BoxGuide(rig, self.model)
         self._recovery = Recovery(meter, self.model, self.locator, judge)
+        self._buried = BuriedBone(meter, self.model, self.settings.locator)
         self._causes = Causes(meter, self.model, judge)
         self._registrar = Registrar(
-            meter, self.model, self.locator, judge, first_look, self._causes, n_refined
+            meter,
+            self.model,
+            self.locator,
+            judge,
+            first_look,
+            self._buried,
+            self._causes,
+            n_refined,
         )
 
     @property
@@ -110,10 +118,7 @@ class Line:
         if state.n_lost == 0:
             start = self._rectified(expected)
             pair, timings = self._rectified_pair(left, right, start, NEAR_VIEW)
-            # What may hide the bone does not depend on where exactly it is.
-            with beside(lambda: self._meter.coarsely(pair, start)) as coarse:
-                fit = self.locator.locate(pair, start)
-            tracked = self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse.result())
+            tracked = self._near(pair, start, predicted, goal, timings)
         if tracked.verdict.status is Status.LOST:
             if not self.locator.is_baseline:
                 boxes = self._boxes.followed(boxes, left)
@@ -124,6 +129,30 @@ class Line:
         # What is not followed does not place the box either.
         boxes = self._boxes.placed(boxes, left, tracked) if after.n_lost == 0 else boxes
         return tracked, replace(after, box=boxes)
+
+    def _near(
+        self,
+        pair: RectifiedPair,
+        start: RigidTransform,
+        predicted: RigidTransform,
+        goal: Goal,
+        timings: LineTimings,
+    ) -> TrackedFrame:
+        """The answer near an expected pose; when its place is in doubt, that of a buried bone."""
+        # What may hide the bone does not depend on where exactly it is.
+        with beside(lambda: self._meter.coarsely(pair, start)) as job:
+            fit = self.locator.locate(pair, start)
+            coarse = job.result()
+        answers = [self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse)]
+        if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
+            return answers[0]
+        for buried in self._buried.followed(pair, start):
+            timings = answers[-1].timings
+            answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
+            if answers[-1].verdict.status is Status.OK:
+                break
+        # Of equals, what was looked for from more starts.
+        return replace(_best(reversed(answers)), timings=answers[-1].timings)
 
     def _searched(
         self,
@@ -147,8 +176,7 @@ class Line:
             if answers[-1].verdict.status is Status.OK:
                 break
         # Of equals, what came later knows more.
-        best = min(reversed(answers), key=lambda one: _BEST_FIRST.index(one.verdict.status))
-        return replace(best, timings=timings)
+        return replace(_best(reversed(answers)), timings=timings)
 
     def register(
         self,
@@ -208,3 +236,8 @@ class Line:
 
     def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
         return self._meter.geometry.rectified_from_left @ left_from_bone
+
+
+def _best(answers: Iterable[TrackedFrame]) -> TrackedFrame:
+    """The first of those with the best status."""
+    return min(answers, key=lambda one: one.verdict.rank)

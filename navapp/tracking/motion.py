@@ -6,7 +6,7 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform, vector_from_rotation
 from navapp.tracking.box_tracker import BoxState
-from navapp.values import Reason, Status, TrackedFrame
+from navapp.values import Reason, Status, TrackedFrame, Verdict
 
 # A patient's limb slows down: the prediction takes this part of the last velocity.
 _DAMPING = 0.7
@@ -81,6 +81,11 @@ class TrackState:
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
             velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
         return TrackState(pose, captured_ns, velocity, 0, self.box, verdict.cause)
+
+
+def is_place_doubted(verdict: Verdict) -> bool:
+    """Whether something speaks against a pose's place; always when it is lost."""
+    return verdict.status is Status.LOST or not _AGAINST.isdisjoint(verdict.reasons)
 
 
 def twist_between(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> FloatArray:

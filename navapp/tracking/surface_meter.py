@@ -25,7 +25,7 @@ from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
-FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
+FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
 _SAMPLED = RefineSettings(n_steps=3, last_step_px=0.3)
 _SAMPLES_PX = 6
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
@@ -211,9 +211,7 @@ class SurfaceMeter:
         found, is_expected = answer.disparity, np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
         share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)
-        return Measurement(
-            found, cloud, answer.timings, share, _MODEL_CORRELATION_PX, expected.view
-        )
+        return Measurement(found, cloud, answer.timings, share, MODEL_CORRELATION_PX, expected.view)
 
     def sampled(self, expected: Expected) -> Measurement:
         """As `on_model`, only on samples, in more steps: it sees further, and is soon done.
@@ -228,7 +226,7 @@ class SurfaceMeter:
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = reproject(found, self.geometry, _SAMPLES_PX)
         timings = LineTimings(stereo_ms=_ms_since(started))
-        return Measurement(found, cloud, timings, share, _MODEL_CORRELATION_PX, expected.view)
+        return Measurement(found, cloud, timings, share, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About as many points as the line wants."""

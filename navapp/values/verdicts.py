@@ -164,6 +164,11 @@ class Verdict:
         """What is wrong for good, when that was found out."""
         return next((reason for reason in self.reasons if reason in _FOR_GOOD), None)
 
+    @property
+    def rank(self) -> int:
+        """Of its status: 0 is the best."""
+        return list(Status).index(self.status)
+
 
 @dataclass(frozen=True, slots=True)
 class LineTimings:
