@@ -3,22 +3,24 @@
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.errors import RigError
-from navapp.geometry.bands import beside, in_row_bands
-from navapp.geometry.float_lane_kernels import LANES, lanes_for
-from navapp.geometry.resample_kernels import Places, resample_rows
+from navapp.geometry.bands import beside
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
+
+if TYPE_CHECKING:
+    # Kernels are loaded at first use: the command line starts without a compiler.
+    from navapp.geometry.resample_kernels import Places
 
 Image = NDArray[np.uint8]
 
 # Pixels on either side that interpolation and sub-pixel steps ask for.
-_TAPS = 8
+TAPS_PX = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,25 +245,30 @@ class Rectifier:
                 )
         if left.shape != right.shape:
             raise ValueError("one picture of the pair is grey and the other coloured")
+        from navapp.geometry.resampling import luma_for, resampled
+
         whole = Box(0, 0, self.rig.width, self.rig.height)
         inside = whole if box is None else box.clipped(whole.width, whole.height)
         in_left, in_right = whole, whole
         if band_px is not None:
-            first = inside.x - math.ceil(band_px[1]) - _TAPS
-            last = inside.x + inside.width - math.floor(band_px[0]) + _TAPS
+            first = inside.x - math.ceil(band_px[1]) - TAPS_PX
+            last = inside.x + inside.width - math.floor(band_px[0]) + TAPS_PX
             in_left, in_right = inside, replace(inside, x=first, width=last - first)
         for_left, for_right = self._places
 
-        def of(picture: Image, places: Places, part: Box) -> Image:
+        def of(picture: Image, places: "Places", part: Box) -> Image:
             grey = luma_for(picture, places, part) if is_grey else picture
             return resampled(grey, places, part)
 
-        of_right = beside(lambda: of(right, for_right, in_right))
-        return RectifiedPair(of(left, for_left, in_left), of_right.result(), self.geometry, inside)
+        with beside(lambda: of(right, for_right, in_right)) as of_right:
+            of_left = of(left, for_left, in_left)
+        return RectifiedPair(of_left, of_right.result(), self.geometry, inside)
 
     @cached_property
-    def _places(self) -> tuple[Places, Places]:
+    def _places(self) -> "tuple[Places, Places]":
         """Where the rectified pixels lie in the left and in the right picture."""
+        from navapp.geometry.resampling import find_places
+
         left_x, left_y, right_x, right_y = self.maps
         return find_places(left_x, left_y), find_places(right_x, right_y)
 
@@ -273,91 +280,3 @@ def luma(picture: Image) -> Image:
     if picture.ndim == 2:
         return picture
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-
-
-def luma_for(picture: Image, places: Places, part: Box) -> Image:
-    """The grey picture where a part of its rectified one asks for it; anything elsewhere."""
-    import cv2
-
-    if picture.ndim == 2:
-        return picture
-    grey = np.empty(picture.shape[:2], dtype=np.uint8)
-    asked = _reached(places, part)
-    if not asked.is_empty:
-        rows, columns = (
-            slice(asked.y, asked.y + asked.height),
-            slice(asked.x, asked.x + asked.width),
-        )
-        cv2.cvtColor(picture[rows, columns], cv2.COLOR_BGR2GRAY, dst=grey[rows, columns])
-    return grey
-
-
-def _reached(places: Places, part: Box) -> Box:
-    """What of the other picture a part of the rectified one is made of."""
-    height, width = places.columns.shape
-    inside = part.clipped(width, height)
-    if inside.is_empty:
-        return inside
-    low, high = inside.y, inside.y + inside.height - 1
-    ends = places.columns[low : high + 1, [inside.x, inside.x + inside.width - 1]]
-    first, last = np.clip([ends.min() - _TAPS, ends.max() + _TAPS], 0, width - 1).astype(int)
-    curves = places.rows[[low, high], first : last + 1]
-    top, bottom = np.clip([curves.min() - _TAPS, curves.max() + _TAPS], 0, height - 1).astype(int)
-    return Box(int(first), int(top), int(last - first + 1), int(bottom - top + 1))
-
-
-def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> Places:
-    """Where to look for pixels (h, w), from smooth maps of both coordinates; columns grow in them.
-
-    The other picture has the same size.
-    """
-    height, width = columns.shape
-    at = np.arange(width)
-    crossings = np.empty((height, width), dtype=np.float32)
-    for y in range(height):
-        # Interpolation looks beyond either end.
-        reached, found = (np.pad(line[y], 1, _goes_on) for line in (columns, rows))
-        crossings[y] = np.interp(at, np.maximum.accumulate(reached), found)
-    is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
-    steps = _blocks(np.floor(columns) - at.astype(np.float32))
-    lines = _blocks(np.floor(crossings))
-    in_step = ((steps == steps[..., :1]) | (steps == steps[..., -1:])).all(axis=2)
-    in_row = (lines == lines[..., :1]).all(axis=2)
-    return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
-
-
-def _goes_on(line: NDArray[np.float32], *_: object) -> None:
-    """Straight on at either end of a line, by so many pixels as interpolation asks for."""
-    line[0] = line[1] + _TAPS * (line[1] - line[2])
-    line[-1] = line[-2] + _TAPS * (line[-2] - line[-3])
-
-
-def _blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(h, blocks, LANES) of (h, w); a cut block is filled up with numbers that are not the same."""
-    height, width = values.shape
-    full = np.full((height, lanes_for(width)), np.nan, dtype=np.float32)
-    full[:, :width] = values
-    return full.reshape(height, -1, LANES)
-
-
-def resampled(picture: Image, places: Places, part: Box | None = None) -> Image:
-    """The picture at real places (h, w), cubic over six pixels; 0 outside it, and outside a part.
-
-    Linear interpolation, and less so a cubic over four pixels, blurs by where a pixel falls;
-    OpenCV's cubic (a = -0.75) bends a ramp: all tilt a disparity that is measured to a part of a
-    pixel.
-    """
-    if picture.ndim == 3:
-        return np.dstack([resampled(picture[..., k], places, part) for k in range(3)])
-    picture = np.ascontiguousarray(picture)
-    values = np.zeros(places.columns.shape, dtype=np.uint8)
-    height, width = places.columns.shape
-    inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
-    if inside.is_empty:
-        return values
-    top, span = inside.y, (inside.x, inside.x + inside.width)
-    in_row_bands(
-        inside.height,
-        lambda first, last: resample_rows(picture, places, (top + first, top + last), span, values),
-    )
-    return values

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import beside
 from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
@@ -28,18 +29,18 @@ class FitJudge:
     """Judges fits of one bone under one rig; holds only what is constant."""
 
     def __init__(
-        self, meter: SurfaceMeter, model: RegistrationModel, is_rig_accepted: bool
+        self, meter: SurfaceMeter, model: RegistrationModel, quality: RigQuality | None
     ) -> None:
         """Join what is judged and what tells what hides it.
 
         Args:
             meter: measures surfaces.
             model: of the bone.
-            is_rig_accepted: the rig's calibration is good enough for an OK.
+            quality: what the rig's calibration says of itself.
         """
         self._meter = meter
         self._model = model
-        self._judge = Judge(meter.geometry, is_rig_accepted)
+        self._judge = Judge(meter.geometry, quality)
         self._contours = ContourMeter(model, meter.geometry)
 
     def judged(

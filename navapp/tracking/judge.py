@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedGeometry
+from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
@@ -84,13 +85,23 @@ class Goal:
 
 
 class Judge:
-    """Judges poses of one bone under one rig."""
+    """Judges poses of one bone under one rig.
+
+    Args:
+        geometry: of the rectified rig.
+        quality: what the calibration says of itself; without it the rig is taken as it is.
+        limits: what keeps a pose from being OK.
+    """
 
     def __init__(
-        self, geometry: RectifiedGeometry, is_rig_accepted: bool, limits: JudgeLimits | None = None
+        self,
+        geometry: RectifiedGeometry,
+        quality: RigQuality | None = None,
+        limits: JudgeLimits | None = None,
     ) -> None:
         self._geometry = geometry
-        self._is_rig_accepted = is_rig_accepted
+        self._is_rig_accepted = quality is None or quality.is_accepted
+        self._by_rig_mm = 0.0 if quality is None else quality.uncertainty_mm or 0.0
         self._limits = limits or JudgeLimits()
 
     def agreement(
@@ -137,7 +148,7 @@ class Judge:
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
         by_plan_mm = _COMMON_ERROR * cartilage_mm
         by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
-        bound_mm = float(np.hypot(by_view_mm, by_plan_mm))
+        bound_mm = math.hypot(by_view_mm, by_plan_mm, self._by_rig_mm)
         doubts = self._doubts(estimate, agreement)
         doubts += [Reason.SIZE_DIFFERS] * _has_another_size(estimate, by_plan_mm)
         doubts += [Reason.POSE_UNCERTAIN] * bool(by_view_mm > np.hypot(goal.seen_mm, by_plan_mm))

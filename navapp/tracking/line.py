@@ -80,8 +80,7 @@ class Line:
         self.model = RegistrationModel(bone)
         depth_mm, n_refined = self.settings.depth_mm, self.settings.n_refined
         meter = SurfaceMeter(rig, self.model, depth_mm, self.settings.max_points)
-        is_accepted = rig.quality is None or rig.quality.is_accepted
-        judge = FitJudge(meter, self.model, is_accepted)
+        judge = FitJudge(meter, self.model, rig.quality)
         self.locator = Locator(meter, self.model, judge.score, self.settings.locator)
         first_look = FirstLook(meter.rectifier, self.model, depth_mm, aspects)
         self._meter, self._fit_judge, self._boxes = meter, judge, BoxGuide(rig, self.model)
