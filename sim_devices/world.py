@@ -55,6 +55,7 @@ class World:
 
     Args:
         scenario: patient, scene, motion.
+        rig: that looks; the default one when absent.
 
     Raises:
         UsageError: the scenario starts with a stage that does not exist.
@@ -62,9 +63,9 @@ class World:
 
     approach_half_angle_deg = 30.0
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, rig: StereoRig | None = None) -> None:
         self.scenario = scenario
-        self.rig: StereoRig = default_rig()
+        self.rig: StereoRig = rig or default_rig()
         self.anatomy: KneeAnatomy = make_knee(scenario.knee)
         self._is_left = scenario.side == "left"
         right = {

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import Box
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import (
     BoneModel,
@@ -238,6 +239,11 @@ def test_the_matched_share_counts_measured_pixels_only():
     assert dataclasses.replace(disparity, origin=nothing.astype(np.uint8)).matched_share == 0.0
 
 
+def test_a_map_knows_its_place_in_the_picture():
+    wide = np.zeros((2, 5), dtype=np.float32)
+    assert DisparityMap(wide, wide, wide.astype(np.uint8), 3, 4).box == Box(3, 4, 5, 2)
+
+
 def test_a_part_of_a_cloud_keeps_its_columns_together():
     cloud = SurfaceCloud(
         np.arange(12.0).reshape(4, 3),
@@ -268,3 +274,15 @@ def test_a_frame_without_an_estimate_has_no_pose():
     assert lost.left_from_bone is None
     found = dataclasses.replace(lost, estimate=estimate(np.eye(6)))
     assert found.left_from_bone is POSE
+
+
+def test_the_cause_comes_first_and_once_and_an_ok_has_none():
+    verdict = Verdict(PoseStatus.LOST, None, (Reason.TOO_FEW_POINTS,))
+    lost = TrackedFrame("femur", None, verdict, LineTimings())
+    assert lost.because(None) is lost
+    named = lost.because(Reason.PICTURES_SWAPPED)
+    assert named.verdict.reasons == (Reason.PICTURES_SWAPPED, Reason.TOO_FEW_POINTS)
+    assert named.because(Reason.PICTURES_SWAPPED).verdict.reasons == named.verdict.reasons
+    assert (verdict.cause, named.verdict.cause) == (None, Reason.PICTURES_SWAPPED)
+    fine = dataclasses.replace(lost, verdict=Verdict(PoseStatus.OK, 0.1))
+    assert fine.because(Reason.OTHER_SIDE) is fine

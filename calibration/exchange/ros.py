@@ -17,10 +17,10 @@ from calibration.exchange.lens_models import coefficients, n_used
 from calibration.exchange.yaml_files import entry, numbers, read_mapping, unusable
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
-from navapp.geometry.ply import write_whole
 from navapp.geometry.rectification import Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.whole_files import write_whole
 
 FORM = "ROS camera_info"
 _SIDES = ("left", "right")

@@ -8,7 +8,7 @@ import numpy as np
 from calibration.report import plots
 from calibration.rig.judge import Limits
 from calibration.rig.solve import Calibration
-from navapp.geometry.ply import write_whole
+from navapp.geometry.whole_files import write_whole
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1a202c; max-width: 62em; margin: 2em auto;

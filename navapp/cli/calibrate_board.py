@@ -36,7 +36,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Draw and write."""
     from calibration.targets.boards import keys_of, read_board
     from calibration.targets.printing import Sheet, printed
-    from navapp.geometry.ply import write_whole
+    from navapp.geometry.whole_files import write_whole
 
     form = Path(options.out).suffix.lower().lstrip(".")
     if form not in ("pdf", "svg"):

@@ -24,7 +24,7 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
     from navapp.config import FILE_NAME, Configuration, as_toml, find_file, load
-    from navapp.geometry.ply import write_whole
+    from navapp.geometry.whole_files import write_whole
 
     check_writable(options.json)
     path: Path | None

@@ -11,7 +11,7 @@ from typing import Any
 
 from navapp import __version__
 from navapp.errors import InputError
-from navapp.geometry.ply import write_whole
+from navapp.geometry.whole_files import write_whole
 
 
 @dataclass(frozen=True, slots=True)

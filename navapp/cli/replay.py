@@ -204,7 +204,8 @@ def _controller(
     configuration: "Configuration",
     listeners: "Sequence[FrameListener]",
 ) -> "SessionController":
-    from navapp.control.controller import SessionController, SessionHooks, SessionOptions
+    from navapp.control.controller import SessionController, SessionOptions
+    from navapp.control.session import SessionHooks
     from navapp.tracking import LineSettings, LocatorSettings
 
     return SessionController(

@@ -3,23 +3,18 @@
 import argparse
 import tempfile
 import tomllib
-from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
+from navapp.cli.live_session import LiveSession, controller_of, prepared
 from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
-    from navapp.control.controller import SessionController, SessionHooks
     from navapp.control.operators import ScriptStep
-    from navapp.control.results import FrameListener, FrameResult
-    from navapp.devices import OpenedDevices
-    from navapp.values import Plan, Prior, StageSpec
+    from navapp.control.results import FrameResult
 
 _EXAMPLE = """\
 examples:
@@ -51,17 +46,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Session:
-    """A session that is about to start."""
-
-    configuration: "Configuration"
-    opened: "OpenedDevices"
-    plan: "Plan"
-    prior: "Prior"
-    stage: "StageSpec"
-
-
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
     from navapp.config import find_file, load
@@ -73,7 +57,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     check_writable(options.json)
     configuration = _with_options(load(find_file(options.config)), options)
     script = _script(options.operator)
-    session = _prepare(configuration, options, diagnostics)
+    session = prepared(configuration, options, diagnostics)
     if options.headless:
         return _run_headless(session, script, options, diagnostics)
     return _run_screen(session, options, diagnostics)
@@ -112,104 +96,8 @@ def _script(path: str | None) -> "tuple[ScriptStep, ...]":
         ) from error
 
 
-def _prepare(
-    configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
-) -> _Session:
-    """Read everything that is given, then open the devices; closed again when that is refused."""
-    from navapp.cli.headless import check_accepted, check_not_expired, check_start
-    from navapp.cli.prior_files import read_prior
-    from navapp.cli.simulated_patient import built_in_plan, nominal_prior
-    from navapp.control.stages import stage_by_name
-    from navapp.devices import open_live
-    from navapp.preop import read_plan
-    from navapp.values import Prior
-
-    given = configuration.plan
-    stage = stage_by_name(options.stage or configuration.stages.first)
-    plan = None if given.path is None else read_plan(given.path)
-    prior = None if given.prior is None else read_prior(given.prior)
-    opened = open_live(configuration, is_headless=options.headless)
-    with ExitStack() as undo:
-        undo.callback(opened.devices.close)
-        check_not_expired(opened.rig, date.today())
-        check_accepted(opened.rig, options.allow_unaccepted, diagnostics)
-        if opened.simulation is not None:
-            plan = plan or built_in_plan(opened.simulation)
-            prior = prior or nominal_prior(opened.simulation)
-        if plan is None:
-            raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
-        prior = prior or Prior()
-        if options.headless:
-            check_start(prior, stage)
-        undo.pop_all()
-    return _Session(configuration, opened, plan, prior, stage)
-
-
-def _controller(
-    session: _Session, *, is_inline: bool, on_frame: "Sequence[FrameListener]", undo: ExitStack
-) -> "SessionController":
-    """The controller with its listeners and, when asked for, its recorder."""
-    from navapp.control.controller import SessionController, SessionOptions
-    from navapp.control.executors import InlineExecutor, ThreadExecutor
-    from navapp.tracking import LineSettings, LocatorSettings
-
-    configuration, opened = session.configuration, session.opened
-    return SessionController(
-        opened.devices,
-        opened.rig,
-        session.plan,
-        session.prior,
-        executor=InlineExecutor() if is_inline else ThreadExecutor(),
-        options=SessionOptions(
-            line=LineSettings(
-                LocatorSettings(method=configuration.tracking.method),
-                depth_mm=configuration.camera.depth_mm,
-            ),
-            first_stage=session.stage,
-            overlay_valid_ms=configuration.display.valid_ms,
-            is_recording=configuration.recording.folder is not None,
-        ),
-        hooks=_listening(session, on_frame, undo),
-    )
-
-
-def _listening(
-    session: _Session, on_frame: "Sequence[FrameListener]", undo: ExitStack
-) -> "SessionHooks":
-    """Who is told: the caller, the simulated room, and the recorder when there is one."""
-    from navapp.cli.session_folder import discard_if_empty, start_recording
-    from navapp.control.controller import SessionHooks
-
-    configuration, opened = session.configuration, session.opened
-    hooks = SessionHooks(
-        on_frame=tuple(on_frame),
-        on_stage=() if opened.simulation is None else (opened.simulation.set_stage,),
-        reopen_camera=opened.reopen_camera,
-    )
-    folder = configuration.recording.folder
-    if folder is None:
-        return hooks
-    recorder = start_recording(
-        folder,
-        configuration,
-        opened.rig,
-        session.plan,
-        session.prior,
-        first_stage=session.stage.name,
-    )
-    undo.callback(discard_if_empty, folder)
-    undo.callback(recorder.close)
-    return replace(
-        hooks,
-        on_frame=(*hooks.on_frame, recorder.on_frame),
-        on_event=(recorder.on_event,),
-        on_command=(recorder.on_command,),
-        on_take_over=(recorder.on_take_over,),
-    )
-
-
 def _run_headless(
-    session: _Session,
+    session: LiveSession,
     script: "tuple[ScriptStep, ...]",
     options: argparse.Namespace,
     diagnostics: Diagnostics,
@@ -221,14 +109,14 @@ def _run_headless(
     log = FrameLog(options.frames, diagnostics)
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = _controller(session, is_inline=True, on_frame=[log], undo=undo)
+        controller = controller_of(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
         seconds = follow(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     return finish(frames, seconds, controller.lost_device, options, diagnostics)
 
 
-def _tre_mm(result: "FrameResult", session: _Session) -> float | None:
+def _tre_mm(result: "FrameResult", session: LiveSession) -> float | None:
     """Join a frame with the truth, after the run."""
     from navapp.evaluation import mean_tre_mm
 
@@ -242,7 +130,7 @@ def _tre_mm(result: "FrameResult", session: _Session) -> float | None:
     return mean_tre_mm(tracked.left_from_bone, true, session.plan.bones[tracked.bone], targets)
 
 
-def _run_screen(session: _Session, options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.control.runner import SessionRunner
     from navapp.control.states import Quit
     from navapp.ui.app import run_app
@@ -257,7 +145,7 @@ def _run_screen(session: _Session, options: argparse.Namespace, diagnostics: Dia
 
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = _controller(session, is_inline=False, on_frame=[count], undo=undo)
+        controller = controller_of(session, is_inline=False, on_frame=[count], undo=undo)
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()

@@ -13,9 +13,9 @@ from navapp.config import Configuration, as_toml
 from navapp.control.operators import RecordedEvents, read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
 from navapp.errors import SequenceError
-from navapp.geometry.ply import write_whole
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import write_rig
+from navapp.geometry.whole_files import write_whole
 from navapp.preop import write_plan
 from navapp.tracking import Method
 from navapp.values import Plan, Prior

@@ -1,22 +1,17 @@
 """`navapp stereo`: the disparity of one pair."""
 
 import argparse
-import json
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import InputError, PriorError, ResultError, UsageError
+from navapp.cli.stereo_pair import Pair, expected_px, read_pair, searched_band
+from navapp.errors import ResultError, UsageError
 
 if TYPE_CHECKING:
-    from navapp.geometry.rectification import RectifiedPair, Rectifier
     from navapp.stereo.chains import StereoAnswer
-
-Image = NDArray[np.uint8]
 
 _METRIC_GAP_PX = 40
 
@@ -64,21 +59,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pair:
-    """A pair ready to be matched."""
-
-    rectified: "RectifiedPair"
-    rectifier: "Rectifier | None"
-    rectify_ms: float
-
-
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Match the pair, write what was asked for; the exit code."""
     from navapp.stereo import smoothed
 
     _check(options)
-    pair = _rectified(_read(options.left), _read(options.right), options)
+    pair = read_pair(options)
     shape = pair.rectified.left.shape
     if options.json != "-":
         diagnostics.say(f"matching {shape[1]}x{shape[0]} (compiles first, once on a machine)")
@@ -130,70 +116,7 @@ def _check(options: argparse.Namespace) -> None:
     check_writable(options.json)
 
 
-def _read(path: str) -> Image:
-    """A picture, grey or colour; decoded from memory, which notices files that are cut short."""
-    import cv2
-
-    try:
-        content = np.frombuffer(Path(path).read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise InputError(
-            f"picture {path} cannot be read ({error.strerror})",
-            subject=path,
-            remedy="give an existing picture",
-        ) from error
-    picture = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
-    if picture is None or picture.dtype != np.uint8:
-        raise InputError(
-            f"picture {path} is damaged or not an 8-bit picture",
-            subject=path,
-            remedy="export it again as 8-bit PNG or JPEG",
-        )
-    return np.asarray(picture[..., :3] if picture.ndim == 3 else picture, dtype=np.uint8)
-
-
-def _rectified(left: Image, right: Image, options: argparse.Namespace) -> _Pair:
-    """Both pictures grey and rectified; without a rig they are taken as they are."""
-    import time
-
-    from navapp.geometry.rectification import (
-        Box,
-        RectifiedGeometry,
-        RectifiedPair,
-        Rectifier,
-        luma,
-    )
-    from navapp.geometry.rig_files import read_rig
-    from navapp.geometry.transform import RigidTransform
-
-    if left.shape != right.shape:
-        raise InputError(
-            f"the pictures differ: {left.shape[1]}x{left.shape[0]} with {_channels(left)} channels "
-            f"against {right.shape[1]}x{right.shape[0]} with {_channels(right)}",
-            subject=options.right,
-            remedy="give two pictures of one camera pair",
-        )
-    grey = luma(left), luma(right)
-    height, width = grey[0].shape
-    if options.rig is None:
-        nowhere = RigidTransform.identity("left_rect", "left")
-        geometry = RectifiedGeometry(1.0, 0.0, 0.0, 1.0, width, height, nowhere)
-        pair = RectifiedPair(*grey, geometry, Box(0, 0, width, height))
-        return _Pair(pair, None, 0.0)
-    rig = read_rig(options.rig)
-    if (rig.width, rig.height) != (width, height):
-        raise InputError(
-            f"the pictures are {width}x{height}, rig {options.rig} is {rig.width}x{rig.height}",
-            subject=options.rig,
-            remedy="use the rig file that belongs to these pictures",
-        )
-    rectifier = Rectifier(rig)
-    started = time.perf_counter()
-    pair = rectifier.rectify(*grey)
-    return _Pair(pair, rectifier, (time.perf_counter() - started) * 1e3)
-
-
-def _match(pair: _Pair, options: argparse.Namespace) -> "StereoAnswer":
+def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
     from navapp.stereo import (
         match_baseline,
         match_on_support,
@@ -204,9 +127,9 @@ def _match(pair: _Pair, options: argparse.Namespace) -> "StereoAnswer":
     fills = options.fill == "wls"
     if options.model:
         return match_on_support(
-            pair.rectified, _support(pair, options), fills=fills, max_gap_px=_METRIC_GAP_PX
+            pair.rectified, expected_px(pair, options), fills=fills, max_gap_px=_METRIC_GAP_PX
         )
-    band = _band(pair, options)
+    band = searched_band(pair, options)
     try:
         if options.matcher == "gradient":
             return match_baseline(pair.rectified, band)
@@ -219,56 +142,14 @@ def _match(pair: _Pair, options: argparse.Namespace) -> "StereoAnswer":
         raise UsageError(str(error), remedy="ask for fewer --disparities") from error
 
 
-def _band(pair: _Pair, options: argparse.Namespace) -> tuple[float, float]:
-    """Disparities that are searched: as asked for, else the configured depth range."""
-    from navapp.config import find_file, load
-
-    geometry = pair.rectified.geometry
-    if options.disparities is not None:
-        low = float(options.min_disparity or 0)
-        band = (low, low + options.disparities - 1.0)
-    else:
-        near, far = load(find_file(options.config)).camera.depth_mm
-        band = (geometry.disparity_px(far), geometry.disparity_px(near))
-    if max(-band[0], band[1]) >= geometry.width:
-        raise UsageError(
-            f"disparities {band[0]:.0f} to {band[1]:.0f} px do not fit into pictures "
-            f"{geometry.width} px wide",
-            remedy="ask for other --disparities or --min-disparity",
-        )
-    return band
-
-
-def _support(pair: _Pair, options: argparse.Namespace) -> NDArray[np.float32]:
-    """Disparity of the expected surface over the whole rectified left view."""
-    from navapp.geometry.ply import read_ply
-    from navapp.geometry.transform import RigidTransform
-    from navapp.geometry.zbuffer import render_rectified
-
-    try:
-        content = json.loads(Path(options.pose).read_text(encoding="utf-8"))
-        pose = RigidTransform("left", "model", content["matrix"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise PriorError(
-            f"pose {options.pose} cannot be understood",
-            subject=options.pose,
-            remedy='it holds {"matrix": [[4x4]]}',
-        ) from error
-    geometry = pair.rectified.geometry
-    mesh, _ = read_ply(options.model)
-    rectified_from_model = geometry.rectified_from_left @ pose
-    view = render_rectified(mesh, rectified_from_model, geometry, pair.rectified.box)
-    return geometry.disparity_map_px(view.depth_mm)
-
-
-def _write(pair: _Pair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
+def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
     """Every file that was asked for."""
     import io
 
     import cv2
 
     from navapp.cli.stereo_files import cloud_ply, coloured
-    from navapp.geometry.ply import write_whole
+    from navapp.geometry.whole_files import write_whole
 
     found = answer.disparity
     for path, values in ((options.out, found.disparity_px), (options.sigma, found.sigma_px)):
@@ -284,7 +165,7 @@ def _write(pair: _Pair, answer: "StereoAnswer", options: argparse.Namespace) -> 
         write_whole(options.cloud, cloud_ply(found, pair.rectified.geometry))
 
 
-def _content(pair: _Pair, answer: "StereoAnswer") -> dict[str, Any]:
+def _content(pair: Pair, answer: "StereoAnswer") -> dict[str, Any]:
     from navapp.values import Origin
 
     origin = answer.disparity.origin
@@ -311,7 +192,3 @@ def _content(pair: _Pair, answer: "StereoAnswer") -> dict[str, Any]:
         },
         "reasons": list(answer.reasons),
     }
-
-
-def _channels(picture: Image) -> int:
-    return 1 if picture.ndim == 2 else picture.shape[2]

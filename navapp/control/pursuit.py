@@ -131,7 +131,13 @@ class Pursuit:
         ]
         captured_ns = search.frame.captured_ns
         self._candidates = [
-            Candidate(TrackState.at_rest(pose, captured_ns), answer, False, number, len(found))
+            Candidate(
+                TrackState.at_rest(pose, captured_ns, answer.verdict.cause),
+                answer,
+                False,
+                number,
+                len(found),
+            )
             for number, (answer, pose) in enumerate(found, start=1)
             if pose is not None
         ]

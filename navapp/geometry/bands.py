@@ -1,57 +1,82 @@
-"""Jobs side by side, on the two threads of one shared pool."""
+"""Jobs side by side: on the thread that wants them done, and on one helper beside it."""
 
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from typing import Generic, Self, TypeVar
 
 _Answer = TypeVar("_Answer")
 
-_N_THREADS = 2
 _lock = threading.Lock()
 _pools: list[ThreadPoolExecutor] = []
 _here = threading.local()
 
 
 def _mark() -> None:
-    _here.is_of_pool = True
+    _here.is_alone = True
 
 
 def pool() -> ThreadPoolExecutor:
-    """The pool of two threads, made at first use; its jobs must not wait for other jobs of it."""
+    """The one helper, made at first use; its jobs must not wait for other jobs of it."""
     with _lock:
         if not _pools:
-            _pools.append(ThreadPoolExecutor(_N_THREADS, initializer=_mark))
+            _pools.append(ThreadPoolExecutor(1, initializer=_mark))
         return _pools[0]
 
 
-def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
-    """Run two jobs side by side and wait for both; the first error is raised.
+class Job(Generic[_Answer]):
+    """A job that the helper may have begun; who asks for it first does it.
 
-    A thread of the pool runs them one after the other: if both threads waited for others of the
-    pool, none would be left to do the work.
+    As a context it is over, or never begun, when its block is left: an error of the block goes
+    before its own, and an answer that nobody asked for is waited for.
     """
-    if getattr(_here, "is_of_pool", False):
-        first()
-        second()
-        return
-    jobs = [pool().submit(first), pool().submit(second)]
-    errors = [job.exception() for job in jobs]
-    for error in errors:
-        if error is not None:
-            raise error
+
+    def __init__(self, work: Callable[[], _Answer]) -> None:
+        self._work = work
+        # The helper itself has nobody beside it.
+        is_alone = getattr(_here, "is_alone", False)
+        self._begun: Future[_Answer] | None = None if is_alone else pool().submit(work)
+        self._taken: list[_Answer] = []
+
+    def result(self) -> _Answer:
+        """The answer, or what went wrong, raised."""
+        if not self._taken:
+            if self._begun is None or self._begun.cancel():
+                self._taken.append(self._work())
+            else:
+                self._taken.append(self._begun.result())
+        return self._taken[0]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.result()
+        elif self._begun is not None and not self._begun.cancel():
+            self._begun.exception()
 
 
-def beside(job: Callable[[], _Answer]) -> "Future[_Answer]":
-    """Begin a job on a thread of the pool; a thread of the pool does it itself, at once."""
-    if not getattr(_here, "is_of_pool", False):
-        return pool().submit(job)
-    done: Future[_Answer] = Future()
+def beside(work: Callable[[], _Answer]) -> Job[_Answer]:
+    """Begin a job on the helper, if it is free before the answer is asked for."""
+    return Job(work)
+
+
+def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
+    """Run two jobs side by side and wait for both; the first error is raised."""
+    other = beside(second)
+    error: Exception | None = None
     try:
-        done.set_result(job())
-    except Exception as error:  # noqa: BLE001 - as an executor does
-        done.set_exception(error)
-    return done
+        first()
+    except Exception as raised:  # noqa: BLE001 - the other job must have ended before it is raised
+        error = raised
+    try:
+        other.result()
+    except Exception:
+        if error is None:
+            raise
+    if error is not None:
+        raise error
 
 
 def in_row_bands(height: int, job: Callable[[int, int], object], every: int = 8) -> None:

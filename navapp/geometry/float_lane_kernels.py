@@ -93,6 +93,22 @@ def store(_: Any, array: Any, __: Any, lanes: Any) -> Any:
 
 
 @intrinsic
+def store_grey(_: Any, array: Any, __: Any, lanes: Any) -> Any:
+    """Write the whole parts of lanes, 0 to 255, into a flat uint8 array from an index on."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, values[0]).data
+        bytes_type = ir.VectorType(ir.IntType(8), LANES)
+        place = builder.bitcast(builder.gep(data, [values[1]]), bytes_type.as_pointer())
+        numbers = builder.fptosi(values[2], ir.VectorType(_INDEX, LANES))
+        builder.store(builder.trunc(numbers, bytes_type), place, align=1)
+        return context.get_dummy_value()
+
+    is_grey = bool(array == types.Array(types.uint8, 1, "C"))
+    return (types.void(array, types.intp, lanes), generate) if is_grey else None
+
+
+@intrinsic
 def spread(_: Any, __: Any) -> Any:
     """The same float32 number in every lane."""
 
@@ -103,6 +119,28 @@ def spread(_: Any, __: Any) -> Any:
         return builder.shuffle_vector(first, nothing, zeros)
 
     return _LANES_TYPE(types.float32), generate
+
+
+@intrinsic
+def whole(_: Any, lanes: Any) -> Any:
+    """The next whole numbers below, lane by lane."""
+
+    def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
+        of_lanes = ir.FunctionType(_VECTOR, [_VECTOR])
+        floor = builder.module.declare_intrinsic(f"llvm.floor.v{LANES}f32", (), of_lanes)
+        return builder.call(floor, values)
+
+    return _LANES_TYPE(lanes), generate
+
+
+@intrinsic
+def lane_numbers(_: Any) -> Any:
+    """0, 1, 2 and so on."""
+
+    def generate(__: Any, ___: Any, ____: Any, _____: Any) -> Any:
+        return ir.Constant(_VECTOR, [float(number) for number in range(LANES)])
+
+    return _LANES_TYPE(), generate
 
 
 def _of_two(operate: Callable[[Any, Any, Any], Any], doc: str) -> Any:

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from navapp.geometry.ply import UnusableContentError
+from navapp.geometry.raw_surface import UnusableContentError
 from navapp.geometry.transform import FloatArray
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.number_tables import number_table, whole_text
-from navapp.geometry.ply import RawSurface, UnusableContentError
+from navapp.geometry.raw_surface import RawSurface, UnusableContentError
 
 _NO_FACES = np.empty((0, 3), dtype=np.int64)
 

@@ -1,17 +1,15 @@
 """PLY files, with the comments that say which space and unit the numbers are in."""
 
-import os
 import re
-import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.raw_surface import RawSurface, damaged, surface_content
 from navapp.geometry.transform import FloatArray
+from navapp.geometry.whole_files import write_whole
 
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -19,27 +17,6 @@ _TYPES = {
     "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RawSurface:
-    """What a surface file holds, as stored and unchecked: NaN points, faces out of range.
-
-    Attributes:
-        points: (V, 3) coordinates in the file's unit.
-        faces: (F, 3) indices into the points; (0, 3) for a cloud.
-        normals: (V, 3) of any length, or None when the file has none.
-        unit: what the file says of its unit, lower case, or None.
-    """
-
-    points: FloatArray
-    faces: NDArray[np.integer]
-    normals: FloatArray | None = None
-    unit: str | None = None
-
-
-class UnusableContentError(ValueError):
-    """What is wrong with a file's content, in words for the user."""
 
 
 _END_OF_HEADER = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE)
@@ -137,22 +114,6 @@ def parse_ply(path: Path, content: bytes) -> tuple[RawSurface, PlyHeader]:
     return RawSurface(points, triangles, normals, unit), header
 
 
-def surface_content(path: Path, kind: str) -> bytes:
-    """The bytes of a surface file.
-
-    Raises:
-        InputError: missing, a folder, not readable.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"surface {path} cannot be read ({error.strerror})",
-            subject=str(path),
-            remedy=f"give the path of an existing {kind} file",
-        ) from error
-
-
 def write_ply(
     path: str | Path, mesh: TriangleMesh, *, space: str = "LPS", unit: str = "mm"
 ) -> None:
@@ -171,32 +132,6 @@ def write_ply(
         f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     )
     write_whole(path, header.encode("ascii") + vertices.tobytes() + faces.tobytes())
-
-
-def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file so that it is there entirely or not at all."""
-    path = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def damaged(path: Path, why: str, kind: str = "PLY") -> InputError:
-    """The error for a surface file that cannot be understood."""
-    again = "binary or ASCII PLY with triangles" if kind == "PLY" else f"{kind} or as binary PLY"
-    return InputError(
-        f"surface {path} is not a usable {kind} file, {why}",
-        subject=str(path),
-        remedy=f"export it again as {again}",
-    )
 
 
 def _three(columns: dict[str, NDArray[np.generic]], names: tuple[str, ...]) -> FloatArray | None:

@@ -3,22 +3,26 @@
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.errors import RigError
-from navapp.geometry.bands import in_row_bands
+from navapp.geometry.bands import beside
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
+if TYPE_CHECKING:
+    # Kernels are loaded at first use: the command line starts without a compiler.
+    from navapp.geometry.resample_kernels import Places
+
 Image = NDArray[np.uint8]
 
 # Pixels on either side that interpolation and sub-pixel steps ask for.
-_TAPS = 8
+TAPS_PX = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +207,8 @@ class Rectifier:
         right: Image,
         box: Box | None = None,
         band_px: tuple[float, float] | None = None,
+        *,
+        is_grey: bool = False,
     ) -> RectifiedPair:
         """Rectify both pictures; `box` (in the rectified left view) is passed on clipped.
 
@@ -212,10 +218,13 @@ class Rectifier:
             box: region of interest; None is the whole picture.
             band_px: smallest and largest disparity. With it only the box, and what it reaches in
                 the right picture, is rectified; the rest stays 0.
+            is_grey: of coloured pictures only the luma.
 
         Raises:
             ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
         """
+        from navapp.geometry.resampling import luma_for, resampled
+
         for picture in (left, right):
             if picture.shape[:2] != (self.rig.height, self.rig.width):
                 raise ValueError(
@@ -224,26 +233,53 @@ class Rectifier:
                 )
         if left.shape != right.shape:
             raise ValueError("one picture of the pair is grey and the other coloured")
-        left_x, left_y, right_x, right_y = self.maps
         whole = Box(0, 0, self.rig.width, self.rig.height)
         inside = whole if box is None else box.clipped(whole.width, whole.height)
         in_left, in_right = whole, whole
         if band_px is not None:
-            first = inside.x - math.ceil(band_px[1]) - _TAPS
-            last = inside.x + inside.width - math.floor(band_px[0]) + _TAPS
+            first = inside.x - math.ceil(band_px[1]) - TAPS_PX
+            last = inside.x + inside.width - math.floor(band_px[0]) + TAPS_PX
             in_left, in_right = inside, replace(inside, x=first, width=last - first)
-        return RectifiedPair(
-            resampled(left, left_x, left_y, in_left, self.interpolation),
-            resampled(right, right_x, right_y, in_right, self.interpolation),
-            self.geometry,
-            inside,
-        )
+        if self.interpolation == "bilinear":
+            pictures = (luma(left), luma(right)) if is_grey else (left, right)
+            return self._bilinear(pictures, (in_left, in_right), inside)
+        for_left, for_right = self._places
+
+        def of(picture: Image, places: "Places", part: Box) -> Image:
+            grey = luma_for(picture, places, part) if is_grey else picture
+            return resampled(grey, places, part)
+
+        with beside(lambda: of(right, for_right, in_right)) as of_right:
+            of_left = of(left, for_left, in_left)
+        return RectifiedPair(of_left, of_right.result(), self.geometry, inside)
+
+    def _bilinear(
+        self, pictures: tuple[Image, Image], parts: tuple[Box, Box], inside: Box
+    ) -> RectifiedPair:
+        """As other programs interpolate."""
+        left_x, left_y, right_x, right_y = self.maps
+        slices = [part.clipped(self.rig.width, self.rig.height).slices for part in parts]
+        left = bilinear(pictures[0], left_x, left_y, slices[0])
+        right = bilinear(pictures[1], right_x, right_y, slices[1])
+        return RectifiedPair(left, right, self.geometry, inside)
+
+    @cached_property
+    def _places(self) -> "tuple[Places, Places]":
+        """Where the rectified pixels lie in the left and in the right picture."""
+        from navapp.geometry.resampling import find_places
+
+        left_x, left_y, right_x, right_y = self.maps
+        return find_places(left_x, left_y), find_places(right_x, right_y)
 
 
 def undistorted(picture: Image, camera: Camera, interpolation: Interpolation = "cubic") -> Image:
     """The picture (H, W) or (H, W, 3) as the same camera without distortion sees it; else 0."""
+    from navapp.geometry.resampling import find_places, resampled
+
     columns, rows = lens_maps(camera, np.eye(3), camera.matrix)
-    return resampled(picture, columns, rows, interpolation=interpolation)
+    if interpolation == "bilinear":
+        return bilinear(picture, columns, rows, Box(0, 0, camera.width, camera.height).slices)
+    return resampled(picture, find_places(columns, rows))
 
 
 def _solve(rig: StereoRig) -> tuple[Any, Any, Any, Any]:
@@ -271,39 +307,3 @@ def luma(picture: Image) -> Image:
     if picture.ndim == 2:
         return picture
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
-
-
-def resampled(
-    picture: Image,
-    columns: NDArray[np.float32],
-    rows: NDArray[np.float32],
-    part: Box | None = None,
-    interpolation: Interpolation = "cubic",
-) -> Image:
-    """The picture at real places (h, w), cubic over six pixels; 0 outside it, and outside a part.
-
-    Linear interpolation, and less so a cubic over four pixels, blurs by where a pixel falls;
-    OpenCV's cubic (a = -0.75) bends a ramp: all tilt a disparity that is measured to a part of a
-    pixel.
-    """
-    from navapp.geometry.resample_kernels import resample_rows
-
-    height, width = columns.shape
-    inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
-    if interpolation == "bilinear":
-        return bilinear(picture, columns, rows, inside.slices)
-    if picture.ndim == 3:
-        n_channels = picture.shape[2]
-        return np.dstack(
-            [resampled(picture[..., k], columns, rows, part) for k in range(n_channels)]
-        )
-    picture = np.ascontiguousarray(picture)
-    values = np.zeros(columns.shape, dtype=np.uint8)
-    top, span = inside.y, (inside.x, inside.x + inside.width)
-    in_row_bands(
-        inside.height,
-        lambda first, last: resample_rows(
-            picture, columns, rows, (top + first, top + last), span, values
-        ),
-    )
-    return values

@@ -1,10 +1,22 @@
-"""Compiled resampling of a picture at given places."""
+"""Compiled resampling of a picture: first along its columns, then along the rows that come out."""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import LANES, load_grey, spread, store
+from navapp.geometry.float_lane_kernels import (
+    LANES,
+    larger,
+    load,
+    load_grey,
+    smaller,
+    spread,
+    store,
+    store_grey,
+    whole,
+)
 
 Taps = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 
@@ -12,6 +24,26 @@ Taps = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.floa
 _BEFORE, _AFTER = 2, 3
 N_TAPS = 6
 _TWELFTH = np.float32(1.0 / 12.0)
+
+
+class Places(NamedTuple):
+    """Where to look for the pixels of a picture (h, w) in another one (H, W).
+
+    Attributes:
+        columns: (h, w) px.
+        rows: (h, W) px: where the curve along which a row is looked for crosses the other's
+            columns.
+        in_step: (h, blocks of w) whether the pixels of a block of `LANES` lie one column apart, but
+            for one jump at most.
+        in_row: (h, blocks of W) whether a block of `rows` lies between the same two rows.
+        is_inside: (h,) whether the whole curve lies in the other picture.
+    """
+
+    columns: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    in_step: NDArray[np.bool_]
+    in_row: NDArray[np.bool_]
+    is_inside: NDArray[np.bool_]
 
 
 @njit(cache=True, nogil=True)
@@ -36,34 +68,121 @@ def weights_at(t: np.float32) -> Taps:
 
 
 @njit(cache=True, nogil=True)
-def weigh_row(places: NDArray[np.float32], weights: NDArray[np.float32]) -> None:
-    """Weights (6, n) in place, of the pixels around places (n,); see `weights_at`."""
-    w0, w1, w2, w3, w4, w5 = weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
-    for x in range(places.shape[0]):
-        t = places[x] - np.floor(places[x])
-        w0[x], w1[x], w2[x], w3[x], w4[x], w5[x] = weights_at(t)
+def lanes_at(t: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """As `weights_at`, for lanes."""
+    t2 = t * t
+    t3 = t2 * t
+    part, one = spread(_TWELFTH), spread(np.float32(1.0))
+    two, six, seven = spread(np.float32(2.0)), spread(np.float32(6.0)), spread(np.float32(7.0))
+    eight, fifteen = spread(np.float32(8.0)), spread(np.float32(15.0))
+    sixteen, twenty = spread(np.float32(16.0)), spread(np.float32(20.0))
+    return (
+        part * (t3 - two * t2 + t),
+        part * (fifteen * t2 - seven * t3 - eight * t),
+        part * (sixteen * t3 - spread(np.float32(28.0)) * t2) + one,
+        part * (twenty * t2 - sixteen * t3 + eight * t),
+        part * (seven * t3 - six * t2 - t),
+        part * (t2 - t3),
+    )
 
 
 @njit(cache=True, nogil=True)
-def value_at(picture: NDArray[np.uint8], u: np.float32, v: np.float32) -> np.uint8:
-    """Grey value at a place inside the picture; beyond its edge the edge goes on."""
+def value_across(crossed: NDArray[np.float32], place: np.float32) -> np.float32:
+    """Value at a place of a row; its column 0 lies at `_BEFORE`."""
+    column = int(place)
+    taps = weights_at(place - np.float32(column))
+    total: np.float32 = taps[0] * crossed[column]
+    for k in range(1, N_TAPS):
+        total += taps[k] * crossed[column + k]
+    return total
+
+
+@njit(cache=True, nogil=True)
+def value_down(picture: NDArray[np.uint8], place: np.float32, x: int) -> np.float32:
+    """Value at a place of a picture's column; beyond its edge the edge goes on."""
+    last, row = picture.shape[0] - 1, int(np.floor(place))
+    taps = weights_at(place - np.float32(row))
+    total: np.float32 = taps[0] * np.float32(picture[min(max(row - _BEFORE, 0), last), x])
+    for k in range(1, N_TAPS):
+        total += taps[k] * np.float32(picture[min(max(row - _BEFORE + k, 0), last), x])
+    return total
+
+
+@njit(cache=True, nogil=True)
+def cross_row(
+    picture: NDArray[np.uint8],
+    rows: NDArray[np.float32],
+    in_row: NDArray[np.bool_],
+    span: tuple[int, int],
+    crossed: NDArray[np.float32],
+) -> None:
+    """Values of a picture where a curve crosses its columns.
+
+    Args:
+        picture: (H, W).
+        rows: (W,) of the curve, px.
+        in_row: (blocks,) as in `Places`.
+        span: first column to fill, a multiple of the lanes, and after the last.
+        crossed: (W + 13,) in place; column 0 lies at `_BEFORE`.
+    """
     height, width = picture.shape
-    i, j = int(u), int(v)
-    across = weights_at(u - np.float32(i))
-    down = weights_at(v - np.float32(j))
-    value = np.float32(0.5)
-    for k in range(6):
-        line = picture[min(max(j - _BEFORE + k, 0), height - 1)]
-        for m in range(6):
-            value += down[k] * across[m] * line[min(max(i - _BEFORE + m, 0), width - 1)]
-    return np.uint8(min(max(value, np.float32(0.0)), np.float32(255.0)))
+    grey = picture.ravel()
+    for first in range(span[0], span[1], LANES):
+        row = int(np.floor(rows[first]))
+        # A cut block is never in a row.
+        if in_row[first // LANES] and row >= _BEFORE and row + _AFTER < height:
+            place = load(rows, first)
+            w0, w1, w2, w3, w4, w5 = lanes_at(place - whole(place))
+            at = (row - _BEFORE) * width + first
+            value = w0 * load_grey(grey, at) + w1 * load_grey(grey, at + width)
+            at += 2 * width
+            value = value + w2 * load_grey(grey, at) + w3 * load_grey(grey, at + width)
+            at += 2 * width
+            value = value + w4 * load_grey(grey, at) + w5 * load_grey(grey, at + width)
+            store(crossed, _BEFORE + first, value)
+        else:
+            for x in range(first, min(first + LANES, width)):
+                crossed[_BEFORE + x] = value_down(picture, rows[x], x)
+
+
+@njit(cache=True, nogil=True)
+def resample_block(
+    crossed: NDArray[np.float32], columns: NDArray[np.float32], first: int,
+    greys: NDArray[np.uint8], at: int, room: NDArray[np.uint8],
+) -> None:  # fmt: skip
+    """Grey values of `LANES` places of a row that lie one column apart, but for one jump.
+
+    Args:
+        crossed: of the row; all that is asked for lies in it.
+        columns: (w,) places.
+        first: of the places.
+        greys: in place, from `at` on.
+        at: see above.
+        room: (lanes,) to work in.
+    """
+    place = load(columns, first)
+    w0, w1, w2, w3, w4, w5 = lanes_at(place - whole(place))
+    zero, most, half = spread(np.float32(0.0)), spread(np.float32(255.0)), spread(np.float32(0.5))
+    begin, end = int(columns[first]), int(columns[first + LANES - 1]) - (LANES - 1)
+    value = w0 * load(crossed, begin) + w1 * load(crossed, begin + 1)
+    value = value + w2 * load(crossed, begin + 2) + w3 * load(crossed, begin + 3)
+    value = value + w4 * load(crossed, begin + 4) + w5 * load(crossed, begin + 5)
+    store_grey(greys, at, smaller(larger(value + half, zero), most))
+    if begin == end:
+        return
+    value = w0 * load(crossed, end) + w1 * load(crossed, end + 1)
+    value = value + w2 * load(crossed, end + 2) + w3 * load(crossed, end + 3)
+    value = value + w4 * load(crossed, end + 4) + w5 * load(crossed, end + 5)
+    store_grey(room, 0, smaller(larger(value + half, zero), most))
+    for k in range(LANES):
+        if int(columns[first + k]) - k != begin:
+            greys[at + k] = room[k]
 
 
 @njit(cache=True, nogil=True)
 def resample_rows(
     picture: NDArray[np.uint8],
-    columns: NDArray[np.float32],
-    rows: NDArray[np.float32],
+    places: Places,
     band: tuple[int, int],
     span: tuple[int, int],
     resampled: NDArray[np.uint8],
@@ -72,44 +191,40 @@ def resample_rows(
 
     Args:
         picture: (H, W)
-        columns: (h, w) where to look, px.
-        rows: (h, w) where to look, px.
+        places: where to look.
         band: first row to fill, and after the last.
         span: first column to fill, and after the last.
         resampled: (h, w) in place.
     """
     height, width = picture.shape
+    zero, most, half = np.float32(0.0), np.float32(255.0), np.float32(0.5)
     last_column, last_row = np.float32(width - 1), np.float32(height - 1)
-    zero, before = np.float32(0.0), np.float32(_BEFORE)
-    far_column, far_row = np.float32(width - (LANES - 1 - _BEFORE)), np.float32(height - _AFTER)
-    grey, sums = picture.ravel(), np.empty(LANES, dtype=np.float32)
-    first, after = span
-    across = np.empty((N_TAPS, after - first), dtype=np.float32)
-    down = np.empty_like(across)
+    far_column = np.float32(width - LANES)
+    crossed = np.zeros(width + 2 * N_TAPS + 1, dtype=np.float32)
+    greys, n_columns, room = resampled.ravel(), resampled.shape[1], np.empty(LANES, np.uint8)
     for y in range(band[0], band[1]):
-        weigh_row(columns[y, first:after], across)
-        weigh_row(rows[y, first:after], down)
-        for x in range(first, after):
-            u, v, k = columns[y, x], rows[y, x], x - first
-            # Also false for NaN.
-            if not (u >= zero and u <= last_column and v >= zero and v <= last_row):
-                resampled[y, x] = 0
-                continue
-            if not (u >= before and u < far_column and v >= before and v < far_row):
-                resampled[y, x] = value_at(picture, u, v)
-                continue
-            at = (int(v) - _BEFORE) * width + int(u) - _BEFORE
-            # Eight columns at once, of which the last two do not count.
-            above = spread(down[0, k]) * load_grey(grey, at)
-            above = above + spread(down[1, k]) * load_grey(grey, at + width)
-            at += 2 * width
-            middle = spread(down[2, k]) * load_grey(grey, at)
-            middle = middle + spread(down[3, k]) * load_grey(grey, at + width)
-            at += 2 * width
-            below = spread(down[4, k]) * load_grey(grey, at)
-            below = below + spread(down[5, k]) * load_grey(grey, at + width)
-            store(sums, 0, above + middle + below)
-            value = np.float32(0.5) + (across[0, k] * sums[0] + across[1, k] * sums[1])
-            value += across[2, k] * sums[2] + across[3, k] * sums[3]
-            value += across[4, k] * sums[4] + across[5, k] * sums[5]
-            resampled[y, x] = np.uint8(min(max(value, zero), np.float32(255.0)))
+        columns, rows, out = places.columns[y], places.rows[y], resampled[y]
+        in_step = places.in_step[y]
+        # Columns only grow along a row.
+        low = min(max(int(columns[span[0]]) - _BEFORE, 0), width - 1) // LANES * LANES
+        high = min(max(int(columns[span[1] - 1]) + _AFTER + 1, low + 1), width)
+        cross_row(picture, rows, places.in_row[y], (low, high), crossed)
+        crossed[:_BEFORE], crossed[_BEFORE + width :] = crossed[_BEFORE], crossed[width + 1]
+        for block in range(span[0] // LANES * LANES, span[1], LANES):
+            first, after = max(block, span[0]), min(block + LANES, span[1])
+            begin, end = columns[first], columns[after - 1]
+            is_full = after == block + LANES and first == block
+            if is_full and in_step[block // LANES] and begin >= zero and end < far_column:
+                resample_block(crossed, columns, block, greys, y * n_columns + block, room)
+            else:
+                for x in range(first, after):
+                    if columns[x] >= zero and columns[x] <= last_column:
+                        value = value_across(crossed, columns[x])
+                        out[x] = np.uint8(min(max(value + half, zero), most))
+                    else:
+                        out[x] = 0
+        if not places.is_inside[y]:
+            for x in range(span[0], span[1]):
+                column = min(max(int(columns[x] + half), 0), width - 1)
+                if not (rows[column] >= zero and rows[column] <= last_row):
+                    out[x] = 0

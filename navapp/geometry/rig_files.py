@@ -10,9 +10,9 @@ import numpy as np
 
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
-from navapp.geometry.ply import write_whole
 from navapp.geometry.rig import RigQuality, StereoRig
 from navapp.geometry.transform import RigidTransform
+from navapp.geometry.whole_files import write_whole
 
 # What other programs call the same thing; the first name is ours.
 _SYNONYMS = {

@@ -21,6 +21,20 @@ def drawn(mesh: TriangleMesh) -> TriangleMesh:
     return simplified(mesh, _DRAWN_VERTICES, _DRAWN_WITHIN_MM)
 
 
+@lru_cache(maxsize=16)
+def is_closed(mesh: TriangleMesh) -> bool:
+    """Whether a mesh has no border and looks outward: it shows no inner side."""
+    faces = mesh.faces.astype(np.int64)
+    if len(faces) == 0:
+        return False
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    n = len(mesh.vertices_mm)
+    # Each edge is gone along once in each direction, by the two triangles beside it.
+    along, back = np.sort(start * n + end), np.sort(end * n + start)
+    has_pairs = np.array_equal(along, back) and len(np.unique(along)) == len(along)
+    return bool(has_pairs and mesh.volume_mm3() > 0.0)
+
+
 def simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
     """A mesh of about so many vertices, or of as many as the distance asks for.
 

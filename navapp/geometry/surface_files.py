@@ -15,13 +15,8 @@ from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh, vertex_normals
 from navapp.geometry.number_tables import number_table, whole_text
 from navapp.geometry.pcd_files import parse_pcd
-from navapp.geometry.ply import (
-    RawSurface,
-    UnusableContentError,
-    damaged,
-    parse_ply,
-    surface_content,
-)
+from navapp.geometry.ply import parse_ply
+from navapp.geometry.raw_surface import RawSurface, UnusableContentError, damaged, surface_content
 from navapp.geometry.transform import FloatArray
 from navapp.geometry.vtk_files import parse_vtk, triangles_of
 

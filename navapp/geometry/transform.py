@@ -10,6 +10,7 @@ FloatArray = NDArray[np.float64]
 
 _ORTHOGONALITY_TOLERANCE = 1e-4
 _EXACT = 1e-12
+_LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,11 +33,12 @@ class RigidTransform:
         matrix = np.array(self.matrix, dtype=np.float64)
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
             raise ValueError(f"{self.name}: a rigid transform is a finite 4x4 matrix")
-        if np.abs(matrix[3] - (0.0, 0.0, 0.0, 1.0)).max() > 1e-9:
+        rows = matrix.tolist()
+        if max(abs(a - b) for a, b in zip(rows[3], _LAST_ROW, strict=True)) > 1e-9:
             raise ValueError(f"{self.name}: the last row must be 0 0 0 1")
-        given = matrix[:3, :3]
         # A rotation that is one already keeps its bits, so that written poses read back the same.
-        if np.abs(given.T @ given - np.eye(3)).max() > _EXACT or np.linalg.det(given) < 0.0:
+        if not _is_rotation(rows):
+            given = matrix[:3, :3]
             rotation = nearest_rotation(given)
             if np.abs(rotation - given).max() > _ORTHOGONALITY_TOLERANCE:
                 kind = "a reflection" if np.linalg.det(given) < 0.0 else "not a rotation"
@@ -121,6 +123,18 @@ class RigidTransform:
         """Row by row, for JSON."""
         rows: list[list[float]] = self.matrix.tolist()
         return rows
+
+
+def _is_rotation(rows: list[list[float]]) -> bool:
+    """Whether the first three of four rows are a rotation's, to the last digits."""
+    # Plain numbers are sooner done with than arrays of nine.
+    (a, b, c, _), (d, e, f, _), (g, h, i, _) = rows[:3]
+    off = (
+        a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0,
+        a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i,
+    )  # fmt: skip
+    turn = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    return max(off) <= _EXACT and min(off) >= -_EXACT and turn > 0.0
 
 
 def nearest_rotation(matrix: ArrayLike) -> FloatArray:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.ply import RawSurface, UnusableContentError
+from navapp.geometry.raw_surface import RawSurface, UnusableContentError
 from navapp.geometry.transform import FloatArray
 
 _TYPES = {

@@ -1,5 +1,6 @@
 """The z-buffer: what a camera sees of a mesh at a pose."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,10 +8,16 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.camera import Camera
+from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.geometry.zbuffer_kernels import raster_nearest
+from navapp.geometry.zbuffer_kernels import (
+    bounds_of_points,
+    project_points,
+    raster_nearest,
+    tell_depth,
+)
 
 # A vertex hidden by less than this is still the surface itself, seen at a grazing angle.
 _SELF_OCCLUSION_MM = 1.0
@@ -50,6 +57,7 @@ def render(
     camera: Camera,
     *,
     is_whole: bool = True,
+    is_closed: bool = False,
 ) -> RenderedView:
     """The mesh as that camera sees it, lens distortion included (exact at the vertices).
 
@@ -58,6 +66,7 @@ def render(
         camera_from_mesh: its pose.
         camera: that sees it.
         is_whole: the whole picture; otherwise only the box around the mesh, empty out of view.
+        is_closed: as for `render_rectified`.
     """
     points_mm = camera_from_mesh.apply(mesh.vertices_mm)
     pixels = camera.project(points_mm)
@@ -65,7 +74,8 @@ def render(
     if not is_whole:
         around = Box.around(pixels)
         box = Box(0, 0, 0, 0) if around is None else around.clipped(camera.width, camera.height)
-    return _raster(pixels, points_mm[:, 2], mesh.faces, box)
+    shifted = np.ascontiguousarray(pixels - (box.x, box.y))
+    return _raster(shifted, points_mm[:, 2].copy(), mesh.faces, box, is_closed)
 
 
 def render_rectified(
@@ -86,24 +96,39 @@ def render_rectified(
         is_closed: the mesh has no border, and its triangles look outward: half of them need not be
             drawn.
     """
-    points_mm = rectified_from_mesh.apply(mesh.vertices_mm)
-    return _raster(geometry.project(points_mm), points_mm[:, 2], mesh.faces, box, is_closed)
+    pixels, depths_mm = np.empty((len(mesh.vertices_mm), 2)), np.empty(len(mesh.vertices_mm))
+    project_points(
+        mesh.vertices_mm, rectified_from_mesh.rotation, rectified_from_mesh.translation_mm,
+        geometry.focal_px, (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y),
+        pixels, depths_mm,
+    )  # fmt: skip
+    return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
 def projected_box(
     mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry
 ) -> Box | None:
     """Box around the mesh in the rectified left view, clipped; None when it is out of view."""
-    return box_around(rectified_from_mesh.apply(mesh.vertices_mm), geometry)
+    return bounds_of(mesh.vertices_mm, rectified_from_mesh, geometry)[0]
 
 
-def box_around(points_mm: FloatArray, geometry: RectifiedGeometry) -> Box | None:
-    """Box around (N, 3) points in the rectified left view, clipped; None when out of view."""
-    around = Box.around(geometry.project(points_mm))
-    if around is None:
-        return None
+def bounds_of(
+    points_mm: FloatArray, rectified_from_points: RigidTransform, geometry: RectifiedGeometry
+) -> tuple[Box | None, tuple[float, float]]:
+    """What bounds (N, 3) points in the rectified left view, and the least and largest depth, mm.
+
+    The box is clipped to the picture, and None when all points are out of view.
+    """
+    u0, v0, u1, v1, near_mm, far_mm = bounds_of_points(
+        points_mm, rectified_from_points.rotation, rectified_from_points.translation_mm,
+        geometry.focal_px, (geometry.centre_x_px, geometry.centre_y_px),
+    )  # fmt: skip
+    if not u0 < np.inf:
+        return None, (near_mm, far_mm)
+    x, y = math.floor(u0), math.floor(v0)
+    around = Box(x, y, math.ceil(u1) - x + 1, math.ceil(v1) - y + 1)
     clipped = around.clipped(geometry.width, geometry.height)
-    return None if clipped.is_empty else clipped
+    return None if clipped.is_empty else clipped, (near_mm, far_mm)
 
 
 def unhidden_vertices(
@@ -135,17 +160,19 @@ def _raster(
     box: Box,
     is_closed: bool = False,
 ) -> RenderedView:
-    inverse_depth = np.zeros((max(box.height, 0), max(box.width, 0)), dtype=np.float32)
-    face_index = np.full(inverse_depth.shape, -1, dtype=np.int32)
-    if not box.is_empty and len(faces):
-        shifted, depths = np.ascontiguousarray(pixels - (box.x, box.y)), depths_mm.copy()
-        writable = np.array(faces)
-        in_row_bands(
-            box.height,
-            lambda first, last: raster_nearest(
-                shifted, depths, writable, inverse_depth, face_index, (first, last), is_closed
-            ),
-        )
-    depth = np.full(inverse_depth.shape, np.nan, dtype=np.float32)
-    np.divide(1.0, inverse_depth, out=depth, where=face_index >= 0)
+    """The triangles of vertices at pixels (V, 2) of the box, whose first pixel is (0, 0)."""
+    height, width = max(box.height, 0), max(box.width, 0)
+    depth = np.empty((height, width), dtype=np.float32)
+    face_index = np.empty(depth.shape, dtype=np.int32)
+    inverse_depth = np.zeros((height, width + LANES), dtype=np.float32)
+    face_code = np.full(inverse_depth.shape, -1, dtype=np.int32)
+    writable = np.array(faces)
+
+    def draw(first: int, last: int) -> None:
+        band, codes = (first, last), face_code.view(np.float32)
+        raster_nearest(pixels, depths_mm, writable, inverse_depth, codes, band, is_closed)
+        tell_depth(inverse_depth, face_code, band, depth, face_index)
+
+    if not box.is_empty:
+        in_row_bands(box.height, draw)
     return RenderedView(depth, face_index, box)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.simplify import drawn
+from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render
-from navapp.overlay.tint_kernels import tint_pixels
+from navapp.overlay.tint_kernels import shares_of_faces, tint_pixels
 from navapp.values import Plan, StageSpec
 
 Image = NDArray[np.uint8]
@@ -24,6 +24,8 @@ CANDIDATE_COLOUR = (40, 180, 255)
 TARGET_COLOUR = (255, 240, 80)
 CURVE_COLOURS = {"artery": (60, 60, 235), "vein": (220, 90, 60), "nerve": (60, 220, 250)}
 
+# Of the bone's colour over a part that faces the camera, and how much more over a steep one.
+_LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
 _FARTHEST_PX = 20_000.0
 
 
@@ -46,7 +48,10 @@ class Scene:
     @cached_property
     def view(self) -> RenderedView:
         """The bone's part of the left camera's picture, distortion included; rendered once."""
-        return render(self.drawn_mesh, self.left_from_bone, self.camera, is_whole=False)
+        mesh = self.drawn_mesh
+        return render(
+            mesh, self.left_from_bone, self.camera, is_whole=False, is_closed=is_closed(mesh)
+        )
 
     @property
     def colour(self) -> tuple[int, int, int]:
@@ -63,9 +68,9 @@ def draw_bone(image: Image, scene: Scene) -> None:
         return
     part = image[box.y : box.y + box.height, box.x : box.x + box.width]
     # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
-    facing = np.abs(mesh.normals @ scene.left_from_bone.rotation[2])[mesh.faces].mean(axis=1)
-    share = 0.10 + 0.35 * (1.0 - np.clip(facing, 0.0, 1.0))
-    tint_pixels(part, view.face_index, share.astype(np.float32), scene.colour)
+    towards = scene.left_from_bone.rotation[2]
+    share = shares_of_faces(mesh.normals, mesh.faces, towards, _LEAST_SHARE, _STEEP_SHARE)
+    tint_pixels(part, view.face_index, share, scene.colour)
     mask = view.mask.astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(image, contours, -1, scene.colour, 2, offset=(box.x, box.y))

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from navapp.geometry.bands import run_both
 from navapp.geometry.camera import Camera
 from navapp.geometry.directions import ViewCone, seen_from
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render
 from navapp.preop.aspects_kernels import contour_segments, spread_out
@@ -93,11 +92,8 @@ class _Look:
     """One bone, looked at from anywhere."""
 
     def __init__(self, bone: BoneModel, settings: AspectSettings) -> None:
-        mesh = bone.mesh
-        # The camera sees the bone with its cartilage.
-        surface_mm = mesh.vertices_mm + bone.cartilage_mm[:, None] * mesh.normals
-        left = ~bone.is_removed[mesh.faces].any(axis=1)
-        self._mesh = TriangleMesh(surface_mm, mesh.faces[left], mesh.normals)
+        self._mesh = bone.seen_surface()
+        surface_mm = self._mesh.vertices_mm
         self._settings = settings
         self._middle_mm = 0.5 * (surface_mm.min(axis=0) + surface_mm.max(axis=0))
         is_anatomy = ~no_anatomy(self._mesh)

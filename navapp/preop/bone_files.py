@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.ply import read_ply, write_ply, write_whole
+from navapp.geometry.ply import read_ply, write_ply
 from navapp.geometry.transform import FloatArray
+from navapp.geometry.whole_files import write_whole
 from navapp.values import BoneModel
 
 # Vertex properties after the coordinates, all of them or none.

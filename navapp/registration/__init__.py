@@ -1,6 +1,7 @@
 """From a measured surface and a model to a pose with its covariance."""
 
 from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc
+from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import InitialSettings, find_initial
 from navapp.registration.landmarks import Landmarks, register_landmarks
 from navapp.registration.model import RegistrationModel
@@ -16,16 +17,19 @@ from navapp.registration.multi_start import (
 from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
 from navapp.registration.register import Outcome, Registration, register
 from navapp.registration.scene import Scene
+from navapp.registration.sliding import Sliding
 
 __all__ = [
     "BimccSettings",
     "Candidate",
+    "DepthMap",
     "InitialSettings",
     "Landmarks",
     "Outcome",
     "Registration",
     "RegistrationModel",
     "Scene",
+    "Sliding",
     "distinct",
     "estimate_at",
     "explained_share",

@@ -262,6 +262,8 @@ class _Fit:
             iterations,
             is_converged,
             tuple(reasons),
+            information.size_mm,
+            information.size_sigma_mm,
         )
         fits = distance < sigma_mm
         return Solution(

@@ -19,7 +19,7 @@ _APART = 12.59
 # What a block's residuals say of its noise counts beside what it claims, which counts as so many.
 _CLAIM_COUNT = 6.0
 # Those residuals of a wrong pose that happen to be small agree with it: they must not speak for the
-# rest. Of a right one 0.56 were near at the least (simulated knee, its rim covered by tissue).
+# rest. Of right ones most are near (docs/registration.md), fewer where tissue covers the rim.
 _MOST_FAR, _BY_CHANCE = 0.5, 1.0
 _FEWEST = 6.0
 # Residuals that show nothing at all (drawn data) still leave a scale.

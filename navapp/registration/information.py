@@ -1,12 +1,13 @@
 """What the pairs fix and what they leave free: covariance and degeneracy."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.pairing_kernels import Pairs
-from navapp.registration.step_kernels import FREE_SHARE, plane_system, weighted_centre
+from navapp.registration.step_kernels import FREE_SHARE, plane_system, size_terms, weighted_centre
 
 _SINGULAR_SHARE = 1e-9
 # A free direction turns when this much of it, in levers, is rotation; else it is a translation.
@@ -22,10 +23,15 @@ class Information:
             the model's centre); infinite when a direction is not fixed at all.
         free: (K, 6) directions that are not fixed, as twists about the seen surface's centre in
             levers: unit vectors, translation first, in the scene's frame.
+        size_mm: by how much the pairs show the seen surface to be larger than the model's, at its
+            rms distance from its centre.
+        size_sigma_mm: standard deviation of that; infinite when nothing fixes it.
     """
 
     covariance: FloatArray
     free: FloatArray
+    size_mm: float = 0.0
+    size_sigma_mm: float = math.inf
 
     @property
     def is_degenerate(self) -> bool:
@@ -73,11 +79,29 @@ def information_of(
     free = (turned @ vectors[:, is_free]).T
     if eigenvalues[0] <= _SINGULAR_SHARE * eigenvalues[-1]:
         return Information(np.diag([np.inf] * 6), free)
+    size_mm, size_variance = _size(pairs, n, seen_mm, lever_mm, H, g)
     plane_system(pairs, n, np.ascontiguousarray(centre_mm), lever_mm, H, g)
     levers = np.diag([1.0, 1.0, 1.0, 1.0 / lever_mm, 1.0 / lever_mm, 1.0 / lever_mm])
     change = levers @ turned
     covariance = n_sharing_errors * change @ np.linalg.inv(H) @ change.T
-    return Information(0.5 * (covariance + covariance.T), free)
+    size_sigma_mm = math.sqrt(n_sharing_errors * size_variance)
+    return Information(0.5 * (covariance + covariance.T), free, size_mm, size_sigma_mm)
+
+
+def _size(
+    pairs: Pairs, n: int, seen_mm: FloatArray, lever_mm: float, H: FloatArray, g: FloatArray
+) -> tuple[float, float]:
+    """Size as a seventh unknown beside the six of the motion, and its variance.
+
+    Source: elimination of the motion from the normal equations (Schur complement).
+    """
+    mixed = np.empty(6)
+    terms = size_terms(pairs, n, seen_mm, lever_mm, mixed)
+    by_motion = np.linalg.solve(H, np.column_stack([mixed, g]))
+    information = terms.squares - float(mixed @ by_motion[:, 0])
+    if information <= _SINGULAR_SHARE * terms.squares:
+        return 0.0, math.inf
+    return (terms.product_mm - float(mixed @ by_motion[:, 1])) / information, 1.0 / information
 
 
 def _axis(vector: FloatArray) -> str:

@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.mesh import TriangleMesh, vertex_normals
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
@@ -35,15 +35,13 @@ class RegistrationModel:
     SURFACE_SIGMA_MM = 0.1
 
     def __init__(self, bone: BoneModel) -> None:
-        mesh = bone.mesh
         self.bone = bone
-        self.points_mm: FloatArray = mesh.vertices_mm + bone.cartilage_mm[:, None] * mesh.normals
-        self.normals: FloatArray = _seen_normals(bone, self.points_mm)
+        self.seen_mesh = bone.seen_surface()
+        self.points_mm: FloatArray = np.array(self.seen_mesh.vertices_mm)
+        self.normals: FloatArray = np.array(self.seen_mesh.normals)
         self.sigma_mm: FloatArray = np.hypot(self.SURFACE_SIGMA_MM, bone.cartilage_sd_mm)
         self.is_usable: NDArray[np.bool_] = ~bone.is_removed
-        is_left = self.is_usable[mesh.faces].all(axis=1)
-        self.seen_mesh = TriangleMesh(self.points_mm, mesh.faces[is_left], self.normals)
-        self.centre_mm: FloatArray = mesh.centroid_mm
+        self.centre_mm: FloatArray = bone.mesh.centroid_mm
 
     @cached_property
     def drawn_mesh(self) -> TriangleMesh:
@@ -127,14 +125,3 @@ class RegistrationModel:
         distance = np.empty(len(points_mm))
         nearest_vertices(np.ascontiguousarray(points_mm), self.arrays, index, distance)
         return index, distance
-
-
-def _seen_normals(bone: BoneModel, points_mm: FloatArray) -> FloatArray:
-    """(V, 3) normals of the seen surface: it leans where the cartilage grows thicker."""
-    normals = np.array(bone.mesh.normals)
-    if not bone.cartilage_mm.any():
-        return normals
-    seen = vertex_normals(points_mm, bone.mesh.faces)
-    has_faces = np.linalg.norm(seen, axis=1) > 0.0
-    normals[has_faces] = seen[has_faces]
-    return normals

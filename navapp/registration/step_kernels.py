@@ -109,6 +109,44 @@ def plane_system(
             H[a, b] = H[b, a]
 
 
+class SizeTerms(NamedTuple):
+    """What a seventh unknown, the size, adds to the normal equations beside its mixed terms."""
+
+    squares: float
+    product_mm: float
+
+
+@njit(cache=True, nogil=True)
+def size_terms(
+    pairs: Pairs, n: int, centre: NDArray[np.float64], lever_mm: float, mixed: NDArray[np.float64]
+) -> SizeTerms:
+    """Terms of a growth of the model about a centre, in mm at the distance of the lever.
+
+    Arguments as of `plane_system`; `mixed` is (6,) in place, with the six unknowns of the motion.
+    """
+    mixed[:] = 0.0
+    squares, product = 0.0, 0.0
+    for i in range(n):
+        w = pairs.weight[i]
+        x, y, z = (
+            pairs.point[i, 0] - centre[0],
+            pairs.point[i, 1] - centre[1],
+            pairs.point[i, 2] - centre[2],
+        )
+        nx, ny, nz = pairs.direction[i, 0], pairs.direction[i, 1], pairs.direction[i, 2]
+        outward = (x * nx + y * ny + z * nz) / lever_mm
+        scaled = w * outward
+        squares += scaled * outward
+        product += scaled * pairs.residual[i]
+        mixed[0] += scaled * (y * nz - z * ny) / lever_mm
+        mixed[1] += scaled * (z * nx - x * nz) / lever_mm
+        mixed[2] += scaled * (x * ny - y * nx) / lever_mm
+        mixed[3] += scaled * nx
+        mixed[4] += scaled * ny
+        mixed[5] += scaled * nz
+    return SizeTerms(squares, product)
+
+
 @njit(cache=True, nogil=True)
 def add_point_system(
     pairs: Pairs, n: int, model: ModelArrays, share: float, centre: NDArray[np.float64],

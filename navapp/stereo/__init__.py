@@ -2,6 +2,7 @@
 
 from navapp.stereo.chains import (
     StereoAnswer,
+    are_swapped,
     match_baseline,
     match_coarsely,
     match_on_support,
@@ -18,6 +19,7 @@ __all__ = [
     "RefineSettings",
     "StereoAnswer",
     "StereoHealth",
+    "are_swapped",
     "match_baseline",
     "match_coarsely",
     "match_on_support",

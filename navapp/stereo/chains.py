@@ -14,16 +14,17 @@ from navapp.stereo.matching.gradient import GradientSettings, match_gradient, sm
 from navapp.stereo.occlusion.classify import classify, seen_from_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
-from navapp.stereo.subpixel.coarse_to_fine import refine_surface, without_steps
+from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
 from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
 from navapp.stereo.subpixel.refine import refine
+from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, LineTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
 # Below this share of left-right agreement the two pictures do not show the same scene that way
 # round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
-_LEAST_AGREEMENT = 0.15
+_LEAST_AGREEMENT, _MOST_AGREE = 0.15, 0.5
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
 _NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
 # Chance and repeated texture confirm a few per cent of any support, in specks.
@@ -34,12 +35,6 @@ _NOT_CONFIRMED = (
     "the surface is not where the pose says: is the pose right, are the pictures swapped?"
 )
 
-_SUPPORT_SIGMA_PX = 2.0
-# Further away than this, a refined value is not the same surface's any more.
-_CLOSE_PX = 1.0
-# A window over an edge mixes two surfaces: there the coarse value stands.
-_WINDOW_PX = 11
-_SAME_SURFACE_PX = 3.0
 _WIDE_SEARCH_PX = 160
 
 # A claimed sigma below this says no more.
@@ -92,7 +87,7 @@ def match_scene(
     found = match_census(pair, band_px, _settings_for(band_px))
     if not found.agreement >= _LEAST_AGREEMENT:
         return _nothing(pair, _why(found.agreement), started)
-    left = _refined(pair, found.left)
+    left = refine_scene(pair, found.left)
     evidence = _Evidence(found.right_px, found.right_x0, found.confidence)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
     return _answer(pair, left, evidence, fill, started)
@@ -130,10 +125,31 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray
         unknown when the pictures hardly agree.
     """
     pair = _clipped(pair)
-    coarse = _coarse(pair, band_px)
-    if not coarse.agreement >= _LEAST_AGREEMENT:
-        return np.full(coarse.surface_px.shape, np.nan, dtype=np.float32)
-    return coarse.surface_px
+    is_half = _is_wide(pair, band_px)
+    small = halved(pair, band_px) if is_half else pair
+    band_px = (band_px[0] / 2.0, band_px[1] / 2.0) if is_half else band_px
+    found = match_census(small, band_px, _SURFACE_CENSUS)
+    if not found.agreement >= _LEAST_AGREEMENT:
+        return np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
+    surface_px = calmed(found.left.disparity_px)
+    return doubled_disparity(surface_px, pair.box) if is_half else surface_px
+
+
+def are_swapped(
+    given: RectifiedPair, band_px: tuple[float, float], exchanged: RectifiedPair
+) -> bool:
+    """Whether two pictures show one scene the other way round only.
+
+    Exchanged, disparities have the other sign: the band that holds the scene holds nothing.
+
+    Args:
+        given: as the pictures came.
+        band_px: smallest and largest disparity of the scene around the box.
+        exchanged: the same, left called right before they were rectified.
+    """
+    if _coarse(_clipped(given), band_px).agreement >= _LEAST_AGREEMENT:
+        return False
+    return _coarse(_clipped(exchanged), band_px).agreement >= _MOST_AGREE
 
 
 def match_on_support(
@@ -233,8 +249,11 @@ class _Coarse:
 
 
 def _coarse(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
-    n_cells = pair.box.width * pair.box.height * (band_px[1] - band_px[0])
-    return (_coarse_at_half if n_cells > _FEW_CELLS else _coarse_at_full)(pair, band_px)
+    return (_coarse_at_half if _is_wide(pair, band_px) else _coarse_at_full)(pair, band_px)
+
+
+def _is_wide(pair: RectifiedPair, band_px: tuple[float, float]) -> bool:
+    return pair.box.width * pair.box.height * (band_px[1] - band_px[0]) > _FEW_CELLS
 
 
 def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
@@ -245,7 +264,7 @@ def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coars
 
 def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
     low, high = band_px
-    found = match_census(halved(pair), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
+    found = match_census(halved(pair, band_px), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
     surface_px = doubled_disparity(without_steps(found.left.disparity_px), pair.box)
     right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
     right_px = np.float32(2.0) * doubled(found.right_px, right)
@@ -257,31 +276,6 @@ def _by_sigma(left: DisparityMap) -> NDArray[np.float32]:
     """(h, w) confidence, 0 to 1: the smaller the claimed sigma, the larger; 0 where unmatched."""
     sigma_px = np.maximum(left.sigma_px, _BEST_SIGMA_PX)
     return np.nan_to_num(_BEST_SIGMA_PX / sigma_px).astype(np.float32)
-
-
-def _refined(pair: RectifiedPair, coarse: DisparityMap) -> DisparityMap:
-    """Sub-pixel values where they settle close to the coarse ones, the coarse ones elsewhere."""
-    # Smoothed only to make a support: a map that was smoothed itself would be tilted.
-    finer = refine(pair, smooth_known(coarse.disparity_px, _SUPPORT_SIGMA_PX))
-    with np.errstate(invalid="ignore"):
-        is_finer = np.abs(finer.disparity_px - coarse.disparity_px) < _CLOSE_PX
-    is_finer &= _local_range_px(coarse.disparity_px) < _SAME_SURFACE_PX
-    return replace(
-        coarse,
-        disparity_px=np.where(is_finer, finer.disparity_px, coarse.disparity_px),
-        sigma_px=np.where(is_finer, finer.sigma_px, coarse.sigma_px),
-    )
-
-
-def _local_range_px(disparity_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Largest minus smallest known disparity in each pixel's window."""
-    import cv2
-
-    window = np.ones((_WINDOW_PX, _WINDOW_PX), dtype=np.uint8)
-    known = np.isfinite(disparity_px)
-    largest = cv2.dilate(np.where(known, disparity_px, np.float32(-1e6)), window)
-    smallest = cv2.erode(np.where(known, disparity_px, np.float32(1e6)), window)
-    return np.asarray(largest - smallest, dtype=np.float32)
 
 
 def _settings_for(band_px: tuple[float, float]) -> CensusSettings:

@@ -83,9 +83,7 @@ def measure_health(
         found: disparity that was matched in it; without one its rows are not compared.
         expected_px: disparity of what is looked at: where the right picture shows the box.
     """
-    box = pair.box
-    if found is not None:
-        box = Box(found.x, found.y, found.disparity_px.shape[1], found.disparity_px.shape[0])
+    box = pair.box if found is None else found.box
     partner = Box(box.x - round(expected_px), box.y, box.width, box.height)
     left, right = _picture_health(pair.left, box), _picture_health(pair.right, partner)
     if found is None:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from navapp.geometry.rectification import RectifiedGeometry
+from navapp.stereo.surface_kernels import count_wanted, reproject_pixels
 from navapp.values import DisparityMap, Origin, SurfaceCloud
 
 
@@ -22,24 +23,18 @@ def reproject(
 
     Source: z = f B / d; sigma_z = z^2 / (f B) * sigma_d.
     """
-    wanted = np.isin(disparity_map.origin, [int(origin) for origin in origins])
-    wanted &= np.isfinite(disparity_map.disparity_px) & (disparity_map.disparity_px > 0.0)
-    thinned = np.zeros_like(wanted)
-    thinned[::stride_px, ::stride_px] = wanted[::stride_px, ::stride_px]
-    rows, columns = np.nonzero(thinned)
-    disparity = disparity_map.disparity_px[rows, columns].astype(np.float64)
-    sigma_px = disparity_map.sigma_px[rows, columns].astype(np.float64)
-    z = geometry.focal_px * geometry.baseline_mm / disparity
-    u = columns + disparity_map.x
-    v = rows + disparity_map.y
-    x = (u - geometry.centre_x_px) / geometry.focal_px
-    y = (v - geometry.centre_y_px) / geometry.focal_px
-    ray_length = np.sqrt(1.0 + x * x + y * y)
-    sigma_z = z * z / (geometry.focal_px * geometry.baseline_mm) * sigma_px
-    return SurfaceCloud(
-        np.column_stack([x * z, y * z, z]),
-        sigma_z * ray_length,
-        np.column_stack([u, v]).astype(np.int32),
-        disparity_map.origin[rows, columns],
-        stride_px,
-    )
+    is_wanted = np.zeros(256, dtype=np.bool_)
+    is_wanted[[int(origin) for origin in origins]] = True
+    found = disparity_map
+    fixed = (found.origin, is_wanted, stride_px)
+    n = count_wanted(found.disparity_px, *fixed)
+    points_mm, sigma_ray_mm = np.empty((n, 3)), np.empty(n)
+    pixels, origin = np.empty((n, 2), dtype=np.int32), np.empty(n, dtype=np.uint8)
+    camera = (
+        geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px, geometry.baseline_mm
+    )  # fmt: skip
+    reproject_pixels(
+        found.disparity_px, found.sigma_px, *fixed, (found.x, found.y), camera, points_mm,
+        sigma_ray_mm, pixels, origin,
+    )  # fmt: skip
+    return SurfaceCloud(points_mm, sigma_ray_mm, pixels, origin, stride_px)

@@ -14,15 +14,15 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.agreement_kernels import (
+    COARSELY_FURTHER,
+    COARSELY_NEARER,
     FURTHER,
     NEARER,
-    ROUGHLY_FURTHER,
-    ROUGHLY_NEARER,
     Comparison,
     classify_pixels,
     gather_open,
 )
-from navapp.tracking.regions import large_regions
+from navapp.tracking.regions import mark_large
 from navapp.values import DisparityMap, Origin
 
 # Nearer or further than the model by at least this, and by so many sigma, is not the model.
@@ -81,7 +81,7 @@ def compare(
         model: for what its surface is uncertain by.
         measured: disparity over the view's box; only matched pixels count.
         geometry: of the rectified pair.
-        coarse_px: (h, w) rough disparity of whatever is there, where `measured` is silent.
+        coarse_px: (h, w) coarse disparity of whatever is there, where `measured` is silent.
     """
     classes = np.empty(view.face_index.shape, dtype=np.uint8)
     deviation, sigma = (np.empty(classes.shape, dtype=np.float32) for _ in range(2))
@@ -97,9 +97,12 @@ def compare(
     )  # fmt: skip
     if n_visible == 0:
         return NO_AGREEMENT
-    is_hidden = _regions(classes, NEARER) | _regions(classes, ROUGHLY_NEARER)
+    is_hidden, is_behind = (np.zeros(classes.shape, dtype=np.bool_) for _ in range(2))
+    for kind in (NEARER, COARSELY_NEARER):
+        mark_large(classes, kind, _LEAST_REGION_PX2, is_hidden)
     inner = np.where(_without_rim(view.mask), classes, np.uint8(0))
-    is_behind = _regions(inner, FURTHER) | _regions(inner, ROUGHLY_FURTHER)
+    for kind in (FURTHER, COARSELY_FURTHER):
+        mark_large(inner, kind, _LEAST_REGION_PX2, is_behind)
     room = classes[::_SPREAD_STRIDE_PX, ::_SPREAD_STRIDE_PX].size
     deviations, sigmas = (np.empty(room, dtype=np.float32) for _ in range(2))
     n_open, n = gather_open(
@@ -108,8 +111,8 @@ def compare(
     return Agreement(
         n_visible,
         n_agreeing / n_visible,
-        float(is_hidden.sum()) / n_visible,
-        float(is_behind.sum()) / n_visible,
+        float(np.count_nonzero(is_hidden)) / n_visible,
+        float(np.count_nonzero(is_behind)) / n_visible,
         n_agreeing / n_open if n_open else 0.0,
         _spread_ratio(deviations[:n], sigmas[:n]),
     )
@@ -120,11 +123,6 @@ def _spread_ratio(deviations_px: NDArray[np.float32], sigmas_px: NDArray[np.floa
         return 0.0
     from_middle = np.abs(deviations_px - np.median(deviations_px))
     return float(_MAD_TO_SIGMA * np.median(from_middle / sigmas_px))
-
-
-def _regions(classes: NDArray[np.uint8], kind: int) -> NDArray[np.bool_]:
-    """Large regions of pixels of a kind."""
-    return large_regions((classes & np.uint8(kind)) > 0, _LEAST_REGION_PX2)
 
 
 def _without_rim(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

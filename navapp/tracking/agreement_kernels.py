@@ -7,8 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 # What a pixel of the model is, one bit each: measured; nearer or further than the model by the fine
-# map, and by the rough one; measured and agreeing.
-MEASURED, NEARER, FURTHER, ROUGHLY_NEARER, ROUGHLY_FURTHER, AGREES = 1, 2, 4, 8, 16, 32
+# map, and by the coarse one; measured and agreeing.
+MEASURED, NEARER, FURTHER, COARSELY_NEARER, COARSELY_FURTHER, AGREES = 1, 2, 4, 8, 16, 32
 
 
 class Comparison(NamedTuple):
@@ -17,7 +17,7 @@ class Comparison(NamedTuple):
     Attributes:
         scale_px_mm: focal length times baseline: disparity times depth.
         off_mm, off_sigmas: nearer or further by the larger of both is not the model.
-        off_coarse_px: the same for the rough map, beside `off_mm`.
+        off_coarse_px: the same for the coarse map, beside `off_mm`.
         fit_sigmas: a difference of less agrees.
     """
 
@@ -51,7 +51,7 @@ def classify_pixels(
         disparity_px: (h, w) fine map.
         sigma_px: (h, w) its standard deviation.
         is_matched: (h, w) where it was measured.
-        coarse_px: (h, w) rough map, NaN where unknown; read where the fine one is silent.
+        coarse_px: (h, w) coarse map, NaN where unknown; read where the fine one is silent.
         limits: and scale.
         classes: (h, w) in place, bits; 0 beside the model.
         deviation: (h, w) in place, px: measured minus model, where measured.
@@ -84,8 +84,8 @@ def classify_pixels(
                 else:
                     off_px = max(off_px, limits.off_coarse_px)
                     # Comparisons with NaN are false.
-                    found = ROUGHLY_NEARER * (coarse_px[y, x] - expected_px > off_px)
-                    found += ROUGHLY_FURTHER * (coarse_px[y, x] - expected_px < -off_px)
+                    found = COARSELY_NEARER * (coarse_px[y, x] - expected_px > off_px)
+                    found += COARSELY_FURTHER * (coarse_px[y, x] - expected_px < -off_px)
             classes[y, x] = found
     return n_visible, n_agreeing
 

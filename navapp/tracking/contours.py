@@ -16,6 +16,7 @@ from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
+from navapp.geometry.zbuffer_kernels import known_range
 from navapp.registration.blocks import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.contour_kernels import find_steps
@@ -75,7 +76,7 @@ class ContourMeter:
         Args:
             pair: that it was fitted in.
             fit: of the bone.
-            coarse_px: (h, w) rough disparity of whatever lies in its box.
+            coarse_px: (h, w) coarse disparity of whatever lies in its box.
         """
         estimate, view = fit.estimate, fit.measured.view
         if view is None or not np.isfinite(estimate.covariance).all():
@@ -101,13 +102,13 @@ class ContourMeter:
             pose: the rectified left camera from the bone.
             view: the model at that pose, or next to it.
             measured: on the model, in the view's box.
-            coarse_px: (h, w) rough disparity of whatever lies in that box.
+            coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
         left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
-        in_right = beside(
+        with beside(
             lambda: self._steps(pair.right, right, pose, *self._seen_from_right(view, right))
-        )
-        in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
+        ) as in_right:
+            in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
         blocks = [
             self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
             for steps in (in_left, in_right.result())
@@ -126,9 +127,10 @@ class ContourMeter:
 
     def _seen_from_right(self, view: RenderedView, right: Eye) -> tuple[NDArray[np.float32], Box]:
         depth, box = view.depth_mm, view.box
-        if not np.isfinite(depth).any():
+        nearest_mm, farthest_mm = known_range(depth)
+        if nearest_mm > farthest_mm:
             return depth, box
-        near, far = (self._geometry.disparity_px(float(f(depth))) for f in (np.nanmin, np.nanmax))
+        near, far = (self._geometry.disparity_px(z) for z in (nearest_mm, farthest_mm))
         x = box.x - math.ceil(near)
         width = box.width + math.ceil(near) - math.floor(far)
         warped = np.full((box.height, width), np.nan, dtype=np.float32)

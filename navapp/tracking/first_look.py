@@ -25,7 +25,7 @@ _SPARE_SHARE = 0.15
 _MOST_POINTS = 40_000
 _EDGE_SAMPLES = 9
 # A different pose that explains as much as this of the best one makes that one a guess.
-_AMBIGUOUS_SHARE = 0.9
+AMBIGUOUS_SHARE = 0.9
 
 
 class FirstLook:
@@ -109,7 +109,7 @@ def doubted(fits: list[Fit], scores: list[float], model: RegistrationModel) -> l
         return ranked
     best = ranked[0]
     is_guess = any(
-        scores[k] >= _AMBIGUOUS_SHARE * scores[order[0]]
+        scores[k] >= AMBIGUOUS_SHARE * scores[order[0]]
         and not is_same_pose(best.pose, fits[k].pose, model.centre_mm)
         for k in order[1:]
     )

@@ -7,14 +7,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.bands import beside
+from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
+from navapp.stereo import measure_health
 from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge
 from navapp.tracking.pair_doubts import with_pair_doubts
-from navapp.tracking.surface_meter import Measurement, RoughMap, SurfaceMeter
+from navapp.tracking.smooth_misfit import with_smooth_misfit
+from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
 # A model that moved by less looks the same.
@@ -25,18 +29,18 @@ class FitJudge:
     """Judges fits of one bone under one rig; holds only what is constant."""
 
     def __init__(
-        self, meter: SurfaceMeter, model: RegistrationModel, is_rig_accepted: bool
+        self, meter: SurfaceMeter, model: RegistrationModel, quality: RigQuality | None
     ) -> None:
         """Join what is judged and what tells what hides it.
 
         Args:
             meter: measures surfaces.
             model: of the bone.
-            is_rig_accepted: the rig's calibration is good enough for an OK.
+            quality: what the rig's calibration says of itself.
         """
         self._meter = meter
         self._model = model
-        self._judge = Judge(meter.geometry, is_rig_accepted)
+        self._judge = Judge(meter.geometry, quality)
         self._contours = ContourMeter(model, meter.geometry)
 
     def judged(
@@ -46,7 +50,7 @@ class FitJudge:
         goal: Goal,
         timings: LineTimings,
         predicted: RigidTransform | None = None,
-        rough: RoughMap | None = None,
+        coarse: CoarseMap | None = None,
     ) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
 
@@ -56,20 +60,24 @@ class FitJudge:
             goal: of the stage.
             timings: of what came before the fit.
             predicted: pose expected by the motion model, in the rectified camera.
-            rough: whatever lies around the bone; matched anew where it does not reach.
+            coarse: whatever lies around the bone; matched anew where it does not reach.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
-        found = fit.measured.disparity
-        rough_px = self.rough_px(pair, fit, rough)
-        fit = self._contours.joined(pair, fit, rough_px)
-        view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
-        verdict = self._judge.judge(
-            self._model, fit.estimate, found, goal, predicted, rough_px, view
-        )
-        depth_mm = fit.pose.apply(self._model.centre_mm)[2]
-        verdict = with_pair_doubts(verdict, pair, found, depth_mm)
+        found, geometry = fit.measured.disparity, pair.geometry
+        depth_mm = float(fit.pose.apply(self._model.centre_mm)[2])
+        # What the pictures say of their cameras does not ask for the pose.
+        with beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm))) as health:
+            coarse_px = self.coarse_px(pair, fit, coarse)
+            fit = self._contours.joined(pair, fit, coarse_px)
+            if fit.measured.view is not None:
+                fit = replace(fit, estimate=with_smooth_misfit(fit.estimate))
+            view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
+            verdict = self._judge.judge(
+                self._model, fit.estimate, found, goal, predicted, coarse_px, view
+            )
+            verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
@@ -90,6 +98,11 @@ class FitJudge:
         found = self._judge.agreement(self._model, pose, measured.disparity)
         return found.coverage * found.inlier_share
 
+    def is_there(self, fit: Fit) -> bool:
+        """Whether so much of the model agrees with what it was fitted to that it may be there."""
+        found = self._judge.agreement(self._model, fit.pose, fit.measured.disparity)
+        return not self._judge.is_elsewhere(found)
+
     def led_to(
         self,
         measured: Measurement,
@@ -105,24 +118,22 @@ class FitJudge:
             on_progress,
         )
 
-    def rough_px(
-        self, pair: RectifiedPair, fit: Fit, rough: RoughMap | None = None
+    def coarse_px(
+        self, pair: RectifiedPair, fit: Fit, coarse: CoarseMap | None = None
     ) -> NDArray[np.float32] | None:
-        """(h, w) rough disparity over the box of a fit; None out of view or depth.
+        """(h, w) coarse disparity over the box of a fit; None out of view or depth.
 
         Args:
             pair: that it was fitted in.
             fit: of the bone.
-            rough: known already; matched anew when it does not reach over all of the box.
+            coarse: known already; matched anew when it does not reach over all of the box.
         """
-        found = fit.measured.disparity
-        height, width = found.disparity_px.shape
-        box = Box(found.x, found.y, width, height)
-        known_px = None if rough is None else rough.over(box)
+        box = fit.measured.disparity.box
+        known_px = None if coarse is None else coarse.over(box)
         if known_px is not None:
             return known_px
-        rough = self._meter.coarsely(pair, fit.pose, box)
-        return None if rough is None else rough.disparity_px
+        coarse = self._meter.coarsely(pair, fit.pose, box)
+        return None if coarse is None else coarse.disparity_px
 
     def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""

@@ -79,7 +79,12 @@ class Follower:
         self._settings, self._margins = settings, margins
 
     def follow(
-        self, pair: RectifiedPair, pose: RigidTransform, least_share: float = 0.0
+        self,
+        pair: RectifiedPair,
+        pose: RigidTransform,
+        least_share: float = 0.0,
+        *,
+        is_near: bool = False,
     ) -> tuple[Fit | None, LineTimings]:
         """The pose where the model rests, near an expected one, and how long that took.
 
@@ -90,12 +95,13 @@ class Follower:
             pair: pictures.
             pose: expected, in the rectified camera.
             least_share: when fewer of the samples answer, the bone is elsewhere.
+            is_near: the pose is next to where it rests: samples see further than is good for it.
 
         Returns:
             No fit when the bone is elsewhere or out of view, or too few points answer.
         """
         settings, timings = self._settings, LineTimings()
-        fit, expected, is_near = None, None, False
+        fit, expected = None, None
         for n_rounds in range(1, settings.max_rounds + 1):
             # After a small move, what was rendered is still what is expected.
             if expected is None:
@@ -140,9 +146,11 @@ def moved_surface_mm(
     model: RegistrationModel, before: RigidTransform, after: RigidTransform
 ) -> float:
     """Mean displacement of the corners around the bone's surface."""
-    points_mm = model.hull_mm
-    moved = after.apply(points_mm) - before.apply(points_mm)
-    return float(np.linalg.norm(moved, axis=1).mean())
+    turned, shifted_mm = (
+        after.rotation - before.rotation, after.translation_mm - before.translation_mm
+    )  # fmt: skip
+    moved = model.hull_mm @ turned.T + shifted_mm
+    return float(np.sqrt(np.einsum("ij,ij->i", moved, moved)).mean())
 
 
 def sum_timings(a: LineTimings, b: LineTimings) -> LineTimings:

@@ -4,12 +4,14 @@ A wrong pose is worse than none. The judge therefore looks at what did not enter
 of the model that should be seen was measured and agrees, not only how well paired points agree.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedGeometry
+from navapp.geometry.rectification import RectifiedGeometry
+from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
@@ -28,6 +30,9 @@ from navapp.values import (
 # Errors of a cartilage's thickness go together over much of a bone: no number of points averages
 # them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
 _COMMON_ERROR = 2.0
+# What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
+OK_ERROR_MM = 0.5
+_SURE_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,20 +70,38 @@ class JudgeLimits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """What the judge measures a pose against: the stage's targets and tolerance."""
+    """What the judge measures a pose against.
+
+    Attributes:
+        targets_mm: (N, 3) of the stage, in bone coordinates.
+        tolerance_mm: of the stage: all that is known against the pose must stay below it.
+        seen_mm: what is seen must fix the pose at least so well. What the plan's own cartilage may
+            cost goes on top, in squares: no better view mends it.
+    """
 
     targets_mm: FloatArray
     tolerance_mm: float
+    seen_mm: float = OK_ERROR_MM
 
 
 class Judge:
-    """Judges poses of one bone under one rig."""
+    """Judges poses of one bone under one rig.
+
+    Args:
+        geometry: of the rectified rig.
+        quality: what the calibration says of itself; without it the rig is taken as it is.
+        limits: what keeps a pose from being OK.
+    """
 
     def __init__(
-        self, geometry: RectifiedGeometry, is_rig_accepted: bool, limits: JudgeLimits | None = None
+        self,
+        geometry: RectifiedGeometry,
+        quality: RigQuality | None = None,
+        limits: JudgeLimits | None = None,
     ) -> None:
         self._geometry = geometry
-        self._is_rig_accepted = is_rig_accepted
+        self._is_rig_accepted = quality is None or quality.is_accepted
+        self._by_rig_mm = 0.0 if quality is None else quality.uncertainty_mm or 0.0
         self._limits = limits or JudgeLimits()
 
     def agreement(
@@ -112,7 +135,7 @@ class Judge:
             measured: disparity over the bone's box.
             goal: of the stage.
             predicted: pose expected by the motion model, for the jump test.
-            coarse_px: (h, w) rough disparity of whatever is in that box: what hides the bone, and
+            coarse_px: (h, w) coarse disparity of whatever is in that box: what hides the bone, and
                 what is seen through the model.
             view: the model in that box at the pose, or next to it; rendered when absent.
         """
@@ -123,9 +146,12 @@ class Judge:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
         is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
-        bound_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
-        bound_mm = float(np.hypot(bound_mm, _COMMON_ERROR * cartilage_mm))
+        by_plan_mm = _COMMON_ERROR * cartilage_mm
+        by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
+        bound_mm = math.hypot(by_view_mm, by_plan_mm, self._by_rig_mm)
         doubts = self._doubts(estimate, agreement)
+        doubts += [Reason.SIZE_DIFFERS] * _has_another_size(estimate, by_plan_mm)
+        doubts += [Reason.POSE_UNCERTAIN] * bool(by_view_mm > np.hypot(goal.seen_mm, by_plan_mm))
         doubts += [Reason.CARTILAGE_UNCERTAIN] * (cartilage_mm > self._limits.cartilage_sd_ok)
         doubts += [Reason.TRE_TOO_LARGE] * (bound_mm > goal.tolerance_mm)
         doubts += [Reason.JUMPED] * self._has_jumped(model, estimate, predicted)
@@ -133,7 +159,7 @@ class Judge:
         return Verdict(
             Status.LOST if is_lost else (Status.DEGRADED if doubts else Status.OK),
             bound_mm,
-            tuple(doubts),
+            tuple(dict.fromkeys(doubts)),
             agreement.coverage,
             agreement.hidden_share,
             agreement.inlier_share,
@@ -157,13 +183,20 @@ class Judge:
         doubts += [Reason.RIG_NOT_ACCEPTED] * (not self._is_rig_accepted)
         return doubts
 
-    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+    def is_elsewhere(self, agreement: Agreement) -> bool:
+        """So little of the model agrees that the bone is not there."""
         limits = self._limits
         return (
             agreement.open_coverage < limits.coverage_lost
             or agreement.coverage < limits.seen_lost
             or agreement.behind_share > limits.behind_lost
             or agreement.inlier_share < limits.inlier_lost
+        )
+
+    def _is_lost(self, estimate: PoseEstimate, agreement: Agreement) -> bool:
+        limits = self._limits
+        return (
+            self.is_elsewhere(agreement)
             or estimate.rms_mm / estimate.expected_rms_mm > limits.rms_ratio_lost
             or Reason.TOO_FEW_POINTS in estimate.reasons
         )
@@ -185,10 +218,8 @@ class Judge:
     def _render(
         self, model: RegistrationModel, pose: RigidTransform, measured: DisparityMap
     ) -> RenderedView:
-        height, width = measured.disparity_px.shape
-        box = Box(measured.x, measured.y, width, height)
         return render_rectified(
-            model.drawn_mesh, pose, self._geometry, box, is_closed=model.is_closed
+            model.drawn_mesh, pose, self._geometry, measured.box, is_closed=model.is_closed
         )
 
     def _bound_mm(
@@ -205,6 +236,15 @@ class Judge:
             return float("inf")
         step = max(1, len(targets_mm) // self._limits.max_bound_targets)
         return predicted_tre_mm(estimate, model.centre_mm, targets_mm[::step])
+
+
+def _has_another_size(estimate: PoseEstimate, by_plan_mm: float) -> bool:
+    """The bone surely is of another size than the model, and that costs more than is promised.
+
+    Errors of a cartilage's thickness that go together look the same.
+    """
+    sigma_mm = math.hypot(estimate.size_sigma_mm, by_plan_mm)
+    return abs(estimate.size_mm) > max(OK_ERROR_MM, _SURE_SIGMAS * sigma_mm)
 
 
 def _rms(values: FloatArray) -> float:

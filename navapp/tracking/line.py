@@ -4,7 +4,8 @@
 terminal; what is remembered between frames is handed in and out as a `TrackState`.
 """
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from navapp.geometry.bands import beside
@@ -13,12 +14,14 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, estimate_at
 from navapp.tracking.box_guide import BoxGuide
+from navapp.tracking.buried import BuriedBone
+from navapp.tracking.causes import Causes
 from navapp.tracking.first_look import FirstLook
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal
 from navapp.tracking.locator import NEAR_VIEW, STEREO_SETTINGS, WIDE_VIEW, Locator, LocatorSettings
-from navapp.tracking.motion import TrackState
+from navapp.tracking.motion import TrackState, is_place_doubted
 from navapp.tracking.recovery import Recovery
 from navapp.tracking.registrar import Registrar
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
@@ -32,7 +35,8 @@ from navapp.values import (
     TrackedFrame,
 )
 
-_BEST_FIRST = (Status.OK, Status.DEGRADED, Status.LOST)
+# It is asked so often, counted in lost frames, whether the pictures are swapped.
+_LOST_BETWEEN = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +80,23 @@ class Line:
         self.model = RegistrationModel(bone)
         depth_mm, n_refined = self.settings.depth_mm, self.settings.n_refined
         meter = SurfaceMeter(rig, self.model, depth_mm, self.settings.max_points)
-        is_accepted = rig.quality is None or rig.quality.is_accepted
-        judge = FitJudge(meter, self.model, is_accepted)
+        judge = FitJudge(meter, self.model, rig.quality)
         self.locator = Locator(meter, self.model, judge.score, self.settings.locator)
         first_look = FirstLook(meter.rectifier, self.model, depth_mm, aspects)
         self._meter, self._fit_judge, self._boxes = meter, judge, BoxGuide(rig, self.model)
         self._recovery = Recovery(meter, self.model, self.locator, judge)
-        self._registrar = Registrar(meter, self.model, self.locator, judge, first_look, n_refined)
+        self._buried = BuriedBone(meter, self.model, self.settings.locator)
+        self._causes = Causes(meter, self.model, judge)
+        self._registrar = Registrar(
+            meter,
+            self.model,
+            self.locator,
+            judge,
+            first_look,
+            self._buried,
+            self._causes,
+            n_refined,
+        )
 
     @property
     def centre_mm(self) -> FloatArray:
@@ -103,19 +117,41 @@ class Line:
         if state.n_lost == 0:
             start = self._rectified(expected)
             pair, timings = self._rectified_pair(left, right, start, NEAR_VIEW)
-            # What may hide the bone does not depend on where exactly it is.
-            rough = beside(lambda: self._meter.coarsely(pair, start))
-            fit = self.locator.locate(pair, start)
-            tracked = self._fit_judge.judged(pair, fit, goal, timings, predicted, rough.result())
+            tracked = self._near(pair, start, predicted, goal, timings)
         if tracked.verdict.status is Status.LOST:
             if not self.locator.is_baseline:
                 boxes = self._boxes.followed(boxes, left)
             places = self._boxes.starts(expected, boxes)
             tracked = self._searched(left, right, places, predicted, state.n_lost, tracked, goal)
+        tracked = tracked.because(self._cause(left, right, predicted, state, tracked))
         after = state.updated(tracked, captured_ns, self.centre_mm)
         # What is not followed does not place the box either.
         boxes = self._boxes.placed(boxes, left, tracked) if after.n_lost == 0 else boxes
         return tracked, replace(after, box=boxes)
+
+    def _near(
+        self,
+        pair: RectifiedPair,
+        start: RigidTransform,
+        predicted: RigidTransform,
+        goal: Goal,
+        timings: LineTimings,
+    ) -> TrackedFrame:
+        """The answer near an expected pose; when its place is in doubt, that of a buried bone."""
+        # What may hide the bone does not depend on where exactly it is.
+        with beside(lambda: self._meter.coarsely(pair, start)) as job:
+            fit = self.locator.locate(pair, start)
+            coarse = job.result()
+        answers = [self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse)]
+        if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
+            return answers[0]
+        for buried in self._buried.followed(pair, start):
+            timings = answers[-1].timings
+            answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
+            if answers[-1].verdict.status is Status.OK:
+                break
+        # Of equals, what was looked for from more starts.
+        return replace(_best(reversed(answers)), timings=answers[-1].timings)
 
     def _searched(
         self,
@@ -139,8 +175,7 @@ class Line:
             if answers[-1].verdict.status is Status.OK:
                 break
         # Of equals, what came later knows more.
-        best = min(reversed(answers), key=lambda one: _BEST_FIRST.index(one.verdict.status))
-        return replace(best, timings=timings)
+        return replace(_best(reversed(answers)), timings=timings)
 
     def register(
         self,
@@ -164,16 +199,34 @@ class Line:
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
     ) -> TrackedFrame:
-        """Judge a pose as it stands, without moving it, by the surface that is seen there."""
+        """Judge a pose as it stands, without moving it, by the surface that is seen there.
+
+        Measured freely, a surface tells whether the pose is the right one, but fixes it less well
+        than a bone that is followed: only the stage's tolerance counts.
+        """
         pose = self._rectified(left_from_bone)
         pair, timings = self._rectified_pair(left, right, pose, NEAR_VIEW)
         measured = self._meter.freely(pair, pose, self.settings.locator.tracking)
         if measured is None:
             return self._fit_judge.lost(Reason.OUT_OF_VIEW)
         estimate = estimate_at(measured.scene, self.model, pose, STEREO_SETTINGS)
-        return self._fit_judge.judged(
-            pair, Fit(estimate, measured, measured.timings), goal, timings
-        )
+        fit = Fit(estimate, measured, measured.timings)
+        return self._fit_judge.judged(pair, fit, replace(goal, seen_mm=math.inf), timings)
+
+    def _cause(
+        self,
+        left: Image,
+        right: Image,
+        expected: RigidTransform,
+        state: TrackState,
+        tracked: TrackedFrame,
+    ) -> Reason | None:
+        """What is wrong for good: as known, or looked for anew in some of the lost frames."""
+        is_lost = tracked.verdict.status is Status.LOST
+        is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
+        if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
+            return state.cause
+        return self._causes.of_loss(left, right, expected)
 
     def _rectified_pair(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins = WIDE_VIEW
@@ -182,3 +235,8 @@ class Line:
 
     def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
         return self._meter.geometry.rectified_from_left @ left_from_bone
+
+
+def _best(answers: Iterable[TrackedFrame]) -> TrackedFrame:
+    """The first of those with the best status."""
+    return min(answers, key=lambda one: one.verdict.rank)

@@ -6,7 +6,7 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform, vector_from_rotation
 from navapp.tracking.box_tracker import BoxState
-from navapp.values import Reason, Status, TrackedFrame
+from navapp.values import Reason, Status, TrackedFrame, Verdict
 
 # A patient's limb slows down: the prediction takes this part of the last velocity.
 _DAMPING = 0.7
@@ -36,6 +36,7 @@ class TrackState:
         velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
         n_lost: frames lost since then.
         box: of the bone in the newest picture, and what it looks like; None before the first.
+        cause: what was found to be wrong for good, until a frame is OK.
     """
 
     left_from_bone: RigidTransform
@@ -43,11 +44,14 @@ class TrackState:
     velocity: FloatArray
     n_lost: int = 0
     box: BoxState | None = None
+    cause: Reason | None = None
 
     @classmethod
-    def at_rest(cls, left_from_bone: RigidTransform, captured_ns: int) -> "TrackState":
-        """A pose without motion."""
-        return cls(left_from_bone, captured_ns, np.zeros(6))
+    def at_rest(
+        cls, left_from_bone: RigidTransform, captured_ns: int, cause: Reason | None = None
+    ) -> "TrackState":
+        """A pose without motion, and what is wrong for good with what was found there."""
+        return cls(left_from_bone, captured_ns, np.zeros(6), cause=cause)
 
     def predicted(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
         """The pose expected at a moment; where it was last seen after a long gap."""
@@ -70,12 +74,18 @@ class TrackState:
         # What lies far from where it was expected, and fits badly too, is something else.
         is_elsewhere = Reason.JUMPED in verdict.reasons and _AGAINST.intersection(verdict.reasons)
         if pose is None or verdict.status is Status.LOST or is_elsewhere:
-            return replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
+            lost = replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
+            return replace(lost, cause=verdict.cause)
         elapsed_ns = captured_ns - self.captured_ns
         velocity = np.zeros(6)
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
             velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
-        return TrackState(pose, captured_ns, velocity, 0, self.box)
+        return TrackState(pose, captured_ns, velocity, 0, self.box, verdict.cause)
+
+
+def is_place_doubted(verdict: Verdict) -> bool:
+    """Whether something speaks against a pose's place; always when it is lost."""
+    return verdict.status is Status.LOST or not _AGAINST.isdisjoint(verdict.reasons)
 
 
 def twist_between(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> FloatArray:

@@ -3,12 +3,11 @@
 import math
 from dataclasses import replace
 
-from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
-from navapp.stereo import PictureHealth, StereoHealth, measure_health
-from navapp.values import DisparityMap, Reason, Status, Verdict
+from navapp.geometry.rectification import RectifiedGeometry
+from navapp.stereo import PictureHealth, StereoHealth
+from navapp.tracking.judge import OK_ERROR_MM
+from navapp.values import Reason, Status, Verdict
 
-# What a moved rig may cost: where an OK pose has to be right to.
-_COST_MM = 0.5
 _SURE_SIGMAS = 3.0
 # A bone fills half of its box and more; what lies around it may be black.
 _UNUSABLE_SHARE = 0.7
@@ -17,18 +16,16 @@ _UNLIKE_RATIO = 2.0
 
 
 def with_pair_doubts(
-    verdict: Verdict, pair: RectifiedPair, found: DisparityMap, depth_mm: float
+    verdict: Verdict, health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float
 ) -> Verdict:
     """A verdict, with what its pair of pictures has against it: that comes first, as the cause.
 
     Args:
         verdict: of the judge.
-        pair: rectified.
-        found: disparity that was matched in it.
+        health: of the pair.
+        geometry: of the pair.
         depth_mm: of the bone.
     """
-    geometry = pair.geometry
-    health = measure_health(pair, found, geometry.disparity_px(depth_mm))
     doubts = pair_doubts(health, geometry, depth_mm)
     verdict = replace(verdict, predicted_tre_mm=_widened_mm(verdict, health, geometry, depth_mm))
     if not doubts:
@@ -52,7 +49,7 @@ def pair_doubts(
     doubts = [Reason.PICTURE_DARK] * is_dark + [Reason.PICTURE_OVEREXPOSED] * is_clipped
     if not doubts:
         doubts += [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
-    is_off = health.has_lost_rows or bool(_row_cost_mm(health, geometry, depth_mm) > _COST_MM)
+    is_off = health.has_lost_rows or bool(_row_cost_mm(health, geometry, depth_mm) > OK_ERROR_MM)
     doubts += [Reason.ROWS_DISAGREE] * is_off
     return tuple(doubts)
 

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, distinct, scattered_starts, tilted_starts
+from navapp.tracking.buried import BuriedBone
+from navapp.tracking.causes import Causes
 from navapp.tracking.first_look import FirstLook, doubted, poses_to_refine
 from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit
@@ -14,8 +16,9 @@ from navapp.tracking.locator import WIDE_VIEW, Locator
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 from navapp.values import LineTimings, Prior, Reason, Status, TrackedFrame
 
-# Near starts come first, which is so much of the work of both lists.
-_NEAR_SHARE = 0.1
+# A first registration tries near starts first, which is so much of the work of all; then far ones;
+# then it looks for a bone that is partly buried.
+_NEAR_SHARE, _FAR_SHARE = 0.05, 0.45
 # Tilts and shifts of a rough pose: (deg, how many).
 _NEAR_TILTS = (15.0, 12)
 _FAR_TILTS = ((15.0, 12), (28.0, 20))
@@ -34,6 +37,8 @@ class Registrar:
         locator: Locator,
         fit_judge: FitJudge,
         first_look: FirstLook,
+        buried: BuriedBone,
+        causes: Causes,
         n_refined: int,
     ) -> None:
         """Join what measures, locates and judges.
@@ -44,11 +49,14 @@ class Registrar:
             locator: of the bone.
             fit_judge: of its fits.
             first_look: tells where the bone may be without a pose.
+            buried: finds a bone that is partly buried in tissue.
+            causes: tells what is wrong for good when the bone is not found.
             n_refined: so many answers of a search are refined.
         """
         self._meter, self._model = meter, model
         self._locator, self._fit_judge = locator, fit_judge
-        self._first_look, self._n_refined = first_look, n_refined
+        self._first_look, self._buried, self._causes = first_look, buried, causes
+        self._n_refined = n_refined
 
     def register(
         self,
@@ -61,10 +69,17 @@ class Registrar:
         """Distinct candidates, best first; see `Line.register`."""
         start = prior.left_from_bone.get(self._model.bone.name)
         if start is None:
-            return self._anywhere(left, right, prior, goal, on_progress)
-        rough = self._meter.geometry.rectified_from_left @ start
-        pair, timings = self._meter.rectified(left, right, rough, WIDE_VIEW)
-        return self._around(pair, rough, goal, timings, on_progress)
+            answers = self._anywhere(left, right, prior, goal, on_progress)
+            start = answers[0].left_from_bone if answers else None
+        else:
+            rough = self._meter.geometry.rectified_from_left @ start
+            pair, timings = self._meter.rectified(left, right, rough, WIDE_VIEW)
+            answers = self._around(pair, rough, goal, timings, on_progress)
+        if not answers or answers[0].verdict.status is Status.OK or self._locator.is_baseline:
+            return answers
+        around = None if start is None else self._meter.geometry.rectified_from_left @ start
+        cause = self._causes.of_failure(left, right, around, answers[0], on_progress)
+        return [answer.because(cause) for answer in answers]
 
     def _around(
         self,
@@ -74,7 +89,7 @@ class Registrar:
         timings: LineTimings,
         on_progress: Callable[[float], None],
     ) -> list[TrackedFrame]:
-        """Around a rough pose: from near starts, and from far ones when those give no OK."""
+        """Around a rough pose: near starts, far ones, partly buried, until one gives an OK."""
         locator = self._locator
         measured = self._meter.freely(
             pair, rough, locator.settings.search, is_baseline=locator.is_baseline
@@ -93,9 +108,17 @@ class Registrar:
         centre_mm = rough.apply(self._model.centre_mm)
         fits = looked_from(near_starts(rough, centre_mm), 0.0, _NEAR_SHARE)
         answers = self._ranked(pair, fits, goal, timings)
-        if not answers or answers[0].verdict.status is not Status.OK:
-            fits += looked_from(far_starts(rough, centre_mm), _NEAR_SHARE, 1.0 - _NEAR_SHARE)
+        if not _is_ok(answers):
+            fits += looked_from(far_starts(rough, centre_mm), _NEAR_SHARE, _FAR_SHARE)
             answers = self._ranked(pair, fits, goal, timings)
+        if not _is_ok(answers):
+            done = _NEAR_SHARE + _FAR_SHARE
+            slid = self._buried.found(
+                pair, measured, rough, lambda part: on_progress(done + (1.0 - done) * part)
+            )
+            buried = self._fit_judge.judged(pair, slid, goal, timings)
+            # Of equals, what was looked for from more starts.
+            answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
         on_progress(1.0)
         return answers
 
@@ -149,6 +172,10 @@ class Registrar:
         return [
             self._fit_judge.judged(pair, fit, goal, timings) for fit in fits if fit.pose in kept
         ]
+
+
+def _is_ok(answers: list[TrackedFrame]) -> bool:
+    return bool(answers) and answers[0].verdict.status is Status.OK
 
 
 def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, luma
+from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import RenderedView, box_around, render_rectified
+from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     RefineSettings,
@@ -25,7 +25,7 @@ from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
-FREE_CORRELATION_PX, _MODEL_CORRELATION_PX = 40.0, 11.0
+FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
 _SAMPLED = RefineSettings(n_steps=3, last_step_px=0.3)
 _SAMPLES_PX = 6
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
@@ -92,7 +92,7 @@ class Expected:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RoughMap:
+class CoarseMap:
     """What lies where, to about a pixel.
 
     Attributes:
@@ -132,8 +132,18 @@ class SurfaceMeter:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         started = time.perf_counter_ns()
         box, band_px = self._region(around, margins) or (None, None)
-        pair = self.rectifier.rectify(luma(left), luma(right), box, band_px)
+        pair = self.rectifier.rectify(left, right, box, band_px, is_grey=True)
         return pair, LineTimings(rectify_ms=_ms_since(started))
+
+    def surroundings(
+        self, left: Image, right: Image, around: RigidTransform | None
+    ) -> tuple[RectifiedPair, tuple[float, float]]:
+        """Both pictures around a pose, and the disparities there; the whole view without one."""
+        region = None if around is None else self._region(around, _AROUND)
+        near_mm, far_mm = self._depth_mm
+        everything = None, (self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm))
+        box, band_px = region or everything
+        return self.rectifier.rectify(left, right, box, band_px, is_grey=True), band_px
 
     def freely(
         self,
@@ -162,8 +172,8 @@ class SurfaceMeter:
 
     def coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
-    ) -> RoughMap | None:
-        """Whatever lies in a box, roughly; None out of view or depth.
+    ) -> CoarseMap | None:
+        """Whatever lies in a box, as a coarse map; None out of view or depth.
 
         Args:
             pair: pictures.
@@ -174,7 +184,7 @@ class SurfaceMeter:
         if region is None:
             return None
         around = box or region[0]
-        return RoughMap(match_coarsely(replace(pair, box=around), region[1]), around)
+        return CoarseMap(match_coarsely(replace(pair, box=around), region[1]), around)
 
     def expected(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
@@ -201,9 +211,7 @@ class SurfaceMeter:
         found, is_expected = answer.disparity, np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
         share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)
-        return Measurement(
-            found, cloud, answer.timings, share, _MODEL_CORRELATION_PX, expected.view
-        )
+        return Measurement(found, cloud, answer.timings, share, MODEL_CORRELATION_PX, expected.view)
 
     def sampled(self, expected: Expected) -> Measurement:
         """As `on_model`, only on samples, in more steps: it sees further, and is soon done.
@@ -218,7 +226,7 @@ class SurfaceMeter:
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = reproject(found, self.geometry, _SAMPLES_PX)
         timings = LineTimings(stereo_ms=_ms_since(started))
-        return Measurement(found, cloud, timings, share, _MODEL_CORRELATION_PX, expected.view)
+        return Measurement(found, cloud, timings, share, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About as many points as the line wants."""
@@ -230,13 +238,11 @@ class SurfaceMeter:
         self, pose: RigidTransform, margins: Margins
     ) -> tuple[Box, tuple[float, float]] | None:
         """Box and disparity band around the model at a pose; None out of view or out of depth."""
-        hull_mm = pose.apply(self._model.hull_mm)
-        box = box_around(hull_mm, self.geometry)
+        box, (nearest_mm, farthest_mm) = bounds_of(self._model.hull_mm, pose, self.geometry)
         if box is None:
             return None
-        depths = hull_mm[:, 2]
-        near = max(float(depths.min()) - margins.band_mm, self._depth_mm[0])
-        far = min(float(depths.max()) + margins.band_mm, self._depth_mm[1])
+        near = max(nearest_mm - margins.band_mm, self._depth_mm[0])
+        far = min(farthest_mm + margins.band_mm, self._depth_mm[1])
         if near >= far:
             return None
         grown = box.grown(margins.box_px).clipped(self.geometry.width, self.geometry.height)

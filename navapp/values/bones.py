@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh import TriangleMesh, vertex_normals
 from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 Side = Literal["left", "right"]
@@ -51,6 +51,21 @@ class BoneModel:
             if kind is float and not (np.isfinite(values) & (values >= 0.0)).all():
                 raise ValueError(f"{self.name}: {name} must be finite and not negative")
             object.__setattr__(self, name, values)
+
+    def seen_surface(self) -> TriangleMesh:
+        """What a camera sees: moved out by the mean cartilage, without what a stage removed.
+
+        Its normals lean where the cartilage grows thicker.
+        """
+        mesh = self.mesh
+        points_mm = mesh.vertices_mm + self.cartilage_mm[:, None] * mesh.normals
+        normals = np.array(mesh.normals)
+        if self.cartilage_mm.any():
+            seen = vertex_normals(points_mm, mesh.faces)
+            has_faces = np.linalg.norm(seen, axis=1) > 0.0
+            normals[has_faces] = seen[has_faces]
+        is_left = ~self.is_removed[mesh.faces].any(axis=1)
+        return TriangleMesh(points_mm, mesh.faces[is_left], normals)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

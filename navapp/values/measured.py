@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.rectification import Box
 from navapp.geometry.transform import FloatArray
 
 
@@ -37,9 +38,16 @@ class DisparityMap:
     y: int
 
     @property
+    def box(self) -> Box:
+        """Where it lies in the rectified picture."""
+        height, width = self.disparity_px.shape
+        return Box(self.x, self.y, width, height)
+
+    @property
     def matched_share(self) -> float:
         """Share of pixels with a measured disparity."""
-        return float((self.origin == Origin.MATCHED).mean()) if self.origin.size else 0.0
+        n_matched = np.count_nonzero(self.origin == Origin.MATCHED)
+        return float(n_matched / self.origin.size) if self.origin.size else 0.0
 
     def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
         """The map, unknown beside a mask (h, w)."""

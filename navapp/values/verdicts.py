@@ -1,5 +1,6 @@
 """A pose, what stands behind it, and what the judge says of it."""
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -17,6 +18,7 @@ class Reason(Enum):
     COVERAGE_LOW = "too little of the bone is seen"
     SEEN_THROUGH = "something is seen where the bone should be in the way"
     SURFACE_MISFIT = "surface does not fit the model"
+    SIZE_DIFFERS = "the bone seen has another size than the model"
     OUTLIERS = "too many points fit no surface of the model"
     NOT_CONVERGED = "the estimate did not settle"
     AMBIGUOUS = "a different pose fits as well"
@@ -30,6 +32,8 @@ class Reason(Enum):
     PICTURE_DARK = "one picture is dark or blocked"
     PICTURE_OVEREXPOSED = "one picture is overexposed"
     PICTURES_UNLIKE = "one picture is blurred or covered"
+    PICTURES_SWAPPED = "left and right pictures are swapped"
+    OTHER_SIDE = "the other side's bone fits better: is it the other knee's plan?"
     RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
     OUT_OF_VIEW = "the bone is outside the picture"
     # of the session
@@ -53,12 +57,13 @@ _REMEDIES = {
     Reason.COVERAGE_LOW: "move the instrument or hand away",
     Reason.SEEN_THROUGH: "check that this is the right bone and plan; register again",
     Reason.SURFACE_MISFIT: "check that this is the right bone and plan; register again",
+    Reason.SIZE_DIFFERS: "check that this is the right plan, and its scale",
     Reason.OUTLIERS: "clear the view of the bone; register again",
     Reason.NOT_CONVERGED: "hold still, or register again",
     Reason.AMBIGUOUS: "expose more of the bone, or start nearer to it",
     Reason.CUES_DISAGREE: "check that this is the right bone and plan; register again",
     Reason.DEGENERATE: "expose more of the bone",
-    Reason.POSE_UNCERTAIN: "expose more of the bone",
+    Reason.POSE_UNCERTAIN: "move the instrument or hand away, or expose more of the bone",
     Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",
@@ -66,6 +71,8 @@ _REMEDIES = {
     Reason.PICTURE_DARK: "uncover both cameras, or check the light",
     Reason.PICTURE_OVEREXPOSED: "turn the light or the exposure down",
     Reason.PICTURES_UNLIKE: "clean and uncover both cameras",
+    Reason.PICTURES_SWAPPED: "swap the cameras' cables, or their names in the settings",
+    Reason.OTHER_SIDE: "check the patient, the side and the plan; load the right one",
     Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",
     Reason.OUT_OF_VIEW: "bring the bone back into both pictures",
     Reason.NOT_NAVIGATING: "register, then accept the candidate",
@@ -76,6 +83,10 @@ _REMEDIES = {
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }
+
+
+# What stays wrong until somebody mends it.
+_FOR_GOOD = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +105,9 @@ class PoseEstimate:
         iterations: of the solver.
         is_converged: the solver met its step limit.
         reasons: what the solver itself has against the result.
+        size_mm: by how much the bone seems larger than the model, at the rms distance of what is
+            seen from its middle; told by the surface alone.
+        size_sigma_mm: standard deviation of that.
     """
 
     camera_from_bone: RigidTransform
@@ -105,6 +119,8 @@ class PoseEstimate:
     iterations: int
     is_converged: bool
     reasons: tuple[Reason, ...] = ()
+    size_mm: float = 0.0
+    size_sigma_mm: float = math.inf
 
     def doubted(self, reason: Reason) -> "PoseEstimate":
         """The same estimate with one more reason against it."""
@@ -143,6 +159,16 @@ class Verdict:
     rms_mm: float | None = None
     expected_rms_mm: float | None = None
 
+    @property
+    def cause(self) -> Reason | None:
+        """What is wrong for good, when that was found out."""
+        return next((reason for reason in self.reasons if reason in _FOR_GOOD), None)
+
+    @property
+    def rank(self) -> int:
+        """Of its status: 0 is the best."""
+        return list(Status).index(self.status)
+
 
 @dataclass(frozen=True, slots=True)
 class LineTimings:
@@ -175,6 +201,13 @@ class TrackedFrame:
     def left_from_bone(self) -> RigidTransform | None:
         """The pose, when there is one."""
         return None if self.estimate is None else self.estimate.camera_from_bone
+
+    def because(self, cause: Reason | None) -> "TrackedFrame":
+        """The same answer with the cause of its failure in front; an OK has none."""
+        if cause is None or self.verdict.status is Status.OK:
+            return self
+        others = tuple(reason for reason in self.verdict.reasons if reason is not cause)
+        return replace(self, verdict=replace(self.verdict, reasons=(cause, *others)))
 
 
 def predicted_tre_mm(

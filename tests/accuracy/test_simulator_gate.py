@@ -6,15 +6,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from drivers.clock import ManualClock
-from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import Goal, Line, TrackState
-from navapp.values import BoneModel, Prior, Status, visible_vertices
-from sim_devices.camera import SimulatedCamera
+from navapp.values import Side, Status, visible_vertices
 from sim_devices.scenario import Scenario
-from sim_devices.sensor import SensorModel
-from sim_devices.truth import TruthOracle
-from sim_devices.world import World
+from tests.knees import SimulatedKnee
 
 KNEES = ((1, "right"), (2, "left"), (3, "right"))
 N_TRACKED = 5
@@ -38,21 +33,15 @@ class Judged:
 
 
 @lru_cache(maxsize=3)
-def run(seed: int, side: str) -> tuple[Judged, ...]:
-    world = World(Scenario(seed=seed, side=side, motion="patient"))
-    camera = SimulatedCamera(
-        world, ManualClock(), is_stepped=True, sensor=SensorModel(seed=seed)
-    )  # fmt: skip
-    camera.open()
-    oracle = TruthOracle(world, camera.world_time_ns)
-    mesh = world.anatomy.bones["femur"]
-    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), side)
-    line = Line(world.rig, bone)
+def run(seed: int, side: Side) -> tuple[Judged, ...]:
+    knee = SimulatedKnee(Scenario(seed=seed, side=side, motion="patient"))
+    mesh = knee.bone.mesh
+    line = Line(knee.rig, knee.bone)
     judged = []
 
     def judge(frame, tracked) -> None:
         assert tracked.left_from_bone is not None, f"no pose in frame {frame.sequence}"
-        true = oracle.left_from_body("femur", frame.captured_ns)
+        true = knee.truth(frame)
         points = mesh.vertices_mm[visible_vertices(mesh, true)]
         error = np.linalg.norm(tracked.left_from_bone.apply(points) - true.apply(points), axis=1)
         verdict = tracked.verdict
@@ -63,13 +52,12 @@ def run(seed: int, side: str) -> tuple[Judged, ...]:
             )
         )  # fmt: skip
 
-    frame = camera.read(1.0)
-    prior = Prior({"femur": world.nominal_left_from_femur})
-    first = line.register(frame.left, frame.right, prior, GOAL)[0]
+    frame = knee.camera.read(1.0)
+    first = line.register(frame.left, frame.right, knee.prior, GOAL)[0]
     judge(frame, first)
     state = TrackState.at_rest(first.left_from_bone, frame.captured_ns)
     for _ in range(N_TRACKED):
-        frame = camera.read(1.0)
+        frame = knee.camera.read(1.0)
         tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         judge(frame, tracked)
     return tuple(judged)

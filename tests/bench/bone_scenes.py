@@ -2,14 +2,14 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from navapp.geometry import Box, RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
+from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.zbuffer import projected_box
@@ -18,6 +18,7 @@ from navapp.values import DisparityMap, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
+from tests.knees import femur_of
 
 SEQUENCES = ("registration", "patient", "instrument")
 _ERODED_PX = 6
@@ -73,8 +74,7 @@ def sequences(folder: Path) -> Iterator[Sequence]:
 def simulated_sequence(name: str) -> Sequence:
     """One of the simulated sequences."""
     world = World(_SIMULATED[name])
-    bone = world.anatomy.bones["femur"]
-    mesh = TriangleMesh(bone.vertices_mm, bone.faces)
+    mesh = femur_of(world).mesh
     return Sequence(f"simulated/{name}", list(_simulated(world, mesh)), mesh, world.rig)
 
 
@@ -148,7 +148,7 @@ def fit_error_mm(scene: Scene, found: DisparityMap, mesh: TriangleMesh) -> float
 def on_bone(scene: Scene, found: DisparityMap) -> DisparityMap:
     """Only what was matched on the bone, over the scene's box."""
     box = scene.pair.box
-    inside = Box(found.x - box.x, found.y - box.y, *found.origin.shape[::-1])
+    inside = replace(found.box, x=found.x - box.x, y=found.y - box.y)
     part = inside.clipped(box.width, box.height)
     here = np.s_[part.y : part.y + part.height, part.x : part.x + part.width]
     x, y = part.x - inside.x, part.y - inside.y

@@ -16,7 +16,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from drivers.clock import ManualClock
 from drivers.frames import StereoFrame
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
@@ -24,13 +23,11 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.preop.cartilage import MAPPED_SD_MM, even_cartilage
 from navapp.tracking import Goal, Line, TrackState
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
-from navapp.values import BoneModel, Origin, Prior, Side, Status, TrackedFrame
-from sim_devices.camera import SimulatedCamera
+from navapp.values import BoneModel, Origin, Side, Status, TrackedFrame
 from sim_devices.relief import waves
 from sim_devices.scenario import Scenario
-from sim_devices.sensor import SensorModel
-from sim_devices.truth import TruthOracle
 from sim_devices.world import World
+from tests.knees import SimulatedKnee, nominal_prior
 
 # Not the seeds of any test or default.
 FIRST_SEED = 81
@@ -75,17 +72,11 @@ class Row:
 def patient(seed: int, n_frames: int, mean_mm: float = MEAN_MM) -> Patient:
     """A knee of that seed, seen in so many frames."""
     side: Side = "left" if seed % 2 else "right"
-    world = World(Scenario(seed=seed, side=side, cartilage_mm=mean_mm, motion="patient"))
-    camera = SimulatedCamera(
-        world, ManualClock(), is_stepped=True, sensor=SensorModel(seed=seed)
-    )  # fmt: skip
-    camera.open()
-    frames = [camera.read(1.0) for _ in range(n_frames)]
-    oracle = TruthOracle(world, camera.world_time_ns)
-    poses = [oracle.left_from_body("femur", frame.captured_ns) for frame in frames]
-    bone = world.anatomy.bones["femur"]
-    mesh = TriangleMesh(bone.vertices_mm, bone.faces)
-    return Patient(seed, world, mesh, side, world.cartilage_mm("femur"), frames, poses)
+    knee = SimulatedKnee(Scenario(seed=seed, side=side, cartilage_mm=mean_mm, motion="patient"))
+    frames = knee.frames(n_frames)
+    poses = [knee.truth(frame) for frame in frames]
+    thickness_mm = knee.world.cartilage_mm("femur")
+    return Patient(seed, knee.world, knee.bone.mesh, side, thickness_mm, frames, poses)
 
 
 def smooth_error_mm(known: Patient) -> FloatArray:
@@ -140,9 +131,8 @@ def _mapped(known: Patient, thickness_mm: FloatArray) -> BoneModel:
 def followed(known: Patient, bone: BoneModel) -> Iterator[Row]:
     """Register in the first frame, track through the others."""
     line = Line(known.world.rig, bone)
-    prior = Prior({"femur": known.world.nominal_left_from_femur})
     first = known.frames[0]
-    answers = line.register(first.left, first.right, prior, GOAL)
+    answers = line.register(first.left, first.right, nominal_prior(known.world), GOAL)
     if not answers or answers[0].left_from_bone is None:
         yield _lost(known.seed, 0, "no candidate")
         return

@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 
 from navapp.evaluation import mean_tre_mm
-from navapp.geometry import RigidTransform, TriangleMesh, read_rig
+from navapp.geometry import RigidTransform, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.preop import build_aspects
@@ -32,6 +32,7 @@ from navapp.values import BoneModel, Prior, Status
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
+from tests.knees import femur_of
 
 _SEQUENCES = ("registration", "patient", "instrument")
 _OFF_SHARE = 0.15
@@ -199,8 +200,7 @@ def simulated(seed: int) -> Case:
     time_ns = int(rng.uniform(0.0, 6e9))
     left, right = (sensor.picture(world.render(eye, time_ns), eye, 0) for eye in ("left", "right"))
     seen = world.depth("left", time_ns)
-    mesh = world.anatomy.bones["femur"]
-    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), scenario.side)
+    bone = femur_of(world)
     group = "simulated, hand" if scenario.instrument == "sweep" else "simulated"
     visible = seen.body == seen.bodies.index("femur")
     frame = Frame(group, left, right, visible, world.left_from_body("femur", time_ns))

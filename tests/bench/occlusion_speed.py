@@ -16,7 +16,6 @@ bench-peers` makes an environment of its own for it, or by hand
 import argparse
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -151,9 +150,8 @@ def peer_filter(filled: DisparityMap, picture: np.ndarray) -> Callable[[], objec
 def use_threads(n: int) -> None:
     """So many on both sides."""
     cv2.setNumThreads(n)
-    for pool in bands._pools:
-        pool.shutdown()
-    bands._pools[:] = [ThreadPoolExecutor(n, initializer=bands._mark)]
+    # Alone, or with the helper beside.
+    bands._here.is_alone = n == 1
 
 
 def median_ms(steps: dict[str, Callable[[], object]], repetitions: int) -> dict[str, float]:

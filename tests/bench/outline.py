@@ -4,32 +4,39 @@ usage: python -m tests.bench.outline [--seeds N] [--first SEED]
 
 One frame of each of N simulated knees (every fourth with a hand and an instrument in the view).
 The first table sorts the strongest edge near each point of the outline, at the true pose, by how
-dark it is behind it; the second joins surface and
-outline, started next to the truth. The truth only starts and scores.
+dark it is behind it; the second joins surface and outline, started next to the truth; the third
+tells how many of the outline's edges are as near as the surface's fit allows, for the right plan
+and for bones of another size. The truth only starts and scores.
 """
 
 import argparse
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from navapp.evaluation import mean_tre_mm
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
+from navapp.registration.blocks import near
 from navapp.tracking import Goal, Line
 from navapp.tracking.contour_kernels import missing_share, sample_across, strongest_edge
+from navapp.tracking.follower import Fit
 from navapp.tracking.locator import NEAR_VIEW
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
-from navapp.values import predicted_tre_mm, visible_vertices
+from navapp.values import BoneModel, predicted_tre_mm, visible_vertices
 from tests.bench.first_registration import Case, simulated
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
 DARKER = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 1.01)
 NEAR_PX = 0.5
 START_OFF_MM, START_OFF_DEG = 0.25, 0.25
+SIZES = (1.0, 0.95, 0.98, 1.02, 1.05)
+FEWEST = 6.0
 
 
 @dataclass(frozen=True)
@@ -41,18 +48,22 @@ class Edge:
 
 
 def main() -> int:
-    """Print both tables."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=501)
     options = parser.parse_args()
     edges: list[Edge] = []
     rows: list[tuple[float, float, float, float]] = []
+    shares: dict[float, list[float]] = {size: [] for size in SIZES}
     for seed in range(options.first, options.first + options.seeds):
         case = simulated(seed)
         line = Line(case.rig, case.bone)
         edges += edges_of(case, line)
         rows += joined(case, line, seed)
+        for size in SIZES:
+            sized = line if size == 1.0 else Line(case.rig, _sized(case.bone, size))
+            shares[size] += near_shares(case, sized, seed)
     print("| darker behind by | edges | within 0.5 px | median px | MAD px |")
     print("|---|---|---|---|---|")
     for low, high in pairwise(DARKER):
@@ -65,7 +76,16 @@ def main() -> int:
             f"| {name} | {len(rows)} | {np.median(error):.3f} mm | {error.max():.3f} mm | "
             f"{np.median(bound):.2f} mm | {100 * np.mean(error <= bound):.0f} % |"
         )
+    print("\n| size of the plan | frames | edges near: median | least |\n|---|---|---|---|")
+    for size, found in shares.items():
+        print(f"| x {size:g} | {len(found)} | {np.median(found):.2f} | {min(found):.2f} |")
     return 0
+
+
+def _sized(bone: BoneModel, size: float) -> BoneModel:
+    centre_mm = bone.mesh.centroid_mm
+    scaled_mm = centre_mm + size * (bone.mesh.vertices_mm - centre_mm)
+    return replace(bone, mesh=TriangleMesh(scaled_mm, bone.mesh.faces))
 
 
 def edges_of(case: Case, line: Line) -> Iterator[Edge]:
@@ -105,6 +125,22 @@ def outline(
 
 def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, float, float]]:
     """Error and bound of the surface alone, then of both; nothing when the bone is not found."""
+    true = line._rectified(case.frames[0].true)
+    pair, fit = located(case, line, seed)
+    if fit is None:
+        return
+    coarse_px = line._fit_judge.coarse_px(pair, fit)
+    answer: list[float] = []
+    for one in (fit, line._fit_judge._contours.joined(pair, fit, coarse_px)):
+        mesh = line.model.bone.mesh
+        targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
+        bound_mm = predicted_tre_mm(one.estimate, line.centre_mm, targets[:: len(targets) // 200])
+        answer += [mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
+    yield answer[0], answer[1], answer[2], answer[3]
+
+
+def located(case: Case, line: Line, seed: int) -> tuple[RectifiedPair, Fit | None]:
+    """The surface's fit from next to the truth; None when the bone is not found."""
     frame, rng = case.frames[0], np.random.default_rng([seed, 3])
     true = line._rectified(frame.true)
     off = np.concatenate(
@@ -113,16 +149,21 @@ def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, fl
     start = true.moved(off, true.apply(line.centre_mm))
     pair, _ = line._rectified_pair(frame.left, frame.right, start, NEAR_VIEW)
     fit = line.locator.locate(pair, start)
-    if fit is None or fit.measured.view is None:
+    return pair, None if fit is None or fit.measured.view is None else fit
+
+
+def near_shares(case: Case, line: Line, seed: int) -> Iterator[float]:
+    """Share of the edges that the fit allows; nothing without a fit, or with too few edges."""
+    pair, fit = located(case, line, seed)
+    if fit is None:
         return
-    rough_px = line._fit_judge.rough_px(pair, fit)
-    answer: list[float] = []
-    for one in (fit, line._fit_judge._contours.joined(pair, fit, rough_px)):
-        mesh = line.model.bone.mesh
-        targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
-        bound_mm = predicted_tre_mm(one.estimate, line.centre_mm, targets[:: len(targets) // 200])
-        answer += [mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
-    yield answer[0], answer[1], answer[2], answer[3]
+    measured, coarse_px = fit.measured, line._fit_judge.coarse_px(pair, fit)
+    block = line._fit_judge._contours.block(
+        pair, fit.pose, measured.view, measured.disparity, coarse_px
+    )
+    weight = 1.0 / block.n_sharing
+    if weight.sum() >= FEWEST:
+        yield float(weight[near(block, fit.estimate.covariance)].sum() / weight.sum())
 
 
 def row(low: float, high: float, edges: list[Edge]) -> str:

@@ -8,17 +8,15 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from drivers.clock import ManualClock
 from navapp.evaluation import mean_tre_mm
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking import Goal, Line, TrackState
 from navapp.values import BoneModel, Prior, Status, TrackedFrame, visible_vertices
-from sim_devices.camera import SimulatedCamera
 from sim_devices.motion import LegMotion, smooth_step
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import Eye, SensorModel
 from sim_devices.world import World
+from tests.knees import femur_of, nominal_prior, stepped_camera
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
 _COVER_ABOVE_MM = 25.0
@@ -107,15 +105,12 @@ class Theatre:
     @property
     def bone(self) -> BoneModel:
         """The right plan."""
-        mesh = self.world.anatomy.bones["femur"]
-        return BoneModel(
-            "femur", TriangleMesh(mesh.vertices_mm, mesh.faces), self.world.scenario.side
-        )
+        return femur_of(self.world)
 
     @property
     def prior(self) -> Prior:
         """The nominal pose."""
-        return Prior({"femur": self.world.nominal_left_from_femur})
+        return nominal_prior(self.world)
 
     def truth(self, time_ns: int) -> RigidTransform:
         """Of the femur."""
@@ -196,11 +191,7 @@ class Shown:
 
 def played(theatre: Theatre, line: Line, rate_hz: float, until_s: float) -> Iterator[Shown]:
     """Register in the first frame, then track, as the controller does: by the capture times."""
-    camera = SimulatedCamera(
-        theatre, ManualClock(), is_stepped=True, rate_hz=rate_hz,
-        sensor=SensorModel(seed=theatre.seed),
-    )  # fmt: skip
-    camera.open()
+    camera = stepped_camera(theatre, SensorModel(seed=theatre.seed), rate_hz)
     state: TrackState | None = None
     bone = theatre.bone
     while True:

@@ -15,16 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.clock import ManualClock
 from navapp.evaluation import mean_tre_mm
-from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import Goal, Line, TrackState
-from navapp.values import BoneModel, Prior, Side, Status, TrackedFrame
-from sim_devices.camera import SimulatedCamera
+from navapp.values import BoneModel, Side, Status, TrackedFrame
 from sim_devices.scenario import Scenario
-from sim_devices.sensor import SensorModel
-from sim_devices.truth import TruthOracle
-from sim_devices.world import World
+from tests.knees import SimulatedKnee
 
 # The paper's situations: motion of the leg, and what passes in front of it.
 SITUATIONS = {
@@ -79,32 +74,23 @@ def operated(seed: int, situation: str, n_frames: int) -> Operation:
     """Register and follow one knee."""
     side: Side = "left" if seed % 2 else "right"
     motion, instrument = SITUATIONS[situation]
-    world = World(Scenario(seed=seed, side=side, motion=motion, instrument=instrument))
-    camera = SimulatedCamera(
-        world, ManualClock(), is_stepped=True, sensor=SensorModel(seed=seed)
-    )  # fmt: skip
-    camera.open()
-    oracle = TruthOracle(world, camera.world_time_ns)
-    mesh = world.anatomy.bones["femur"]
-    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), side)
-    line, state = Line(world.rig, bone), None
-    prior = Prior({"femur": world.nominal_left_from_femur})
+    knee = SimulatedKnee(Scenario(seed=seed, side=side, motion=motion, instrument=instrument))
+    line, state = Line(knee.rig, knee.bone), None
     answers: list[Answer] = []
     is_at_once = False
     for number in range(n_frames):
-        frame = camera.read(1.0)
+        frame = knee.camera.read(1.0)
         if state is None:
-            tracked = line.register(frame.left, frame.right, prior, _GOAL)[0]
+            tracked = line.register(frame.left, frame.right, knee.prior, _GOAL)[0]
         else:
             tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
-        true = oracle.left_from_body("femur", frame.captured_ns)
-        answer = _answer(tracked, true, bone)
+        answer = _answer(tracked, knee.truth(frame), knee.bone)
         if state is None and tracked.verdict.status is Status.OK:
             state = TrackState.at_rest(tracked.left_from_bone, frame.captured_ns)
             is_at_once = number == 0 and answer.tre_mm < _SUCCESS_MM
         if state is not None:
             answers.append(answer)
-    camera.close()
+    knee.camera.close()
     return Operation(is_at_once, answers)
 
 

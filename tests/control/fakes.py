@@ -11,10 +11,11 @@ from drivers.fixed_mirror import FixedMirror
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionController, SessionHooks, SessionOptions
+from navapp.control.controller import SessionController, SessionOptions
 from navapp.control.executors import Executor, InlineExecutor
 from navapp.control.results import FrameResult
-from navapp.control.states import Command, Event, Snapshot
+from navapp.control.session import SessionHooks
+from navapp.control.states import Accept, Command, Event, Register, Snapshot
 from navapp.errors import DeviceError, DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
@@ -245,6 +246,17 @@ class Bench:
         return next((e.text for e in reversed(self.events) if e.kind == "refused"), "")
 
 
+def navigating(bench: Bench) -> Bench:
+    """Registered, accepted, and one frame on."""
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(1)
+    bench.do(Accept())
+    bench.frames(1)
+    assert bench.state == "navigating"
+    return bench
+
+
 def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) -> None:
     """Poll something that another thread brings about."""
     import time
@@ -253,3 +265,7 @@ def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) 
     while not condition():
         assert time.monotonic() < end, f"waited in vain for {what}"
         time.sleep(0.002)
+
+
+LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
+DOUBTED = answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)

@@ -83,8 +83,8 @@ def test_steps_wait_for_their_frame(bench: Bench) -> None:
         ScriptStep(do="stage", stage="drilling", at_frame=15),
     )
     dark = []
-    bench.controller._hooks = replace(
-        bench.controller._hooks, on_frame=(lambda r: dark.append(bench.is_dark),)
+    bench.controller._session.hooks = replace(
+        bench.controller._session.hooks, on_frame=(lambda r: dark.append(bench.is_dark),)
     )
     given = commands_of(bench, ScriptedOperator(steps))
     assert given == [Register(), Accept(), Blank(), Show(), EnterStage(2)]
@@ -113,8 +113,8 @@ def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
 def test_a_recorded_operator_gives_each_command_after_the_same_frame(bench: Bench) -> None:
     recorded = [(-1, Show()), (2, Register()), (5, Accept()), (5, Blank())]
     told: list[tuple[int, object]] = []
-    bench.controller._hooks = replace(
-        bench.controller._hooks, on_command=(lambda c, s: told.append((s, c)),)
+    bench.controller._session.hooks = replace(
+        bench.controller._session.hooks, on_command=(lambda c, s: told.append((s, c)),)
     )
     run_headless(bench.controller, RecordedOperator(list(recorded)))
     assert told == recorded
@@ -126,8 +126,8 @@ def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
 
     live = Bench(monkeypatch, executor=ThreadExecutor(), camera=FakeCamera(None, n_frames=30))
     told: list[tuple[int, object]] = []
-    live.controller._hooks = replace(
-        live.controller._hooks, on_command=(lambda c, s: told.append((s, c)),)
+    live.controller._session.hooks = replace(
+        live.controller._session.hooks, on_command=(lambda c, s: told.append((s, c)),)
     )
     from navapp.control.states import Cancel
     from tests.control.fakes import wait_for

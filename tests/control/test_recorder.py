@@ -30,8 +30,8 @@ class Sink:
 def recorded(monkeypatch, folder: Path, sink: Sink) -> tuple[Bench, SessionRecorder]:
     bench = Bench(monkeypatch)
     recorder = SessionRecorder(folder, sink, with_pictures=False)
-    bench.controller._hooks = replace(
-        bench.controller._hooks,
+    bench.controller._session.hooks = replace(
+        bench.controller._session.hooks,
         on_frame=(recorder.on_frame,),
         on_event=(recorder.on_event,),
         on_command=(recorder.on_command,),

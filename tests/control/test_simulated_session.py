@@ -8,14 +8,14 @@ from drivers.clock import ManualClock, SystemClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionController, SessionHooks
+from navapp.control.controller import SessionController
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.operators import ScriptedOperator
 from navapp.control.runner import SessionRunner, run_headless
+from navapp.control.session import SessionHooks
 from navapp.control.states import Accept, Propose, Register, Reject
 from navapp.errors import WrongDevice
-from navapp.geometry.mesh import TriangleMesh
-from navapp.values import BoneModel, Plan, Prior, Status
+from navapp.values import Plan, Status
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.faults import Fault, FaultKind, FaultScript
@@ -24,6 +24,7 @@ from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 from tests.control.fakes import wait_for
+from tests.knees import femur_of, nominal_prior
 
 SEED = 5
 
@@ -46,15 +47,13 @@ class SimulatedRoom:
         self.display = SimulatedDisplay(self.clock, rig.width, rig.height)
         self.display.open()
         self.oracle = TruthOracle(world, self.camera.world_time_ns)
-        mesh = world.anatomy.bones["femur"]
-        bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "right")
         self.results = []
         self.commands = []
         self.controller = SessionController(
             DeviceSet(self.camera, self.display, NoProjector(), FixedMirror(45.0), self.clock),
             rig,
-            Plan({"femur": bone}),
-            Prior({"femur": world.nominal_left_from_femur}),
+            Plan({"femur": femur_of(world)}),
+            nominal_prior(world),
             executor=ThreadExecutor() if is_live else InlineExecutor(),
             hooks=SessionHooks(
                 on_frame=(self.results.append,),
@@ -171,7 +170,8 @@ def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
     wait_for(lambda: room.state == "navigating", "navigation")
     runner.submit(Register())
     wait_for(lambda: room.state == "registering", "the search")
-    wait_for(lambda: room.state != "registering", "the end of the search")
+    # Where nothing is found, everything is tried.
+    wait_for(lambda: room.state != "registering", "the end of the search", 60.0)
     runner.stop()
     assert runner.error is None
     assert not room.display.visible_image().any()

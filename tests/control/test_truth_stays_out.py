@@ -48,16 +48,16 @@ def reachable(root: object, not_through: set[int]) -> list[object]:
 @pytest.fixture
 def built():
     from navapp.cli.diagnostics import Diagnostics
+    from navapp.cli.live_session import controller_of, prepared
     from navapp.cli.main import _parser
-    from navapp.cli.run import _controller, _prepare
     from navapp.config import parse
 
     configuration = parse({"camera": {"simulated": {"scale": 0.2}}}, "test")
     options = _parser().parse_args(["run", "--headless"])
     with ExitStack() as undo:
-        session = _prepare(configuration, options, Diagnostics(is_quiet=True))
+        session = prepared(configuration, options, Diagnostics(is_quiet=True))
         undo.callback(session.opened.devices.close)
-        controller = _controller(session, is_inline=True, on_frame=[], undo=undo)
+        controller = controller_of(session, is_inline=True, on_frame=[], undo=undo)
         undo.callback(controller.close)
         controller.step()
         yield session, controller

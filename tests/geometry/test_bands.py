@@ -1,10 +1,18 @@
 """Two halves of a job."""
 
 import threading
+from contextlib import ExitStack
 
 import pytest
 
 from navapp.geometry.bands import beside, in_row_bands, run_both
+
+
+def fails_as(name):
+    def fails():
+        raise ValueError(name)
+
+    return fails
 
 
 def test_halves_of_halves_do_not_wait_for_each_other():
@@ -26,11 +34,8 @@ def test_halves_of_halves_do_not_wait_for_each_other():
 def test_the_first_error_is_raised_after_both_have_ended():
     ended = []
 
-    def fails():
-        raise ValueError("upper")
-
     with pytest.raises(ValueError, match="upper"):
-        run_both(fails, lambda: ended.append("lower"))
+        run_both(fails_as("upper"), lambda: ended.append("lower"))
     assert ended == ["lower"]
 
 
@@ -50,40 +55,103 @@ def test_the_lower_half_begins_at_a_multiple(every):
 
 
 def test_a_job_beside_runs_on_its_own_and_its_error_is_told():
-    name = beside(lambda: threading.current_thread().name).result(20.0)
-    assert name != threading.current_thread().name
+    meeting = threading.Barrier(2, timeout=20.0)
+    with beside(lambda: (meeting.wait(), threading.current_thread().name)[1]) as job:
+        meeting.wait()
+        assert job.result() != threading.current_thread().name
+    with pytest.raises(ValueError, match="beside"), beside(fails_as("beside")) as job:
+        job.result()
 
-    def fails():
-        raise ValueError("beside")
 
-    with pytest.raises(ValueError, match="beside"):
-        beside(fails).result(20.0)
+def test_a_job_that_the_helper_has_no_time_for_is_done_by_who_asks():
+    is_over = threading.Event()
+    with beside(lambda: is_over.wait(20.0)) as busy:
+        while not busy._begun.running():
+            is_over.wait(0.001)
+        with beside(lambda: threading.current_thread().name) as waiting:
+            assert waiting.result() == threading.current_thread().name
+        is_over.set()
+        assert busy.result()
+
+
+def test_a_job_beside_is_done_once_whoever_does_it():
+    done = []
+    with beside(lambda: done.append("outer")) as job:
+        pass
+    job.result()
+
+    def inner():
+        with beside(lambda: done.append("inner")) as one:
+            one.result()
+        one.result()
+
+    with beside(inner) as outer:
+        outer.result()
+    assert done == ["outer", "inner"]
+
+
+def test_an_error_that_nobody_asked_for_is_told_at_the_end():
+    with pytest.raises(ValueError, match="beside"), beside(fails_as("beside")):
+        pass
+
+
+def test_a_job_beside_is_over_when_the_block_fails():
+    begun, let_go, ended = threading.Event(), threading.Event(), []
+
+    def job():
+        begun.set()
+        let_go.wait(20.0)
+        ended.append("job")
+        raise ValueError("job")
+
+    def block():
+        assert begun.wait(20.0)
+        threading.Timer(0.05, let_go.set).start()
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError), beside(job):
+        block()
+    assert ended == ["job"]
+
+
+def test_a_job_that_has_not_begun_when_the_block_fails_never_runs():
+    let_go, done = threading.Event(), []
+    with beside(lambda: let_go.wait(20.0)):
+        with pytest.raises(ZeroDivisionError), beside(lambda: done.append("job")):
+            raise ZeroDivisionError
+        let_go.set()
+    run_both(lambda: None, lambda: None)
+    assert done == []
 
 
 def test_halves_of_a_job_beside_do_not_wait_for_others():
     done = []
-    jobs = [
-        beside(lambda: run_both(lambda: done.append("a"), lambda: done.append("b")))
-        for _ in range(4)
-    ]
-    for job in jobs:
-        job.result(20.0)
+    with ExitStack() as stack:
+        for _ in range(4):
+            stack.enter_context(
+                beside(lambda: run_both(lambda: done.append("a"), lambda: done.append("b")))
+            )
     assert sorted(done) == ["a"] * 4 + ["b"] * 4
 
 
-def test_a_thread_of_the_pool_does_what_it_begins_beside():
-    def job():
-        return threading.current_thread().name, beside(lambda: threading.current_thread().name)
+def test_the_helper_does_what_it_begins_beside():
+    meeting = threading.Barrier(2, timeout=20.0)
 
-    jobs = [beside(job) for _ in range(4)]
-    for one in jobs:
-        name, inner = one.result(20.0)
-        assert inner.result(20.0) == name
+    def job():
+        meeting.wait()
+        with beside(lambda: threading.current_thread().name) as inner:
+            return threading.current_thread().name, inner.result()
+
+    with beside(job) as begun:
+        meeting.wait()
+        name, inner = begun.result()
+    assert inner == name != threading.current_thread().name
 
 
 def test_an_error_of_what_it_does_itself_is_told_as_well():
-    def fails():
-        raise ValueError("inner")
+    def job():
+        with beside(fails_as("inner")):
+            pass
 
-    with pytest.raises(ValueError, match="inner"):
-        beside(lambda: beside(fails)).result(20.0).result(20.0)
+    with pytest.raises(ValueError, match="inner"), beside(job) as outer:
+        outer.result()

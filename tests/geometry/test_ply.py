@@ -1,4 +1,3 @@
-import os
 import struct
 
 import numpy as np
@@ -6,7 +5,7 @@ import pytest
 
 from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.ply import read_ply, write_ply, write_whole
+from navapp.geometry.ply import read_ply, write_ply
 from tests.geometry.shapes import cube, sphere
 
 QUADS = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -334,29 +333,3 @@ def test_what_open3d_writes_is_read(tmp_path, as_text):
     again, _ = read_ply(tmp_path / "a.ply")
     np.testing.assert_allclose(again.vertices_mm, sphere().vertices_mm, atol=1e-4)
     np.testing.assert_array_equal(again.faces, sphere().faces)
-
-
-def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
-    path = tmp_path / "kept.bin"
-    write_whole(path, b"old")
-
-    def no_space(_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", no_space)
-    with pytest.raises(OSError, match="No space"):
-        write_whole(path, b"new")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["kept.bin"]
-    assert path.read_bytes() == b"old"
-
-
-def test_a_folder_in_the_way_leaves_nothing_behind(tmp_path):
-    (tmp_path / "taken").mkdir()
-    with pytest.raises(OSError, match="directory"):
-        write_whole(tmp_path / "taken", b"new")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["taken"]
-
-
-def test_a_written_file_can_be_read_by_others(tmp_path):
-    write_whole(tmp_path / "a", b"1")
-    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o644

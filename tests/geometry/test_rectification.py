@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from navapp.errors import RigError
-from navapp.geometry.rectification import Box, Rectifier
+from navapp.geometry.rectification import Box, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from tests.geometry.shapes import camera, toed_in_rig
@@ -231,3 +231,13 @@ def test_with_a_band_only_what_the_box_reaches_is_rectified(rectifier):
     assert part.box == whole.box
     assert (part.left[:100] == 0).all()
     assert (part.right[:, :190] == 0).all()
+
+
+def test_only_the_luma_of_what_is_asked_for_is_made(rectifier):
+    rng = np.random.default_rng(9)
+    left, right = (rng.integers(0, 256, (480, 640, 3), dtype=np.uint8) for _ in range(2))
+    for box, band in ((Box(300, 100, 120, 80), (40.0, 90.0)), (Box(0, 400, 640, 80), (0.0, 9.0))):
+        part = rectifier.rectify(left, right, box, band, is_grey=True)
+        whole = rectifier.rectify(luma(left), luma(right), box, band)
+        np.testing.assert_array_equal(part.left, whole.left)
+        np.testing.assert_array_equal(part.right, whole.right)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import Box, RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
@@ -10,7 +11,13 @@ from navapp.geometry.zbuffer import (
     render_rectified,
     unhidden_vertices,
 )
-from navapp.geometry.zbuffer_kernels import raster_nearest
+from navapp.geometry.zbuffer_kernels import (
+    bounds_of_points,
+    known_range,
+    project_points,
+    raster_nearest,
+    tell_depth,
+)
 from tests.geometry.shapes import STRONG, camera, cube, sphere
 from tests.reference import zbuffer_reference
 
@@ -37,6 +44,18 @@ def square(z_mm, half_mm=10.0, centre=(0.0, 0.0)):
     return TriangleMesh(np.array(vertices), [[0, 2, 1], [0, 3, 2]])
 
 
+def drawn(pixels, depths, faces, width, height, bands=None):
+    """Inverse depth and triangle per pixel."""
+    inverse_depth = np.zeros((height, width + LANES), dtype=np.float32)
+    codes = np.full(inverse_depth.shape, -1, dtype=np.int32)
+    depth, face_index = (np.empty((height, width), dtype=kind) for kind in (np.float32, np.int32))
+    for band in bands or [(0, height)]:
+        raster_nearest(pixels, depths, faces, inverse_depth, codes.view(np.float32), band, False)
+        tell_depth(inverse_depth, codes, band, depth, face_index)
+    np.testing.assert_array_equal(np.isnan(depth), face_index < 0)
+    return np.where(face_index < 0, 0.0, 1.0 / depth), face_index
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_kernel_agrees_with_the_reference(seed):
     rng = np.random.default_rng(seed)
@@ -46,22 +65,19 @@ def test_the_kernel_agrees_with_the_reference(seed):
     pixels[:3] = np.nan
     depths[3:6] = (-50.0, 0.0, 1e-7)
     faces = rng.integers(0, 60, (25, 3)).astype(np.int32)
-    inverse_depth = np.zeros((height, width), dtype=np.float32)
-    face_index = np.full((height, width), -1, dtype=np.int32)
-    for band in ((0, 11), (11, height)):
-        raster_nearest(pixels, depths, faces, inverse_depth, face_index, band, False)
+    bands = ((0, 11), (11, height))
+    inverse_depth, face_index = drawn(pixels, depths, faces, width, height, bands)
     expected_depth, expected_face = zbuffer_reference.nearest(pixels, depths, faces, width, height)
     assert (face_index >= 0).mean() > 0.3
     np.testing.assert_array_equal(face_index, expected_face)
-    np.testing.assert_allclose(inverse_depth, expected_depth, rtol=1e-6)
+    # Needles of triangles: what float32 leaves of them.
+    np.testing.assert_allclose(inverse_depth, expected_depth, rtol=1e-5)
 
 
 def test_the_edges_of_a_triangle_on_pixel_centres_belong_to_it():
     pixels = np.array([[2.0, 3.0], [8.0, 3.0], [2.0, 9.0]])
-    inverse_depth = np.zeros((12, 12), dtype=np.float32)
-    face_index = np.full((12, 12), -1, dtype=np.int32)
     faces = np.array([[0, 1, 2]], dtype=np.int32)
-    raster_nearest(pixels, np.full(3, 100.0), faces, inverse_depth, face_index, (0, 12), False)
+    inverse_depth, face_index = drawn(pixels, np.full(3, 100.0), faces, 12, 12)
     expected, _ = zbuffer_reference.nearest(pixels, np.full(3, 100.0), [[0, 1, 2]], 12, 12)
     np.testing.assert_array_equal(inverse_depth > 0, expected > 0)
     assert face_index[3, 2:9].tolist() == [0] * 7
@@ -282,16 +298,12 @@ def test_neighbours_leave_no_seam(seed):
     )
     faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([d, c, b])])
     for turn in range(3):
-        inverse_depth = np.zeros((40, 50), dtype=np.float32)
-        face_index = np.full((40, 50), -1, dtype=np.int32)
-        raster_nearest(
+        _, face_index = drawn(
             np.column_stack([x.ravel(), y.ravel()]),
             np.full(x.size, 250.0),
             np.roll(faces, turn, axis=1).astype(np.int32),
-            inverse_depth,
-            face_index,
-            (0, 40),
-            False,
+            50,
+            40,
         )
         assert (face_index >= 0).all()
 
@@ -310,3 +322,28 @@ def test_the_box_around_a_mesh_shows_what_the_whole_picture_shows() -> None:
 def test_the_box_around_a_mesh_out_of_view_is_empty() -> None:
     away = RigidTransform.from_parts("left", "bone", np.eye(3), (9000.0, 0.0, 300.0))
     assert render(sphere(), away, camera(), is_whole=False).box.is_empty
+
+
+def test_points_are_projected_as_the_geometry_says():
+    rng = np.random.default_rng(5)
+    points = rng.uniform((-60.0, -40.0, -90.0), (60.0, 40.0, 300.0), (200, 3))
+    tilted = pose((0.2, -0.1, 0.3), (4.0, -7.0, 30.0))
+    moved = tilted.apply(points)
+    pixels, depths = np.empty((200, 2)), np.empty(200)
+    centre = (GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
+    place = (tilted.rotation, tilted.translation_mm, GEOMETRY.focal_px, centre)
+    project_points(points, *place, pixels, depths)
+    expected = GEOMETRY.project(moved)
+    assert np.isnan(expected).any()
+    np.testing.assert_allclose(pixels, expected, rtol=1e-9)
+    np.testing.assert_allclose(depths, moved[:, 2], rtol=1e-9)
+    limits = bounds_of_points(points, *place)
+    low, high = np.nanmin(expected, axis=0), np.nanmax(expected, axis=0)
+    np.testing.assert_allclose(limits[:4], [*low, *high], rtol=1e-9)
+    np.testing.assert_allclose(limits[4:], [moved[:, 2].min(), moved[:, 2].max()], rtol=1e-9)
+
+
+def test_the_range_is_that_of_what_is_known():
+    values = np.array([[np.nan, 3.0, -1.0], [7.0, np.nan, 2.0]], dtype=np.float32)
+    assert known_range(values) == (-1.0, 7.0)
+    assert known_range(np.full((2, 3), np.nan, np.float32)) == (np.inf, -np.inf)

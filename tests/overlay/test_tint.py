@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navapp.overlay.tint_kernels import tint_pixels
+from navapp.overlay.tint_kernels import shares_of_faces, tint_pixels
 
 
 def test_pixels_of_the_mesh_are_blended_and_no_others() -> None:
@@ -17,3 +17,14 @@ def test_pixels_of_the_mesh_are_blended_and_no_others() -> None:
     assert np.abs(image - expected).max() <= 1.0
     np.testing.assert_array_equal(image[faces < 0], before[faces < 0])
     np.testing.assert_array_equal(image[faces == 4][:, 1], 230)
+
+
+def test_a_steep_triangle_has_a_larger_share() -> None:
+    rng = np.random.default_rng(4)
+    normals = rng.normal(size=(30, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    faces = rng.integers(0, 30, (50, 3)).astype(np.int32)
+    towards = np.array([0.6, 0.0, -0.8])
+    found = shares_of_faces(normals, faces, towards, 0.1, 0.35)
+    facing = np.abs(normals @ towards)[faces].mean(axis=1)
+    np.testing.assert_allclose(found, 0.1 + 0.35 * (1.0 - facing), rtol=1e-6)

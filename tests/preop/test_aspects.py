@@ -58,6 +58,16 @@ def tube(n_rings: int = 40, cap: bool = False) -> TriangleMesh:
     return TriangleMesh(vertices, np.array(faces, dtype=np.int32))
 
 
+def test_edges_are_those_of_the_surface_that_is_seen() -> None:
+    """Cartilage that grows thicker along x turns the outline: it leans from the bone's normals."""
+    ball = sphere()
+    bone = BoneModel("ball", ball, cartilage_mm=3.0 + 0.09 * ball.vertices_mm[:, 0])
+    covered = build_aspects(bone, (1, 0, 1), 10.0)
+    seen_mm = ball.vertices_mm + bone.cartilage_mm[:, None] * ball.normals
+    bare = build_aspects(BoneModel("ball", TriangleMesh(seen_mm, ball.faces)), (1, 0, 1), 10.0)
+    np.testing.assert_allclose(covered.points_mm, bare.points_mm, atol=1e-9)
+
+
 def test_the_outline_of_a_sphere_is_its_circle_with_tangents_along_it() -> None:
     graph = build_aspects(BoneModel("ball", sphere()), (0, 0, 1), 20.0)
     assert len(graph) >= 1

@@ -13,14 +13,14 @@ def classify_slowly(view, face_sigma_mm, measured_map, coarse_px, limits):
     surface_mm = face_sigma_mm[np.maximum(view.face_index, 0)]
     sigma = np.where(is_measured, np.hypot(measured_map.sigma_px, surface_mm * px_per_mm), np.nan)
     off = np.maximum(limits.off_sigmas * sigma, limits.off_mm * px_per_mm)
-    rough = np.where(seen & ~is_measured, coarse_px - expected, np.nan)
-    off_rough = np.maximum(limits.off_coarse_px, limits.off_mm * px_per_mm)
+    coarse = np.where(seen & ~is_measured, coarse_px - expected, np.nan)
+    off_coarse = np.maximum(limits.off_coarse_px, limits.off_mm * px_per_mm)
     masks = {
         "measured": is_measured,
         "nearer": difference > off,
         "further": difference < -off,
-        "roughly nearer": rough > off_rough,
-        "roughly further": rough < -off_rough,
+        "coarsely nearer": coarse > off_coarse,
+        "coarsely further": coarse < -off_coarse,
         "agrees": np.abs(difference) < limits.fit_sigmas * sigma,
     }
     return masks, difference, sigma

@@ -137,6 +137,14 @@ def plane_system(measured, weight, centre, lever_mm):
     return rows.T @ (weight[:, None] * rows), rows.T @ (weight * measured.residual)
 
 
+def size_terms(measured, weight, centre, lever_mm):
+    """(mixed with the motion, squares, product) of the row n . (p - c) / lever."""
+    offset = measured.point - centre
+    row = (offset * measured.direction).sum(axis=1) / lever_mm
+    motion = np.hstack([np.cross(offset, measured.direction) / lever_mm, measured.direction])
+    return motion.T @ (weight * row), weight @ row**2, weight @ (row * measured.residual)
+
+
 def point_system(measured, model, vertex, weight, centre, lever_mm):
     """(H, g) of the whole distances: three rows [-[p - c]x / lever, I] for each pair."""
     H, g = np.zeros((6, 6)), np.zeros(6)

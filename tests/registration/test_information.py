@@ -1,11 +1,21 @@
 import numpy as np
+import pytest
 
+from navapp.registration import RegistrationModel, Scene, fit_bimcc
 from navapp.registration.information import information_of
 from navapp.registration.pairing_kernels import Pairs, make_pairs
 from navapp.registration.step_kernels import weigh
 from tests.reference import bimcc_reference as reference
 from tests.registration.kernel_cases import POSE, make_case, measured_pairs
-from tests.registration.shapes import ball_mesh, blob_mesh, grid_mesh, tube_mesh
+from tests.registration.shapes import (
+    TRUE,
+    ball_mesh,
+    blob_mesh,
+    femur,
+    grid_mesh,
+    seen_cloud,
+    tube_mesh,
+)
 
 CENTRE = np.array([4.0, -3.0, 8.0])
 # The columns of a surface's own axes in the scene, where a pose turns them.
@@ -88,3 +98,23 @@ def test_a_single_point_fixes_one_direction_of_six() -> None:
     found = information_of(*pairs_on(points, normals), POSE, CENTRE, 1.0)
     assert len(found.free) == 5
     assert not np.isfinite(np.diag(found.covariance)).any()
+
+
+@pytest.mark.parametrize("size", [0.97, 1.0, 1.03])
+def test_the_size_of_a_bone_is_told_beside_its_pose(size: float) -> None:
+    """At the rms distance of what is seen from its middle, in mm."""
+    own = femur()
+    cloud = seen_cloud(own, 2500, 0.1)
+    points = cloud.points_mm - TRUE.translation_mm
+    scene = Scene(TRUE.translation_mm + size * points, np.zeros(3), cloud.sigma_ray_mm)
+    found = fit_bimcc(scene, RegistrationModel(own), TRUE)
+    lever_mm = np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean())
+    assert found.size_sigma_mm < 0.05
+    # A kernel makes less of what lies far off: what is found is a little smaller.
+    assert found.size_mm == pytest.approx((size - 1.0) * lever_mm, rel=0.3, abs=0.03)
+
+
+def test_one_side_of_a_plane_has_no_size() -> None:
+    points = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3)) * (1.0, 1.0, 0.0)
+    found = information_of(*pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0)
+    assert found.size_sigma_mm == np.inf

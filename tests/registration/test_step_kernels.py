@@ -11,6 +11,7 @@ from navapp.registration.step_kernels import (
     noise_under_kernel_mm2,
     plane_step,
     plane_system,
+    size_terms,
     weigh,
     weighted_centre,
 )
@@ -97,6 +98,15 @@ def test_the_plane_system_is_that_of_the_reference() -> None:
     H_expected, g_expected = reference.plane_system(measured, pairs.weight[:n], CENTRE, LEVER_MM)
     np.testing.assert_allclose(H, H_expected, atol=1e-9 * np.abs(H_expected).max())
     np.testing.assert_allclose(g, g_expected, atol=1e-9 * np.abs(H_expected).max())
+
+
+def test_the_terms_of_the_size_are_those_of_the_reference() -> None:
+    _, pairs, n, measured, _ = weighed_pairs()
+    mixed = np.full(6, np.nan)
+    found = size_terms(pairs, n, CENTRE, LEVER_MM, mixed)
+    expected = reference.size_terms(measured, pairs.weight[:n], CENTRE, LEVER_MM)
+    np.testing.assert_allclose(mixed, expected[0], atol=1e-9 * np.abs(expected[0]).max())
+    np.testing.assert_allclose(found, expected[1:], rtol=1e-9)
 
 
 def test_the_point_system_is_added_as_by_the_reference() -> None:

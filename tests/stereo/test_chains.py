@@ -11,6 +11,7 @@ from navapp.geometry.rectification import Box, RectifiedPair
 from navapp.stereo import chains
 from navapp.stereo.chains import (
     StereoAnswer,
+    are_swapped,
     match_on_support,
     match_scene,
     match_surface,
@@ -380,3 +381,22 @@ def test_of_a_box_that_leaves_the_picture_the_inside_is_matched(chain, fills: bo
     error = found.disparity_px - TRUTH[:180, 200:]
     assert np.nanmedian(np.abs(error)) < 0.1
     assert found.matched_share > 0.7
+
+
+@EVERY_RESOLUTION
+def test_the_order_of_two_pictures_is_told_by_which_way_round_they_agree(
+    band_px: tuple[float, float],
+) -> None:
+    right_way = scene(INSIDE)
+    assert not are_swapped(right_way, band_px, swapped(right_way))
+    assert are_swapped(swapped(right_way), band_px, right_way)
+
+
+def test_pictures_that_agree_neither_way_are_not_called_swapped() -> None:
+    right_way = scene(INSIDE)
+    black = replace(right_way, right=np.zeros_like(right_way.right))
+    noise = np.random.default_rng(1).integers(0, 255, right_way.right.shape).astype(np.uint8)
+    unrelated = replace(right_way, right=noise)
+    for pair in (black, unrelated):
+        assert not are_swapped(pair, FULL, swapped(pair))
+        assert not are_swapped(swapped(pair), FULL, pair)

@@ -5,19 +5,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from drivers.clock import ManualClock
 from drivers.frames import StereoFrame
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import projected_box, render_rectified
 from navapp.tracking import Goal, Line
 from navapp.values import BoneModel, DisparityMap, Origin, Prior, visible_vertices
-from sim_devices.camera import SimulatedCamera
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
+from tests.knees import SimulatedKnee
 from tests.registration.shapes import GEOMETRY, TRUE
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
@@ -60,21 +58,9 @@ class Room:
 
 @lru_cache(maxsize=4)
 def room(motion: str = "still", n_frames: int = 3, is_grey: bool = False) -> Room:
-    world = World(Scenario(seed=5, motion=motion))
-    sensor = SensorModel(seed=5, is_grey=is_grey)
-    camera = SimulatedCamera(world, ManualClock(), is_stepped=True, sensor=sensor)
-    camera.open()
-    mesh = world.anatomy.bones["femur"]
-    bone = BoneModel("femur", TriangleMesh(mesh.vertices_mm, mesh.faces), "right")
-    rig = world.rig
-    frames = tuple(camera.read(1.0) for _ in range(n_frames))
-    return Room(
-        rig,
-        Line(rig, bone),
-        frames,
-        TruthOracle(world, camera.world_time_ns),
-        Prior({"femur": world.nominal_left_from_femur}),
-    )
+    knee = SimulatedKnee(Scenario(seed=5, motion=motion), SensorModel(seed=5, is_grey=is_grey))
+    line, frames = Line(knee.rig, knee.bone), tuple(knee.frames(n_frames))
+    return Room(knee.rig, line, frames, knee.oracle, knee.prior)
 
 
 @lru_cache(maxsize=1)

@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.geometry import Box
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration import RegistrationModel
 from navapp.tracking.agreement import Agreement, compare
 from navapp.tracking.agreement_kernels import (
     AGREES,
+    COARSELY_FURTHER,
+    COARSELY_NEARER,
     FURTHER,
     MEASURED,
     NEARER,
-    ROUGHLY_FURTHER,
-    ROUGHLY_NEARER,
     Comparison,
     classify_pixels,
     gather_open,
@@ -29,8 +28,7 @@ BONE = femur()
 MODEL = RegistrationModel(BONE)
 MAP = measured_map(BONE)
 HEIGHT, WIDTH = MAP.disparity_px.shape
-BOX = Box(MAP.x, MAP.y, WIDTH, HEIGHT)
-VIEW = render_rectified(MODEL.drawn_mesh, TRUE, GEOMETRY, BOX)
+VIEW = render_rectified(MODEL.drawn_mesh, TRUE, GEOMETRY, MAP.box)
 EXPECTED_PX = GEOMETRY.disparity_map_px(VIEW.depth_mm)
 SEEN = VIEW.mask
 
@@ -52,7 +50,7 @@ def agreement(measured: DisparityMap, coarse_px: np.ndarray | None = None) -> Ag
 
 
 def coarse(change_mm: float, part: np.ndarray) -> np.ndarray:
-    """A rough map of the bone, nearer (negative) or further by a length in a part."""
+    """A coarse map of the bone, nearer (negative) or further by a length in a part."""
     depth_mm = np.where(part, VIEW.depth_mm + change_mm, VIEW.depth_mm)
     return GEOMETRY.disparity_map_px(depth_mm)
 
@@ -85,13 +83,13 @@ def test_what_is_seen_through_the_model_is_told() -> None:
 
 
 @pytest.mark.parametrize("change_mm", [-1.0, 1.0])
-def test_a_rough_map_says_nothing_about_a_millimetre(change_mm: float) -> None:
+def test_a_coarse_map_says_nothing_about_a_millimetre(change_mm: float) -> None:
     part = half()
     found = agreement(silent_in(part), coarse(change_mm, part))
     assert found.hidden_share == found.behind_share == 0.0
 
 
-def test_what_was_measured_outweighs_a_rough_map() -> None:
+def test_what_was_measured_outweighs_a_coarse_map() -> None:
     found = agreement(MAP, coarse(-20.0, SEEN))
     assert found.hidden_share < 0.1
     assert found.coverage > 0.9
@@ -122,7 +120,9 @@ def test_wider_differences_than_claimed_show_in_the_spread() -> None:
 
 def test_a_view_without_the_model_agrees_with_nothing() -> None:
     empty = RenderedView(
-        np.full((HEIGHT, WIDTH), np.nan, np.float32), np.full((HEIGHT, WIDTH), -1, np.int32), BOX
+        np.full((HEIGHT, WIDTH), np.nan, np.float32),
+        np.full((HEIGHT, WIDTH), -1, np.int32),
+        MAP.box,
     )
     found = compare(empty, MODEL, MAP, GEOMETRY)
     assert found.n_visible == 0
@@ -157,12 +157,12 @@ def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
     assert n_visible == SEEN.sum()
     assert n_agreeing == masks["agrees"].sum() > 0
     for bit, (name, mask) in zip(
-        (MEASURED, NEARER, FURTHER, ROUGHLY_NEARER, ROUGHLY_FURTHER, AGREES),
+        (MEASURED, NEARER, FURTHER, COARSELY_NEARER, COARSELY_FURTHER, AGREES),
         masks.items(),
         strict=True,
     ):
         np.testing.assert_array_equal((classes & bit) > 0, mask, err_msg=name)
-        assert mask.any() == (with_coarse or "roughly" not in name), name
+        assert mask.any() == (with_coarse or "coarse" not in name), name
     measured = masks["measured"]
     np.testing.assert_allclose(deviation[measured], expected[measured], atol=1e-4)
     np.testing.assert_allclose(sigma[measured], expected_sigma[measured], rtol=1e-5)

@@ -3,9 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from navapp.geometry.rig import RigQuality
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
 from navapp.stereo import reproject
-from navapp.tracking.judge import Goal, Judge
+from navapp.tracking.judge import OK_ERROR_MM, Goal, Judge
 from navapp.tracking.locator import STEREO_SETTINGS
 from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict
 from sim_devices.anatomy import KneeSpec, make_knee
@@ -27,7 +28,7 @@ def verdict_on(
     tolerance_mm: float = 3.0, predicted=None,
 ) -> Verdict:  # fmt: skip
     estimate = estimate_at(scene_of(measured), model, pose, STEREO_SETTINGS)
-    judge = Judge(GEOMETRY, is_accepted)
+    judge = Judge(GEOMETRY, RigQuality(is_accepted))
     return judge.judge(model, estimate, measured, Goal(NO_TARGETS, tolerance_mm), predicted)
 
 
@@ -82,7 +83,7 @@ def with_blob(share: float) -> DisparityMap:
 
 
 def test_a_small_occluder_is_named_and_does_not_count_as_a_misfit() -> None:
-    verdict = verdict_on(measured=with_blob(0.25))
+    verdict = verdict_on(measured=with_blob(0.2))
     assert verdict.status is Status.OK
     assert verdict.occluded_share > 0.1
     assert verdict.inlier_share > 0.9
@@ -98,7 +99,7 @@ def test_a_large_occluder_leaves_too_little_of_the_bone() -> None:
 
 def test_filled_pixels_do_not_count_as_seen() -> None:
     filled = replace(MAP, origin=np.where(MAP.origin == 1, Origin.FILLED_INTERIOR, 0))
-    found = Judge(GEOMETRY, True).agreement(MODEL, TRUE, filled)
+    found = Judge(GEOMETRY).agreement(MODEL, TRUE, filled)
     assert found.coverage == 0.0
 
 
@@ -116,9 +117,70 @@ def test_the_bound_is_held_against_the_stages_tolerance() -> None:
     assert verdict.reasons == (Reason.TRE_TOO_LARGE,)
 
 
+def test_a_view_that_fixes_the_pose_too_loosely_is_degraded_whatever_the_tolerance() -> None:
+    """Enough of the bone agrees, but the part that is seen leaves more than is promised."""
+    measured = with_blob(0.35)
+    verdict = verdict_on(measured=measured, tolerance_mm=99.0)
+    assert verdict.status is Status.DEGRADED
+    assert verdict.reasons == (Reason.POSE_UNCERTAIN,)
+    assert verdict.predicted_tre_mm > OK_ERROR_MM
+    estimate = estimate_at(scene_of(measured), MODEL, TRUE, STEREO_SETTINGS)
+    goal = Goal(NO_TARGETS, 99.0, seen_mm=1.01 * verdict.predicted_tre_mm)
+    assert Judge(GEOMETRY).judge(MODEL, estimate, measured, goal).status is Status.OK
+
+
+def test_what_the_calibration_leaves_widens_the_bound_and_nothing_else() -> None:
+    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, STEREO_SETTINGS)
+    goal = Goal(NO_TARGETS, 3.0)
+    exact = Judge(GEOMETRY).judge(MODEL, estimate, MAP, goal)
+    known = Judge(GEOMETRY, RigQuality(True, (), 0.3)).judge(MODEL, estimate, MAP, goal)
+    assert known.predicted_tre_mm == pytest.approx(np.hypot(exact.predicted_tre_mm, 0.3))
+    assert (known.status, known.reasons) == (exact.status, exact.reasons)
+
+
+def test_what_the_plans_cartilage_costs_is_not_held_against_the_view() -> None:
+    """The deviation of the thickness widens what is promised as it widens what is predicted."""
+    sd_mm = np.full(len(BONE.mesh.vertices_mm), 0.35)
+    model = RegistrationModel(replace(BONE, cartilage_sd_mm=sd_mm))
+    verdict = verdict_on(model=model)
+    assert verdict.status is Status.OK
+    assert verdict.predicted_tre_mm > 2.0 * 0.35
+
+
+def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL) -> Verdict:
+    estimate = estimate_at(scene_of(MAP), model, TRUE, STEREO_SETTINGS)
+    estimate = replace(estimate, size_mm=size_mm, size_sigma_mm=sigma_mm)
+    return Judge(GEOMETRY).judge(model, estimate, MAP, Goal(NO_TARGETS, 3.0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_bone_of_another_size_is_doubted_when_that_is_sure_and_costs_much(sign: float) -> None:
+    assert judged_with_size(sign * 0.6, 0.1).reasons == (Reason.SIZE_DIFFERS,)
+    assert judged_with_size(sign * 0.6, 0.1).status is Status.DEGRADED
+    assert judged_with_size(sign * 0.4, 0.1).reasons == ()
+    assert judged_with_size(sign * 0.6, 0.25).reasons == ()
+    assert judged_with_size(sign * 0.6, np.inf).reasons == ()
+
+
+def test_cartilage_that_the_plan_knows_roughly_may_look_like_another_size() -> None:
+    sd_mm = np.full(len(BONE.mesh.vertices_mm), 0.35)
+    model = RegistrationModel(replace(BONE, cartilage_sd_mm=sd_mm))
+    assert judged_with_size(1.0, 0.1, model).reasons == ()
+
+
+def test_the_right_bone_has_the_right_size_and_a_larger_one_has_not() -> None:
+    mesh = BONE.mesh
+    for size, reasons in ((1.0, False), (0.95, True)):
+        scaled = mesh.centroid_mm + size * (mesh.vertices_mm - mesh.centroid_mm)
+        model = RegistrationModel(replace(BONE, mesh=replace(mesh, vertices_mm=scaled)))
+        fitted = fit_bimcc(scene_of(MAP), model, TRUE, STEREO_SETTINGS)
+        verdict = verdict_on(fitted.camera_from_bone, model=model)
+        assert (Reason.SIZE_DIFFERS in verdict.reasons) == reasons
+
+
 def test_targets_far_from_the_seen_surface_are_less_certain() -> None:
     estimate = estimate_at(scene_of(MAP), MODEL, TRUE, STEREO_SETTINGS)
-    judge = Judge(GEOMETRY, True)
+    judge = Judge(GEOMETRY)
     near = BONE.mesh.vertices_mm[BONE.mesh.vertices_mm[:, 2].argmin()][None]
     bounds = [
         judge.judge(
@@ -184,5 +246,5 @@ def test_parts_that_were_cut_away_are_not_expected() -> None:
     kept = ~removed[BONE.mesh.faces].any(axis=1)
     rest = replace(BONE, mesh=replace(BONE.mesh, faces=BONE.mesh.faces[kept]))
     model = RegistrationModel(replace(BONE, is_removed=removed))
-    found = Judge(GEOMETRY, True).agreement(model, TRUE, measured_map(rest))
+    found = Judge(GEOMETRY).agreement(model, TRUE, measured_map(rest))
     assert found.coverage > 0.85

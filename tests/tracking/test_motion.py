@@ -127,3 +127,13 @@ def test_something_else_far_away_is_not_followed(
     state = TrackState.at_rest(START, 0).updated(found, PERIOD_NS, CENTRE)
     assert state.left_from_bone is (far if is_taken else START)
     assert state.n_lost == (0 if is_taken else 1)
+
+
+def test_what_is_wrong_for_good_is_remembered_until_a_frame_is_ok() -> None:
+    state = TrackState.at_rest(START, 0, Reason.OTHER_SIDE)
+    for number, status in enumerate((Status.DEGRADED, Status.LOST), start=1):
+        found = frame(START, status)
+        found = replace(found, verdict=Verdict(status, 0.2, (Reason.SURFACE_MISFIT,)))
+        state = state.updated(found.because(state.cause), number * PERIOD_NS, CENTRE)
+        assert state.cause is Reason.OTHER_SIDE
+    assert state.updated(frame(START), 3 * PERIOD_NS, CENTRE).cause is None

@@ -1,6 +1,7 @@
 import numpy as np
+import pytest
 
-from navapp.tracking.regions import large_regions
+from navapp.tracking.regions import large_regions, mark_large
 
 
 def test_only_regions_of_enough_pixels_are_left() -> None:
@@ -19,3 +20,35 @@ def test_corners_connect_with_eight_neighbours_only() -> None:
     mask = np.eye(4, dtype=bool)
     np.testing.assert_array_equal(large_regions(mask, 4), mask)
     assert not large_regions(mask, 4, connectivity=4).any()
+
+
+@pytest.mark.parametrize("connectivity", [4, 8])
+@pytest.mark.parametrize("share", [0.02, 0.4, 0.6, 0.99])
+def test_the_kernels_agree_with_a_flood(share: float, connectivity: int) -> None:
+    rng = np.random.default_rng(int(100 * share))
+    # More runs than fit at first, and rows and columns that are not alike.
+    mask = rng.random((83, 211)) < share
+    expected = flooded(mask, 7, connectivity)
+    np.testing.assert_array_equal(large_regions(mask, 7, connectivity), expected)
+    values = np.where(mask, np.uint8(6), np.uint8(1))
+    found = np.zeros(mask.shape, dtype=bool)
+    assert mark_large(values, 2, 7, found, connectivity) == expected.sum()
+    np.testing.assert_array_equal(found, expected)
+
+
+def flooded(mask: np.ndarray, least: int, connectivity: int) -> np.ndarray:
+    """Region by region, pixel by pixel."""
+    steps = [(0, 1), (1, 0), (0, -1), (-1, 0)]
+    steps += [(1, 1), (1, -1), (-1, 1), (-1, -1)] if connectivity == 8 else []
+    left, large = mask.copy(), np.zeros_like(mask)
+    for place in np.argwhere(mask):
+        region, rim = [], [tuple(place)]
+        while rim:
+            y, x = rim.pop()
+            if 0 <= y < mask.shape[0] and 0 <= x < mask.shape[1] and left[y, x]:
+                left[y, x] = False
+                region.append((y, x))
+                rim += [(y + dy, x + dx) for dy, dx in steps]
+        if len(region) >= least:
+            large[tuple(np.array(region).T)] = True
+    return large

@@ -3,7 +3,7 @@
 import numpy as np
 
 from navapp.geometry.rectification import Box
-from navapp.tracking.surface_meter import RoughMap, without_gap_rims
+from navapp.tracking.surface_meter import CoarseMap, without_gap_rims
 from navapp.values import DisparityMap
 
 SHAPE = (80, 120)
@@ -52,10 +52,10 @@ def test_where_too_little_would_be_left_all_of_it_is_trusted() -> None:
     np.testing.assert_array_equal(without_gap_rims(found, EVERYWHERE).origin, found.origin)
 
 
-def test_a_rough_map_tells_of_a_box_inside_it() -> None:
+def test_a_coarse_map_tells_of_a_box_inside_it() -> None:
     values = np.arange(48, dtype=np.float32).reshape(6, 8)
-    rough = RoughMap(values, Box(10, 20, 8, 6))
-    np.testing.assert_array_equal(rough.over(Box(11, 22, 3, 4)), values[2:6, 1:4])
-    np.testing.assert_array_equal(rough.over(rough.box), values)
+    coarse = CoarseMap(values, Box(10, 20, 8, 6))
+    np.testing.assert_array_equal(coarse.over(Box(11, 22, 3, 4)), values[2:6, 1:4])
+    np.testing.assert_array_equal(coarse.over(coarse.box), values)
     for beyond in (Box(9, 22, 3, 4), Box(11, 19, 3, 4), Box(16, 22, 3, 4), Box(11, 23, 3, 4)):
-        assert rough.over(beyond) is None
+        assert coarse.over(beyond) is None

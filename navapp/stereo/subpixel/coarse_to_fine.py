@@ -28,6 +28,9 @@ _FAIR = RefineSettings(
 _GOOD = RefineSettings(radius_px=_RADIUS_PX, last_step_px=0.25, max_roughness_px=0.35)
 # A window that wants to be further from the surface through its neighbours follows something else.
 _FAR_FROM_SURFACE_PX = 0.4
+# Neighbours over which a map is averaged that only has to tell what lies where.
+_CALM_PX = 5
+_COARSE_STEP_PX = 0.5
 # A surface that is further from the coarse map belongs to another thing: edges keep their place.
 _FAR_PX = 3.0
 _FAR_FROM_MATCH_PX = 1.5
@@ -69,6 +72,26 @@ def without_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
         is_same = np.abs(surface - coarse_px) < _FAR_FROM_MATCH_PX
     smooth = np.where(known & ~is_same, coarse_px, surface)
     return np.where(around, smooth, np.float32(np.nan)).astype(np.float32)
+
+
+def calmed(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A matched map (h, w) with less noise, single holes closed: to tell what lies where.
+
+    A pixel whose neighbourhood is off by more than a step of the map keeps what it has: edges keep
+    their place.
+    """
+    import cv2
+
+    known = np.isfinite(coarse_px)
+    counts = known.astype(np.float32)
+    window = (_CALM_PX, _CALM_PX)
+    total = cv2.boxFilter(np.where(known, coarse_px, np.float32(0.0)), -1, window, normalize=False)
+    mean = total / np.maximum(cv2.boxFilter(counts, -1, window, normalize=False), np.float32(1.0))
+    around = cv2.dilate(known.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    with np.errstate(invalid="ignore"):
+        is_off = np.abs(mean - coarse_px) > _COARSE_STEP_PX
+    calm = np.where(is_off, coarse_px, mean)
+    return np.where(around, calm, np.float32(np.nan)).astype(np.float32, copy=False)
 
 
 def _weights(samples: DisparityMap) -> NDArray[np.float32]:

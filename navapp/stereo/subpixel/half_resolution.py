@@ -4,6 +4,7 @@ One pixel is the mean of four: pixel k of the half lies at 2 k + 0.5 of the whol
 of the whole is exactly twice that of the half.
 """
 
+import math
 from dataclasses import replace
 from typing import TypeVar
 
@@ -12,23 +13,33 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rectification import Box, Image, RectifiedPair
 
+# What windows and the steps at the ends of a search ask for beside a box.
+_WINDOW_PX = 8
+
 T = TypeVar("T", bound=np.generic)
 
 
-def halved(pair: RectifiedPair) -> RectifiedPair:
-    """The pair at half its resolution; an odd last row or column is left out."""
-    import cv2
+def halved(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> RectifiedPair:
+    """The pair at half its resolution; an odd last row or column is left out.
 
+    Args:
+        pair: rectified grey pictures.
+        band_px: smallest and largest disparity. With it only the pair's box, and what it reaches in
+            the right picture, is made; the rest is 0.
+    """
     geometry = pair.geometry
     height, width = (length // 2 for length in pair.left.shape)
-
-    def half(image: Image) -> Image:
-        even = image[: 2 * height, : 2 * width]
-        return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
-
+    half, whole = half_box(pair.box), Box(0, 0, width, height)
+    in_left = in_right = whole
+    if band_px is not None:
+        in_left = half.grown(_WINDOW_PX)
+        # From the farthest partner of the first column to the nearest of the last.
+        farthest, nearest = math.ceil(band_px[1] / 2.0), math.floor(band_px[0] / 2.0)
+        first, after = in_left.x - farthest, in_left.x + in_left.width - nearest
+        in_right = replace(in_left, x=first, width=max(after - first, 0))
     return RectifiedPair(
-        half(pair.left),
-        half(pair.right),
+        _halved(pair.left, in_left.clipped(width, height), whole),
+        _halved(pair.right, in_right.clipped(width, height), whole),
         replace(
             geometry,
             focal_px=geometry.focal_px / 2.0,
@@ -37,8 +48,23 @@ def halved(pair: RectifiedPair) -> RectifiedPair:
             width=width,
             height=height,
         ),
-        half_box(pair.box),
+        half,
     )
+
+
+def _halved(image: Image, part: Box, whole: Box) -> Image:
+    """A part (of the half) of a picture at half its resolution; 0 elsewhere."""
+    import cv2
+
+    small = np.zeros((whole.height, whole.width), dtype=np.uint8)
+    if not part.is_empty:
+        rows, columns = (
+            slice(part.y, part.y + part.height), slice(part.x, part.x + part.width)
+        )  # fmt: skip
+        even = image[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop]
+        size = (part.width, part.height)
+        cv2.resize(even, size, dst=small[rows, columns], interpolation=cv2.INTER_AREA)
+    return small
 
 
 def half_box(box: Box) -> Box:

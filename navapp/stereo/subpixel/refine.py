@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.zbuffer_kernels import known_range
 from navapp.stereo.subpixel.refine_kernels import N_QUALITIES, accept_rows, refine_rows
 from navapp.values import DisparityMap
 
@@ -144,9 +145,9 @@ def _steps(
 
 def _reached(support: NDArray[np.float32], first_column: int, picture_width: int) -> slice:
     """Columns of the right picture that some pixel's window can ask for."""
-    if not np.isfinite(support).any():
+    farthest, nearest = known_range(support)
+    if farthest > nearest:
         return slice(0, 0)
-    nearest, farthest = np.nanmax(support), np.nanmin(support)
     first = int(first_column - nearest) - _SPARE_COLUMNS
     last = int(first_column + support.shape[1] - farthest) + _SPARE_COLUMNS
     return slice(min(max(first, 0), picture_width), max(min(last, picture_width), 0))

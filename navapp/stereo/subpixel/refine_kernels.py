@@ -88,6 +88,7 @@ def sample_row(
     support: NDArray[np.float32],
     offset: NDArray[np.float32],
     right_column: int,
+    span: tuple[int, int],
     samples: NDArray[np.float32],
 ) -> None:
     """Neighbours in the right picture of where the disparity points, of one row.
@@ -98,16 +99,17 @@ def sample_row(
         support: (w,) disparity px, NaN where there is none.
         offset: (w,) px that is added to it.
         right_column: column of the left row's first pixel in the right row.
+        span: first pixel, and after the last.
         samples: (8 pitch,) in place; the neighbours are 0 where they are unknown or outside.
     """
     planes = samples.reshape(_N_SAMPLES, -1)
     known, place = planes[_KNOWN], planes[_T]
     p0, p1, p2, p3 = planes[_P0], planes[_P1], planes[_P2], planes[_P3]
-    width = left.shape[0]
-    planes[_LEFT, :width] = left
-    planes[_OFFSET, :width] = offset
+    first, after = span[0], min(span[1], left.shape[0])
+    planes[_LEFT, first:after] = left[first:after]
+    planes[_OFFSET, first:after] = offset[first:after]
     last = np.float32(right.shape[0] - 2)
-    for x in range(width):
+    for x in range(first, after):
         u = np.float32(x + right_column) - support[x] - offset[x]
         # Also false for NaN.
         if u >= np.float32(1.0) and u < last:
@@ -123,12 +125,13 @@ def sample_row(
 
 
 @njit(cache=True, nogil=True)
-def enter_row(planes: Planes, place: int) -> None:
+def enter_row(planes: Planes, place: int, span: tuple[int, int]) -> None:
     """Terms of the sampled row, into the ring and added to its block.
 
     Args:
         planes: samples are read; ring and block in place.
         place: of the row in the ring.
+        span: first pixel, and after the last; multiples of the lanes.
 
     Catmull-Rom with a = -0.5: it reproduces a ramp, and its derivative is exact.
     """
@@ -136,7 +139,7 @@ def enter_row(planes: Planes, place: int) -> None:
     half, two = spread(np.float32(0.5)), spread(np.float32(2.0))
     three_halves, five_halves = spread(np.float32(1.5)), spread(np.float32(2.5))
     three = spread(np.float32(3.0))
-    for x in range(0, pitch, LANES):
+    for x in range(span[0], span[1], LANES):
         p0, p1 = load(samples, _P0 * pitch + x), load(samples, _P1 * pitch + x)
         p2, p3 = load(samples, _P2 * pitch + x), load(samples, _P3 * pitch + x)
         t = load(samples, _T * pitch + x)
@@ -170,40 +173,46 @@ def _enter(planes: Planes, place: int, term: int, x: int, value: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def close_block(planes: Planes, size: int) -> None:
+def close_block(planes: Planes, size: int, span: tuple[int, int]) -> None:
     """The ring is full: from terms to sums of each row to the last one; a new block begins.
 
     Args:
         planes: ring and block in place.
         size: rows of the ring.
+        span: first pixel that was entered, and after the last.
     """
-    length = N_SUMS * planes.pitch
+    pitch, length = planes.pitch, N_SUMS * planes.pitch
     for place in range(size - 2, -1, -1):
-        for at in range(place * length, (place + 1) * length, LANES):
-            store(planes.ring, at, load(planes.ring, at) + load(planes.ring, at + length))
+        for term in range(N_SUMS):
+            begin = place * length + term * pitch
+            for at in range(begin + span[0], begin + span[1], LANES):
+                store(planes.ring, at, load(planes.ring, at) + load(planes.ring, at + length))
     planes.block[:] = np.float32(0.0)
 
 
 @njit(cache=True, nogil=True)
-def add_up(planes: Planes, place: int, radius: int) -> None:
-    """Sums over the windows around every pixel of a row.
+def add_up(planes: Planes, place: int, radius: int, span: tuple[int, int]) -> None:
+    """Sums over the windows around the pixels of a row.
 
     Args:
         planes: ring and block are read; columns and sums in place.
         place: in the ring, of the last row of the windows.
         radius: px.
+        span: first pixel, and after the last; multiples of the lanes.
     """
+    margin = -(-radius // LANES) * LANES
+    low, high = max(span[0] - margin, 0), min(span[1] + margin, planes.pitch)
     pitch, wide, columns = planes.pitch, planes.wide_pitch, planes.columns
     # The older rows of the windows end the block before, unless the block is all of them.
     older = (place + 1) * N_SUMS * pitch
     for term in range(N_SUMS):
         middle = term * (wide - pitch) + radius
-        for at in range(term * pitch, (term + 1) * pitch, LANES):
+        for at in range(term * pitch + low, term * pitch + high, LANES):
             value = load(planes.block, at)
             if place < 2 * radius:
                 value = value + load(planes.ring, older + at)
             store(columns, middle + at, value)
-        for x in range(0, pitch, LANES):
+        for x in range(span[0], span[1], LANES):
             at = term * wide + x
             value = load(columns, at)
             for k in range(at + 1, at + 2 * radius + 1, 2):
@@ -231,7 +240,7 @@ def thin_out(planes: Planes, support: NDArray[np.float32], stride: int) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve_windows(planes: Planes, count: int, least: np.float32) -> None:
+def solve_windows(planes: Planes, span: tuple[int, int], least: np.float32) -> None:
     """Gain and disparity step of each window.
 
     Minimises sum (l - b (r - g e))^2 over the gain b and the step e, all mean-free: a difference in
@@ -239,12 +248,12 @@ def solve_windows(planes: Planes, count: int, least: np.float32) -> None:
 
     Args:
         planes: sums are read; solved in place.
-        count: of windows.
+        span: first window, a multiple of the lanes, and after the last.
         least: number of pixels that a window needs.
     """
     pitch, sums, solved = planes.pitch, planes.sums, planes.solved
     zero, one, unknown = spread(_NOTHING), spread(np.float32(1.0)), spread(np.float32(np.nan))
-    for x in range(0, count, LANES):
+    for x in range(span[0], span[1], LANES):
         n, s_l, s_r = load(sums, x), load(sums, _L * pitch + x), load(sums, _R * pitch + x)
         s_g, weight = load(sums, _G * pitch + x), load(sums, _GG * pitch + x)
         per_n = one / larger(n, one)
@@ -287,43 +296,109 @@ def solve_windows(planes: Planes, count: int, least: np.float32) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def take_roots(planes: Planes) -> None:
+def take_roots(planes: Planes, span: tuple[int, int]) -> None:
     """Square roots of what was solved: loops over one array, so that the compiler makes vectors."""
+    first, after = span
     solved = planes.solved.reshape(_N_SOLVED, -1)
     for index in (_VARIANCE, _SPREAD, _LL_RR):
         plane = solved[index]
-        for x in range(planes.pitch):
+        for x in range(first, after):
             plane[x] = np.sqrt(plane[x])
     correlation, divisor = solved[_CORRELATION], solved[_LL_RR]
-    for x in range(planes.pitch):
+    for x in range(first, after):
         correlation[x] /= divisor[x]
 
 
 @njit(cache=True, nogil=True)
 def tell_row(
-    planes: Planes, stride: int, refined: NDArray[np.float32], quality: NDArray[np.float32]
+    planes: Planes,
+    stride: int,
+    span: tuple[int, int],
+    refined: NDArray[np.float32],
+    quality: NDArray[np.float32],
 ) -> None:
     """Hand out what was solved.
 
     Args:
         planes: solved is read.
         stride: px from window to window.
+        span: first window that was solved, and after the last; the others cannot tell.
         refined: (w,) in place, new offset px; of the `stride` pixels from each window on.
         quality: (w / stride, 4) in place.
     """
     solved = planes.solved.reshape(_N_SOLVED, -1)
     step, sigma, new = solved[_STEP], solved[_VARIANCE], solved[_NEW]
     correlation, roughness = solved[_CORRELATION], solved[_SPREAD]
-    told = quality.ravel()
-    for x in range(quality.shape[0]):
+    told, width = quality.ravel(), refined.shape[0]
+    first, after = span[0], min(span[1], quality.shape[0])
+    quality[:first], quality[after:] = np.float32(np.nan), np.float32(np.nan)
+    quality[:first, CORRELATION], quality[after:, CORRELATION] = _NOTHING, _NOTHING
+    for x in range(first, after):
         told[N_QUALITIES * x + STEP] = step[x]
         told[N_QUALITIES * x + SIGMA] = sigma[x]
         told[N_QUALITIES * x + CORRELATION] = correlation[x]
         told[N_QUALITIES * x + ROUGHNESS] = roughness[x]
-    width = refined.shape[0]
+    refined[: first * stride], refined[after * stride :] = _NOTHING, _NOTHING
     for phase in range(stride):
-        for x in range((width - phase + stride - 1) // stride):
+        for x in range(first, min(after, (width - phase + stride - 1) // stride)):
             refined[x * stride + phase] = new[x]
+
+
+@njit(cache=True, nogil=True)
+def supported_spans(
+    support: NDArray[np.float32], stride: int, rows: tuple[int, int]
+) -> NDArray[np.int32]:
+    """Columns of the windows of some rows that stand for a supported pixel.
+
+    Args:
+        support: (h, w) disparity px, NaN without.
+        stride: px; a window stands for so many pixels each way from its own on.
+        rows: first, and after the last.
+
+    Returns:
+        (n, 2) first column, and after the last; 0 and 0 without any.
+    """
+    height, width = support.shape
+    spans = np.zeros((rows[1] - rows[0], 2), dtype=np.int32)
+    for y in range(rows[0], rows[1]):
+        if y % stride:
+            continue
+        low, high = width, 0
+        for row in range(y, min(y + stride, height)):
+            x = 0
+            while x < low and np.isnan(support[row, x]):
+                x += 1
+            low, x = x, width
+            while x > high and np.isnan(support[row, x - 1]):
+                x -= 1
+            high = x
+        if low < high:
+            spans[y - rows[0], 0], spans[y - rows[0], 1] = max(low - stride + 1, 0), high
+    return spans
+
+
+@njit(cache=True, nogil=True)
+def joint_span(
+    spans: NDArray[np.int32], rows: tuple[int, int], radius: int, pitch: int
+) -> tuple[int, int]:
+    """The columns that the windows of some rows reach, in whole lanes; of no rows, none.
+
+    Args:
+        spans: as `supported_spans` makes them.
+        rows: first, and after the last, of the spans.
+        radius: px of the windows.
+        pitch: no column lies beyond.
+    """
+    low, high = pitch, 0
+    for row in range(max(rows[0], 0), min(rows[1], spans.shape[0])):
+        if spans[row, 0] < spans[row, 1]:
+            low, high = min(low, spans[row, 0]), max(high, spans[row, 1])
+    if low >= high:
+        return 0, 0
+    return (
+        max(low - radius, 0) // LANES * LANES,
+        min(-(-(high + radius) // LANES) * LANES, pitch),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -352,8 +427,9 @@ def refine_rows(
         right_column: column of the box's first pixel in `right`.
         window: radius px; stride px of the windows that are solved; least number of pixels.
         rows: first, and after the last; the first is a multiple of the stride.
-        refined: (h, w) in place, the new offset px; the window's mean where it cannot tell. With a
-            stride, what one window says stands for the pixels up to the next.
+        refined: (h, w) in place, the new offset px; the window's mean where it cannot tell, and
+            anything where there is no support. With a stride, what one window says stands for the
+            pixels up to the next.
         quality: (h / stride, w / stride, 4) in place, of the windows that are solved: step px (NaN
             where the window cannot tell), sigma px, correlation, roughness px.
     """
@@ -362,25 +438,35 @@ def refine_rows(
     first, after = rows
     size = 2 * radius + 1
     planes = make_planes(width, radius)
+    spans = supported_spans(support, stride, rows)
+    entered_low, entered_high = planes.pitch, 0
     for y in range(first - radius, after + radius):
         place = (y - first + radius) % size
+        # All that some window asks for; what lies beside it is not read.
+        span = joint_span(spans, (y - radius - first, y + radius + 1 - first), radius, planes.pitch)
         if 0 <= y < height:
-            sample_row(left[y], right[y], support[y], offset[y], right_column, planes.samples)
+            sample_row(left[y], right[y], support[y], offset[y], right_column, span, planes.samples)
         else:
             planes.samples[:] = np.float32(0.0)
-        enter_row(planes, place)
+        enter_row(planes, place, span)
+        if span[0] < span[1]:
+            entered_low, entered_high = min(entered_low, span[0]), max(entered_high, span[1])
         row = y - radius
         if row >= first:
             if row % stride == 0:
-                add_up(planes, place, radius)
+                asked = joint_span(spans, (row - first, row - first + 1), 0, planes.pitch)
+                add_up(planes, place, radius, asked)
                 thin_out(planes, support[row], stride)
-                solve_windows(planes, quality.shape[1], np.float32(least))
-                take_roots(planes)
-                tell_row(planes, stride, refined[row], quality[row // stride])
+                if stride > 1:
+                    asked = (asked[0] // stride // LANES * LANES, -(-asked[1] // stride))
+                solve_windows(planes, asked, np.float32(least))
+                take_roots(planes, asked)
+                tell_row(planes, stride, asked, refined[row], quality[row // stride])
             else:
                 refined[row] = refined[row - 1]
         if place == size - 1:
-            close_block(planes, size)
+            close_block(planes, size, (entered_low, entered_high))
+            entered_low, entered_high = planes.pitch, 0
 
 
 @njit(cache=True, nogil=True)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.rectification import Box, RectifiedPair
-from navapp.stereo.subpixel.coarse_to_fine import refine_surface, without_steps
+from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
 from navapp.stereo.subpixel.refine import refine
 from navapp.values import Origin
 from tests.stereo.pairs import HEIGHT, WIDTH, shifted_pair
@@ -196,3 +196,20 @@ def test_a_small_island_stays() -> None:
     coarse = np.full((60, 60), np.nan, np.float32)
     coarse[30:34, 30:34] = 20.0
     assert np.isfinite(without_steps(coarse)[30:34, 30:34]).all()
+
+
+def test_a_calmed_map_has_less_noise_and_keeps_its_edges() -> None:
+    rng = np.random.default_rng(8)
+    true = np.where(np.arange(60) < 30, 20.0, 26.0) + 0.02 * np.arange(40)[:, None]
+    noisy = (true + rng.uniform(-0.25, 0.25, true.shape)).astype(np.float32)
+    noisy[10, 12] = np.nan
+    noisy[20:30, 40:50] = np.nan
+    found = calmed(noisy)
+    assert np.isfinite(found[10, 12])
+    assert np.isnan(found[22:28, 42:48]).all()
+    error = np.abs(found - true)
+    known = np.isfinite(noisy)
+    # An edge keeps its place: nothing lies between the two surfaces.
+    assert np.nanmax(error[known]) < 0.5
+    away = known & (np.abs(np.arange(60) - 29.5) > 3.0)
+    assert np.std((found - true)[away]) < 0.5 * np.std((noisy - true)[away])

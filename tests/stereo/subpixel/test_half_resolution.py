@@ -61,3 +61,17 @@ def test_unknown_pixels_do_not_spread() -> None:
     expected = np.full((12, 12), 20.0)
     expected[4:6, 6:8] = np.nan
     np.testing.assert_array_equal(found, expected)
+
+
+def test_with_a_band_only_what_the_box_reaches_is_made() -> None:
+    pair = pair_of(400, 90, Box(240, 20, 61, 31))
+    whole, part = halved(pair), halved(pair, (30.0, 60.0))
+    box = part.box
+    rows = slice(box.y - 4, box.y + box.height + 4)
+    columns = slice(box.x - 4, box.x + box.width + 4)
+    np.testing.assert_array_equal(part.left[rows, columns], whole.left[rows, columns])
+    reached = slice(box.x - 34, box.x + box.width - 11)
+    np.testing.assert_array_equal(part.right[rows, reached], whole.right[rows, reached])
+    assert box == whole.box
+    assert (part.left[:, :100] == 0).all()
+    assert (part.right[:, :70] == 0).all()

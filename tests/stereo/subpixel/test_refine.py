@@ -136,6 +136,9 @@ def test_the_kernel_agrees_with_the_readable_reference(case: str) -> None:
     for rows in ((0, half), (half, height)):
         refine_rows(left, right, support, offset, column, window, rows, refined, quality)
     expected = refine_step(left, right, support, offset, column, 2, filled)
+    # Where there is no support, an offset says nothing.
+    for offsets in (refined, expected[0]):
+        offsets[np.isnan(support)] = 0.0
     for found, wanted in zip((refined, quality), expected, strict=True):
         np.testing.assert_array_equal(np.isnan(found), np.isnan(wanted))
         # Window sums run in float32 terms.

@@ -1,0 +1,26 @@
+"""The TOML configuration; what is wrong with it is told with the nearest known key."""
+
+from navapp.config.checking import checked, parse
+from navapp.config.files import FILE_NAME, find_file, load
+from navapp.config.sections import (
+    CalibrationSection,
+    Configuration,
+    FaultSection,
+    Section,
+    SimulationSection,
+)
+from navapp.config.toml_text import as_toml
+
+__all__ = [
+    "FILE_NAME",
+    "CalibrationSection",
+    "Configuration",
+    "FaultSection",
+    "Section",
+    "SimulationSection",
+    "as_toml",
+    "checked",
+    "find_file",
+    "load",
+    "parse",
+]

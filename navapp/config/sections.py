@@ -1,0 +1,192 @@
+"""The tables of the configuration: frozen models that refuse unknown keys."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+def _rising(values: tuple[float, float]) -> tuple[float, float]:
+    if values[0] >= values[1]:
+        raise ValueError("the first must be smaller than the second")
+    return values
+
+
+class Section(BaseModel):
+    """One table of the file."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+    )
+
+
+class FaultSection(Section):
+    """One scripted fault of the simulated camera; seconds since it was opened first."""
+
+    kind: Literal[
+        "unplug", "freeze", "drop", "delay", "blackout_left", "blackout_right", "wrong_serial"
+    ]
+    """What goes wrong."""
+    start_s: Annotated[float, Field(ge=0.0)]
+    """When it begins."""
+    duration_s: Annotated[float, Field(gt=0.0, allow_inf_nan=True)]
+    """How long it lasts; inf: for good."""
+    delay_s: Annotated[float, Field(ge=0.0)] = 0.3
+    """Of a delay: how much later frames come."""
+
+    @model_validator(mode="after")
+    def _has_its_own_keys(self) -> Self:
+        if "delay_s" in self.model_fields_set and self.kind != "delay":
+            raise ValueError(f"delay_s belongs to a delay, not to {self.kind}")
+        return self
+
+
+class SimulationSection(Section):
+    """The simulated patient and rig."""
+
+    seed: Annotated[int, Field(ge=0)] = 1
+    """Of the anatomy, the textures, the placement and the motion."""
+    side: Literal["left", "right"] = "right"
+    """Of the knee."""
+    sex: Literal["female", "male"] = "female"
+    """Of the patient."""
+    age_group: Literal["young", "middle", "old"] = "middle"
+    """Of the patient."""
+    cartilage_mm: Annotated[float, Field(ge=0.0, le=2.6)] = 0.0
+    """Mean thickness of the cartilage that the camera sees and the plan does not; 0: bare bone."""
+    motion: Literal["still", "breathing", "patient", "jump"] = "breathing"
+    """Of the leg."""
+    instrument: Literal["none", "sweep"] = "none"
+    """What passes in front of the bone."""
+    scale: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
+    """Size of the pictures: 1.0 is 1280 x 720."""
+    stepped: bool | None = None
+    """Whether frames wait to be read; by default in headless sessions only."""
+    skew_ms: float = 0.0
+    """The right camera exposes later by this."""
+    grey: bool = False
+    """Grey pictures, like those of an OAK camera."""
+    faults: tuple[FaultSection, ...] = ()
+    """Scripted faults: tables with kind, start_s, duration_s and, of a delay, delay_s."""
+
+
+class CameraSection(BaseModel):
+    """Where the pictures come from."""
+
+    # Tables of third-party devices, [camera.NAME], are passed through unchecked.
+    model_config = ConfigDict(
+        frozen=True,
+        extra="allow",
+        strict=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+    )
+
+    backend: str = "simulated"
+    """simulated, or the name of an installed device."""
+    rig: str | None = None
+    """Rig file (OpenCV YAML); simulated cameras bring their own."""
+    rate_hz: Positive = 15.0
+    """Pairs per second asked for, or assumed where a recording has no times."""
+    depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (300.0, 700.0)
+    """Nearest and farthest surface that the rig is used for."""
+    simulated: SimulationSection = SimulationSection()
+    """The simulated patient and rig."""
+
+
+class DisplaySection(Section):
+    """Where the overlay is shown."""
+
+    backend: Literal["simulated"] = "simulated"
+    """simulated."""
+    valid_ms: Positive = 500.0
+    """A picture without a newer one turns black after this."""
+
+
+class ProjectorSection(Section):
+    """The projector's control line."""
+
+    backend: Literal["none"] = "none"
+    """none."""
+
+
+class MirrorSection(Section):
+    """The mount of the half-silvered mirror."""
+
+    backend: Literal["fixed"] = "fixed"
+    """fixed."""
+    calibrated_deg: float = 45.0
+    """Angle at which the display was calibrated."""
+
+
+class PlanSection(Section):
+    """The pre-operative plan."""
+
+    path: str | None = None
+    """Plan folder; the simulated rig brings its own."""
+    prior: str | None = None
+    """JSON file with the rough start pose."""
+
+
+class TrackingSection(Section):
+    """The line."""
+
+    method: Literal["bimcc", "icp"] = "bimcc"
+    """icp is the paper's baseline."""
+
+
+class CalibrationSection(Section):
+    """Calibration of the stereo rig."""
+
+    stop_capture_mm: Positive = 0.15
+    """A capture may end when half of the working volume has a predicted 95 % error below."""
+    accept_mm: Positive = 0.40
+    """A rig is accepted when nearly all of the working volume has a predicted 95 % error below."""
+    working_depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (350.0, 550.0)
+    """Nearest and farthest surface of the working volume."""
+    valid_days: Annotated[int, Field(gt=0)] = 180
+    """A rig is refused when it is older."""
+
+
+class StagesSection(Section):
+    """The surgical stages."""
+
+    first: str = "opening"
+    """Name or number of the stage that a session starts in."""
+
+
+class RecordingSection(Section):
+    """Session folders."""
+
+    folder: str | None = None
+    """Record every session into this new folder."""
+    pictures: bool = True
+    """Keep the raw pairs (lossless PNG), so that the session can be replayed."""
+
+
+class EmptySection(Section):
+    """A table without keys."""
+
+
+class Configuration(Section):
+    """The whole file."""
+
+    camera: CameraSection = CameraSection()
+    display: DisplaySection = DisplaySection()
+    projector: ProjectorSection = ProjectorSection()
+    mirror: MirrorSection = MirrorSection()
+    plan: PlanSection = PlanSection()
+    stereo: EmptySection = EmptySection()
+    registration: EmptySection = EmptySection()
+    tracking: TrackingSection = TrackingSection()
+    calibration: CalibrationSection = CalibrationSection()
+    overlay: EmptySection = EmptySection()
+    stages: StagesSection = StagesSection()
+    recording: RecordingSection = RecordingSection()
+    link: EmptySection = EmptySection()
+    ui: EmptySection = EmptySection()

@@ -1,0 +1,93 @@
+"""The snapshot of a session, with the interlocks' answer in it."""
+
+from dataclasses import dataclass, replace
+
+from drivers.interfaces import DeviceSet
+from navapp.control.camera_link import CameraLink
+from navapp.control.device_lines import camera_line, display_line, mirror_line, projector_line
+from navapp.control.display_link import DisplayLink
+from navapp.control.interlocks import navigable
+from navapp.control.session import Session
+from navapp.control.stages import STAGES
+from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
+from navapp.geometry.rig import StereoRig
+from navapp.values import Plan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SnapshotMaker:
+    """Looks at a session and at the room in which it takes place.
+
+    Attributes:
+        session: what is known.
+        camera: in use.
+        display: in use.
+        devices: the others.
+        rig: of the camera.
+        plan: of the operation.
+        is_recording: the session is kept in a folder.
+    """
+
+    session: Session
+    camera: CameraLink
+    display: DisplayLink
+    devices: DeviceSet
+    rig: StereoRig
+    plan: Plan
+    is_recording: bool
+
+    def make(self) -> Snapshot:
+        """As of now."""
+        session = self.session
+        now_ns = session.clock.now_ns()
+        tracked = session.tracked
+        bone = self.plan.bones.get(session.stage.bone)
+        draft = Snapshot(
+            time_ns=now_ns,
+            state=session.state,
+            stage=session.stage,
+            stages=STAGES,
+            reasons=(),
+            is_blanked=self.display.is_blanked,
+            verdict=None if tracked is None else tracked.verdict,
+            left_from_bone=None if tracked is None else tracked.left_from_bone,
+            is_candidate=session.state is SessionState.REVIEW and tracked is not None,
+            pose_age_ms=None if tracked is None else (now_ns - session.tracked_at_ns) / 1e6,
+            preview=session.preview,
+            rates=session.meter.rates(self.camera.n_dropped),
+            devices=self._device_lines(),
+            events=session.events,
+            progress=self._progress(),
+            rig_name=self.rig.name,
+            is_simulated=self._is_simulated,
+            is_recording=self.is_recording,
+            plan_name=self.plan.name,
+            plan_digest=self.plan.digest,
+            side="" if bone is None or bone.side is None else bone.side,
+            sequence=session.sequence,
+            is_bone_planned=bone is not None,
+            is_camera_silent=self.camera.is_silent,
+            is_over=session.is_over,
+        )
+        return replace(draft, reasons=navigable(draft))
+
+    @property
+    def _is_simulated(self) -> bool:
+        """The pictures are not of this world; a replayed rig still says so by its name."""
+        return self.camera.camera.info.is_simulated or self.rig.name.startswith("sim:")
+
+    def _device_lines(self) -> tuple[DeviceLine, ...]:
+        return (
+            camera_line(self.camera.camera.info, self.camera.trouble),
+            display_line(self.display.display.info, self.display.trouble),
+            projector_line(self.devices.projector),
+            mirror_line(self.devices.mirror),
+        )
+
+    def _progress(self) -> Progress | None:
+        share = self.session.pursuit.progress
+        if share is not None:
+            return Progress(f"searching for the {self.session.stage.bone}", share)
+        if self.session.state is SessionState.STARTING:
+            return Progress("waiting for the first picture", 0.0)
+        return None

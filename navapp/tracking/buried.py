@@ -1,0 +1,188 @@
+"""A bone that is partly buried in tissue which continues its surface.
+
+Such a bone has many places to rest within a millimetre of the true one: tissue that lies flush
+holds it in each. At the true one most of the model answers to within the noise. Steps onto the
+model are therefore taken from many starts, those that find most are the next starts, and of all
+that then come to rest the one whose residuals show least stands.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import DepthMap, RegistrationModel, Sliding
+from navapp.tracking.first_look import doubted
+from navapp.tracking.follower import Fit, Follower
+from navapp.tracking.locator import LocatorSettings
+from navapp.tracking.smooth_misfit import shown_ratio2
+from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+
+# Always the same draws: the same pictures give the same pose.
+_SEED = 20
+# What the model finds at a pose: under a kernel of its own noise, asked at so many points.
+_SIGMA_MM, _N_POINTS = 0.1, 3000
+# So much of the work is the search on the free measurement, then come the steps.
+_SEARCH_SHARE = 0.3
+
+
+class Round(NamedTuple):
+    """From each place so many starts, drawn with a standard deviation along and about each axis.
+
+    `n_kept` of all that they lead to, and of the places themselves, are the next places.
+    """
+
+    n_starts: int
+    shift_mm: float
+    turn_deg: float
+    n_kept: int
+
+    @property
+    def deviations(self) -> FloatArray:
+        """(6,) of a twist."""
+        return np.repeat([self.shift_mm, np.radians(self.turn_deg)], 3)
+
+
+class Place(NamedTuple):
+    """Where a step onto the model led, and how much of it answers there."""
+
+    fit: Fit
+    score: float
+
+
+# The free measurement finds places a millimetre beside the true one. Matching on the model sees
+# half a pixel, which is as far: each round is drawn a little nearer than the one before.
+_N_PLACES = 3
+_ROUNDS = (
+    Round(12, 0.7, 1.2, 8),
+    Round(5, 0.5, 0.8, 6),
+    Round(5, 0.4, 0.6, 5),
+    Round(5, 0.25, 0.4, 5),
+)
+# A prediction is off by part of a frame's motion.
+_N_FRAME_STARTS, _N_FRAME_PLACES = 16, 6
+_FRAME_ROUNDS = (Round(6, 0.5, 0.8, 4), Round(5, 0.3, 0.5, 3))
+
+
+class BuriedBone:
+    """Looks for one bone under one rig; holds only what is constant."""
+
+    def __init__(
+        self, meter: SurfaceMeter, model: RegistrationModel, settings: LocatorSettings
+    ) -> None:
+        """Join what is looked for and what measures.
+
+        Args:
+            meter: measures surfaces.
+            model: of the bone.
+            settings: how the bone is located otherwise.
+        """
+        self._meter, self._model = meter, model
+        self._follower = Follower(meter, model, settings.follower, settings.tracking)
+        one_step = replace(settings.follower, max_rounds=1)
+        self._stepper = Follower(meter, model, one_step, settings.tracking)
+
+    @cached_property
+    def _sliding(self) -> Sliding:
+        return Sliding(self._model)
+
+    def found(
+        self,
+        pair: RectifiedPair,
+        measured: Measurement,
+        rough: RigidTransform,
+        on_progress: Callable[[float], None],
+    ) -> Fit | None:
+        """The bone around a rough pose; it says so when it is a guess. None when nothing answers.
+
+        Args:
+            pair: rectified pictures.
+            measured: freely around the rough pose.
+            rough: rectified camera from bone.
+            on_progress: told the share done; may raise to cancel.
+        """
+        depth = DepthMap.of(self._meter.geometry, measured.disparity)
+        found = self._sliding.search(
+            depth, rough, _N_PLACES, lambda share: on_progress(_SEARCH_SHARE * share)
+        )
+        places = self._placed(pair, [one.scene_from_bone for one in found])
+        random = np.random.default_rng(_SEED)
+        for number, one in enumerate(_ROUNDS):
+            on_progress(_SEARCH_SHARE + (1.0 - _SEARCH_SHARE) * number / len(_ROUNDS))
+            places = self._improved(pair, places, one, random)
+        return self._rested(pair, places)
+
+    def followed(self, pair: RectifiedPair, predicted: RigidTransform) -> Iterator[Fit]:
+        """The bone from one frame to the next: where the prediction rests, then the best around it.
+
+        Args:
+            pair: rectified pictures.
+            predicted: rectified camera from bone.
+        """
+        fit, _ = self._follower.follow(pair, predicted, is_near=True)
+        if fit is not None:
+            yield fit
+        random = np.random.default_rng(_SEED)
+        twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations
+        centre_mm = predicted.apply(self._model.centre_mm)
+        places = self._placed(pair, [predicted.moved(twist, centre_mm) for twist in twists])
+        places = _most_answering(places, _N_FRAME_PLACES)
+        for one in _FRAME_ROUNDS:
+            places = self._improved(pair, places, one, random)
+        fit = self._rested(pair, places)
+        if fit is not None:
+            yield fit
+
+    def _placed(self, pair: RectifiedPair, starts: list[RigidTransform]) -> list[Place]:
+        """Where one step onto the model leads from each start."""
+        places = []
+        for start in starts:
+            fit, _ = self._stepper.follow(pair, start, is_near=True)
+            if fit is not None and np.isfinite(fit.estimate.covariance).all():
+                depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
+                score = self._sliding.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
+                places.append(Place(fit, score))
+        return places
+
+    def _improved(
+        self, pair: RectifiedPair, places: list[Place], one: Round, random: np.random.Generator
+    ) -> list[Place]:
+        """The best of places and of what starts around them lead to."""
+        starts = [start for place in places for start in self._around(place.fit, one, random)]
+        return _most_answering(places + self._placed(pair, starts), one.n_kept)
+
+    def _around(self, fit: Fit, one: Round, random: np.random.Generator) -> list[RigidTransform]:
+        """Poses beside a fit: in all directions alike, or as loosely as it is fixed, in turns.
+
+        What slides along tissue slides where the surface holds least.
+        """
+        centre_mm, covariance = fit.pose.apply(self._model.centre_mm), fit.estimate.covariance
+        size_mm2 = np.trace(covariance[:3, :3]) + self._lever_mm**2 * np.trace(covariance[3:, 3:])
+        loose = np.linalg.cholesky(covariance) * (2.0 * one.shift_mm / size_mm2**0.5)
+        twists = random.standard_normal((one.n_starts, 6))
+        twists[0::2] *= one.deviations
+        twists[1::2] @= loose.T
+        return [fit.pose.moved(twist, centre_mm) for twist in twists]
+
+    def _rested(self, pair: RectifiedPair, places: list[Place]) -> Fit | None:
+        """Of all that come to rest, what leaves least; a guess when another leaves as little."""
+        found = (self._follower.follow(pair, place.fit.pose, is_near=True)[0] for place in places)
+        fits = [fit for fit in found if fit is not None]
+        if not fits:
+            return None
+        fitting = [max(shown_ratio2(fit.estimate), 1e-6) ** -0.5 for fit in fits]
+        return doubted(fits, fitting, self._model)[0]
+
+    @cached_property
+    def _lever_mm(self) -> float:
+        """At which a rotation moves the bone as much as a shift does."""
+        offsets_mm = self._model.points_mm - self._model.centre_mm
+        return float(np.sqrt((offsets_mm**2).sum(axis=1).mean()))
+
+
+def _most_answering(places: list[Place], n: int) -> list[Place]:
+    return sorted(places, key=lambda place: place.score, reverse=True)[:n]

@@ -1,0 +1,168 @@
+"""The controller's devices: a camera that is lost or silent, a display that fails, the mirror."""
+
+import numpy as np
+
+from drivers.interfaces import PowerState
+from drivers.no_projector import NoProjector
+from navapp.control.controller import SessionOptions
+from navapp.control.states import (
+    DeviceHealth,
+    Reconnect,
+    Register,
+)
+from navapp.errors import DeviceLost, DeviceNotFound, DeviceTimeout, WrongDevice
+from navapp.values import Reason
+from tests.control.fakes import Bench, navigating
+
+
+def test_a_lost_camera_is_a_fault_and_dark_and_it_comes_back_suspended(bench: Bench) -> None:
+    navigating(bench)
+    bench.camera.error = DeviceLost("the camera was unplugged")
+    snapshot = bench.frames(1)
+    assert snapshot.state.value == "fault"
+    assert snapshot.reasons[0] is Reason.DEVICE_FAULT
+    assert bench.is_dark
+    assert not snapshot.is_over
+    assert snapshot.devices[0].health is DeviceHealth.LOST
+    bench.camera.opening_error = DeviceNotFound("still unplugged")
+    for _ in range(20):
+        assert bench.frames(1).state.value == "fault"
+    assert "still unplugged" in bench.snapshot.devices[0].detail
+    bench.camera.error = bench.camera.opening_error = None
+    for _ in range(10):
+        if bench.frames(1).state.value == "suspended":
+            break
+    assert bench.state == "suspended"
+    assert bench.frames(1).state.value == "navigating"
+    assert bench.shows_guides
+    assert bench.snapshot.devices[0].health is DeviceHealth.OK
+
+
+def test_a_camera_lost_before_a_registration_comes_back_ready(bench: Bench) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    bench.camera.error = DeviceLost("gone")
+    bench.frames(1)
+    assert bench.do(Register()).state.value == "fault"
+    assert "camera is lost" in bench.refused()
+    bench.camera.error = None
+    bench.do(Reconnect())
+    assert bench.frames(1).state.value == "ready"
+
+
+def test_another_camera_is_not_taken_for_the_calibrated_one(bench: Bench) -> None:
+    navigating(bench)
+    bench.camera.error = DeviceLost("gone")
+    bench.frames(1)
+    bench.camera.opening_error = WrongDevice("serial numbers differ")
+    bench.do(Reconnect())
+    for _ in range(15):
+        assert bench.frames(1).state.value == "fault"
+    assert bench.is_dark
+    assert "serial numbers differ" in bench.snapshot.devices[0].detail
+
+
+def test_attempts_to_reopen_pause_for_a_second(bench: Bench) -> None:
+    attempts = []
+    bench.frames(1)
+    bench.camera.error = DeviceLost("gone")
+    bench.frames(1)
+
+    def refuse() -> None:
+        attempts.append(bench.clock.now_ns())
+        raise DeviceNotFound("no")
+
+    bench.camera.open = refuse
+    start_ns = bench.clock.now_ns()
+    while bench.clock.now_ns() < start_ns + 5 * 10**9:
+        bench.frames(1)
+    assert 4 <= len(attempts) <= 5
+    assert min(np.diff(attempts)) >= 10**9
+
+
+def test_a_camera_that_nobody_can_reopen_ends_the_session(monkeypatch) -> None:
+    bench = Bench(monkeypatch, can_reopen=False)
+    bench.frames(1)
+    bench.camera.error = DeviceLost("gone")
+    assert bench.frames(1).is_over
+
+
+def test_a_silent_camera_turns_everything_dark(bench: Bench) -> None:
+    navigating(bench)
+    bench.camera.is_silent = True
+    for _ in range(8):
+        bench.controller.step(0.2)
+    assert bench.is_dark
+    assert Reason.CAMERA_SILENT in bench.snapshot.reasons
+    assert Reason.POSE_TOO_OLD in bench.snapshot.reasons
+    bench.camera.is_silent = False
+    assert bench.frames(1).is_navigable
+
+
+def test_guides_leave_the_display_when_their_pose_is_too_old(monkeypatch) -> None:
+    """However long a picture is said to stay valid."""
+    bench = navigating(Bench(monkeypatch, options=SessionOptions(overlay_valid_ms=60_000.0)))
+    bench.camera.is_silent = True
+    bench.controller.step(0.3)
+    assert bench.shows_guides
+    bench.controller.step(0.3)
+    assert Reason.POSE_TOO_OLD in bench.snapshot.reasons
+    assert not bench.shows_guides
+
+
+def test_a_picture_is_dark_when_its_time_is_over(bench: Bench) -> None:
+    navigating(bench)
+    valid_ns = bench.results[-1].picture.valid_until_ns
+    assert valid_ns == bench.results[-1].frame.captured_ns + 500_000_000
+    bench.clock.wait_until_ns(valid_ns - 1)
+    assert bench.shows_guides
+    bench.clock.wait_until_ns(valid_ns)
+    assert bench.is_dark
+
+
+def test_a_failing_display_does_not_stop_the_line(bench: Bench) -> None:
+    navigating(bench)
+    show = bench.display.show
+
+    def fail(image, valid_until_ns):
+        raise DeviceLost("the display is gone")
+
+    bench.display.show = fail
+    bench.frames(3)
+    assert bench.results[-1].frame.sequence == bench.snapshot.sequence
+    assert bench.snapshot.devices[1].health is DeviceHealth.TROUBLE
+    assert sum("display is gone" in event.text for event in bench.events) == 1
+    bench.display.show = show
+    bench.frames(1)
+    assert bench.snapshot.devices[1].health is DeviceHealth.OK
+    assert bench.shows_guides
+
+
+class BrokenProjector(NoProjector):
+    """Says nothing when asked."""
+
+    def status(self):
+        raise DeviceTimeout("the projector does not answer")
+
+
+def test_a_projector_that_does_not_answer_is_told_and_stops_nothing(monkeypatch) -> None:
+    bench = Bench(monkeypatch, projector=BrokenProjector())
+    navigating(bench)
+    line = next(line for line in bench.snapshot.devices if line.kind == "projector")
+    assert line.health is DeviceHealth.LOST
+    assert "does not answer" in line.detail
+    assert NoProjector().status().power is PowerState.ABSENT
+
+
+def test_a_mirror_that_does_not_answer_is_told_and_stops_nothing(monkeypatch) -> None:
+    from drivers.fixed_mirror import FixedMirror
+
+    class Broken(FixedMirror):
+        def position_deg(self) -> float:
+            raise DeviceLost("the mirror's cable is out")
+
+    bench = Bench(monkeypatch, mirror=Broken(45.0))
+    navigating(bench)
+    line = next(line for line in bench.snapshot.devices if line.kind == "mirror")
+    assert line.health is DeviceHealth.LOST
+    assert "cable is out" in line.detail

@@ -1,0 +1,50 @@
+"""A bone that is followed for long; tests/bench/memory.py does it for longer."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from navapp.tracking import TrackState
+from tests.bench.memory import growth_of
+from tests.tracking.rooms import GOAL, Room, room
+
+N_WARM, N_MORE = 12, 24
+PERIOD_NS = 66_000_000
+# The grey picture of a box has 100,000. Caches of the interpreter fill by some 1,000 at first.
+LARGEST_GROWTH_BYTES_PER_FRAME = 5000
+
+
+def followed(a: Room, state: TrackState, first: int, n: int) -> TrackState:
+    """There and back; one frame in twelve is dark in one eye, and the bone is searched."""
+    for number in range(first, first + n):
+        frame = a.frames[number % len(a.frames)]
+        right = np.zeros_like(frame.right) if number % 12 == 11 else frame.right
+        _, state = a.line.track(frame.left, right, number * PERIOD_NS, state, GOAL)
+    return state
+
+
+@pytest.mark.slow
+def test_nothing_is_kept_of_the_frames_that_have_passed() -> None:
+    a = room()
+    state = followed(a, TrackState.at_rest(a.truth(a.frames[0]), 0), 1, N_WARM)
+    tracemalloc.start()
+    try:
+        state = followed(a, state, N_WARM + 1, N_WARM)
+        before, _ = tracemalloc.get_traced_memory()
+        followed(a, state, 2 * N_WARM + 1, N_MORE)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert after - before < LARGEST_GROWTH_BYTES_PER_FRAME * N_MORE
+
+
+def test_growth_is_the_slope_after_the_first_tenth() -> None:
+    frames = np.arange(20.0, 2001.0, 20.0)
+    noise = np.random.default_rng(1).normal(0.0, 30.0, frames.shape)
+    warming_up = np.where(frames < 200.0, -9000.0, 0.0)
+    found = growth_of(frames, 4e5 + 0.25 * frames + noise + warming_up)
+    assert abs(found.kib_per_1000 - 250.0) < 3.0 * found.sigma_kib_per_1000 < 60.0
+    assert growth_of(frames, np.full(frames.shape, 4e5)).kib_per_1000 == pytest.approx(
+        0.0, abs=1e-6
+    )
