@@ -43,7 +43,12 @@ CHANGED: dict[str, Any] = {
     "stereo": {},
     "registration": {},
     "tracking": {"method": "icp"},
-    "calibration": {},
+    "calibration": {
+        "stop_capture_mm": 0.2,
+        "accept_mm": 0.5,
+        "working_depth_mm": [400.0, 500.0],
+        "valid_days": 30,
+    },
     "overlay": {},
     "stages": {"first": "3"},
     "recording": {"folder": "sessions/1", "pictures": False},
