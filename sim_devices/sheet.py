@@ -14,7 +14,7 @@ from sim_devices.sensor import Eye
 from sim_devices.sheet_kernels import draw_sheet
 
 # Radiance of ink, of paper in full light and of the table behind.
-_INK, _PAPER, _GROUND = 0.05, 0.55, 0.07
+_INK, _PAPER, _GROUND = 0.05, 0.55, 0.08
 # Light from everywhere, and from a lamp beside the cameras.
 _AMBIENT = 0.35
 _N_SAMPLES = 3

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from navapp.config import CalibrationSection
     from navapp.control.capture.capture import Capture
     from navapp.control.capture.states import CaptureSnapshot, Outcome
-    from navapp.devices import OpenedCapture
     from navapp.geometry.rig import StereoRig
 
 _EXAMPLE = """\
@@ -61,8 +60,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Capture, solve, judge; the exit code."""
     from calibration.targets.boards import read_board
     from navapp.config import find_file, load
-    from navapp.control.capture.capture import Capture, CaptureSettings
+    from navapp.control.capture.capture import Capture
     from navapp.control.capture.folder import CaptureFolder
+    from navapp.control.capture.interfaces import CaptureSettings
     from navapp.control.executors import InlineExecutor, ThreadExecutor
     from navapp.devices import open_capture
 
@@ -79,6 +79,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     folder = CaptureFolder(Path(options.out))
     folder.begin(json.loads(Path(options.board).read_text(encoding="utf-8")))
     with ExitStack() as undo:
+        undo.callback(folder.discard_if_empty)
         opened = open_capture(configuration, board, is_headless=options.headless)
         undo.callback(opened.camera.close)
         solver = _Solver(board, opened.camera.info, section, folder.path)
@@ -95,7 +96,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             hand=opened.hand,
         )
         undo.callback(capture.close)
-        last = (_headless if options.headless else _on_screen)(capture, opened, diagnostics)
+        if options.headless:
+            _headless(capture, diagnostics)
+        elif (code := _on_screen(capture)) != 0:
+            return code
+        last = capture.snapshot
     return _finish(last, solver, options, diagnostics)
 
 
@@ -134,9 +139,7 @@ class _Solver:
         return Outcome(is_accepted, tuple(reasons))
 
 
-def _headless(
-    capture: "Capture", opened: "OpenedCapture", diagnostics: Diagnostics
-) -> "CaptureSnapshot":
+def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
     """The script: follow every wish, finish when it is enough."""
     from navapp.control.capture.states import Finish, Follow
 
@@ -159,13 +162,23 @@ def _headless(
     capture.submit(Finish())
     while snapshot.outcome is None:
         snapshot = capture.step()
-    return snapshot
 
 
-def _on_screen(
-    capture: "Capture", opened: "OpenedCapture", diagnostics: Diagnostics
-) -> "CaptureSnapshot":
-    raise NotImplementedError
+def _on_screen(capture: "Capture") -> int:
+    """The operator does it; 0, or the code of what ended the screen."""
+    from navapp.cli.run import log_folder
+    from navapp.control.capture.runner import CaptureRunner
+    from navapp.ui.capture.app import run_capture_app
+
+    runner = CaptureRunner(capture)
+    runner.start()
+    try:
+        code = run_capture_app(runner, log_folder() / "navapp.log")
+    finally:
+        runner.stop()
+    if runner.error is not None:
+        raise runner.error
+    return code
 
 
 def _finish(
@@ -187,14 +200,16 @@ def _finish(
     write_json(options.json, "calibrate capture", figures)
     if solver.found is not None and options.json != "-":
         tell(*solver.found, diagnostics)
-    if last.outcome is None:
+    if solver.found is None:
+        why = "" if last.outcome is None else f" ({'; '.join(last.outcome.sentences)})"
         raise ResultError(
-            f"no rig was solved; {last.n_kept} pairs are kept in {options.out}",
+            f"no rig was solved{why}; {last.n_kept} pairs are kept in {options.out}",
             remedy="solve them with `navapp calibrate stereo`, or capture again",
         )
-    if not last.outcome.is_accepted:
+    quality = solver.found[1].quality
+    if quality is not None and not quality.is_accepted:
         raise ResultError(
-            f"the rig is not accepted: {'; '.join(last.outcome.sentences)}",
+            f"the rig is not accepted: {'; '.join(quality.reasons)}",
             remedy=f"see {options.out}/report.html, and show the board as the reasons ask",
         )
     return 0

@@ -1,19 +1,16 @@
 """A guided capture: one step a frame."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from calibration.rig.judge import occupied
 from calibration.targets.boards import Board
-from calibration.targets.pairs import SeenPair
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
+from navapp.control.capture.interfaces import BoardHand, CaptureSettings, PairStore, Solve
+from navapp.control.capture.kept import KeptPairs
 from navapp.control.capture.looks import Look, Shutter, look_at
 from navapp.control.capture.previews import outlines, preview
 from navapp.control.capture.states import (
@@ -35,55 +32,15 @@ from navapp.control.executors import Executor, Job
 from navapp.control.sources import open_source
 from navapp.control.states import Progress
 from navapp.errors import NavappError
-from navapp.geometry.transform import RigidTransform
 
 _WAIT_S = 0.1
 # A simulated hand that was not good enough after so long goes there again.
 _PATIENCE_NS = 3_000_000_000
 _MOST_EVENTS = 30
-
-Solve = Callable[[list[SeenPair], Callable[[float], None]], Outcome]
-
-
-class BoardHand(Protocol):
-    """A simulated hand that holds the board."""
-
-    def move_to(self, left_from_body: RigidTransform) -> None:
-        """Go there, nearly."""
-        ...
-
-    def nudge(self, shift_mm: ArrayLike, turn_rad: ArrayLike) -> None:
-        """A shift in mm and a turn in rad along the left camera's axes."""
-        ...
-
-
-class PairStore(Protocol):
-    """Where pairs are kept."""
-
-    def keep(self, index: int, frame: StereoFrame) -> None:
-        """Write both pictures."""
-        ...
-
-    def drop(self, index: int) -> None:
-        """Delete them."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class CaptureSettings:
-    """What is asked of a capture.
-
-    Attributes:
-        depth_mm: nearest and farthest surface of the working volume.
-        stop_mm: enough when half of that volume has a predicted 95 % error below.
-        fewest_pairs: never enough with fewer.
-        n_pairs: enough with so many, whatever the error; None: the error alone decides.
-    """
-
-    depth_mm: tuple[float, float]
-    stop_mm: float
-    fewest_pairs: int = 8
-    n_pairs: int | None = None
+# So many more pairs are asked for when a rig was not accepted.
+_MORE_AFTER_REFUSAL = 4
+# Poses measured with a guessed camera: the first views differ by more than this allows.
+_SLACK_OF_GUESS = 3.0
 
 
 class Capture:
@@ -116,11 +73,12 @@ class Capture:
         self._name, self._size = info.name, (info.width, info.height)
         self._source, self._clock = open_source(camera), clock
         self._board, self._settings, self._executor = board, settings, executor
-        self._store, self._solve, self._hand = store, solve, hand
+        self._solve, self._hand = solve, hand
         self._middle_mm = board.points_mm.mean(axis=0)
         self._commands: SimpleQueue[CaptureCommand] = SimpleQueue()
         self._phase = CapturePhase.CAPTURING
-        self._shutter, self._pairs, self._events = Shutter(), list[SeenPair](), list[str]()
+        self._kept = KeptPairs(store, self._size)
+        self._shutter, self._events = Shutter(), list[str]()
         self._frame: StereoFrame | None = None
         self._look: Look | None = None
         self._checks: tuple[Check, ...] = ()
@@ -132,6 +90,7 @@ class Capture:
         self._wishing: Job[Wish] | None = None
         self._solving: Job[Outcome] | None = None
         self._outcome: Outcome | None = None
+        self._n_least = settings.fewest_pairs if settings.n_pairs is None else settings.n_pairs
         self.snapshot = self._told()
 
     def submit(self, command: CaptureCommand) -> None:
@@ -170,10 +129,10 @@ class Capture:
     @property
     def is_enough(self) -> bool:
         """The limit is reached, by pairs that are all in the prediction."""
-        n, bound, asked = len(self._pairs), self._wish.bound_mm, self._settings
-        if asked.n_pairs is not None:
-            return n >= asked.n_pairs
-        return n >= asked.fewest_pairs and bound is not None and bound <= asked.stop_mm
+        n, bound, asked = len(self._kept), self._wish.bound_mm, self._settings
+        if n < self._n_least:
+            return False
+        return asked.n_pairs is not None or (bound is not None and bound <= asked.stop_mm)
 
     def _next_command(self) -> CaptureCommand | None:
         try:
@@ -194,20 +153,17 @@ class Capture:
                 pass
             case Take():
                 self._is_told_to_take = True
-            case DropLast() if self._pairs:
-                pair = self._pairs.pop()
-                self._store.drop(pair.index)
-                self._tell(f"pair {pair.index} dropped")
-                self._ask()
-            case Finish() if len(self._pairs) >= N_STARTING:
-                pairs = list(self._pairs)
+            case DropLast():
+                if (pair := self._kept.drop_last()) is not None:
+                    self._tell(f"pair {pair.index} dropped")
+                    self._ask()
+            case Finish() if len(self._kept) >= N_STARTING:
+                pairs = self._kept.pairs
                 self._solving = Job(lambda report: self._solve(pairs, report))
                 self._phase = CapturePhase.SOLVING
                 self._executor.start(self._solving)
             case Finish():
-                self._tell(
-                    f"{len(self._pairs)} pairs are too few to solve, {N_STARTING} are needed"
-                )
+                self._tell(f"{len(self._kept)} pairs are too few to solve, {N_STARTING} are needed")
 
     def _take_look(self) -> None:
         job = self._looking
@@ -219,32 +175,30 @@ class Capture:
         look = self._look = job.result
         if look is None or self._phase is not CapturePhase.CAPTURING:
             return
-        self._checks = self._shutter.checks(look, self._pairs)
+        self._checks = self._shutter.checks(look, self._kept.pairs)
         self._way = self._way_from(look)
         is_good = all(check.is_met for check in self._checks)
         is_there = self._way is not None and self._way.is_there
         # A wish that is being thought over is not one that a view can meet.
         is_due = is_good and is_there and self._wishing is None and not self.is_enough
-        pair = look.pair(self._pairs[-1].index + 1 if self._pairs else 0)
-        if self._is_told_to_take and pair is None:
-            self._tell("nothing was taken: the board is not seen by both cameras")
-        elif self._is_told_to_take or is_due:
-            self._keep(pair, look)
+        if self._is_told_to_take or is_due:
+            self._keep(look)
         self._is_told_to_take = False
 
-    def _keep(self, pair: SeenPair | None, look: Look) -> None:
+    def _keep(self, look: Look) -> None:
+        pair = self._kept.add(look)
         if pair is None:
+            self._tell("nothing was taken: the board is not seen by both cameras")
             return
-        self._store.keep(pair.index, look.frame)
-        self._pairs.append(pair)
         self._tell(f"pair {pair.index} kept: {len(pair.common()[0])} marks by both")
         self._ask()
 
     def _ask(self) -> None:
         """Think over what is wanted, with the pairs of now."""
+        self._outcome = None
         if self._wishing is not None:
             self._wishing.cancel()
-        pairs, last = list(self._pairs), self._wish
+        pairs, last = self._kept.pairs, self._wish
         self._wishing = Job(
             lambda report: next_wish(
                 self._board, pairs, self._size, self._settings.depth_mm, last
@@ -274,20 +228,25 @@ class Capture:
         job = self._solving
         if job is None or not job.is_finished:
             return
-        self._solving, self._phase = None, CapturePhase.CAPTURING
+        self._solving = None
+        if self._phase is CapturePhase.SOLVING:
+            self._phase = CapturePhase.CAPTURING
         if isinstance(job.error, NavappError):
             self._outcome = Outcome(is_accepted=False, sentences=(str(job.error),))
         elif job.error is not None:
             raise job.error
         else:
             self._outcome = job.result
+        if self._outcome is not None and not self._outcome.is_accepted:
+            self._n_least = len(self._kept) + _MORE_AFTER_REFUSAL
 
     def _way_from(self, look: Look) -> Way | None:
         wanted = self._wish.left_from_board
         if look.left is None or wanted is None:
             return None
         now = measured_pose(self._board, look.left, self._wish.left)
-        return None if now is None else way(now, wanted, self._middle_mm)
+        slack = 1.0 if self._wish.rig is not None else _SLACK_OF_GUESS
+        return None if now is None else way(now, wanted, self._middle_mm, slack)
 
     def _move_hand(self) -> None:
         wanted, frame = self._wish.left_from_board, self._frame
@@ -316,12 +275,12 @@ class Capture:
             n_seen=(counts[0], counts[1], len(self._board.points_mm)),
             checks=self._checks,
             wish=self._wish_text(),
-            n_kept=len(self._pairs),
+            n_kept=len(self._kept),
             bound_mm=wish.bound_mm,
             worst_mm=wish.worst_mm,
             stop_mm=self._settings.stop_mm,
             is_enough=self.is_enough,
-            covered=self._covered(),
+            covered=self._kept.covered,
             progress=None if job is None else Progress("solving the rig", job.progress),
             events=tuple(self._events),
             outcome=self._outcome,
@@ -347,16 +306,3 @@ class Capture:
         if self._way is None:
             return "show the board to both cameras, as the outline is drawn"
         return str(self._way)
-
-    def _covered(self) -> NDArray[np.bool_]:
-        return np.stack(
-            [
-                occupied(
-                    np.vstack([np.empty((0, 2)), *(seen.pixels for seen in views)]), self._size
-                )
-                for views in (
-                    [pair.left for pair in self._pairs],
-                    [pair.right for pair in self._pairs],
-                )
-            ]
-        )

@@ -1,5 +1,6 @@
 """The folder of a capture: every pair as soon as it is kept, the board beside them."""
 
+import contextlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,8 @@ from typing import Any
 from drivers.frames import Image, StereoFrame
 from navapp.errors import InputError
 from navapp.geometry.ply import write_whole
+
+_BOARD = "board.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +25,7 @@ class CaptureFolder:
         Raises:
             InputError: it cannot be written, or holds pairs already.
         """
-        if any(self.path.glob("left[_-]*")) or any(self.path.glob("right[_-]*")):
+        if self._holds_pictures():
             raise InputError(
                 f"folder {self.path} already holds pictures",
                 subject=str(self.path),
@@ -30,7 +33,7 @@ class CaptureFolder:
             )
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            write_whole(self.path / "board.json", (json.dumps(board, indent=1) + "\n").encode())
+            write_whole(self.path / _BOARD, (json.dumps(board, indent=1) + "\n").encode())
         except OSError as error:
             raise self._refusal(error) from error
 
@@ -51,6 +54,18 @@ class CaptureFolder:
         """Delete both pictures of a pair."""
         for path in self._files(index):
             path.unlink(missing_ok=True)
+
+    def discard_if_empty(self) -> None:
+        """Remove it when no pair was kept, so that its name is free again."""
+        if self._holds_pictures():
+            return
+        (self.path / _BOARD).unlink(missing_ok=True)
+        # Whatever else lies there is not ours.
+        with contextlib.suppress(OSError):
+            self.path.rmdir()
+
+    def _holds_pictures(self) -> bool:
+        return any(self.path.glob("left[_-]*")) or any(self.path.glob("right[_-]*"))
 
     def _files(self, index: int) -> tuple[Path, Path]:
         return self.path / f"left_{index:04d}.png", self.path / f"right_{index:04d}.png"

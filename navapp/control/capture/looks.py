@@ -79,7 +79,7 @@ class Shutter:
         blurs = (pair.left.blur_px, pair.right.blur_px)
         self._sharpest = [min(a, b) for a, b in zip(self._sharpest, blurs, strict=True)]
         ratio = max(blur / best for blur, best in zip(blurs, self._sharpest, strict=True))
-        return Check("sharp", ratio <= _WORST_BLUR, f"blur {max(blurs):.1f} px")
+        return Check("sharp", ratio <= _WORST_BLUR, f"{max(blurs):.1f} px")
 
 
 def _still(look: Look, last: Look | None) -> Check:

@@ -79,22 +79,30 @@ def next_wish(
     if len(pairs) < N_STARTING:
         return Wish(starting_view(board, len(pairs), depth_mm), nominal_camera(size))
     try:
-        solved, used, out = _solved(board, pairs, size, last)
-        rig = unpacked(solved.model, solved.shared)
+        return _informed(board, pairs, size, depth_mm, last)
     except (ValueError, np.linalg.LinAlgError):
         # These views explain no rig: more of the starting ones may.
-        again = starting_view(board, len(pairs), depth_mm)
-        return Wish(again, nominal_camera(size))
+        return Wish(starting_view(board, len(pairs), depth_mm), nominal_camera(size))
+
+
+def _informed(
+    board: Board,
+    pairs: Sequence[SeenPair],
+    size: tuple[int, int],
+    depth_mm: tuple[float, float],
+    last: Wish | None,
+) -> Wish:
+    """The wish of a rig that can be solved."""
+    solved, used, out = _solved(board, pairs, size, last)
+    rig = unpacked(solved.model, solved.shared)
     bounds = volume_bounds_mm(solved, depth_mm)
     view = wanted_view(board, solved, noise_px(solved), depth_mm)
-    middle, worst = (
-        (float(np.median(bounds)), float(np.quantile(bounds, _NEARLY_ALL)))
-        if len(bounds)
-        else (np.inf, np.inf)
-    )
     pose = starting_view(board, 0, depth_mm) if view is None else view.left_from_board
     indices = tuple(pair.index for pair in used)
-    return Wish(pose, rig.left, rig, solved, indices, tuple(out), middle, worst)
+    if len(bounds) == 0:
+        return Wish(pose, rig.left, rig, solved, indices, tuple(out))
+    middle_mm, worst_mm = float(np.median(bounds)), float(np.quantile(bounds, _NEARLY_ALL))
+    return Wish(pose, rig.left, rig, solved, indices, tuple(out), middle_mm, worst_mm)
 
 
 def _solved(

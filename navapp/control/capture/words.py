@@ -35,34 +35,37 @@ class Way:
     is_there: bool
 
     def __str__(self) -> str:
-        """The largest parts first; directions as seen in the left picture."""
-        parts = [
+        """The three largest parts; directions as seen in the left picture."""
+        shifts = [
             (abs(mm) / _LEAST_MM, f"{abs(mm):.0f} mm {words[int(mm > 0.0)]}")
             for mm, words in zip(self.shift_mm, _SHIFTS, strict=True)
-            if abs(mm) >= _LEAST_MM
         ]
         turns = [
             (abs(deg) / _LEAST_DEG, words[int(deg > 0.0)].format(abs(deg)))
             for deg, words in zip(self.turn_deg, _TURNS, strict=True)
-            if abs(deg) >= _LEAST_DEG
         ]
-        told = sorted(parts + turns, reverse=True)[:_MOST_PARTS]
-        shifts = [text for part in told if part in parts for text in part[1:]]
-        rest = [text for part in told if part in turns for text in part[1:]]
-        said = ([f"move it {', '.join(shifts)}"] if shifts else []) + rest
+        # Always in the same order: words that change places cannot be followed.
+        least = max(1.0, sorted(size for size, _ in shifts + turns)[-_MOST_PARTS])
+        moves = ", ".join(text for size, text in shifts if size >= least)
+        said = ([f"move it {moves}"] if moves else []) + [
+            text for size, text in turns if size >= least
+        ]
         return "; ".join(said) if said else "hold it still"
 
 
-def way(now: RigidTransform, wanted: RigidTransform, middle_mm: FloatArray) -> Way:
+def way(
+    now: RigidTransform, wanted: RigidTransform, middle_mm: FloatArray, slack: float = 1.0
+) -> Way:
     """How a board gets from one pose to another.
 
     Args:
         now: left camera from board.
         wanted: left camera from board.
         middle_mm: (3,) of the board, in its frame.
+        slack: how much farther away still counts as there.
     """
     shift_mm = wanted.apply(middle_mm) - now.apply(middle_mm)
     turn_deg = np.degrees(vector_from_rotation(wanted.rotation @ now.rotation.T))
-    near_mm = _NEAR_SHARE * float(np.linalg.norm(wanted.apply(middle_mm)))
-    is_there = bool(np.linalg.norm(shift_mm) < near_mm and np.linalg.norm(turn_deg) < _NEAR_DEG)
-    return Way(shift_mm, turn_deg, is_there)
+    near_mm = slack * _NEAR_SHARE * float(np.linalg.norm(wanted.apply(middle_mm)))
+    is_turned = bool(np.linalg.norm(turn_deg) < slack * _NEAR_DEG)
+    return Way(shift_mm, turn_deg, is_turned and bool(np.linalg.norm(shift_mm) < near_mm))
