@@ -29,7 +29,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the verb and its parts."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="a board to print, its capture, a stereo rig from its pictures, its check, a tool's tip",
+        help="a board, its pictures, a stereo rig from them, its check; a tool's tip",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
