@@ -30,8 +30,8 @@ examples:
 The folder gets every pair as soon as it is kept, the board, and after the solve report.html and,
 when the rig is accepted, rig.yml. Without a screen a simulated hand follows every wish.
 """
-# Without a screen: a hand that cannot meet a wish for so many frames never will.
-_MOST_FRAMES_A_PAIR = 150
+# Without a screen: some twenty views in a row that cannot be had.
+_MOST_FRAMES_A_PAIR = 600
 
 
 def add_parser(subparsers: Any) -> None:
@@ -151,7 +151,7 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
         n_kept = snapshot.n_kept
         if n_waited > _MOST_FRAMES_A_PAIR:
             raise ResultError(
-                f"the wanted view cannot be taken after {n_kept} pairs ({snapshot.wish})",
+                f"no wanted view can be taken after {n_kept} pairs ({snapshot.wish})",
                 remedy="use a larger board, or solve what is kept with `navapp calibrate stereo`",
             )
         snapshot = capture.step()

@@ -2,9 +2,15 @@
 
 import json
 
+import numpy as np
 import pytest
 
+from calibration.rig.lengths import triangulated_mm
+from calibration.rig.parameters import RigModel, packed
+from calibration.rig.uncertainty import working_points_mm
 from navapp.cli.main import run
+from navapp.geometry import read_rig
+from sim_devices.rigs import default_rig
 
 BOARD = {
     "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
@@ -24,6 +30,17 @@ def capture(board, out, *more, config=None):
     return run(["--quiet", *(["--config", str(config)] if config else []), *options])
 
 
+def true_error_mm(found):
+    """Median over the working volume, against the rig that the simulated camera has."""
+    true = default_rig()
+    model = RigModel(5, 0, true.width, true.height)
+    points_mm = working_points_mm(model, packed(model, true), (350.0, 550.0))
+    left = true.left.project(points_mm)
+    right = true.right.project(true.right_from_left.apply(points_mm))
+    off_mm = triangulated_mm(found, left, right) - points_mm
+    return float(np.median(np.linalg.norm(off_mm, axis=1)))
+
+
 @pytest.mark.slow
 def test_a_hand_that_follows_every_wish_gives_an_accepted_rig(board, tmp_path):
     out, result = tmp_path / "out", tmp_path / "result.json"
@@ -36,6 +53,7 @@ def test_a_hand_that_follows_every_wish_gives_an_accepted_rig(board, tmp_path):
     assert told["baseline_mm"] == pytest.approx(80.0, abs=0.15)
     names = {path.name for path in out.iterdir()}
     assert {"board.json", "rig.yml", "report.html", "left_0007.png", "right_0007.png"} <= names
+    assert true_error_mm(read_rig(out / "rig.yml")) < 0.15
     # The folder is one that `calibrate stereo` reads.
     again = tmp_path / "again.json"
     arguments = ["--out", str(tmp_path / "rig.yml"), "--json", str(again)]

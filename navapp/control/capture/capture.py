@@ -14,6 +14,7 @@ from navapp.control.capture.kept import KeptPairs
 from navapp.control.capture.looks import Look, Shutter, look_at
 from navapp.control.capture.previews import outlines, preview
 from navapp.control.capture.states import (
+    Another,
     CaptureCommand,
     CapturePhase,
     CaptureSnapshot,
@@ -32,10 +33,11 @@ from navapp.control.executors import Executor, Job
 from navapp.control.sources import open_source
 from navapp.control.states import Progress
 from navapp.errors import NavappError
+from navapp.geometry.transform import FloatArray
 
 _WAIT_S = 0.1
-# A simulated hand that was not good enough after so long goes there again.
-_PATIENCE_NS = 3_000_000_000
+# A simulated hand that was not good enough after so long goes there again, then gives up.
+_PATIENCE_NS, _MOST_TRIES = 3_000_000_000, 2
 _MOST_EVENTS = 30
 # So many more pairs are asked for when a rig was not accepted.
 _MORE_AFTER_REFUSAL = 4
@@ -84,7 +86,8 @@ class Capture:
         self._checks: tuple[Check, ...] = ()
         self._way: Way | None = None
         self._is_told_to_take = self._is_following = False
-        self._moved_at_ns = 0
+        self._moved_at_ns = self._n_tries = 0
+        self._avoid: list[FloatArray] = []
         self._wish = next_wish(board, [], self._size, settings.depth_mm)
         self._looking: Job[Look] | None = None
         self._wishing: Job[Wish] | None = None
@@ -157,6 +160,9 @@ class Capture:
                 if (pair := self._kept.drop_last()) is not None:
                     self._tell(f"pair {pair.index} dropped")
                     self._ask()
+            case Another() if self._wish.left_from_board is not None:
+                self._avoid.append(self._wish.left_from_board.rotation)
+                self._ask()
             case Finish() if len(self._kept) >= N_STARTING:
                 pairs = self._kept.pairs
                 self._solving = Job(lambda report: self._solve(pairs, report))
@@ -198,12 +204,12 @@ class Capture:
         self._outcome = None
         if self._wishing is not None:
             self._wishing.cancel()
-        pairs, last = self._kept.pairs, self._wish
+        pairs, last, avoid = self._kept.pairs, self._wish, list(self._avoid)
         self._wishing = Job(
             lambda report: next_wish(
-                self._board, pairs, self._size, self._settings.depth_mm, last
+                self._board, pairs, self._size, self._settings.depth_mm, last, avoid
             )
-        )  # fmt: skip
+        )
         self._executor.start(self._wishing)
 
     def _take_wish(self) -> None:
@@ -220,7 +226,7 @@ class Capture:
             if one.index not in known:
                 self._tell(f"pair {one.index} does not count: {one.reason}")
         was_enough = self.is_enough
-        self._wish, self._moved_at_ns = job.result, 0
+        self._wish, self._moved_at_ns, self._n_tries = job.result, 0, 0
         if self.is_enough and not was_enough:
             self._tell("this is enough: finish, or take more")
 
@@ -253,9 +259,14 @@ class Capture:
         if self._hand is None or not self._is_following or wanted is None or frame is None:
             return
         is_late = frame.captured_ns - self._moved_at_ns > _PATIENCE_NS
-        if self._wishing is None and (self._moved_at_ns == 0 or is_late):
-            self._hand.move_to(wanted)
-            self._moved_at_ns = max(frame.captured_ns, 1)
+        if self._wishing is not None or not (self._moved_at_ns == 0 or is_late):
+            return
+        if self._n_tries == _MOST_TRIES and not self.is_enough:
+            self._do(Another())
+            return
+        self._n_tries += 1
+        self._hand.move_to(wanted)
+        self._moved_at_ns = max(frame.captured_ns, 1)
 
     def _tell(self, text: str) -> None:
         self._events = [*self._events, text][-_MOST_EVENTS:]

@@ -28,6 +28,11 @@ class DropLast:
 
 
 @dataclass(frozen=True, slots=True)
+class Another:
+    """The wanted view cannot be had: ask for one that is turned otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
 class Finish:
     """Solve with what is kept."""
 
@@ -52,7 +57,7 @@ class Nudge:
     turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-CaptureCommand = Take | DropLast | Finish | Leave | Follow | Nudge
+CaptureCommand = Take | DropLast | Another | Finish | Leave | Follow | Nudge
 
 
 @dataclass(frozen=True, slots=True)

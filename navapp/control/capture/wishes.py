@@ -66,6 +66,7 @@ def next_wish(
     size: tuple[int, int],
     depth_mm: tuple[float, float],
     last: Wish | None = None,
+    avoid: Sequence[FloatArray] = (),
 ) -> Wish:
     """Solve the simplest rig again and ask what it lacks most.
 
@@ -75,14 +76,16 @@ def next_wish(
         size: width and height of a picture, px.
         depth_mm: nearest and farthest surface of the working volume.
         last: where the solve begins.
+        avoid: (3, 3) turns of the board that could not be had.
     """
+    start = starting_view(board, len(pairs) + len(avoid), depth_mm)
     if len(pairs) < N_STARTING:
-        return Wish(starting_view(board, len(pairs), depth_mm), nominal_camera(size))
+        return Wish(start, nominal_camera(size))
     try:
-        return _informed(board, pairs, size, depth_mm, last)
+        return _informed(board, pairs, size, depth_mm, last, avoid)
     except (ValueError, np.linalg.LinAlgError):
         # These views explain no rig: more of the starting ones may.
-        return Wish(starting_view(board, len(pairs), depth_mm), nominal_camera(size))
+        return Wish(start, nominal_camera(size))
 
 
 def _informed(
@@ -91,12 +94,13 @@ def _informed(
     size: tuple[int, int],
     depth_mm: tuple[float, float],
     last: Wish | None,
+    avoid: Sequence[FloatArray],
 ) -> Wish:
     """The wish of a rig that can be solved."""
     solved, used, out = _solved(board, pairs, size, last)
     rig = unpacked(solved.model, solved.shared)
     bounds = volume_bounds_mm(solved, depth_mm)
-    view = wanted_view(board, solved, noise_px(solved), depth_mm)
+    view = wanted_view(board, solved, noise_px(solved), depth_mm, avoid)
     pose = starting_view(board, 0, depth_mm) if view is None else view.left_from_board
     indices = tuple(pair.index for pair in used)
     if len(bounds) == 0:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from navapp.control.capture.states import (
+    Another,
     CaptureCommand,
     CapturePhase,
     CaptureSnapshot,
@@ -50,6 +51,7 @@ def _turn(key: str, *turn_rad: float) -> Key:
 KEYS = (
     Key("space", Take(), "take", "SPACE"),
     Key("d", DropLast(), "drop", "d"),
+    Key("n", Another(), "other", "n"),
     Key("f", Finish(), "finish", "f"),
     Key("q", Leave(), "leave", "q"),
     Key("m", Follow(is_on=True), "follow", "m", is_for_hand=True),
@@ -66,7 +68,7 @@ KEYS = (
     _turn("u", 0.0, 0.0, -_TURN_RAD),
     _turn("o", 0.0, 0.0, _TURN_RAD),
 )
-HAND_HINT = ("arrows + -", "move", "ik jl uo", "turn")
+HAND_HINT = ("arrows+-ikjluo", "move")
 
 
 def is_possible(key: Key, snapshot: CaptureSnapshot) -> bool:

@@ -187,8 +187,8 @@ class CaptureFooter(Lines[CaptureView]):
             else:
                 parts.append((f" {key.shown} {label} ", "$text-disabled"))
         if snapshot.has_hand:
-            for keys, label in zip(HAND_HINT[::2], HAND_HINT[1::2], strict=True):
-                parts += [(f" {keys} ", "bold $primary"), (f"{label} ", "$foreground")]
+            keys, label = HAND_HINT
+            parts += [(f" {keys} ", "bold $primary"), (f"{label} ", "$foreground")]
         return [Content.assemble(*parts).truncate(width)]
 
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from navapp.control.capture.looks import Look
 from navapp.control.capture.states import (
+    Another,
     CapturePhase,
     DropLast,
     Finish,
@@ -155,6 +157,29 @@ def test_a_rig_that_is_refused_asks_for_more_pairs(room, monkeypatch):
     assert "no rig explains" in snapshot.outcome.sentences[0]
     assert not snapshot.is_enough
     assert followed(capture, lambda s: s.is_enough).n_kept == 8
+
+
+def test_a_view_that_cannot_be_had_is_not_asked_for_again(room, monkeypatch):
+    capture = capture_in(room, monkeypatch, stop_mm=0.3)
+    followed(capture, lambda s: s.n_kept == 6)
+    look, tilts_deg = room.look, []
+
+    def only_flat(frame, board):
+        tilts_deg.append(np.degrees(np.arccos(room.pose.rotation[2, 2])))
+        return look(frame, board) if tilts_deg[-1] < 20.0 else Look(frame, None, None)
+
+    monkeypatch.setattr("navapp.control.capture.capture.look_at", only_flat)
+    snapshot = followed(capture, lambda s: s.n_kept == 8, most=900)
+    assert max(tilts_deg) > 30.0
+    assert snapshot.n_kept == 8
+
+
+def test_n_asks_for_another_view(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    at_start(room, aside_mm=150.0)
+    first = steps(capture, 2).wish
+    capture.submit(Another())
+    assert steps(capture, 2).wish != first
 
 
 def test_keys_move_the_hand_and_end_the_following(room, monkeypatch):

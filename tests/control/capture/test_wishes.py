@@ -71,3 +71,12 @@ def test_views_that_explain_no_rig_ask_for_the_starting_views_again():
     wish = next_wish(BOARD, same, SIZE, DEPTH_MM)
     assert wish.left_from_board is not None
     assert wish.bound_mm is None or wish.bound_mm > 0.5
+
+
+def test_turns_that_cannot_be_had_are_not_asked_for():
+    rng = np.random.default_rng(7)
+    pairs = drawn_pairs(drawn_rig(rng), rng, 6)
+    wish = next_wish(BOARD, pairs, SIZE, DEPTH_MM)
+    avoid = [wish.left_from_board.rotation]
+    other = next_wish(BOARD, pairs, SIZE, DEPTH_MM, wish, avoid)
+    assert rotation_angle_deg(other.left_from_board, wish.left_from_board) > 10.0

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.control.capture.states import (
+    Another,
     CapturePhase,
     CaptureSnapshot,
     Check,
@@ -106,7 +107,7 @@ def test_everything_is_said_at_both_sizes(size):
         "navapp calibrate", "sim", "12 pairs", "CAPTURING",
         "move it 40 mm to the left, 60 mm nearer", "clockwise by 90 deg",
         "70  64 of 70", "not still 41 px/s", "0.21 mm, enough at 0.15", "everywhere 0.41",
-        "kept marks", "pair 11 kept", "SPACE take", "m follow", "ik jl uo turn",
+        "kept marks", "pair 11 kept", "SPACE take", "m follow", "arrows+-ikjluo move",
     ):  # fmt: skip
         assert words in text, words
     assert text.count("▀") > 100  # both pictures
@@ -117,6 +118,7 @@ def test_everything_is_said_at_both_sizes(size):
     [
         ("space", Take()),
         ("d", DropLast()),
+        ("n", Another()),
         ("f", Finish()),
         ("q", Leave()),
         ("m", Follow(True)),
