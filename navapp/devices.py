@@ -6,6 +6,8 @@ from typing import Literal
 
 import numpy as np
 
+from calibration.targets.boards import Board
+from calibration.targets.drawing import drawn, rastered
 from drivers.clock import Clock, ManualClock, SystemClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet, StereoCamera
@@ -18,12 +20,19 @@ from navapp.geometry.transform import FloatArray
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.faults import Fault, FaultKind, FaultScript
+from sim_devices.hand import Hand
+from sim_devices.rigs import WORKING_DISTANCE_MM
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
+from sim_devices.sheet import PrintedSheet, SheetScene
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 
 _ENTRY_POINTS = "navapp.devices"
+# Of a simulated board: finer than any picture shows it.
+_SHEET_PX_PER_MM, _MOST_SHEET_PX, _SHEET_MARGIN_MM = 12.0, 6000.0, 8.0
+# A board that waits to be photographed needs no more frames than this.
+_STEPPED_CAPTURE_HZ = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +84,72 @@ def open_live(configuration: Configuration, *, is_headless: bool) -> OpenedDevic
     if configuration.camera.backend == "simulated":
         return _open_simulated(configuration, is_headless=is_headless)
     return _open_third_party(configuration)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedCapture:
+    """An opened camera that need not be calibrated yet.
+
+    Attributes:
+        camera: opened.
+        clock: of its frames.
+        hand: holds the board in front of simulated cameras, else None.
+    """
+
+    camera: StereoCamera
+    clock: Clock
+    hand: Hand | None = None
+
+
+def open_capture(configuration: Configuration, board: Board, *, is_headless: bool) -> OpenedCapture:
+    """Open the configured camera in front of a board; a simulated one sees a simulated board.
+
+    Args:
+        configuration: in force; it need not name a rig.
+        board: what a simulated camera is shown.
+        is_headless: nobody watches; a simulated camera then waits to be read.
+
+    Raises:
+        DeviceError, ConfigurationError.
+    """
+    if configuration.camera.backend != "simulated":
+        clock = SystemClock()
+        camera = _third_party_camera(configuration, clock)
+        camera.open()
+        return OpenedCapture(camera, clock)
+    settings = configuration.camera.simulated
+    hand = _hand_with(board, settings.seed)
+    scene = SheetScene(_printed(board), hand.left_from_body)
+    is_stepped = is_headless if settings.stepped is None else settings.stepped
+    rate_hz = configuration.camera.rate_hz
+    sim_clock: Clock = ManualClock() if is_stepped else SystemClock()
+    simulated = SimulatedCamera(
+        scene,
+        sim_clock,
+        is_stepped=is_stepped,
+        rate_hz=min(rate_hz, _STEPPED_CAPTURE_HZ) if is_stepped else rate_hz,
+        scale=settings.scale,
+        sensor=SensorModel(seed=settings.seed, is_grey=settings.grey),
+        faults=FaultScript(tuple(_fault(section) for section in settings.faults)),
+        skew_ns=round(settings.skew_ms * 1e6),
+    )
+    simulated.open()
+    return OpenedCapture(simulated, sim_clock, hand)
+
+
+def _printed(board: Board) -> PrintedSheet:
+    drawing = drawn(board)
+    px_per_mm = min(_SHEET_PX_PER_MM, _MOST_SHEET_PX / max(board.size_mm))
+    left_mm, top_mm = drawing.low_mm - _SHEET_MARGIN_MM
+    white = rastered(drawing, px_per_mm, _SHEET_MARGIN_MM)
+    return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
+
+
+def _hand_with(board: Board, seed: int) -> Hand:
+    """A hand that holds the board's middle in front of the left camera."""
+    middle_mm = board.points_mm.mean(axis=0)
+    place_mm = np.array([0.0, 0.0, WORKING_DISTANCE_MM]) - middle_mm
+    return Hand(RigidTransform.from_parts("left", "board", np.eye(3), place_mm), middle_mm, seed)
 
 
 def open_recording(
@@ -166,6 +241,15 @@ def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
 
 
 def _open_third_party(configuration: Configuration) -> OpenedDevices:
+    clock = SystemClock()
+    camera = _third_party_camera(configuration, clock)
+    rig = _configured_rig(configuration)
+    _open_fitting(camera, rig)
+    reopen = _reopener(camera, rig)
+    return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
+
+
+def _third_party_camera(configuration: Configuration, clock: Clock) -> StereoCamera:
     """A camera of the entry-point group `navapp.devices`, entry `camera.NAME`."""
     from importlib.metadata import entry_points
 
@@ -177,16 +261,12 @@ def _open_third_party(configuration: Configuration) -> OpenedDevices:
             subject="camera.backend",
             remedy="use simulated, or install the package that provides it",
         )
-    rig = _configured_rig(configuration)
-    clock = SystemClock()
     settings = (configuration.camera.model_extra or {}).get(name, {})
     try:
         camera: StereoCamera = found[0].load()(settings, clock)
     except (ImportError, AttributeError, TypeError) as error:
         raise DeviceError(f"camera backend '{name}' cannot be loaded: {error}") from error
-    _open_fitting(camera, rig)
-    reopen = _reopener(camera, rig)
-    return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
+    return camera
 
 
 def _device_set(

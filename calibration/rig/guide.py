@@ -1,5 +1,6 @@
 """Which view of the board tells most about the rig: what a capture asks for next."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -20,6 +21,8 @@ _N_DIRECTIONS = 8
 _ROLL_DEG = (0.0, 90.0)
 # So much of the board must be seen by both cameras, and this far from the pictures' edges.
 _LEAST_SEEN, _EDGE_PX = 0.6, 12.0
+# Turns this near are the same.
+_SAME_RAD = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +49,11 @@ def predicted_bound_mm(solved: Bundle, depth_mm: tuple[float, float]) -> float:
 
 
 def wanted_view(
-    board: Board, solved: Bundle, sigma_px: float, depth_mm: tuple[float, float]
+    board: Board,
+    solved: Bundle,
+    sigma_px: float,
+    depth_mm: tuple[float, float],
+    avoid: Sequence[FloatArray] = (),
 ) -> WantedView | None:
     """The view that lowers the predicted error in the working volume most.
 
@@ -55,6 +62,7 @@ def wanted_view(
         solved: a flat board's rig, from what was taken so far.
         sigma_px: standard error of a mark's coordinate, as seen so far.
         depth_mm: nearest and farthest surface of the working volume.
+        avoid: (3, 3) turns of the board that cannot be had, left camera from board.
 
     Returns:
         None when no view can be seen by both cameras.
@@ -68,6 +76,8 @@ def wanted_view(
     normal = solved.normal / max(solved.scale, 1e-6) ** 2
     best: tuple[float, FloatArray, FloatArray] | None = None
     for pose in candidates(board, model, shared, depth_mm):
+        if any(_is_same(rotation_from_vector(pose[:3]), turn) for turn in avoid):
+            continue
         told = information(board, pose, model, shared, sigma_px)
         if told is None:
             continue
@@ -85,6 +95,10 @@ def wanted_view(
     matrix[:3, :3] = rotation_from_vector(pose[:3])
     matrix[:3, 3] = pose[3:]
     return WantedView(RigidTransform("left", "board", matrix), bound)
+
+
+def _is_same(a: FloatArray, b: FloatArray) -> bool:
+    return bool(0.5 * (np.trace(a.T @ b) - 1.0) > np.cos(_SAME_RAD))
 
 
 def information(

@@ -9,6 +9,7 @@ from navapp.cli.diagnostics import Diagnostics
 # What can be calibrated -> module with `add_parser(subparsers)` and `run(options, diagnostics)`.
 _PARTS = {
     "board": "calibrate_board",
+    "capture": "calibrate_capture",
     "stereo": "calibrate_stereo",
     "check": "calibrate_check",
     "pivot": "calibrate_pivot",
@@ -17,6 +18,7 @@ _PARTS = {
 _EXAMPLE = """\
 examples:
   navapp calibrate board --board board.json --out board.pdf
+  navapp calibrate capture --board board.json --out capture/
   navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
   navapp calibrate check rig.yml today/ --board board.json
   navapp calibrate pivot poses.csv
@@ -27,7 +29,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the verb and its parts."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="a board to print, a stereo rig from its pictures, its check, a tool's tip",
+        help="a board, its pictures, a stereo rig from them, its check; a tool's tip",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

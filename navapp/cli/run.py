@@ -149,13 +149,13 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()
-        code = run_app(runner, _log_folder() / "navapp.log")
+        code = run_app(runner, log_folder() / "navapp.log")
     if runner.error is not None:
         raise runner.error
     return code
 
 
-def _log_folder() -> Path:
+def log_folder() -> Path:
     """Where the screen's log goes: the user's log folder, else the one for temporary files."""
     import platformdirs
 

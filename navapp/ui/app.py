@@ -2,14 +2,12 @@
 
 import asyncio
 import os
-import signal
 import sys
 import traceback
 from pathlib import Path
 from typing import ClassVar
 
 from textual import events
-from textual.app import App
 from textual.binding import BindingType
 from textual.screen import Screen
 
@@ -19,6 +17,7 @@ from navapp.ui.actions import ACTION_OF_KEY_EVERYWHERE, ACTION_OF_NAME, bindings
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
+from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
 from navapp.ui.symbols import UNICODE, Symbols, symbols_for
@@ -38,7 +37,7 @@ _ASKING_STATES = (SessionState.NAVIGATING, SessionState.SUSPENDED)
 _PAGES = {"help": HelpPage, "devices": DevicesPage, "events": EventsPage}
 
 
-class NavigationApp(App[int]):
+class NavigationApp(QuietApp):
     """The operator's screen for one session.
 
     Args:
@@ -75,7 +74,6 @@ class NavigationApp(App[int]):
         start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
         self._view = View(snapshot, symbols, start_ns, title=title)
         self._known_alarms: frozenset[object] = frozenset()
-        self.failure: Exception | None = None
 
     def get_default_screen(self) -> Screen[None]:
         """The main screen."""
@@ -152,19 +150,6 @@ class NavigationApp(App[int]):
         """What Textual does at ctrl+c."""
         self.action_act("quit")
 
-    def _handle_exception(self, error: Exception) -> None:
-        """Keep what ends the application, for the sentence afterwards."""
-        self.failure = self.failure or error
-        super()._handle_exception(error)
-
-    def _fatal_error(self) -> None:
-        """End without a traceback on the screen."""
-        self._close_messages_no_wait()
-
-    def panic(self, *_renderables: object) -> None:
-        """As `_fatal_error`, for errors that would draw themselves."""
-        self._close_messages_no_wait()
-
 
 def _status(view: View) -> tuple[object, ...]:
     """What must be seen at once when it changes."""
@@ -196,7 +181,7 @@ def run_app(session: Session, log_path: Path, title: str = "navapp") -> int:
         with own_terminal(log_path):
             symbols = symbols_for(getattr(sys.__stdout__, "encoding", None), os.environ)
             app = NavigationApp(session, title, symbols=symbols)
-            code = asyncio.run(_drive(app))
+            code = asyncio.run(drive(app))
             failure = app.failure
             if failure is not None:
                 traceback.print_exception(failure, file=sys.stderr)
@@ -208,15 +193,7 @@ def run_app(session: Session, log_path: Path, title: str = "navapp") -> int:
         session.stop()
     if failure is None:
         return code
-    return _say(failure, log_path)
-
-
-async def _drive(app: NavigationApp) -> int:
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
-        loop.add_signal_handler(number, app.exit, 128 + number)
-    result = await app.run_async(mouse=False)
-    return 1 if result is None else result
+    return say(failure, log_path)
 
 
 def _fault(snapshot: Snapshot) -> NavappError | None:
@@ -227,13 +204,3 @@ def _fault(snapshot: Snapshot) -> NavappError | None:
     text = alarms[-1] if alarms else "the session ended in a fault"
     is_device = any(device.health is DeviceHealth.LOST for device in snapshot.devices)
     return DeviceError(text) if is_device else NavappError(text)
-
-
-def _say(failure: Exception, log_path: Path) -> int:
-    if isinstance(failure, NavappError):
-        text, code = str(failure), failure.exit_code
-    else:
-        text = f"the screen failed ({type(failure).__name__}: {failure}): see {log_path}"
-        code = 1
-    sys.stderr.write(f"navapp: error: {' '.join(text.split())}\n")
-    return code

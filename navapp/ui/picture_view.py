@@ -15,26 +15,21 @@ _WAITING = "waiting for the first picture"
 NOTICE = "research, not for clinical use"
 
 
-class PictureView(Widget):
-    """Shows the newest preview; repaints the rows that changed."""
+class HalfBlocks(Widget):
+    """A picture as half blocks; repaints the rows that changed."""
 
-    def __init__(self) -> None:
-        super().__init__(id="picture")
-        self.border_subtitle = NOTICE
+    def __init__(self, widget_id: str) -> None:
+        super().__init__(id=widget_id)
         self._preview: NDArray[np.uint8] | None = None
         self._codes: NDArray[np.int32] = np.empty((0, 0), dtype=np.int32)
         self._strips: list[Strip] = []
         self._ramp = ""
 
-    def show(self, view: View) -> None:
-        """Take over the newest picture and say how it stands."""
-        if self.border_title != view.picture_title:
-            self.border_title = view.picture_title
-        for level in Level:
-            self.set_class(level is view.level, f"-{level.name.lower()}")
-        self._ramp = view.symbols.ramp
-        if view.snapshot.preview is not self._preview:
-            self._preview = view.snapshot.preview
+    def show_picture(self, picture: NDArray[np.uint8] | None, ramp: str) -> None:
+        """Take over a picture (h, w, 3) BGR; a ramp draws it where there are no half blocks."""
+        self._ramp = ramp
+        if picture is not self._preview:
+            self._preview = picture
             self._redraw()
 
     def on_resize(self, _event: events.Resize) -> None:
@@ -69,3 +64,19 @@ class PictureView(Widget):
         if not self._strips and y == height // 2:
             return Strip([Segment(_WAITING[:width].center(width), self.rich_style)], width)
         return Strip.blank(width, self.rich_style)
+
+
+class PictureView(HalfBlocks):
+    """The newest preview of a session, in a frame that says how it stands."""
+
+    def __init__(self) -> None:
+        super().__init__("picture")
+        self.border_subtitle = NOTICE
+
+    def show(self, view: View) -> None:
+        """Take over the newest picture and say how it stands."""
+        if self.border_title != view.picture_title:
+            self.border_title = view.picture_title
+        for level in Level:
+            self.set_class(level is view.level, f"-{level.name.lower()}")
+        self.show_picture(view.snapshot.preview, view.symbols.ramp)

@@ -1,0 +1,215 @@
+"""`navapp calibrate capture`: guided capture of a stereo rig's pictures, then the rig."""
+
+import argparse
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import ResultError, UsageError
+
+if TYPE_CHECKING:
+    from calibration.rig.solve import Calibration
+    from calibration.targets.boards import Board
+    from calibration.targets.pairs import SeenPair
+    from drivers.interfaces import CameraInfo
+    from navapp.config import CalibrationSection
+    from navapp.control.capture.capture import Capture
+    from navapp.control.capture.states import CaptureSnapshot, Outcome
+    from navapp.geometry.rig import StereoRig
+
+_EXAMPLE = """\
+examples:
+  navapp calibrate capture --board board.json --out capture/             the simulated rig
+  navapp calibrate capture --board board.json --out capture/ --headless  without a screen
+  navapp --config mine.toml calibrate capture --board board.json --out capture/
+
+The folder gets every pair as soon as it is kept, the board, and after the solve report.html and,
+when the rig is accepted, rig.yml. Without a screen a simulated hand follows every wish.
+"""
+# Without a screen: some twenty views in a row that cannot be had.
+_MOST_FRAMES_A_PAIR = 600
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the part."""
+    parser = subparsers.add_parser(
+        "capture",
+        help="guided capture on the configured camera; by default on the simulated rig",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--board", required=True, metavar="BOARD.json", help="what is shown")
+    parser.add_argument("--out", required=True, metavar="DIR", help="new folder for everything")
+    parser.add_argument(
+        "--headless", action="store_true", help="no screen; a simulated hand follows every wish"
+    )
+    parser.add_argument(
+        "--pairs",
+        type=int,
+        metavar="N",
+        help="enough with N pairs (default: [calibration] stop_capture_mm decides)",
+    )
+    parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
+
+
+def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Capture, solve, judge; the exit code."""
+    from calibration.targets.boards import read_board
+    from navapp.config import find_file, load
+    from navapp.control.capture.capture import Capture
+    from navapp.control.capture.folder import CaptureFolder
+    from navapp.control.capture.interfaces import CaptureSettings
+    from navapp.control.executors import InlineExecutor, ThreadExecutor
+    from navapp.devices import open_capture
+
+    check_writable(options.json)
+    if options.pairs is not None and options.pairs < 1:
+        raise UsageError("--pairs must be at least 1")
+    configuration = load(find_file(options.config))
+    if options.headless and configuration.camera.backend != "simulated":
+        raise UsageError(
+            "--headless needs the simulated rig: nobody else holds the board",
+            remedy="leave --headless away",
+        )
+    section, board = configuration.calibration, read_board(options.board)
+    folder = CaptureFolder(Path(options.out))
+    folder.begin(json.loads(Path(options.board).read_text(encoding="utf-8")))
+    with ExitStack() as undo:
+        undo.callback(folder.discard_if_empty)
+        opened = open_capture(configuration, board, is_headless=options.headless)
+        undo.callback(opened.camera.close)
+        solver = _Solver(board, opened.camera.info, section, folder.path)
+        capture = Capture(
+            opened.camera,
+            opened.clock,
+            board,
+            CaptureSettings(
+                section.working_depth_mm, section.stop_capture_mm, n_pairs=options.pairs
+            ),
+            executor=InlineExecutor() if options.headless else ThreadExecutor(),
+            store=folder,
+            solve=solver,
+            hand=opened.hand,
+        )
+        undo.callback(capture.close)
+        if options.headless:
+            _headless(capture, diagnostics)
+        elif (code := _on_screen(capture)) != 0:
+            return code
+        last = capture.snapshot
+    return _finish(last, solver, options, diagnostics)
+
+
+class _Solver:
+    """Solves, judges and writes; keeps what it found for the end."""
+
+    def __init__(
+        self, board: "Board", info: "CameraInfo", section: "CalibrationSection", folder: Path
+    ) -> None:
+        self._board, self._info, self._section, self._folder = board, info, section, folder
+        self.found: tuple[Calibration, StereoRig] | None = None
+
+    def __call__(self, pairs: "list[SeenPair]", report: Callable[[float], None]) -> "Outcome":
+        from calibration.report.html import write_report
+        from calibration.rig.judge import Limits
+        from calibration.rig.solve import solve_rig
+        from navapp.cli.calibrate_stereo import recorded
+        from navapp.control.capture.states import Outcome
+        from navapp.geometry.rig_files import write_rig
+
+        section, info = self._section, self._info
+        limits = Limits(accept_mm=section.accept_mm, depth_mm=section.working_depth_mm)
+        size = (info.width, info.height)
+        found = solve_rig(self._board, pairs, size, limits=limits, on_progress=report)
+        rig = replace(recorded(found, section, self._folder.name), serials=info.serials)
+        write_report(self._folder / "report.html", replace(found, rig=rig), limits)
+        is_accepted = rig.quality is not None and rig.quality.is_accepted
+        path = self._folder / "rig.yml"
+        if is_accepted:
+            write_rig(path, rig)
+        else:
+            # One of an earlier solve would be taken for this one.
+            path.unlink(missing_ok=True)
+        self.found = found, rig
+        reasons = () if rig.quality is None else rig.quality.reasons
+        return Outcome(is_accepted, tuple(reasons))
+
+
+def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
+    """The script: follow every wish, finish when it is enough."""
+    from navapp.control.capture.states import Finish, Follow
+
+    capture.submit(Follow(is_on=True))
+    told, n_kept, n_waited = 0, 0, 0
+    snapshot = capture.step()
+    while not snapshot.is_enough:
+        n_waited = 0 if snapshot.n_kept > n_kept else n_waited + 1
+        n_kept = snapshot.n_kept
+        if n_waited > _MOST_FRAMES_A_PAIR:
+            raise ResultError(
+                f"no wanted view can be taken after {n_kept} pairs ({snapshot.wish})",
+                remedy="use a larger board, or solve what is kept with `navapp calibrate stereo`",
+            )
+        snapshot = capture.step()
+        for text in snapshot.events[told:]:
+            bound = snapshot.bound_mm
+            diagnostics.detail(f"{text}{'' if bound is None else f' ({bound:.2f} mm)'}")
+        told = len(snapshot.events)
+    capture.submit(Finish())
+    while snapshot.outcome is None:
+        snapshot = capture.step()
+
+
+def _on_screen(capture: "Capture") -> int:
+    """The operator does it; 0, or the code of what ended the screen."""
+    from navapp.cli.run import log_folder
+    from navapp.control.capture.runner import CaptureRunner
+    from navapp.ui.capture.app import run_capture_app
+
+    runner = CaptureRunner(capture)
+    runner.start()
+    try:
+        code = run_capture_app(runner, log_folder() / "navapp.log")
+    finally:
+        runner.stop()
+    if runner.error is not None:
+        raise runner.error
+    return code
+
+
+def _finish(
+    last: "CaptureSnapshot",
+    solver: _Solver,
+    options: argparse.Namespace,
+    diagnostics: Diagnostics,
+) -> int:
+    """Tell and write the result; the exit code."""
+    from navapp.cli.calibrate_stereo import content, tell
+
+    figures = {
+        "pairs_kept": last.n_kept,
+        "enough": last.is_enough,
+        "predicted_mm": {"median": last.bound_mm, "p95": last.worst_mm},
+    }
+    if solver.found is not None:
+        figures |= content(*solver.found)
+    write_json(options.json, "calibrate capture", figures)
+    if solver.found is not None and options.json != "-":
+        tell(*solver.found, diagnostics)
+    if solver.found is None:
+        why = "" if last.outcome is None else f" ({'; '.join(last.outcome.sentences)})"
+        raise ResultError(
+            f"no rig was solved{why}; {last.n_kept} pairs are kept in {options.out}",
+            remedy="solve them with `navapp calibrate stereo`, or capture again",
+        )
+    quality = solver.found[1].quality
+    if quality is not None and not quality.is_accepted:
+        raise ResultError(
+            f"the rig is not accepted: {'; '.join(quality.reasons)}",
+            remedy=f"see {options.out}/report.html, and show the board as the reasons ask",
+        )
+    return 0

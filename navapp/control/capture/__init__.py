@@ -1,0 +1,1 @@
+"""Guided capture of a calibration: what is seen, what is kept, what is wanted next."""

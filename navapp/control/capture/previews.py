@@ -1,0 +1,73 @@
+"""Small pictures for the screen: what the cameras see, the marks, and where the board is wanted."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.targets.boards import Board
+from calibration.targets.detection import SeenBoard
+from drivers.frames import Image
+from navapp.control.capture.wishes import Wish
+from navapp.geometry.camera import Camera
+from navapp.geometry.transform import FloatArray, RigidTransform
+
+_WIDTH = 192
+_MARK_BGR, _OUTLINE_BGR, _FIRST_BGR = (90, 235, 90), (40, 170, 255), (60, 60, 255)
+_STEPS = 12
+
+
+def preview(
+    picture: Image, seen: SeenBoard | None, outline_px: FloatArray | None
+) -> NDArray[np.uint8]:
+    """(h, 192, 3) BGR.
+
+    Args:
+        picture: as the camera gave it.
+        seen: marks to draw.
+        outline_px: (n, 2) of the wanted view, its first corner first; None for none.
+    """
+    import cv2
+
+    scale = _WIDTH / picture.shape[1]
+    size = (_WIDTH, max(1, round(scale * picture.shape[0])))
+    small = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    if small.ndim == 2:
+        small = np.asarray(cv2.cvtColor(small, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    if seen is not None:
+        for x, y in _scaled(seen.pixels, scale):
+            cv2.circle(small, (x, y), 1, _MARK_BGR, -1)
+    if outline_px is not None:
+        line = np.array(_scaled(outline_px, scale), dtype=np.int32)
+        cv2.polylines(small, [line.reshape(-1, 1, 2)], True, _OUTLINE_BGR, 2)
+        cv2.circle(small, tuple(int(value) for value in line[0]), 3, _FIRST_BGR, -1)
+    return small
+
+
+def outlines(board: Board, wish: Wish | None) -> tuple[FloatArray | None, FloatArray | None]:
+    """(n, 2) px of the wanted view's edge in the left and right picture, where they are known."""
+    if wish is None or wish.left_from_board is None:
+        return None, None
+    left = _outline(board, wish.left, wish.left_from_board)
+    if wish.rig is None:
+        return left, None
+    in_right = wish.rig.right_from_left @ wish.left_from_board
+    return left, _outline(board, wish.rig.right, in_right)
+
+
+def _outline(board: Board, camera: Camera, camera_from_board: RigidTransform) -> FloatArray | None:
+    low, high = board.points_mm.min(axis=0), board.points_mm.max(axis=0)
+    edge = 0.5 * board.spacing_mm
+    x, y = (low - edge)[:2], (high + edge)[:2]
+    corners = np.array([[x[0], x[1]], [y[0], x[1]], [y[0], y[1]], [x[0], y[1]]])
+    share = np.linspace(0.0, 1.0, _STEPS, endpoint=False)[None, :, None]
+    sides = corners[:, None] * (1.0 - share) + np.roll(corners, -1, axis=0)[:, None] * share
+    flat = sides.reshape(-1, 2)
+    points_mm = np.column_stack([flat, np.zeros(len(flat))])
+    pixels = camera.project(camera_from_board.apply(points_mm))
+    far = 4.0 * camera.width
+    is_near = np.isfinite(pixels).all() and (np.abs(pixels) < far).all()
+    return pixels if is_near else None
+
+
+def _scaled(pixels: FloatArray, scale: float) -> list[tuple[int, int]]:
+    places = np.rint((pixels + 0.5) * scale - 0.5).astype(int)
+    return [(int(x), int(y)) for x, y in places]

@@ -1,0 +1,206 @@
+"""The lines of the capture's screen."""
+
+from dataclasses import dataclass
+
+from textual.content import Content
+
+from navapp.control.capture.states import CapturePhase, CaptureSnapshot
+from navapp.ui.capture.keys import HAND_HINT, KEYS, is_possible
+from navapp.ui.gauges import Number, bar, cut, share_bar
+from navapp.ui.symbols import Symbols
+from navapp.ui.text_view import Lines
+from navapp.ui.view import Level
+
+_GAUGE_WIDTH, _WORK_WIDTH = 26, 30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CaptureView:
+    """What is shown: a snapshot and the characters for it."""
+
+    snapshot: CaptureSnapshot
+    symbols: Symbols
+
+    @property
+    def state(self) -> tuple[str, Level]:
+        """A word and how it stands."""
+        snapshot = self.snapshot
+        if snapshot.phase is CapturePhase.SOLVING:
+            return "SOLVING", Level.QUIET
+        if snapshot.outcome is not None:
+            if snapshot.outcome.is_accepted:
+                return "ACCEPTED", Level.OK
+            return "NOT ACCEPTED", Level.BAD
+        return ("ENOUGH", Level.OK) if snapshot.is_enough else ("CAPTURING", Level.ATTENTION)
+
+    def mark(self, level: Level) -> str:
+        """The symbol of a level."""
+        symbols = self.symbols
+        return {
+            Level.OK: symbols.ok,
+            Level.ATTENTION: symbols.attention,
+            Level.BAD: symbols.bad,
+            Level.QUIET: symbols.absent,
+        }[level]
+
+
+class CaptureTitle(Lines[CaptureView]):
+    """Camera at the left, pairs and state at the right."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """One line."""
+        snapshot = view.snapshot
+        word, level = view.state
+        right = Content.assemble(
+            (f"{snapshot.n_kept} pairs", "bold $foreground"), "  ",
+            (f"{view.mark(level)} {word}", level.value), " ",
+        )  # fmt: skip
+        is_simulated = snapshot.camera.startswith("sim:")
+        left = Content.assemble(
+            (" navapp calibrate ", "bold $primary"),
+            (" sim " if is_simulated else "", "bold $background on $warning"),
+            " ", snapshot.camera.removeprefix("sim:"),
+        )  # fmt: skip
+        room = max(width - right.cell_length, 0)
+        left = left.truncate(room).pad_right(max(room - left.cell_length, 0))
+        return [Content.assemble(left, right)]
+
+
+class WishLines(Lines[CaptureView]):
+    """Where the board is wanted, or what became of the solve."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """Two lines."""
+        outcome, symbols = view.snapshot.outcome, view.symbols
+        if outcome is not None:
+            level = Level.OK if outcome.is_accepted else Level.BAD
+            what = "accepted: rig.yml and report.html are written" if outcome.is_accepted else "no:"
+            text = " ".join([what, *outcome.sentences])
+            first, rest = _broken(text, width - 10)
+        else:
+            level = Level.OK if view.snapshot.is_enough else Level.ATTENTION
+            first, rest = _broken(view.snapshot.wish, width - 10)
+        head = "outcome " if outcome is not None else "wanted  "
+        return [
+            Content.assemble((f" {head}", "$text-muted"), (first, level.value)),
+            Content.assemble("         ", (cut(rest, max(width - 10, 0), symbols), level.value)),
+        ]
+
+
+def _broken(text: str, width: int) -> tuple[str, str]:
+    """The words that fit into a line, and the others."""
+    if len(text) <= width:
+        return text, ""
+    place = text.rfind(" ", 0, max(width, 1) + 1)
+    return (text[:width], text[width:]) if place < 1 else (text[:place], text[place + 1 :])
+
+
+class CheckLine(Lines[CaptureView]):
+    """The shutter's conditions."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """One line."""
+        left, right, n_all = view.snapshot.n_seen
+        parts: list[str | Content | tuple[str, str]] = [
+            (" shutter ", "$text-muted"),
+            f"{left:3d} {right:3d} of {n_all}",
+        ]
+        for check in view.snapshot.checks:
+            level = Level.OK if check.is_met else Level.ATTENTION
+            name = check.name if check.is_met else f"not {check.name}"
+            told = "" if check.name in ("seen", "new") and check.is_met else f" {check.text}"
+            parts += ["  ", (f"{view.mark(level)} {name}", level.value), (told, "$text-muted")]
+        return [Content.assemble(*parts).truncate(width)]
+
+
+class GaugeLine(Lines[CaptureView]):
+    """The predicted error against the limit at which a capture is enough."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """One line; while a rig is solved, how far it is."""
+        snapshot, symbols = view.snapshot, view.symbols
+        if snapshot.progress is not None:
+            return [
+                Content.assemble(
+                    (" solving ", "$text-muted"),
+                    (share_bar(snapshot.progress.share, _WORK_WIDTH, symbols), "$primary"),
+                    f" {Number.PERCENT.text(100.0 * snapshot.progress.share)} %",
+                )
+            ]
+        level = Level.OK if snapshot.is_enough else Level.ATTENTION
+        return [
+            Content.assemble(
+                (" error   ", "$text-muted"),
+                (bar(snapshot.bound_mm, snapshot.stop_mm, _GAUGE_WIDTH, symbols), level.value),
+                f" {Number.MM.text(snapshot.bound_mm)} mm, enough at {snapshot.stop_mm:.2f}",
+                (f"; everywhere {Number.MM.text(snapshot.worst_mm).strip()}", "$text-muted"),
+            ).truncate(width)
+        ]
+
+
+class CoverageMap(Lines[CaptureView]):
+    """Where marks were kept, in both pictures."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """A title and three lines of two rows of cells each."""
+        symbols = view.symbols
+        signs = (
+            {(0, 0): ".", (1, 0): "^", (0, 1): "_", (1, 1): "#"}
+            if symbols.is_ascii
+            else {(0, 0): symbols.dot, (1, 0): "▀", (0, 1): "▄", (1, 1): "█"}
+        )
+        lines = [Content.styled(" kept marks: left   right", "$text-muted")]
+        covered = view.snapshot.covered.astype(int)
+        for row in range(0, covered.shape[1], 2):
+            maps = [
+                "".join(
+                    2 * signs[int(a), int(b)] for a, b in zip(one[row], one[row + 1], strict=True)
+                )
+                for one in covered
+            ]
+            lines.append(Content.assemble(" ", (maps[0], "$primary"), "  ", (maps[1], "$primary")))
+        return lines
+
+
+class CaptureEvents(Lines[CaptureView]):
+    """What happened, newest first."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """As many lines as there is room for."""
+        newest = list(reversed(view.snapshot.events))[:height]
+        return [Content.styled(cut(text, width, view.symbols), "$text-muted") for text in newest]
+
+
+class CaptureFooter(Lines[CaptureView]):
+    """The keys; those that cannot be used now dimmed."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """One line."""
+        snapshot = view.snapshot
+        parts: list[str | Content | tuple[str, str]] = []
+        for key in KEYS:
+            if not key.label or (key.is_for_hand and not snapshot.has_hand):
+                continue
+            label = "let go" if key.key == "m" and snapshot.is_following else key.label
+            if is_possible(key, snapshot):
+                parts += [(f" {key.shown} ", "bold $primary"), (f"{label} ", "$foreground")]
+            else:
+                parts.append((f" {key.shown} {label} ", "$text-disabled"))
+        if snapshot.has_hand:
+            keys, label = HAND_HINT
+            parts += [(f" {keys} ", "bold $primary"), (f"{label} ", "$foreground")]
+        return [Content.assemble(*parts).truncate(width)]
+
+
+class SmallCapture(Lines[CaptureView]):
+    """Stands in for everything on a terminal that is too small."""
+
+    def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
+        """Most important line first."""
+        word, level = view.state
+        return [
+            Content.styled(word, level.value),
+            Content(view.snapshot.wish),
+            Content(f"{view.snapshot.n_kept} pairs"),
+            Content.styled("make the terminal 80 x 24", "$text-muted"),
+        ]

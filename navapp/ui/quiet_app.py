@@ -1,0 +1,53 @@
+"""An application that ends in one sentence, never in a traceback on the screen."""
+
+import asyncio
+import signal
+import sys
+from pathlib import Path
+
+from textual.app import App
+
+from navapp.errors import NavappError
+
+
+class QuietApp(App[int]):
+    """Keeps what ends it instead of drawing it.
+
+    Attributes:
+        failure: what ended it, or None.
+    """
+
+    failure: Exception | None = None
+
+    def _handle_exception(self, error: Exception) -> None:
+        """Keep what ends the application, for the sentence afterwards."""
+        self.failure = self.failure or error
+        super()._handle_exception(error)
+
+    def _fatal_error(self) -> None:
+        """End without a traceback on the screen."""
+        self._close_messages_no_wait()
+
+    def panic(self, *_renderables: object) -> None:
+        """As `_fatal_error`, for errors that would draw themselves."""
+        self._close_messages_no_wait()
+
+
+async def drive(app: QuietApp) -> int:
+    """Run it to its end; the exit code, 128 and the number of the signal that ended it."""
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+        loop.add_signal_handler(number, app.exit, 128 + number)
+    result = await app.run_async(mouse=False)
+    return 1 if result is None else result
+
+
+def say(failure: Exception, log_path: Path) -> int:
+    """One sentence on the standard error; the exit code."""
+    if isinstance(failure, NavappError):
+        text, code = str(failure), failure.exit_code
+    else:
+        text = f"the screen failed ({type(failure).__name__}: {failure}): see {log_path}"
+        code = 1
+    sys.stderr.write(f"navapp: error: {' '.join(text.split())}\n")
+    return code

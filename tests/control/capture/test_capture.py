@@ -1,0 +1,213 @@
+"""A guided capture on projected marks: when it keeps, what it asks for, when it stops."""
+
+import numpy as np
+import pytest
+
+from navapp.control.capture.looks import Look
+from navapp.control.capture.states import (
+    Another,
+    CapturePhase,
+    DropLast,
+    Finish,
+    Follow,
+    Leave,
+    Nudge,
+    Outcome,
+    Take,
+)
+from navapp.control.capture.wishes import starting_view
+from navapp.errors import InputError, ResultError
+from navapp.geometry.transform import RigidTransform
+from tests.calibration.marks import BOARD
+from tests.control.capture.rooms import DEPTH_MM, Room, capture_in, steps
+
+
+@pytest.fixture
+def room() -> Room:
+    return Room()
+
+
+def at_start(room: Room, aside_mm: float = 0.0) -> None:
+    pose = starting_view(BOARD, 0, DEPTH_MM).matrix.copy()
+    pose[0, 3] += aside_mm
+    room.pose = RigidTransform("left", "board", pose)
+
+
+def followed(capture, until, most: int = 400):
+    capture.submit(Follow(is_on=True))
+    for _ in range(most):
+        snapshot = capture.step()
+        if until(snapshot):
+            return snapshot
+    raise AssertionError(f"not after {most} frames: {capture.snapshot}")
+
+
+def test_a_board_that_is_held_still_where_it_is_wanted_is_kept_once(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    at_start(room)
+    assert steps(capture, 1).n_kept == 0  # nothing is known of its motion yet
+    assert steps(capture, 6).n_kept == 1
+    assert list(room.kept) == [0]
+
+
+def test_a_board_elsewhere_or_in_motion_is_not_kept(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    at_start(room, aside_mm=120.0)
+    snapshot = steps(capture, 4)
+    assert snapshot.n_kept == 0
+    assert "mm to the left" in snapshot.wish
+    for k in range(6):
+        at_start(room, aside_mm=2.0 * (-1) ** k)
+        snapshot = capture.step()
+    assert snapshot.n_kept == 0
+    assert [check.name for check in snapshot.checks if not check.is_met] == ["still"]
+
+
+def test_it_asks_for_the_board_while_a_camera_does_not_see_it(room, monkeypatch):
+    snapshot = steps(capture_in(room, monkeypatch), 2)
+    assert snapshot.n_seen[:2] == (0, 0)
+    assert "show the board" in snapshot.wish
+
+
+def test_space_keeps_what_is_seen_wherever_it_is(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    capture.submit(Take())
+    assert "not seen by both" in steps(capture, 1).events[-1]
+    at_start(room, aside_mm=60.0)
+    capture.submit(Take())
+    assert steps(capture, 1).n_kept == 1
+
+
+def test_the_last_pair_is_dropped_with_its_pictures_and_its_number(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    for aside in (0.0, 60.0):
+        at_start(room, aside)
+        capture.submit(Take())
+        steps(capture, 1)
+    capture.submit(DropLast())
+    assert steps(capture, 1).n_kept == 1
+    assert list(room.kept) == [0]
+    capture.submit(Take())
+    steps(capture, 1)
+    assert list(room.kept) == [0, 2]
+
+
+def test_a_hand_that_follows_brings_the_error_below_the_limit(room, monkeypatch):
+    capture = capture_in(room, monkeypatch, stop_mm=0.4)
+    snapshot = followed(capture, lambda s: s.is_enough)
+    assert 8 <= snapshot.n_kept <= 20
+    assert snapshot.bound_mm <= 0.4 <= snapshot.worst_mm or snapshot.worst_mm <= 0.4
+    assert snapshot.covered.mean() > 0.4
+    n_kept = snapshot.n_kept
+    assert steps(capture, 20).n_kept == n_kept  # the shutter rests
+    assert "enough" in capture.snapshot.wish
+
+
+def test_it_is_enough_with_the_pairs_that_were_asked_for(room, monkeypatch):
+    capture = capture_in(room, monkeypatch, n_pairs=5)
+    assert followed(capture, lambda s: s.is_enough).n_kept == 5
+
+
+def test_a_pair_that_does_not_fit_is_named_and_left_out(room, monkeypatch):
+    capture = capture_in(room, monkeypatch, stop_mm=0.01)
+    followed(capture, lambda s: s.n_kept == 8)
+    look = room.look
+
+    def torn(frame, board):
+        found = look(frame, board)
+        room.pose = room.pose.moved((6.0, 2.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 450.0))
+        other = look(frame, board)
+        return type(found)(frame, found.left, other.right)
+
+    monkeypatch.setattr("navapp.control.capture.capture.look_at", torn)
+    capture.submit(Follow(is_on=False))
+    capture.submit(Take())
+    snapshot = steps(capture, 2)
+    assert snapshot.n_kept == 9
+    assert any("pair 8 does not count" in text for text in snapshot.events)
+
+
+def test_finish_solves_with_what_is_kept_and_tells(room, monkeypatch):
+    given = []
+
+    def solve(pairs, report):
+        report(0.5)
+        given.extend(pairs)
+        return Outcome(True, ("well",))
+
+    capture = capture_in(room, monkeypatch, solve, n_pairs=4)
+    capture.submit(Finish())
+    assert "too few" in steps(capture, 1).events[-1]
+    followed(capture, lambda s: s.is_enough)
+    capture.submit(Finish())
+    snapshot = steps(capture, 1)
+    assert [pair.index for pair in given] == [0, 1, 2, 3]
+    assert snapshot.outcome == Outcome(True, ("well",))
+
+
+def test_a_rig_that_is_refused_asks_for_more_pairs(room, monkeypatch):
+    def solve(pairs, report):
+        raise ResultError("no rig explains these views", remedy="look at the pictures")
+
+    capture = capture_in(room, monkeypatch, solve, n_pairs=4)
+    followed(capture, lambda s: s.is_enough)
+    capture.submit(Finish())
+    snapshot = steps(capture, 1)
+    assert not snapshot.outcome.is_accepted
+    assert "no rig explains" in snapshot.outcome.sentences[0]
+    assert not snapshot.is_enough
+    assert followed(capture, lambda s: s.is_enough).n_kept == 8
+
+
+def test_a_view_that_cannot_be_had_is_not_asked_for_again(room, monkeypatch):
+    capture = capture_in(room, monkeypatch, stop_mm=0.3)
+    followed(capture, lambda s: s.n_kept == 6)
+    look, tilts_deg = room.look, []
+
+    def only_flat(frame, board):
+        tilts_deg.append(np.degrees(np.arccos(room.pose.rotation[2, 2])))
+        return look(frame, board) if tilts_deg[-1] < 20.0 else Look(frame, None, None)
+
+    monkeypatch.setattr("navapp.control.capture.capture.look_at", only_flat)
+    snapshot = followed(capture, lambda s: s.n_kept == 8, most=900)
+    assert max(tilts_deg) > 30.0
+    assert snapshot.n_kept == 8
+
+
+def test_n_asks_for_another_view(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    at_start(room, aside_mm=150.0)
+    first = steps(capture, 2).wish
+    capture.submit(Another())
+    assert steps(capture, 2).wish != first
+
+
+def test_keys_move_the_hand_and_end_the_following(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    capture.submit(Follow(is_on=True))
+    assert steps(capture, 1).is_following
+    capture.submit(Nudge(shift_mm=(20.0, 0.0, 0.0)))
+    assert not steps(capture, 1).is_following
+    assert room.nudges == [((20.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
+
+
+def test_leaving_ends_it_and_closing_closes_the_camera(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    capture.submit(Leave())
+    assert steps(capture, 1).phase is CapturePhase.OVER
+    capture.close()
+    assert room.is_closed
+
+
+def test_a_full_disk_ends_the_capture_in_a_sentence(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    at_start(room)
+
+    def full(index, frame):
+        raise InputError("folder x cannot be written (No space left on device)")
+
+    monkeypatch.setattr(room, "keep", full)
+    capture.submit(Take())
+    with pytest.raises(InputError, match="No space"):
+        steps(capture, 1)
+    assert np.size(list(room.kept)) == 0

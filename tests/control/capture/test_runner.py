@@ -1,0 +1,45 @@
+"""The capture's thread: it ends with the capture, and keeps what ended it."""
+
+import time
+
+import pytest
+
+from navapp.control.capture.runner import CaptureRunner
+from navapp.control.capture.states import CapturePhase, Leave
+from navapp.errors import DeviceLost
+from tests.control.capture.rooms import Room, capture_in
+
+
+def over(runner: CaptureRunner, limit_s: float = 20.0) -> bool:
+    end = time.monotonic() + limit_s
+    while not runner.is_over and time.monotonic() < end:
+        time.sleep(0.01)
+    return runner.is_over
+
+
+@pytest.fixture
+def room() -> Room:
+    return Room()
+
+
+def test_it_ends_when_it_is_left(room, monkeypatch):
+    runner = CaptureRunner(capture_in(room, monkeypatch))
+    runner.start()
+    runner.submit(Leave())
+    assert over(runner)
+    runner.stop()
+    runner.stop()
+    assert runner.error is None
+    assert runner.snapshot().phase is CapturePhase.OVER
+
+
+def test_a_lost_camera_ends_it_and_is_told(room, monkeypatch):
+    def lost(timeout_s):
+        raise DeviceLost("the camera is gone")
+
+    monkeypatch.setattr(room, "read", lost)
+    runner = CaptureRunner(capture_in(room, monkeypatch))
+    runner.start()
+    assert over(runner)
+    runner.stop()
+    assert isinstance(runner.error, DeviceLost)

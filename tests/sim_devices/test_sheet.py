@@ -1,0 +1,117 @@
+"""A printed sheet in front of the simulated cameras: every mark where optics put it."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from calibration.targets.boards import board_from
+from calibration.targets.detection import find_board
+from calibration.targets.drawing import drawn, rastered
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from sim_devices.rigs import default_rig
+from sim_devices.sensor import SensorModel
+from sim_devices.sheet import PrintedSheet, SheetScene
+from sim_devices.sheet_kernels import draw_sheet
+from tests.reference.sheet_reference import sheet_reference
+
+BOARD = board_from(
+    {
+        "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
+        "marker_mm": 14.0, "dictionary": "DICT_4X4_100",
+    }
+)  # fmt: skip
+MARGIN_MM = 8.0
+
+
+def plain_picture(radiance: np.ndarray) -> np.ndarray:
+    """A lens that blurs a little and a linear sensor without noise."""
+    light = cv2.GaussianBlur(radiance[:, :, 0], (0, 0), 0.5)
+    return np.rint(20.0 + 380.0 * light).clip(0, 255).astype(np.uint8)
+
+
+def simulated_picture(radiance: np.ndarray) -> np.ndarray:
+    """The simulated sensor with its tone curve, without noise."""
+    sensor = replace(SensorModel(is_grey=True), full_well_e=1e12, read_noise_e=0.0)
+    return sensor.picture(radiance, "left", 0)
+
+
+def off_px(eye: str, pose: RigidTransform, take) -> np.ndarray:
+    """(n, 2) marks found less marks projected by the rig."""
+    seen = find_board(take(SheetScene(sheet_of(), lambda time_ns: pose).render(eye, 0)), BOARD)
+    assert seen is not None
+    assert len(seen.ids) == len(BOARD.points_mm)
+    rig = default_rig()
+    camera, in_camera = rig.left, pose
+    if eye == "right":
+        camera, in_camera = rig.right, rig.right_from_left @ pose
+    return seen.pixels - camera.project(in_camera.apply(BOARD.points_mm[seen.ids]))
+
+
+def sheet_of(board=BOARD, px_per_mm: float = 12.0) -> PrintedSheet:
+    drawing = drawn(board)
+    white = rastered(drawing, px_per_mm, MARGIN_MM)
+    left_mm, top_mm = drawing.low_mm - MARGIN_MM
+    return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
+
+
+def held(distance_mm: float, turn_rad: tuple[float, float, float]) -> RigidTransform:
+    rotation = rotation_from_vector(turn_rad)
+    place = np.array([35.0, 5.0, distance_mm]) - rotation @ BOARD.points_mm.mean(axis=0)
+    return RigidTransform.from_parts("left", "sheet", rotation, place)
+
+
+@pytest.mark.parametrize("eye", ["left", "right"])
+@pytest.mark.parametrize(
+    ("distance_mm", "turn_rad"),
+    [(450.0, (0.0, 0.0, 0.05)), (360.0, (0.5, 0.2, -0.2)), (510.0, (-0.3, -0.4, 1.5))],
+)
+def test_every_corner_is_where_the_optics_put_it(eye, distance_mm, turn_rad):
+    pose = held(distance_mm, turn_rad)
+    assert np.linalg.norm(off_px(eye, pose, plain_picture), axis=1).max() < 0.02
+    # A tone curve makes dark squares smaller, not elsewhere; sharp pictures feel it a little.
+    assert np.sqrt((off_px(eye, pose, simulated_picture) ** 2).mean()) < 0.02
+
+
+def test_the_kernel_does_what_its_reference_does():
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[0:41, 0:61]
+    rays = np.dstack([(x - 30) / 50.0 + 0.02 * (y / 40.0) ** 2, (y - 20) / 50.0])
+    homography = np.array([[30.0, 4.0, 9.0], [-3.0, 28.0, 11.0], [0.2, -0.3, 1.0]])
+    texture = rng.random((24, 32)).astype(np.float32)
+    picture = np.zeros((40, 60), np.float32)
+    draw_sheet(rays, homography, texture, 2, 0.1, 0.8, np.array([0, 40, 0, 60]), picture)
+    expected = sheet_reference(rays, homography, texture, 2, 0.1, 0.8)
+    assert np.abs(picture - expected).max() < 1e-5
+    assert np.ptp(picture) > 0.3
+
+
+def test_only_the_box_is_drawn_and_it_holds_the_whole_sheet():
+    pose = held(400.0, (0.3, -0.4, 0.8))
+    scene = SheetScene(sheet_of(px_per_mm=4.0), lambda time_ns: pose)
+    picture = scene.render("left", 0)
+    ground = picture[0, 0, 0]
+    rows, columns = np.nonzero(picture[:, :, 0] != ground)
+    corners = default_rig().left.project(pose.apply(sheet_of(px_per_mm=4.0).corners_mm))
+    corners = np.clip(corners, 0, (1279, 719))
+    assert columns.min() == pytest.approx(corners[:, 0].min(), abs=2.5)
+    assert columns.max() == pytest.approx(corners[:, 0].max(), abs=2.5)
+    assert rows.min() == pytest.approx(corners[:, 1].min(), abs=2.5)
+    assert rows.max() == pytest.approx(corners[:, 1].max(), abs=2.5)
+
+
+def test_nothing_is_printed_on_the_back_and_nothing_is_seen_behind_the_cameras():
+    scene = SheetScene(sheet_of(px_per_mm=4.0), lambda time_ns: held(450.0, (0.0, np.pi, 0.0)))
+    back = scene.render("left", 0)
+    assert len(np.unique(np.round(back, 4))) < 40
+    assert back.max() > 5 * back.min()
+    behind = SheetScene(sheet_of(px_per_mm=4.0), lambda time_ns: held(-450.0, (0.0, 0.0, 0.0)))
+    assert np.ptp(behind.render("left", 0)) == 0.0
+
+
+def test_a_sheet_is_a_grey_picture_with_a_size():
+    with pytest.raises(ValueError, match="grey picture"):
+        PrintedSheet(np.zeros((4, 4, 3), np.uint8), 4.0, 0.0, 0.0)
+    with pytest.raises(ValueError, match="grey picture"):
+        PrintedSheet(np.zeros((4, 4), np.uint8), 0.0, 0.0, 0.0)
