@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from drivers.interfaces import CameraInfo
     from navapp.config import CalibrationSection
     from navapp.control.capture.capture import Capture
+    from navapp.control.capture.folder import CaptureFolder
     from navapp.control.capture.states import CaptureSnapshot, Outcome
+    from navapp.devices import OpenedCapture
     from navapp.geometry.rig import StereoRig
 
 _EXAMPLE = """\
@@ -60,10 +62,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Capture, solve, judge; the exit code."""
     from calibration.targets.boards import read_board
     from navapp.config import find_file, load
-    from navapp.control.capture.capture import Capture
     from navapp.control.capture.folder import CaptureFolder
-    from navapp.control.capture.interfaces import CaptureSettings
-    from navapp.control.executors import InlineExecutor, ThreadExecutor
     from navapp.devices import open_capture
 
     check_writable(options.json)
@@ -75,26 +74,14 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             "--headless needs the simulated rig: nobody else holds the board",
             remedy="leave --headless away",
         )
-    section, board = configuration.calibration, read_board(options.board)
-    folder = CaptureFolder(Path(options.out))
+    board, folder = read_board(options.board), CaptureFolder(Path(options.out))
     folder.begin(json.loads(Path(options.board).read_text(encoding="utf-8")))
     with ExitStack() as undo:
         undo.callback(folder.discard_if_empty)
         opened = open_capture(configuration, board, is_headless=options.headless)
         undo.callback(opened.camera.close)
-        solver = _Solver(board, opened.camera.info, section, folder.path)
-        capture = Capture(
-            opened.camera,
-            opened.clock,
-            board,
-            CaptureSettings(
-                section.working_depth_mm, section.stop_capture_mm, n_pairs=options.pairs
-            ),
-            executor=InlineExecutor() if options.headless else ThreadExecutor(),
-            store=folder,
-            solve=solver,
-            hand=opened.hand,
-        )
+        solver = _Solver(board, opened.camera.info, configuration.calibration, folder)
+        capture = _capture(opened, solver, options)
         undo.callback(capture.close)
         if options.headless:
             _headless(capture, diagnostics)
@@ -104,13 +91,35 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return _finish(last, solver, options, diagnostics)
 
 
+def _capture(opened: "OpenedCapture", solver: "_Solver", options: argparse.Namespace) -> "Capture":
+    from navapp.control.capture.capture import Capture
+    from navapp.control.capture.interfaces import CaptureSettings
+    from navapp.control.executors import InlineExecutor, ThreadExecutor
+
+    section = solver.section
+    return Capture(
+        opened.camera,
+        opened.clock,
+        solver.board,
+        CaptureSettings(section.working_depth_mm, section.stop_capture_mm, n_pairs=options.pairs),
+        executor=InlineExecutor() if options.headless else ThreadExecutor(),
+        store=solver.folder,
+        solve=solver,
+        hand=opened.hand,
+    )
+
+
 class _Solver:
     """Solves, judges and writes; keeps what it found for the end."""
 
     def __init__(
-        self, board: "Board", info: "CameraInfo", section: "CalibrationSection", folder: Path
+        self,
+        board: "Board",
+        info: "CameraInfo",
+        section: "CalibrationSection",
+        folder: "CaptureFolder",
     ) -> None:
-        self._board, self._info, self._section, self._folder = board, info, section, folder
+        self.board, self._info, self.section, self.folder = board, info, section, folder
         self.found: tuple[Calibration, StereoRig] | None = None
 
     def __call__(self, pairs: "list[SeenPair]", report: Callable[[float], None]) -> "Outcome":
@@ -121,14 +130,14 @@ class _Solver:
         from navapp.control.capture.states import Outcome
         from navapp.geometry.rig_files import write_rig
 
-        section, info = self._section, self._info
+        section, info, folder = self.section, self._info, self.folder.path
         limits = Limits(accept_mm=section.accept_mm, depth_mm=section.working_depth_mm)
         size = (info.width, info.height)
-        found = solve_rig(self._board, pairs, size, limits=limits, on_progress=report)
-        rig = replace(recorded(found, section, self._folder.name), serials=info.serials)
-        write_report(self._folder / "report.html", replace(found, rig=rig), limits)
+        found = solve_rig(self.board, pairs, size, limits=limits, on_progress=report)
+        rig = replace(recorded(found, section, folder.name), serials=info.serials)
+        write_report(folder / "report.html", replace(found, rig=rig), limits)
         is_accepted = rig.quality is not None and rig.quality.is_accepted
-        path = self._folder / "rig.yml"
+        path = folder / "rig.yml"
         if is_accepted:
             write_rig(path, rig)
         else:

@@ -2,17 +2,15 @@
 
 from queue import Empty, SimpleQueue
 
-import numpy as np
-from numpy.typing import NDArray
-
 from calibration.targets.boards import Board
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
+from navapp.control.capture.following import Following
 from navapp.control.capture.interfaces import BoardHand, CaptureSettings, PairStore, Solve
 from navapp.control.capture.kept import KeptPairs
 from navapp.control.capture.looks import Look, Shutter, look_at
-from navapp.control.capture.previews import outlines, preview
+from navapp.control.capture.previews import previews
 from navapp.control.capture.states import (
     Another,
     CaptureCommand,
@@ -36,8 +34,6 @@ from navapp.errors import NavappError
 from navapp.geometry.transform import FloatArray
 
 _WAIT_S = 0.1
-# A simulated hand that was not good enough after so long goes there again, then gives up.
-_PATIENCE_NS, _MOST_TRIES = 3_000_000_000, 2
 _MOST_EVENTS = 30
 # So many more pairs are asked for when a rig was not accepted.
 _MORE_AFTER_REFUSAL = 4
@@ -75,7 +71,7 @@ class Capture:
         self._name, self._size = info.name, (info.width, info.height)
         self._source, self._clock = open_source(camera), clock
         self._board, self._settings, self._executor = board, settings, executor
-        self._solve, self._hand = solve, hand
+        self._solve, self._following = solve, Following(hand)
         self._middle_mm = board.points_mm.mean(axis=0)
         self._commands: SimpleQueue[CaptureCommand] = SimpleQueue()
         self._phase = CapturePhase.CAPTURING
@@ -85,8 +81,7 @@ class Capture:
         self._look: Look | None = None
         self._checks: tuple[Check, ...] = ()
         self._way: Way | None = None
-        self._is_told_to_take = self._is_following = False
-        self._moved_at_ns = self._n_tries = 0
+        self._is_told_to_take = False
         self._avoid: list[FloatArray] = []
         self._wish = next_wish(board, [], self._size, settings.depth_mm)
         self._looking: Job[Look] | None = None
@@ -148,10 +143,9 @@ class Capture:
             case Leave():
                 self._phase = CapturePhase.OVER
             case Follow(is_on):
-                self._is_following, self._moved_at_ns = is_on, 0
-            case Nudge(shift_mm, turn_rad) if self._hand is not None:
-                self._is_following = False
-                self._hand.nudge(shift_mm, turn_rad)
+                self._following.turn(is_on=is_on)
+            case Nudge(shift_mm, turn_rad):
+                self._following.nudge(shift_mm, turn_rad)
             case _ if self._phase is not CapturePhase.CAPTURING:
                 pass
             case Take():
@@ -226,7 +220,8 @@ class Capture:
             if one.index not in known:
                 self._tell(f"pair {one.index} does not count: {one.reason}")
         was_enough = self.is_enough
-        self._wish, self._moved_at_ns, self._n_tries = job.result, 0, 0
+        self._wish = job.result
+        self._following.begin()
         if self.is_enough and not was_enough:
             self._tell("this is enough: finish, or take more")
 
@@ -256,17 +251,10 @@ class Capture:
 
     def _move_hand(self) -> None:
         wanted, frame = self._wish.left_from_board, self._frame
-        if self._hand is None or not self._is_following or wanted is None or frame is None:
+        if wanted is None or frame is None or self._wishing is not None or self.is_enough:
             return
-        is_late = frame.captured_ns - self._moved_at_ns > _PATIENCE_NS
-        if self._wishing is not None or not (self._moved_at_ns == 0 or is_late):
-            return
-        if self._n_tries == _MOST_TRIES and not self.is_enough:
+        if not self._following.step(wanted, frame.captured_ns):
             self._do(Another())
-            return
-        self._n_tries += 1
-        self._hand.move_to(wanted)
-        self._moved_at_ns = max(frame.captured_ns, 1)
 
     def _tell(self, text: str) -> None:
         self._events = [*self._events, text][-_MOST_EVENTS:]
@@ -280,9 +268,11 @@ class Capture:
             time_ns=self._clock.now_ns(),
             phase=self._phase,
             camera=self._name,
-            has_hand=self._hand is not None,
-            is_following=self._is_following,
-            pictures=self._pictures(),
+            has_hand=self._following.has_hand,
+            is_following=self._following.is_on,
+            pictures=previews(
+                self._board, self._frame, look, None if self.is_enough else self._wish
+            ),
             n_seen=(counts[0], counts[1], len(self._board.points_mm)),
             checks=self._checks,
             wish=self._wish_text(),
@@ -295,16 +285,6 @@ class Capture:
             progress=None if job is None else Progress("solving the rig", job.progress),
             events=tuple(self._events),
             outcome=self._outcome,
-        )
-
-    def _pictures(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]] | None:
-        frame, look = self._frame, self._look
-        if frame is None:
-            return None
-        left_px, right_px = outlines(self._board, None if self.is_enough else self._wish)
-        return (
-            preview(frame.left, None if look is None else look.left, left_px),
-            preview(frame.right, None if look is None else look.right, right_px),
         )
 
     def _wish_text(self) -> str:

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
-from drivers.frames import Image
+from drivers.frames import Image, StereoFrame
+from navapp.control.capture.looks import Look
 from navapp.control.capture.wishes import Wish
 from navapp.geometry.camera import Camera
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -15,16 +16,27 @@ _MARK_BGR, _OUTLINE_BGR, _FIRST_BGR = (90, 235, 90), (40, 170, 255), (60, 60, 25
 _STEPS = 12
 
 
-def preview(
-    picture: Image, seen: SeenBoard | None, outline_px: FloatArray | None
-) -> NDArray[np.uint8]:
-    """(h, 192, 3) BGR.
+def previews(
+    board: Board, frame: StereoFrame | None, look: Look | None, wish: Wish | None
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]] | None:
+    """(h, 192, 3) BGR, left and right; None before the first frame.
 
     Args:
-        picture: as the camera gave it.
-        seen: marks to draw.
-        outline_px: (n, 2) of the wanted view, its first corner first; None for none.
+        board: that is shown.
+        frame: the newest.
+        look: the newest; its marks are drawn.
+        wish: its view is outlined; None for none.
     """
+    if frame is None:
+        return None
+    left_px, right_px = _outlines(board, wish)
+    seen = (None, None) if look is None else (look.left, look.right)
+    return _preview(frame.left, seen[0], left_px), _preview(frame.right, seen[1], right_px)
+
+
+def _preview(
+    picture: Image, seen: SeenBoard | None, outline_px: FloatArray | None
+) -> NDArray[np.uint8]:
     import cv2
 
     scale = _WIDTH / picture.shape[1]
@@ -42,7 +54,7 @@ def preview(
     return small
 
 
-def outlines(board: Board, wish: Wish | None) -> tuple[FloatArray | None, FloatArray | None]:
+def _outlines(board: Board, wish: Wish | None) -> tuple[FloatArray | None, FloatArray | None]:
     """(n, 2) px of the wanted view's edge in the left and right picture, where they are known."""
     if wish is None or wish.left_from_board is None:
         return None, None
