@@ -97,7 +97,7 @@ def _new(pair: SeenPair, kept: Sequence[SeenPair]) -> Check:
     for other in kept:
         moved = [moved_px(pair.left, other.left), moved_px(pair.right, other.right)]
         if all(one is not None and one < _LEAST_NEW_PX for one in moved):
-            return Check("new", is_met=False, text=f"as pair {other.index}")
+            return Check("new", is_met=False, text=f"as {other.index}")
     return Check("new", is_met=True)
 
 
