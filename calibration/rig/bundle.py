@@ -75,7 +75,6 @@ def solve_bundle(
     shared: FloatArray,
     poses: FloatArray,
     *,
-    off_mm: FloatArray | None = None,
     is_fixed: bool = False,
 ) -> Bundle:
     """Solve from a start nearby.
@@ -86,15 +85,11 @@ def solve_bundle(
         model: which numbers are solved for.
         shared: (n_shared,) start.
         poses: (V, 6) start, left camera from board.
-        off_mm: (3,) standard deviation of a mark's place on the board; by default 1 % of the
-            distance of two marks along the board, 5 % across it.
         is_fixed: leave the shared numbers as they are and solve for the poses alone.
     """
     shared, poses = shared.copy(), poses.copy()
     damping, is_settled = _FIRST_DAMPING, False
-    if off_mm is None:
-        off_mm = np.array(_EXPECTED_SHARE_OFF) * board.spacing_mm
-    views = _Views(board, pairs, model, off_mm)
+    views = _Views(board, pairs, model)
     linear = _Linearised(views, shared, poses)
     for _ in range(_MOST_STEPS):
         step_shared, step_poses = linear.step(damping, is_fixed)
@@ -171,7 +166,6 @@ class _Views:
     board: Board
     pairs: Sequence[SeenPair]
     model: RigModel
-    off_mm: FloatArray
 
 
 class _Linearised:
@@ -204,7 +198,7 @@ class _Linearised:
         self._view_normals: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         for view in self._views:
             self._add(view)
-        self._expect_board(views.off_mm)
+        self._expect_board(np.array(_EXPECTED_SHARE_OFF) * views.board.spacing_mm)
 
     def _seen(
         self, board: Board, seen: SeenBoard, pose: FloatArray, number: int

@@ -40,7 +40,6 @@ def hold_out(
     board: Board,
     pairs: Sequence[SeenPair],
     whole: Bundle,
-    off_mm: FloatArray | None = None,
     on_fold: Callable[[], None] = lambda: None,
 ) -> HeldOut:
     """Solve without each fold of the views in turn, and look at that fold.
@@ -49,7 +48,6 @@ def hold_out(
         board: that was seen.
         pairs: V views.
         whole: solved with all of them; where each solve begins.
-        off_mm: as `solve_bundle` takes it.
         on_fold: told when one is done.
     """
     n_views = len(pairs)
@@ -57,9 +55,7 @@ def hold_out(
     for fold in range(min(N_FOLDS, n_views)):
         is_out = np.arange(n_views) % N_FOLDS == fold
         kept = [pair for pair, out in zip(pairs, is_out, strict=True) if not out]
-        solved = solve_bundle(
-            board, kept, whole.model, whole.shared, whole.poses[~is_out], off_mm=off_mm
-        )
+        solved = solve_bundle(board, kept, whole.model, whole.shared, whole.poses[~is_out])
         rigs.append(solved.shared)
         for view in np.flatnonzero(is_out):
             judged = look_at(board, [pairs[int(view)]], solved)

@@ -1,15 +1,14 @@
 """Which view of the board tells most about the rig: what a capture asks for next."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
 from calibration.rig.bundle import Bundle, projected
 from calibration.rig.parameters import RigModel
-from calibration.rig.start import vector_of
-from calibration.rig.uncertainty import bounds_mm, triangulation_slopes, working_points_mm
+from calibration.rig.start import matrix_of, vector_of
+from calibration.rig.uncertainty import triangulation_slopes, working_points_mm
 from calibration.targets.boards import Board
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 
@@ -25,36 +24,13 @@ _LEAST_SEEN, _EDGE_PX = 0.6, 12.0
 _SAME_RAD = 0.2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class WantedView:
-    """A view of the board that is worth taking.
-
-    Attributes:
-        left_from_board: where the board should be held.
-        bound_mm: predicted 95 % error in the working volume once it is taken.
-    """
-
-    left_from_board: RigidTransform
-    bound_mm: float
-
-
-def predicted_bound_mm(solved: Bundle, depth_mm: tuple[float, float]) -> float:
-    """95 % error that nearly all of the working volume stays below, from the covariance alone."""
-    model = solved.model
-    points_mm = working_points_mm(model, solved.shared, depth_mm)
-    if len(points_mm) == 0:
-        return float("inf")
-    covariance = solved.covariance[: model.n_rig, : model.n_rig]
-    return float(np.quantile(bounds_mm(model, solved.shared, covariance, points_mm), 0.95))
-
-
 def wanted_view(
     board: Board,
     solved: Bundle,
     sigma_px: float,
     depth_mm: tuple[float, float],
     avoid: Sequence[FloatArray] = (),
-) -> WantedView | None:
+) -> RigidTransform | None:
     """The view that lowers the predicted error in the working volume most.
 
     Args:
@@ -65,7 +41,8 @@ def wanted_view(
         avoid: (3, 3) turns of the board that cannot be had, left camera from board.
 
     Returns:
-        None when no view can be seen by both cameras.
+        Where the board should be held, left camera from board; None when no view can be seen by
+        both cameras.
     """
     model, shared = solved.model, solved.shared
     points_mm = working_points_mm(model, shared, depth_mm)
@@ -74,7 +51,7 @@ def wanted_view(
     slopes = triangulation_slopes(model, shared, points_mm).reshape(-1, model.n_rig)
     size = 1.0 / np.sqrt(np.maximum(np.diag(solved.normal), 1e-300))
     normal = solved.normal / max(solved.scale, 1e-6) ** 2
-    best: tuple[float, FloatArray, FloatArray] | None = None
+    best: tuple[float, FloatArray] | None = None
     for pose in candidates(board, model, shared, depth_mm):
         if any(_is_same(rotation_from_vector(pose[:3]), turn) for turn in avoid):
             continue
@@ -86,15 +63,10 @@ def wanted_view(
         covariance = np.linalg.inv(scaled) * size[:, None] * size[None, :]
         cost = float(np.einsum("ij,jk,ik->", slopes, covariance, slopes))
         if best is None or cost < best[0]:
-            best = (cost, pose, covariance)
+            best = (cost, pose)
     if best is None:
         return None
-    _, pose, covariance = best
-    bound = float(np.quantile(bounds_mm(model, shared, covariance, points_mm), 0.95))
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation_from_vector(pose[:3])
-    matrix[:3, 3] = pose[3:]
-    return WantedView(RigidTransform("left", "board", matrix), bound)
+    return RigidTransform("left", "board", matrix_of(best[1]))
 
 
 def _is_same(a: FloatArray, b: FloatArray) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.rig.bundle import Bundle
-from calibration.rig.parameters import shape_mm, unpacked
+from calibration.rig.parameters import placement, shape_mm, unpacked
 from calibration.rig.start import matrix_of
 from calibration.rig.uncertainty import working_points_mm
 from calibration.targets.boards import Board
@@ -116,7 +116,8 @@ def refusals(
     reasons = []
     if n_pairs < limits.fewest_pairs:
         reasons.append(f"only {n_pairs} pairs can be used, {limits.fewest_pairs} are needed")
-    if solved.shared[2 * solved.model.n_camera + 3] > 0.0:
+    _, translation_mm = placement(solved.model, solved.shared)
+    if translation_mm[0] > 0.0:
         reasons.append(
             "the right camera stands left of the left one: left and right pictures are swapped"
         )
@@ -157,7 +158,7 @@ def refusals(
 def _known_distance(board: Board, solved: Bundle, known_mm: float, allowed: float) -> list[str]:
     """A length that was measured by hand: between the cameras, or along the board."""
     model = solved.model
-    baseline_mm = float(np.linalg.norm(solved.shared[2 * model.n_camera + 3 : model.n_rig]))
+    baseline_mm = float(np.linalg.norm(placement(model, solved.shared)[1]))
     row = board.points_mm[: board.columns - int(board.has_squares)]
     off = shape_mm(model, solved.shared)[: len(row)] if model.n_marks else np.zeros((len(row), 3))
     row_mm = float(np.linalg.norm((row + off)[-1] - (row + off)[0]))

@@ -54,7 +54,7 @@ class Pictures:
 
 
 def main() -> int:
-    """Print both tables."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("NAVAPP_DATA", "../shared/data")
@@ -62,6 +62,11 @@ def main() -> int:
     parser.add_argument("--rigs", type=int, default=20)
     options = parser.parse_args()
     folder = Path(options.folder)
+    print("| marks | detector | found | rms px | largest px | claimed px |")
+    print("|---|" + "---|" * 5)
+    for place in sorted(folder.glob("phantom_*/charuco")):
+        marks(place.parent)
+    print()
     print("| pictures | chain | pairs | stereo rms px | held-out rms px | baseline "
           "| bone median mm | after one shift mm | predicted 95 % mm |")  # fmt: skip
     print("|---|" + "---|" * 8)
@@ -81,6 +86,28 @@ def phantom(folder: Path) -> None:
     pictures = looked_at(open_folder(folder / "charuco"), board)
     aside = looked_at(open_folder(folder / "charuco_heldout"), board)
     compare(folder.name, board, pictures, aside, (read_rig(folder / "rig.yml"), bone(folder)))
+
+
+def marks(folder: Path) -> None:
+    """Found less true marks of one phantom, a coordinate, by both detectors."""
+    board, rig = read_board(folder / "charuco" / "board.json"), read_rig(folder / "rig.yml")
+    pictures = looked_at(open_folder(folder / "charuco"), board)
+    truth = json.loads((folder / "charuco" / "truth.json").read_text())["poses"]
+    poses = {one["index"]: np.array(one["T_leftcam_from_board"]) for one in truth}
+    for name, pairs in (("navapp", pictures.ours), ("OpenCV", pictures.opencv)):
+        off, claimed = [], []
+        for pair in pairs:
+            pose = RigidTransform("left", "board", poses[pair.index])
+            for seen, camera, place in (
+                (pair.left, rig.left, pose),
+                (pair.right, rig.right, rig.right_from_left @ pose),
+            ):
+                off.append(seen.pixels - camera.project(place.apply(board.points_mm[seen.ids])))
+                claimed.append(seen.sigma_px)
+        errors = np.vstack(off)
+        told = f"{np.median(np.concatenate(claimed)):.4f}" if name == "navapp" else "-"
+        print(f"| {folder.name} | {name} | {len(errors)} | {np.sqrt(np.mean(errors**2)):.4f} "
+              f"| {np.abs(errors).max():.3f} | {told} |", flush=True)  # fmt: skip
 
 
 def looked_at(source: PictureFiles, board: Board) -> Pictures:

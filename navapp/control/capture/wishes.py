@@ -101,7 +101,7 @@ def _informed(
     rig = unpacked(solved.model, solved.shared)
     bounds = volume_bounds_mm(solved, depth_mm)
     view = wanted_view(board, solved, noise_px(solved), depth_mm, avoid)
-    pose = starting_view(board, 0, depth_mm) if view is None else view.left_from_board
+    pose = starting_view(board, 0, depth_mm) if view is None else view
     indices = tuple(pair.index for pair in used)
     if len(bounds) == 0:
         return Wish(pose, rig.left, rig, solved, indices, tuple(out))
