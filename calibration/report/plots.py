@@ -21,13 +21,13 @@ _MAP_COLUMNS, _MAP_ROWS = 24, 14
 
 def residuals(found: Calibration) -> str:
     """Seen less predicted of every mark, enlarged, over both pictures."""
-    largest = max(float(np.abs(part).max()) for pair in found.solved.left_px for part in pair)
+    largest = max(float(np.abs(part).max()) for pair in found.solved.residuals_px for part in pair)
     factor = 0.04 * found.solved.model.width / max(largest, 1e-9)
 
     def draw(figure: Any) -> None:
         for number, side in enumerate(("left", "right")):
             axes = _picture_axes(figure, number, found, f"{side} picture")
-            for pair, left in zip(found.pairs, found.solved.left_px, strict=True):
+            for pair, left in zip(found.pairs, found.solved.residuals_px, strict=True):
                 marks, arrows = getattr(pair, side).pixels, left[number] * factor
                 axes.quiver(
                     marks[:, 0], marks[:, 1], arrows[:, 0], arrows[:, 1],
@@ -54,7 +54,7 @@ def coverage(found: Calibration) -> str:
 
 def views(found: Calibration) -> str:
     """Residuals of every view, solved with and held out."""
-    solved = [_rms(np.vstack(left)) for left in found.solved.left_px]
+    solved = [_rms(np.vstack(left)) for left in found.solved.residuals_px]
     held = np.sqrt(found.held_out.squares_px2)
     names = [str(pair.index) for pair in found.pairs]
 
@@ -106,8 +106,8 @@ def uncertainty(found: Calibration, depth_mm: float) -> str:
     return _svg(draw, (4.7, 2.8))
 
 
-def _rms(left_px: FloatArray) -> float:
-    return float(np.sqrt((left_px**2).sum(axis=1).mean()))
+def _rms(residual_px: FloatArray) -> float:
+    return float(np.sqrt((residual_px**2).sum(axis=1).mean()))
 
 
 def _picture_axes(figure: Any, number: int, found: Calibration, title: str) -> Any:

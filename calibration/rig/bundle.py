@@ -40,7 +40,7 @@ class Bundle:
         poses: (V, 6) rotation vector and translation, left camera from board.
         normal: (n_shared, n_shared) information about the shared numbers, the poses eliminated.
         scale: robust standard deviation of what is left, in units of the marks' standard errors.
-        left_px: per view (n, 2) and (m, 2): seen less predicted, left and right.
+        residuals_px: per view (n, 2) and (m, 2): seen less predicted, left and right.
         is_settled: the steps came to rest.
     """
 
@@ -49,7 +49,7 @@ class Bundle:
     poses: FloatArray
     normal: FloatArray
     scale: float
-    left_px: list[tuple[FloatArray, FloatArray]]
+    residuals_px: list[tuple[FloatArray, FloatArray]]
     is_settled: bool
 
     @property
@@ -64,7 +64,7 @@ class Bundle:
     @property
     def rms_px(self) -> float:
         """Of all distances between marks seen and predicted, both cameras."""
-        squared = [np.sum(part**2, axis=1) for pair in self.left_px for part in pair]
+        squared = [np.sum(part**2, axis=1) for pair in self.residuals_px for part in pair]
         return float(np.sqrt(np.concatenate(squared).mean()))
 
 
@@ -108,7 +108,9 @@ def solve_bundle(
             break
         else:
             damping *= 10.0
-    return Bundle(model, shared, poses, linear.reduced(), linear.scale, linear.left_px, is_settled)
+    return Bundle(
+        model, shared, poses, linear.reduced(), linear.scale, linear.residuals_px, is_settled
+    )
 
 
 def projected(
@@ -182,10 +184,10 @@ class _Linearised:
             ]
             for pair, pose in zip(views.pairs, poses, strict=True)
         ]
-        self.left_px = [(view[0][0], view[1][0]) for view in self._views]
+        self.residuals_px = [(view[0][0], view[1][0]) for view in self._views]
         lengths = np.concatenate(
             [
-                np.abs(left / sigma[:, None]).ravel()
+                np.abs(residual / sigma[:, None]).ravel()
                 for view in self._views
                 for left, _, _, sigma in view
             ]
@@ -223,9 +225,8 @@ class _Linearised:
         """Add one view to the normal equations, weighed as Huber does."""
         n = self._model.n_shared
         mixed, own, right = np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(6)
-        for left_px, by_shared, by_pose, sigma_px in view:
-            left = left_px / sigma_px[:, None]
-            length = np.linalg.norm(left, axis=1)
+        for residual_px, by_shared, by_pose, sigma_px in view:
+            length = np.linalg.norm(residual_px / sigma_px[:, None], axis=1)
             # Two coordinates: their length has a limit a little beyond that of one.
             limit = self._limit
             weight = np.minimum(1.0, limit / np.maximum(length, 1e-12))
@@ -233,7 +234,7 @@ class _Linearised:
             self.cost += float(np.where(inside, length**2, 2.0 * limit * length - limit**2).sum())
             root = np.repeat(np.sqrt(weight) / sigma_px, 2)
             a, b = by_shared * root[:, None], by_pose * root[:, None]
-            r = left_px.ravel() * root
+            r = residual_px.ravel() * root
             self._shared_normal += a.T @ a
             self._shared_right += a.T @ r
             mixed += a.T @ b

@@ -59,8 +59,8 @@ def hold_out(
         rigs.append(solved.shared)
         for view in np.flatnonzero(is_out):
             judged = look_at(board, [pairs[int(view)]], solved)
-            left_px = np.vstack(judged.left_px[0])
-            squares[view] = (left_px**2).sum(axis=1).mean()
+            residual_px = np.vstack(judged.residuals_px[0])
+            squares[view] = (residual_px**2).sum(axis=1).mean()
             costs[view] = _cost(pairs[int(view)], judged)
         on_fold()
     return HeldOut(squares, costs, np.array(rigs))
@@ -75,8 +75,10 @@ def look_at(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> Bundle:
 def _cost(pair: SeenPair, judged: Bundle) -> float:
     lengths = np.concatenate(
         [
-            np.linalg.norm(left_px, axis=1) / seen.sigma_px
-            for left_px, seen in zip(judged.left_px[0], (pair.left, pair.right), strict=True)
+            np.linalg.norm(residual_px, axis=1) / seen.sigma_px
+            for residual_px, seen in zip(
+                judged.residuals_px[0], (pair.left, pair.right), strict=True
+            )
         ]
     )
     return float(np.minimum(lengths**2, 9.0 * np.maximum(lengths, 1.0)).mean())

@@ -68,7 +68,7 @@ def blurred_pairs(pairs: Sequence[SeenPair]) -> list[DroppedPair]:
 
 def misfits(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> list[DroppedPair]:
     """Pairs that leave far more than is usual in a solved rig, and why."""
-    rms = np.array([_rms(np.vstack(left)) for left in solved.left_px])
+    rms = np.array([_rms(np.vstack(left)) for left in solved.residuals_px])
     usual = float(np.median(rms))
     suspects = np.flatnonzero(rms > max(_TOO_FAR * usual, _LEAST_MISFIT_PX))
     if len(suspects) == 0:
@@ -136,8 +136,8 @@ def _alone(board: Board, seen: SeenBoard, camera: Camera) -> _Alone:
     return _Alone(pose, _rms(camera.project(points_mm) - seen.pixels))
 
 
-def _rms(left_px: FloatArray) -> float:
-    return float(np.sqrt((left_px**2).sum(axis=1).mean()))
+def _rms(residual_px: FloatArray) -> float:
+    return float(np.sqrt((residual_px**2).sum(axis=1).mean()))
 
 
 def _is_same(a: FloatArray, b: FloatArray) -> bool:

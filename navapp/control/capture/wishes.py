@@ -155,8 +155,8 @@ def volume_bounds_mm(solved: Bundle, depth_mm: tuple[float, float]) -> FloatArra
 
 def noise_px(solved: Bundle) -> float:
     """Standard error of a mark's coordinate, from what is left of all of them."""
-    left_px = np.concatenate([part.ravel() for view in solved.left_px for part in view])
-    return max(_MAD_TO_SIGMA * float(np.median(np.abs(left_px))), 1e-4)
+    residual_px = np.concatenate([part.ravel() for view in solved.residuals_px for part in view])
+    return max(_MAD_TO_SIGMA * float(np.median(np.abs(residual_px))), 1e-4)
 
 
 def starting_view(board: Board, number: int, depth_mm: tuple[float, float]) -> RigidTransform:
