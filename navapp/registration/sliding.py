@@ -50,8 +50,8 @@ class Draw:
         return np.repeat([self.shift_mm, np.radians(self.turn_deg)], 3)
 
 
-# Width of the kernel, and what is drawn. A rough pose may be 20 mm and 15 degrees off. Each round is
-# drawn about as wide as the kernel of the one before lets the best ones differ.
+# Width of the kernel, and what is drawn. A rough pose may be 20 mm and 15 degrees off. Each round
+# is drawn about as wide as the kernel of the one before lets the best ones differ.
 _ROUNDS = (
     (3.0, Draw(300, 20_000, 300, 14.0, 8.0)),
     (2.0, Draw(500, 6_000, 150, 4.0, 4.0)),
