@@ -32,14 +32,12 @@ class Draw:
     """One round of drawing and scoring.
 
     Attributes:
-        sigma_mm: width of the kernel.
         n_points: of the model, that are asked.
         n_poses: drawn.
         n_kept: of them, the best.
         shift_mm, turn_deg: standard deviation along and about each axis.
     """
 
-    sigma_mm: float
     n_points: int
     n_poses: int
     n_kept: int
@@ -52,18 +50,18 @@ class Draw:
         return np.repeat([self.shift_mm, np.radians(self.turn_deg)], 3)
 
 
-# A rough pose may be 20 mm and 15 degrees off. Each round is drawn about as wide as the kernel of
-# the one before lets the best ones differ.
+# Width of the kernel, and what is drawn. A rough pose may be 20 mm and 15 degrees off. Each round
+# is drawn about as wide as the kernel of the one before lets the best ones differ.
 _ROUNDS = (
-    Draw(3.0, 300, 20_000, 300, 14.0, 8.0),
-    Draw(2.0, 500, 6_000, 150, 4.0, 4.0),
-    Draw(1.2, 800, 4_000, 150, 2.0, 2.0),
+    (3.0, Draw(300, 20_000, 300, 14.0, 8.0)),
+    (2.0, Draw(500, 6_000, 150, 4.0, 4.0)),
+    (1.2, Draw(800, 4_000, 150, 2.0, 2.0)),
 )
 # Then so many that differ climb, each on its own, kernel by kernel: many a little, the best of them
 # to the end.
 _CLIMBS = (
-    (60, Draw(0.8, 500, 100, 15, 1.5, 2.0), (1.2, 1.2, 0.8, 0.8, 0.8)),
-    (12, Draw(0.5, 1000, 200, 25, 0.7, 1.0), (0.5, 0.5, 0.5, 0.5, 0.3, 0.3, 0.3, 0.3)),
+    (60, Draw(500, 100, 15, 1.5, 2.0), (1.2, 1.2, 0.8, 0.8, 0.8)),
+    (12, Draw(1000, 200, 25, 0.7, 1.0), (0.5, 0.5, 0.5, 0.5, 0.3, 0.3, 0.3, 0.3)),
 )
 
 
@@ -98,9 +96,9 @@ class Sliding:
         """
         random = np.random.default_rng(_SEED)
         poses = [rough]
-        for k, draw in enumerate(_ROUNDS):
+        for k, (sigma_mm, draw) in enumerate(_ROUNDS):
             on_progress(k / (len(_ROUNDS) + 1))
-            poses = self._drawn(depth, poses, draw, random)
+            poses = self._drawn(depth, poses, draw, sigma_mm, random)
         on_progress(len(_ROUNDS) / (len(_ROUNDS) + 1))
         found: list[Candidate] = []
         for n_climbing, draw, sigmas_mm in _CLIMBS:
@@ -151,6 +149,7 @@ class Sliding:
         depth: DepthMap,
         poses: list[RigidTransform],
         draw: Draw,
+        sigma_mm: float,
         random: np.random.Generator,
     ) -> list[RigidTransform]:
         """The best of many poses around some, and of those themselves."""
@@ -158,7 +157,7 @@ class Sliding:
         twists = random.standard_normal((draw.n_poses, 6)) * draw.deviations
         parents[: len(poses)], twists[: len(poses)] = np.arange(len(poses)), 0.0
         rotations, shifts = self._moved(poses, twists, parents)
-        scores = self.scores(depth, rotations, shifts, draw.sigma_mm, draw.n_points)
+        scores = self.scores(depth, rotations, shifts, sigma_mm, draw.n_points)
         names = poses[0].target, poses[0].source
         best = np.argsort(-scores, kind="stable")[: draw.n_kept]
         return [RigidTransform.from_parts(*names, rotations[k], shifts[k]) for k in best]
