@@ -189,7 +189,7 @@ class _Linearised:
             [
                 np.abs(residual / sigma[:, None]).ravel()
                 for view in self._views
-                for left, _, _, sigma in view
+                for residual, _, _, sigma in view
             ]
         )
         self.scale = max(_MAD_TO_SIGMA * float(np.median(lengths)), 1e-6)

@@ -15,10 +15,10 @@ def at_partner(right_values, disparity_px, shift, missing):
 
 def judge(evidence, demands):
     """Which pixels have contrast, which match, how surely."""
-    partner_contrast = at_partner(evidence.right_contrast, evidence.residuals_px, evidence.shift, 0)
+    partner_contrast = at_partner(evidence.right_contrast, evidence.left_px, evidence.shift, 0)
     contrast = np.minimum(evidence.left_contrast, partner_contrast)
-    partner_px = at_partner(evidence.right_px, evidence.residuals_px, evidence.shift, np.nan)
-    difference = np.abs(partner_px - evidence.residuals_px)
+    partner_px = at_partner(evidence.right_px, evidence.left_px, evidence.shift, np.nan)
+    difference = np.abs(partner_px - evidence.left_px)
     is_judged = contrast >= demands.contrast_grey
     is_matched = is_judged & (difference <= demands.max_difference_px)
     is_matched &= evidence.uniqueness >= demands.min_uniqueness

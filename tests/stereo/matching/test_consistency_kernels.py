@@ -36,13 +36,13 @@ def test_matches_are_judged_as_the_definition_says(shift, least_contrast) -> Non
     seen = evidence(shift)
     demands = Demands(least_contrast, np.float32(16.0), np.float32(1.0), np.float32(0.05))
     expected_judged, expected_matched, expected = reference.judge(seen, demands)
-    given = seen.residuals_px.copy()
+    given = seen.left_px.copy()
     is_judged, confidence = np.empty(given.shape, dtype=np.bool_), np.empty_like(given)
     for rows in ((0, 3), (3, HEIGHT)):
         judge_rows(seen, demands, rows, is_judged, confidence)
     assert np.array_equal(is_judged, expected_judged)
     kept = np.where(expected_matched, given, np.float32(np.nan))
-    assert np.array_equal(seen.residuals_px, kept, equal_nan=True)
+    assert np.array_equal(seen.left_px, kept, equal_nan=True)
     np.testing.assert_allclose(confidence, expected, rtol=1e-6)
     assert expected_matched.any() == (shift < 40)
 
@@ -50,9 +50,9 @@ def test_matches_are_judged_as_the_definition_says(shift, least_contrast) -> Non
 @pytest.mark.parametrize("shift", [-6, 0, 3])
 def test_partners_are_found_as_the_definition_says(shift) -> None:
     seen = evidence(shift)
-    found = np.empty_like(seen.residuals_px)
-    partner_values(seen.right_px, seen.residuals_px, shift, np.float32(-9.0), found)
-    expected = reference.at_partner(seen.right_px, seen.residuals_px, shift, -9.0)
+    found = np.empty_like(seen.left_px)
+    partner_values(seen.right_px, seen.left_px, shift, np.float32(-9.0), found)
+    expected = reference.at_partner(seen.right_px, seen.left_px, shift, -9.0)
     assert np.array_equal(found, expected, equal_nan=True)
 
 
