@@ -9,8 +9,8 @@ STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cu
 
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py \
-    tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resample.py \
-    tests/stereo tests/tracking/test_agreement.py
+    tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \
+    tests/stereo tests/tracking/test_agreement.py tests/calibration/targets
 
 SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 libx11-6 tmux
 
