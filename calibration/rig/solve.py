@@ -145,7 +145,7 @@ class _Work:
             raise ResultError(
                 f"the board is seen in {len(pairs)} usable pairs, "
                 f"{_FEWEST_TO_SOLVE} are needed to solve anything",
-                remedy="show it in more places, whole, sharp and to both cameras",
+                remedy="compare it with its file; show it in more places, sharp and to both cameras",
             )
         model = RigModel(_COEFFICIENTS[0], 0, *self._size)
         try:

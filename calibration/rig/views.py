@@ -56,6 +56,8 @@ class DroppedPair:
 def blurred_pairs(pairs: Sequence[SeenPair]) -> list[DroppedPair]:
     """Pairs of which a picture is far less sharp than is usual for its camera."""
     dropped: dict[int, DroppedPair] = {}
+    if not pairs:
+        return []
     for side in ("left", "right"):
         blurs = np.array([getattr(pair, side).blur_px for pair in pairs])
         usual = float(np.median(blurs))

@@ -95,8 +95,9 @@ def reasons_of(pairs, **kwargs):
 def test_too_few_views_are_refused(world):
     _, reasons = reasons_of(world[1][:6])
     assert any("only 6 pairs" in reason for reason in reasons)
-    with pytest.raises(ResultError, match="3 usable pairs"):
-        solve_rig(BOARD, world[1][:3], SIZE)
+    for n in (3, 0):
+        with pytest.raises(ResultError, match=f"{n} usable pairs"):
+            solve_rig(BOARD, world[1][:n], SIZE)
 
 
 def test_frontal_views_are_refused(world):
