@@ -108,9 +108,11 @@ def solve_bundle(
             break
         else:
             damping *= 10.0
-    return Bundle(
-        model, shared, poses, linear.reduced(), linear.scale, linear.residuals_px, is_settled
-    )
+    n = 2 * sum(len(pair.left.ids) + len(pair.right.ids) for pair in pairs)
+    n_solved = (0 if is_fixed else model.n_shared) + poses.size
+    # What was solved for takes its part of the noise with it.
+    scale = linear.scale * (n / max(n - n_solved, 1)) ** 0.5
+    return Bundle(model, shared, poses, linear.reduced(), scale, linear.residuals_px, is_settled)
 
 
 def projected(

@@ -39,7 +39,7 @@ class Limits:
     worst_rms_px: float = 0.6
     worst_held_out: float = 1.5
     accept_mm: float = 0.40
-    known_share: float = 0.02
+    known_share: float = 0.005
     depth_mm: tuple[float, float] | None = (350.0, 550.0)
 
 
@@ -135,12 +135,14 @@ def refusals(
                 f"{100 * share:.0f} % of where the working volume is seen, "
                 f"{100 * limits.least_coverage:.0f} % are needed"
             )
-    if solved.rms_px > limits.worst_rms_px:
+    if not solved.is_settled:
+        reasons.append("the solve did not come to rest: the views do not fix the rig")
+    if not solved.rms_px <= limits.worst_rms_px:
         reasons.append(
             f"the marks fit badly: {solved.rms_px:.2f} px rms, "
             f"{limits.worst_rms_px:.2f} px are allowed"
         )
-    if held_out_rms_px > limits.worst_held_out * solved.rms_px:
+    if not held_out_rms_px <= limits.worst_held_out * solved.rms_px:
         reasons.append(
             f"held-out views fit worse ({held_out_rms_px:.3f} px) than those solved with "
             f"({solved.rms_px:.3f} px)"

@@ -130,13 +130,14 @@ class _Work:
     def cleaned(self, pairs: list[SeenPair]) -> tuple[list[SeenPair], Bundle, list[DroppedPair]]:
         """The simplest model, without the pairs that do not belong."""
         dropped: list[DroppedPair] = []
+        solved = self._first(pairs)
         for _ in range(_MOST_CLEANINGS):
-            solved = self._first(pairs)
             more = misfits(self._board, pairs, solved)
             if not more:
                 break
             dropped += more
             pairs = _without(pairs, more)
+            solved = self._first(pairs)
         self._step()
         return pairs, solved, dropped
 
@@ -145,7 +146,7 @@ class _Work:
             raise ResultError(
                 f"the board is seen in {len(pairs)} usable pairs, "
                 f"{_FEWEST_TO_SOLVE} are needed to solve anything",
-                remedy="compare it with its file; show it in more places, sharp and to both cameras",
+                remedy="compare it with its file; show it in more places, sharp, to both cameras",
             )
         model = RigModel(_COEFFICIENTS[0], 0, *self._size)
         try:
@@ -215,4 +216,4 @@ def _bounds(solved: Bundle, held_out: HeldOut, points_mm: FloatArray) -> FloatAr
     seen = np.sqrt((n - 1) / n * (moved**2).sum(axis=(0, 2)))
     told = np.sqrt(np.einsum("nij,jk,nik->n", slopes, covariance, slopes))
     excess = float(np.sqrt(np.mean(seen**2) / np.mean(told**2)))
-    return formal * max(1.0, excess / _CHANCE)
+    return formal * (excess if excess > _CHANCE else 1.0)

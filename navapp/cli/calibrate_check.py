@@ -1,6 +1,8 @@
 """`navapp calibrate check`: how good a rig is today, on new pictures of the board."""
 
 import argparse
+from dataclasses import replace
+from datetime import date
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from navapp.errors import ResultError, RigError
 
 if TYPE_CHECKING:
     from calibration.rig.check import RigCheck
+    from navapp.geometry.rig import StereoRig
 
 _EXAMPLE = """\
 example: navapp calibrate check rig.yml today/ --board board.json
@@ -37,6 +40,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Judge; the exit code."""
     from calibration.rig.check import check_rig
     from calibration.targets.boards import read_board
+    from navapp.config import find_file, load
     from navapp.geometry.rig_files import read_rig
 
     check_writable(options.json)
@@ -49,16 +53,30 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             subject=options.rig,
             remedy="check the rig with pictures of its own cameras",
         )
-    found = check_rig(board, rig, pairs.seen)
+    section = load(find_file(options.config)).calibration
+    worst_length = section.accept_mm / float(np.mean(section.working_depth_mm))
+    found = check_rig(board, rig, pairs.seen, worst_length)
+    found = replace(found, reasons=(*_of_record(rig), *found.reasons))
     write_json(options.json, "calibrate check", _content(found, len(pairs.unseen)))
     if options.json != "-":
         _tell(found, diagnostics)
     if found.reasons:
         raise ResultError(
-            f"the rig is not what it was: {'; '.join(found.reasons)}",
+            f"the rig does not pass: {'; '.join(found.reasons)}",
             remedy="calibrate again",
         )
     return 0
+
+
+def _of_record(rig: "StereoRig") -> tuple[str, ...]:
+    """What the rig's own file says against it."""
+    quality = rig.quality
+    if quality is None:
+        return ()
+    reasons = [] if quality.is_accepted else ["its calibration was not accepted"]
+    if quality.has_expired(date.today()):
+        reasons.append(f"it expired on {quality.expires_on}")
+    return tuple(reasons)
 
 
 def _content(found: "RigCheck", n_unseen: int) -> dict[str, Any]:

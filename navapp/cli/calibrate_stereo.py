@@ -11,10 +11,12 @@ import numpy as np
 
 from navapp.cli.board_pairs import read_pairs
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import ResultError, UsageError
+from navapp.errors import InputError, ResultError, UsageError
 
 if TYPE_CHECKING:
     from calibration.rig.solve import Calibration
+    from calibration.targets.boards import Board
+    from calibration.targets.pairs import SeenPair
     from navapp.config import CalibrationSection
     from navapp.geometry.rig import StereoRig
 
@@ -73,10 +75,13 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     section = load(find_file(options.config)).calibration
     board = read_board(options.board)
     pairs = read_pairs(options.images, board, diagnostics)
-    aside = read_pairs(options.holdout, board, diagnostics).seen if options.holdout else []
+    aside = _aside(options.holdout, board, pairs.size, diagnostics)
     limits = Limits(accept_mm=section.accept_mm, depth_mm=section.working_depth_mm)
-    if board.spacing_mm == 1.0:
-        diagnostics.warn("the board's unit is its own square: limits in mm are not checked")
+    if is_unit(board):
+        diagnostics.warn(
+            "the board's unit is its own square: limits in mm are not checked, and no session "
+            "takes this rig"
+        )
         limits = replace(limits, accept_mm=math.inf, depth_mm=None)
     found = solve_rig(
         board, pairs.seen, pairs.size, limits=limits, aside=aside, known_distance_mm=known_mm,
@@ -97,6 +102,34 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return _verdict(rig, options)
 
 
+def _aside(
+    folder: str | None, board: "Board", size: tuple[int, int], diagnostics: Diagnostics
+) -> "list[SeenPair]":
+    """Pairs that judge; none when no folder was given.
+
+    Raises:
+        InputError: pictures of another size.
+        ResultError: none of them shows the board.
+    """
+    if folder is None:
+        return []
+    pairs = read_pairs(folder, board, diagnostics)
+    if pairs.size != size:
+        raise InputError(
+            f"pictures of {folder} are {pairs.size[0]}x{pairs.size[1]}, those to solve with "
+            f"{size[0]}x{size[1]}",
+            subject=folder,
+            remedy="set pairs of the same cameras aside",
+        )
+    if not pairs.seen:
+        raise ResultError(
+            f"no pair of {folder} shows the board",
+            subject=folder,
+            remedy="set pairs aside that do, or leave --holdout away",
+        )
+    return pairs.seen
+
+
 def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> "StereoRig":
     """The rig with its name and all that its file should say of it."""
     assert found.rig.quality is not None  # noqa: S101 (for the type checker: it always has one)
@@ -115,12 +148,21 @@ def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> 
             "views_dropped": len(found.dropped),
             "coverage_left": found.covered.left,
             "coverage_right": found.covered.right,
+            "working_near_mm": found.depth_mm[0],
+            "working_far_mm": found.depth_mm[1],
             "nearest_mark_mm": found.covered.depth_mm[0],
             "farthest_mark_mm": found.covered.depth_mm[1],
         },
         covariance=found.solved.covariance[: found.solved.model.n_rig, : found.solved.model.n_rig],
     )
+    if is_unit(found.board):
+        quality = replace(quality, length_unit="square")
     return replace(found.rig, quality=quality, name=name)
+
+
+def is_unit(board: "Board") -> bool:
+    """The board's own squares are the unit of length."""
+    return board.spacing_mm == 1.0
 
 
 def length_error(found: "Calibration") -> float:

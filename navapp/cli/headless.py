@@ -26,12 +26,18 @@ def check_accepted(rig: StereoRig, is_allowed: bool, diagnostics: Diagnostics) -
     """Refuse a rig that its calibration did not accept, unless it is allowed.
 
     Raises:
-        RigError: not accepted and not allowed.
+        RigError: not accepted and not allowed; or not in mm.
     """
     if rig.quality is None:
         if not rig.name.startswith("sim:"):
             diagnostics.warn(f"rig {rig.name} carries no quality record; it is taken as given")
         return
+    if rig.quality.length_unit != "mm":
+        raise RigError(
+            f"rig {rig.name} is measured in {rig.quality.length_unit}s of its board, not in mm",
+            subject=rig.name,
+            remedy="give the board's true size and calibrate again",
+        )
     if rig.quality.is_accepted:
         return
     why = "; ".join(rig.quality.reasons) or "no reason is recorded"

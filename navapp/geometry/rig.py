@@ -23,6 +23,7 @@ class RigQuality:
         figures: what was measured, by name (`rms_px`, `holdout_rms_px`, `coverage_left`, ...).
         covariance: (n, n) of the solved numbers: fx fy cx cy and the distortion of the left and of
             the right camera, rotation vector and translation in mm of `right_from_left`.
+        length_unit: mm, or "square" where the board's size was not known: no rig to navigate with.
     """
 
     is_accepted: bool
@@ -32,6 +33,17 @@ class RigQuality:
     expires_on: date | None = None
     figures: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = field(default=None, compare=False)
+    length_unit: str = "mm"
+
+    def error_mm(self, depth_mm: float) -> float:
+        """Predicted 95 % error of a point at a depth; 0 when nobody said.
+
+        Beyond the working volume it grows as depth does from a disparity: with its square.
+        """
+        if self.uncertainty_mm is None:
+            return 0.0
+        farthest_mm = self.figures.get("working_far_mm", depth_mm)
+        return self.uncertainty_mm * max(1.0, depth_mm / farthest_mm) ** 2
 
     def has_expired(self, today: date) -> bool:
         """Whether its time is over."""

@@ -23,6 +23,9 @@ _SYNONYMS = {
     "R": ("R",),
     "T": ("T",),
 }
+_TEXTS = (
+    "serial_left", "serial_right", "rig_name", "rig_id", "made_on", "expires_on", "length_unit",
+)  # fmt: skip
 _HASH_KEY = "file_sha256"
 
 
@@ -146,6 +149,8 @@ def _write_quality(storage: Any, quality: RigQuality) -> None:
         for name, value in quality.figures.items():
             storage.write(name, float(value))
         storage.endWriteStruct()
+    if quality.length_unit != "mm":
+        storage.write("length_unit", quality.length_unit)
     if quality.covariance is not None:
         storage.write("covariance", np.array(quality.covariance))
 
@@ -163,6 +168,7 @@ def _quality(values: dict[str, Any]) -> RigQuality | None:
         _day(values.get("expires_on", "")),
         values.get("figures", {}),
         values.get("covariance"),
+        str(values.get("length_unit", "mm")),
     )
 
 
@@ -221,7 +227,15 @@ def _read_scalars(storage: Any) -> dict[str, Any]:
         node = storage.getNode(name)
         if not node.empty():
             values[name] = _number(node)
-    for name in ("serial_left", "serial_right", "rig_name", "rig_id", "made_on", "expires_on"):
+    for name in (
+        "serial_left",
+        "serial_right",
+        "rig_name",
+        "rig_id",
+        "made_on",
+        "expires_on",
+        "length_unit",
+    ):
         node = storage.getNode(name)
         if not node.empty() and node.isString():
             values[name] = node.string()

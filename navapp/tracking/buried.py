@@ -6,6 +6,7 @@ model are therefore taken from many starts, those that find most are the next st
 that then come to rest the one whose residuals show least stands.
 """
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cached_property
@@ -21,6 +22,7 @@ from navapp.tracking.follower import Fit, Follower
 from navapp.tracking.locator import LocatorSettings
 from navapp.tracking.smooth_misfit import shown_ratio2
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values import LineTimings
 
 # Always the same draws: the same pictures give the same pose.
 _SEED = 20
@@ -119,13 +121,17 @@ class BuriedBone:
     def followed(self, pair: RectifiedPair, predicted: RigidTransform) -> Iterator[Fit]:
         """The bone from one frame to the next: where the prediction rests, then the best around it.
 
+        The time of a fit is that of everything that was tried for it.
+
         Args:
             pair: rectified pictures.
             predicted: rectified camera from bone.
         """
+        started_ns = time.perf_counter_ns()
         fit, _ = self._follower.follow(pair, predicted, is_near=True)
         if fit is not None:
-            yield fit
+            yield _timed(fit, started_ns)
+        started_ns = time.perf_counter_ns()
         random = np.random.default_rng(_SEED)
         twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations
         centre_mm = predicted.apply(self._model.centre_mm)
@@ -135,7 +141,7 @@ class BuriedBone:
             places = self._improved(pair, places, one, random)
         fit = self._rested(pair, places)
         if fit is not None:
-            yield fit
+            yield _timed(fit, started_ns)
 
     def _placed(self, pair: RectifiedPair, starts: list[RigidTransform]) -> list[Place]:
         """Where one step onto the model leads from each start."""
@@ -186,3 +192,10 @@ class BuriedBone:
 
 def _most_answering(places: list[Place], n: int) -> list[Place]:
     return sorted(places, key=lambda place: place.score, reverse=True)[:n]
+
+
+def _timed(fit: Fit, started_ns: int) -> Fit:
+    """The fit, with all the time since then as that of its estimate."""
+    return replace(
+        fit, timings=LineTimings(estimate_ms=(time.perf_counter_ns() - started_ns) / 1e6)
+    )

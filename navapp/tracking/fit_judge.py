@@ -15,7 +15,7 @@ from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
 from navapp.tracking.contours import ContourMeter
 from navapp.tracking.follower import Fit, sum_timings
-from navapp.tracking.judge import Goal, Judge
+from navapp.tracking.judge import Goal, Judge, within_tolerance
 from navapp.tracking.pair_doubts import with_pair_doubts
 from navapp.tracking.smooth_misfit import with_smooth_misfit
 from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
@@ -78,6 +78,7 @@ class FitJudge:
                 self._model, fit.estimate, found, goal, predicted, coarse_px, view
             )
             verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
+            verdict = within_tolerance(verdict, goal)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)

@@ -5,7 +5,7 @@ of the model that should be seen was measured and agrees, not only how well pair
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +101,7 @@ class Judge:
     ) -> None:
         self._geometry = geometry
         self._is_rig_accepted = quality is None or quality.is_accepted
-        self._by_rig_mm = 0.0 if quality is None else quality.uncertainty_mm or 0.0
+        self._quality = quality
         self._limits = limits or JudgeLimits()
 
     def agreement(
@@ -148,7 +148,7 @@ class Judge:
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
         by_plan_mm = _COMMON_ERROR * cartilage_mm
         by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
-        bound_mm = math.hypot(by_view_mm, by_plan_mm, self._by_rig_mm)
+        bound_mm = math.hypot(by_view_mm, by_plan_mm, self._by_rig_mm(model, estimate))
         doubts = self._doubts(estimate, agreement)
         doubts += [Reason.SIZE_DIFFERS] * _has_another_size(estimate, by_plan_mm)
         doubts += [Reason.POSE_UNCERTAIN] * bool(by_view_mm > np.hypot(goal.seen_mm, by_plan_mm))
@@ -166,6 +166,11 @@ class Judge:
             estimate.rms_mm,
             estimate.expected_rms_mm,
         )
+
+    def _by_rig_mm(self, model: RegistrationModel, estimate: PoseEstimate) -> float:
+        """What the calibration itself leaves at the bone."""
+        depth_mm = float(estimate.camera_from_bone.apply(model.centre_mm)[2])
+        return 0.0 if self._quality is None else self._quality.error_mm(depth_mm)
 
     def _doubts(self, estimate: PoseEstimate, agreement: Agreement) -> list[Reason]:
         """What keeps a pose from being OK, apart from the stage's own limits."""
@@ -236,6 +241,16 @@ class Judge:
             return float("inf")
         step = max(1, len(targets_mm) // self._limits.max_bound_targets)
         return predicted_tre_mm(estimate, model.centre_mm, targets_mm[::step])
+
+
+def within_tolerance(verdict: Verdict, goal: Goal) -> Verdict:
+    """A verdict whose error was widened since: no longer OK where it exceeds what is tolerated."""
+    bound_mm = verdict.predicted_tre_mm
+    if verdict.status is not Status.OK or bound_mm is None or bound_mm <= goal.tolerance_mm:
+        return verdict
+    return replace(
+        verdict, status=Status.DEGRADED, reasons=(*verdict.reasons, Reason.TRE_TOO_LARGE)
+    )
 
 
 def _has_another_size(estimate: PoseEstimate, by_plan_mm: float) -> bool:

@@ -37,6 +37,8 @@ from navapp.values import (
 
 # It is asked so often, counted in lost frames, whether the pictures are swapped.
 _LOST_BETWEEN = 10
+# A bone of which more is hidden is not looked for in the tissue that is left.
+_MOSTLY_HIDDEN = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,13 +147,18 @@ class Line:
         answers = [self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse)]
         if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
             return answers[0]
+        # Behind a hand there is nothing to look for.
+        if answers[0].verdict.occluded_share > _MOSTLY_HIDDEN:
+            return answers[0]
         for buried in self._buried.followed(pair, start):
             timings = answers[-1].timings
             answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
             if answers[-1].verdict.status is Status.OK:
                 break
-        # Of equals, what was looked for from more starts.
-        return replace(_best(reversed(answers)), timings=answers[-1].timings)
+        # Of equals, what was looked for from more starts, unless another fits as well there.
+        told = reversed(answers)
+        best = min(told, key=lambda one: (one.verdict.rank, one.verdict.is_ambiguous))
+        return replace(best, timings=answers[-1].timings)
 
     def _searched(
         self,
@@ -223,6 +230,9 @@ class Line:
     ) -> Reason | None:
         """What is wrong for good: as known, or looked for anew in some of the lost frames."""
         is_lost = tracked.verdict.status is Status.LOST
+        if not is_lost and state.cause is Reason.PICTURES_SWAPPED:
+            # Swapped pictures show no bone: they are no longer.
+            return None
         is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
         if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
             return state.cause

@@ -165,6 +165,11 @@ class Verdict:
         return next((reason for reason in self.reasons if reason in _FOR_GOOD), None)
 
     @property
+    def is_ambiguous(self) -> bool:
+        """A different pose fits as well."""
+        return Reason.AMBIGUOUS in self.reasons
+
+    @property
     def rank(self) -> int:
         """Of its status: 0 is the best."""
         return list(Status).index(self.status)

@@ -6,7 +6,7 @@ import pytest
 from navapp.geometry.rig import RigQuality
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
 from navapp.stereo import reproject
-from navapp.tracking.judge import OK_ERROR_MM, Goal, Judge
+from navapp.tracking.judge import OK_ERROR_MM, Goal, Judge, within_tolerance
 from navapp.tracking.locator import STEREO_SETTINGS
 from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict
 from sim_devices.anatomy import KneeSpec, make_knee
@@ -136,6 +136,19 @@ def test_what_the_calibration_leaves_widens_the_bound_and_nothing_else() -> None
     known = Judge(GEOMETRY, RigQuality(True, (), 0.3)).judge(MODEL, estimate, MAP, goal)
     assert known.predicted_tre_mm == pytest.approx(np.hypot(exact.predicted_tre_mm, 0.3))
     assert (known.status, known.reasons) == (exact.status, exact.reasons)
+
+
+def test_the_calibrations_error_grows_beyond_its_working_volume() -> None:
+    quality = RigQuality(True, (), 0.2, figures={"working_far_mm": 500.0})
+    assert quality.error_mm(400.0) == quality.error_mm(500.0) == 0.2
+    assert quality.error_mm(700.0) == pytest.approx(0.2 * 1.4**2)
+
+
+def test_an_error_that_was_widened_is_held_against_the_tolerance_again() -> None:
+    verdict = Verdict(Status.OK, 1.1)
+    assert within_tolerance(verdict, Goal(NO_TARGETS, 1.2)) is verdict
+    found = within_tolerance(verdict, Goal(NO_TARGETS, 1.0))
+    assert (found.status, found.reasons) == (Status.DEGRADED, (Reason.TRE_TOO_LARGE,))
 
 
 def test_what_the_plans_cartilage_costs_is_not_held_against_the_view() -> None:
