@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import ResultError
 
 if TYPE_CHECKING:
     from navapp.geometry.camera import Camera
@@ -42,6 +43,11 @@ def add_parser(subparsers: Any) -> None:
     convert.add_argument("rig", metavar="IN", help="rig file, or the folder of a ROS pair")
     convert.add_argument("out", metavar="OUT", help="file or folder to write")
     convert.add_argument("--to", choices=_FORMATS, help="format (default: by the name of OUT)")
+    convert.add_argument(
+        "--force",
+        action="store_true",
+        help="also when the rig was not accepted and the format cannot say so",
+    )
     for part in (show, convert):
         part.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
@@ -68,6 +74,13 @@ def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if form != "ros":
         check_writable(options.out)
     rig, before = read_any(options.rig)
+    is_refused = rig.quality is not None and not rig.quality.is_accepted
+    if is_refused and form in ("ros", "kalibr") and not options.force:
+        raise ResultError(
+            f"rig {options.rig} was not accepted, and {form} has no place to say so",
+            subject=options.rig,
+            remedy="calibrate again, or add --force",
+        )
     write_as(form, options.out, rig)
     warnings = lost(rig, form)
     for warning in warnings:

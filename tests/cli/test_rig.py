@@ -78,10 +78,14 @@ def test_the_format_may_be_said(source, tmp_path) -> None:
     assert len(content["warnings"]) == 2
 
 
-def test_that_a_rig_was_refused_is_not_lost_silently(tmp_path, capsys) -> None:
+def test_that_a_rig_was_refused_is_not_lost_unless_it_is_forced(tmp_path, capsys) -> None:
     bad = dataclasses.replace(plain_rig(), quality=RigQuality(False, ("too few views",)))
     write_rig(tmp_path / "rig.yml", bad)
-    assert run(["rig", "convert", str(tmp_path / "rig.yml"), str(tmp_path / "pair")]) == 0
+    arguments = ["rig", "convert", str(tmp_path / "rig.yml"), str(tmp_path / "pair")]
+    assert run(arguments) == 4
+    assert not (tmp_path / "pair").exists()
+    capsys.readouterr()
+    assert run([*arguments, "--force"]) == 0
     assert "was not accepted (too few views)" in capsys.readouterr().err
 
 
