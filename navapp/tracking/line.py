@@ -37,8 +37,6 @@ from navapp.values import (
 
 # It is asked so often, counted in lost frames, whether the pictures are swapped.
 _LOST_BETWEEN = 10
-# A bone of which more is hidden is not looked for in the tissue that is left.
-_MOSTLY_HIDDEN = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,18 +145,12 @@ class Line:
         answers = [self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse)]
         if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
             return answers[0]
-        # Behind a hand there is nothing to look for.
-        if answers[0].verdict.occluded_share > _MOSTLY_HIDDEN:
-            return answers[0]
         for buried in self._buried.followed(pair, start):
             timings = answers[-1].timings
             answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
             if answers[-1].verdict.status is Status.OK:
                 break
-        # Of equals, what was looked for from more starts, unless another fits as well there.
-        told = reversed(answers)
-        best = min(told, key=lambda one: (one.verdict.rank, one.verdict.is_ambiguous))
-        return replace(best, timings=answers[-1].timings)
+        return replace(min(answers, key=_doubtfulness), timings=answers[-1].timings)
 
     def _searched(
         self,
@@ -250,3 +242,9 @@ class Line:
 def _best(answers: Iterable[TrackedFrame]) -> TrackedFrame:
     """The first of those with the best status."""
     return min(answers, key=lambda one: one.verdict.rank)
+
+
+def _doubtfulness(tracked: TrackedFrame) -> tuple[int, bool, float]:
+    """The smallest is the best: by status; of equals no guess, then what explains most."""
+    verdict = tracked.verdict
+    return verdict.rank, verdict.is_ambiguous, -verdict.coverage
