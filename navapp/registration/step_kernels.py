@@ -69,6 +69,23 @@ def noise_under_kernel_mm2(squares_mm2: float, kernels: float, sigma_mm: float) 
 
 
 @njit(cache=True, nogil=True)
+def twist_row(
+    pairs: Pairs, i: int, centre: NDArray[np.float64], lever_mm: float, row: NDArray[np.float64]
+) -> None:
+    """How one residual grows with the motion; `row` is (6,) in place, else as `plane_system`."""
+    x, y, z = (
+        pairs.point[i, 0] - centre[0],
+        pairs.point[i, 1] - centre[1],
+        pairs.point[i, 2] - centre[2],
+    )
+    nx, ny, nz = pairs.direction[i, 0], pairs.direction[i, 1], pairs.direction[i, 2]
+    row[0] = (y * nz - z * ny) / lever_mm
+    row[1] = (z * nx - x * nz) / lever_mm
+    row[2] = (x * ny - y * nx) / lever_mm
+    row[3], row[4], row[5] = nx, ny, nz
+
+
+@njit(cache=True, nogil=True)
 def plane_system(
     pairs: Pairs, n: int, centre: NDArray[np.float64], lever_mm: float, H: NDArray[np.float64],
     g: NDArray[np.float64],
@@ -89,16 +106,7 @@ def plane_system(
     row = np.empty(6)
     for i in range(n):
         w = pairs.weight[i]
-        x, y, z = (
-            pairs.point[i, 0] - centre[0],
-            pairs.point[i, 1] - centre[1],
-            pairs.point[i, 2] - centre[2],
-        )
-        nx, ny, nz = pairs.direction[i, 0], pairs.direction[i, 1], pairs.direction[i, 2]
-        row[0] = (y * nz - z * ny) / lever_mm
-        row[1] = (z * nx - x * nz) / lever_mm
-        row[2] = (x * ny - y * nx) / lever_mm
-        row[3], row[4], row[5] = nx, ny, nz
+        twist_row(pairs, i, centre, lever_mm, row)
         for a in range(6):
             scaled = w * row[a]
             g[a] += scaled * pairs.residual[i]
@@ -126,24 +134,19 @@ def size_terms(
     """
     mixed[:] = 0.0
     squares, product = 0.0, 0.0
+    row = np.empty(6)
     for i in range(n):
         w = pairs.weight[i]
-        x, y, z = (
-            pairs.point[i, 0] - centre[0],
-            pairs.point[i, 1] - centre[1],
-            pairs.point[i, 2] - centre[2],
-        )
-        nx, ny, nz = pairs.direction[i, 0], pairs.direction[i, 1], pairs.direction[i, 2]
-        outward = (x * nx + y * ny + z * nz) / lever_mm
+        twist_row(pairs, i, centre, lever_mm, row)
+        outward = 0.0
+        for k in range(3):
+            outward += (pairs.point[i, k] - centre[k]) * pairs.direction[i, k]
+        outward /= lever_mm
         scaled = w * outward
         squares += scaled * outward
         product += scaled * pairs.residual[i]
-        mixed[0] += scaled * (y * nz - z * ny) / lever_mm
-        mixed[1] += scaled * (z * nx - x * nz) / lever_mm
-        mixed[2] += scaled * (x * ny - y * nx) / lever_mm
-        mixed[3] += scaled * nx
-        mixed[4] += scaled * ny
-        mixed[5] += scaled * nz
+        for k in range(6):
+            mixed[k] += scaled * row[k]
     return SizeTerms(squares, product)
 
 
