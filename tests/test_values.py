@@ -14,6 +14,7 @@ from navapp.values import (
     Plan,
     PoseEstimate,
     Reason,
+    Status,
     SurfaceCloud,
     TrackedFrame,
     Verdict,
@@ -286,3 +287,13 @@ def test_the_cause_comes_first_and_once_and_an_ok_has_none():
     assert (verdict.cause, named.verdict.cause) == (None, Reason.PICTURES_SWAPPED)
     fine = dataclasses.replace(lost, verdict=Verdict(PoseStatus.OK, 0.1))
     assert fine.because(Reason.OTHER_SIDE) is fine
+
+
+def test_verdicts_have_an_order() -> None:
+    """By status; of equals no guess comes first, then what explains more of the model."""
+    degraded = Verdict(Status.DEGRADED, 0.5, (Reason.COVERAGE_LOW,), coverage=0.4)
+    more = dataclasses.replace(degraded, coverage=0.5)
+    guess = dataclasses.replace(degraded, reasons=(Reason.AMBIGUOUS,), coverage=0.9)
+    good, lost = Verdict(Status.OK, 0.3, coverage=0.3), Verdict(Status.LOST, None)
+    found = sorted([lost, guess, degraded, more, good], key=lambda one: one.order)
+    assert found == [good, more, degraded, guess, lost]

@@ -140,10 +140,14 @@ def explained_share(
     return share * coverage(scene, model, scene_from_bone, sigma_mm)
 
 
-def distinct(poses: Sequence[RigidTransform], centre_mm: FloatArray) -> list[RigidTransform]:
-    """Without those that repeat an earlier one; `centre_mm` (3,) in the bone's frame."""
+def distinct(
+    poses: Sequence[RigidTransform], centre_mm: FloatArray, n: int | None = None
+) -> list[RigidTransform]:
+    """The first n that repeat no earlier one; `centre_mm` (3,) in the bone's frame."""
     kept: list[RigidTransform] = []
     for pose in poses:
+        if len(kept) == n:
+            break
         if not any(is_same_pose(pose, other, centre_mm) for other in kept):
             kept.append(pose)
     return kept

@@ -17,7 +17,7 @@ from navapp.geometry.bands import run_both
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.model import RegistrationModel
-from navapp.registration.multi_start import Candidate, is_same_pose
+from navapp.registration.multi_start import Candidate, distinct
 from navapp.registration.sliding_kernels import SurfacePoints, score_poses
 
 # Always the same draws: the same pictures give the same pose.
@@ -102,11 +102,11 @@ class Sliding:
         on_progress(len(_ROUNDS) / (len(_ROUNDS) + 1))
         found: list[Candidate] = []
         for n_climbing, draw, sigmas_mm in _CLIMBS:
-            starts = self._distinct(poses, n_climbing)
+            starts = distinct(poses, self._centre_mm, n_climbing)
             found = [self._climbed(depth, pose, draw, sigmas_mm) for pose in starts]
             found.sort(key=lambda one: one.score, reverse=True)
             poses = [one.scene_from_bone for one in found]
-        kept = self._distinct(poses, n)
+        kept = distinct(poses, self._centre_mm, n)
         return [one for one in found if one.scene_from_bone in kept]
 
     def score(self, depth: DepthMap, pose: RigidTransform, sigma_mm: float, n_points: int) -> float:
@@ -194,16 +194,6 @@ class Sliding:
         centres_mm = np.array([pose.apply(self._centre_mm) for pose in poses])[parents]
         rotations = _rotations(twists[:, 3:]) @ rotations
         return rotations, centres_mm + twists[:, :3] - rotations @ self._centre_mm
-
-    def _distinct(self, poses: list[RigidTransform], n: int) -> list[RigidTransform]:
-        """The first n that differ."""
-        kept: list[RigidTransform] = []
-        for pose in poses:
-            if len(kept) == n:
-                break
-            if not any(is_same_pose(pose, other, self._centre_mm) for other in kept):
-                kept.append(pose)
-        return kept
 
 
 def spread_order(points_mm: FloatArray) -> NDArray[np.int64]:

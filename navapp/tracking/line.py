@@ -5,7 +5,7 @@ terminal; what is remembered between frames is handed in and out as a `TrackStat
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from navapp.geometry.bands import beside
@@ -150,7 +150,7 @@ class Line:
             answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
             if answers[-1].verdict.status is Status.OK:
                 break
-        return replace(min(answers, key=_doubtfulness), timings=answers[-1].timings)
+        return replace(min(answers, key=lambda one: one.verdict.order), timings=answers[-1].timings)
 
     def _searched(
         self,
@@ -174,7 +174,8 @@ class Line:
             if answers[-1].verdict.status is Status.OK:
                 break
         # Of equals, what came later knows more.
-        return replace(_best(reversed(answers)), timings=timings)
+        best = min(reversed(answers), key=lambda one: one.verdict.order)
+        return replace(best, timings=timings)
 
     def register(
         self,
@@ -237,14 +238,3 @@ class Line:
 
     def _rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
         return self._meter.geometry.rectified_from_left @ left_from_bone
-
-
-def _best(answers: Iterable[TrackedFrame]) -> TrackedFrame:
-    """The first of those with the best status."""
-    return min(answers, key=lambda one: one.verdict.rank)
-
-
-def _doubtfulness(tracked: TrackedFrame) -> tuple[int, bool, float]:
-    """The smallest is the best: by status; of equals no guess, then what explains most."""
-    verdict = tracked.verdict
-    return verdict.rank, verdict.is_ambiguous, -verdict.coverage

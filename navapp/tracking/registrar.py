@@ -117,8 +117,7 @@ class Registrar:
                 pair, measured, rough, lambda part: on_progress(done + (1.0 - done) * part)
             )
             buried = self._fit_judge.judged(pair, slid, goal, timings)
-            # Of equals, what was looked for from more starts.
-            answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
+            answers = sorted([buried, *answers], key=lambda one: one.verdict.order)
         on_progress(1.0)
         return answers
 

@@ -165,14 +165,10 @@ class Verdict:
         return next((reason for reason in self.reasons if reason in _FOR_GOOD), None)
 
     @property
-    def is_ambiguous(self) -> bool:
-        """A different pose fits as well."""
-        return Reason.AMBIGUOUS in self.reasons
-
-    @property
-    def rank(self) -> int:
-        """Of its status: 0 is the best."""
-        return list(Status).index(self.status)
+    def order(self) -> tuple[int, bool, float]:
+        """Verdicts in this order: by status; of equals no guess, then what explains more."""
+        rank = list(Status).index(self.status)
+        return rank, Reason.AMBIGUOUS in self.reasons, -self.coverage
 
 
 @dataclass(frozen=True, slots=True)
