@@ -13,13 +13,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from calibration.targets.mark_kernels import add_pixel, edge, solve_step
+from calibration.targets.mark_kernels import (
+    FIRST_BLUR_PX,
+    MOST_STEPS,
+    add_pixel,
+    edge,
+    has_settled,
+    tell,
+)
 
-N_PARAMETERS = 10
-_MOST_STEPS = 30
-_SETTLED_PX = 1e-4
-_LEAST_BLUR_PX = 0.15
-_FIRST_BLUR_PX = 1.2
+N_PARAMETERS, _N_SHAPE = 10, 6
 _LARGEST_RADIUS_PX = 60.0
 
 
@@ -88,6 +91,32 @@ def start_shape(px_from_disc: NDArray[np.float64], p: NDArray[np.float64]) -> fl
 
 
 @njit(cache=True, nogil=True)
+def near_pixels(
+    centre_px: NDArray[np.float64], p: NDArray[np.float64], reach: float, radius_px: float
+) -> NDArray[np.int64]:
+    """(n, 2) columns and rows of the pixels around a disc.
+
+    Args:
+        centre_px: (2,) where it is expected.
+        p: parameters; its shape is read.
+        reach: farthest pixel, in radii.
+        radius_px: larger half axis.
+    """
+    window = math.ceil(reach * radius_px)
+    x0, y0 = round(centre_px[0]), round(centre_px[1])
+    pixels = np.empty(((2 * window + 1) ** 2, 2), dtype=np.int64)
+    n = 0
+    for y in range(y0 - window, y0 + window + 1):
+        for x in range(x0 - window, x0 + window + 1):
+            dx, dy = x - centre_px[0], y - centre_px[1]
+            u, v = p[2] * dx + p[3] * dy, p[3] * dx + p[4] * dy
+            if u * u + v * v <= reach * reach:
+                pixels[n, 0], pixels[n, 1] = x, y
+                n += 1
+    return pixels[:n]
+
+
+@njit(cache=True, nogil=True)
 def fit_circle(
     picture: NDArray[np.uint8],
     centre_px: NDArray[np.float64],
@@ -104,58 +133,41 @@ def fit_circle(
         px_from_disc: (2, 2) linear map from the disc, of radius 1, to pixels.
         reach: farthest pixel that is looked at, in radii.
         horizon: (3,) the board's line at infinity in homogeneous pixels.
-        told: (5,) written: x, y, standard error of one coordinate px, blur px, and contrast (step
-            between paper and disc over the rms of what is left). NaN when the fit fails.
+        told: (5,) written as `tell` does; NaN when the fit fails.
     """
     told[:] = np.nan
     p, slopes = np.zeros(N_PARAMETERS), np.empty(N_PARAMETERS)
     radius_px = start_shape(px_from_disc, p)
-    x0, y0 = round(centre_px[0]), round(centre_px[1])
     window = math.ceil(reach * radius_px)
+    x0, y0 = round(centre_px[0]), round(centre_px[1])
     height, width = picture.shape
-    if radius_px > _LARGEST_RADIUS_PX or x0 < window or y0 < window:
+    is_inside = min(x0, y0) >= window and x0 + window < width and y0 + window < height
+    if radius_px > _LARGEST_RADIUS_PX or not is_inside:
         return
-    if x0 + window >= width or y0 + window >= height:
+    pixels = near_pixels(centre_px, p, reach, radius_px)
+    n = len(pixels)
+    if n <= 2 * N_PARAMETERS:
         return
     p[0], p[1] = centre_px[0] - x0, centre_px[1] - y0
-    p[5], p[6] = _FIRST_BLUR_PX, 1.0
+    p[5], p[6] = FIRST_BLUR_PX, 1.0
     expected = p.copy()
     normal, right = np.empty((N_PARAMETERS, N_PARAMETERS)), np.empty(N_PARAMETERS)
-    is_settled, n, squares = False, 0, 0.0
-    for number in range(_MOST_STEPS):
-        normal[:], right[:] = 0.0, 0.0
-        n, squares = 0, 0.0
-        for row in range(-window, window + 1):
-            for column in range(-window, window + 1):
-                dx, dy = column - expected[0], row - expected[1]
-                u = expected[2] * dx + expected[3] * dy
-                v = expected[3] * dx + expected[4] * dy
-                if u * u + v * v > reach * reach:
-                    continue
-                left = picture[y0 + row, x0 + column] - predict(column, row, p, slopes)
-                n += 1
-                squares += left * left
-                add_pixel(left, slopes, normal, right)
-        if n <= 2 * N_PARAMETERS:
+    for number in range(MOST_STEPS):
+        normal[:], right[:], squares = 0.0, 0.0, 0.0
+        for k in range(n):
+            x, y = pixels[k, 0], pixels[k, 1]
+            residual = picture[y, x] - predict(x - x0, y - y0, p, slopes)
+            squares += residual * residual
+            add_pixel(residual, slopes, normal, right)
+        rests = has_settled(p, normal, right, _N_SHAPE, number)
+        off = max(abs(p[0] - expected[0]), abs(p[1] - expected[1]))
+        if not off < radius_px:
             return
-        step = solve_step(normal, right, 6, number == 0)
-        p += step
-        p[5] = max(p[5], _LEAST_BLUR_PX)
-        if not (abs(p[0] - expected[0]) < radius_px and abs(p[1] - expected[1]) < radius_px):
+        if rests:
+            shift = horizon[0] * x0 + horizon[1] * y0 + horizon[2]
+            u, v = pole_of_horizon(p, np.array([horizon[0], horizon[1], shift]))
+            tell(x0 + u, y0 + v, p, _N_SHAPE, squares / (n - N_PARAMETERS), normal, told)
             return
-        if number > 1 and abs(step[0]) < _SETTLED_PX and abs(step[1]) < _SETTLED_PX:
-            is_settled = True
-            break
-    if not is_settled:
-        return
-    variance = squares / (n - N_PARAMETERS)
-    covariance = np.linalg.inv(normal)
-    moved = np.array([horizon[0], horizon[1], horizon[0] * x0 + horizon[1] * y0 + horizon[2]])
-    x, y = pole_of_horizon(p, moved)
-    told[0], told[1] = x0 + x, y0 + y
-    told[2] = math.sqrt(max(0.5 * variance * (covariance[0, 0] + covariance[1, 1]), 0.0))
-    told[3] = p[5]
-    told[4] = 2.0 * abs(p[6]) / math.sqrt(variance + 1e-12)
 
 
 @njit(cache=True, nogil=True)

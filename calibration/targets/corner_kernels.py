@@ -13,14 +13,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from calibration.targets.mark_kernels import add_pixel, edge, solve_step
+from calibration.targets.mark_kernels import (
+    FIRST_BLUR_PX,
+    MOST_STEPS,
+    add_pixel,
+    edge,
+    has_settled,
+    tell,
+)
 
-N_PARAMETERS = 9
-N_TOLD = 5
-_MOST_STEPS = 25
-_SETTLED_PX = 1e-4
-_LEAST_BLUR_PX = 0.15
-_FIRST_BLUR_PX = 1.2
+N_PARAMETERS, _N_SHAPE = 9, 5
 
 
 @njit(cache=True, nogil=True)
@@ -72,6 +74,31 @@ def is_clear(
 
 
 @njit(cache=True, nogil=True)
+def clear_pixels(
+    corner_px: NDArray[np.float64],
+    board_from_px: NDArray[np.float64],
+    limits: tuple[float, float, float],
+) -> NDArray[np.int64]:
+    """(n, 2) columns and rows of the pixels around a corner that show nothing but its squares.
+
+    Args:
+        corner_px: (2,) where it is expected.
+        board_from_px: (2, 2) linear map to units of the board.
+        limits: as `is_clear` takes them.
+    """
+    radius = int(limits[0])
+    x0, y0 = round(corner_px[0]), round(corner_px[1])
+    pixels = np.empty(((2 * radius + 1) ** 2, 2), dtype=np.int64)
+    n = 0
+    for y in range(y0 - radius, y0 + radius + 1):
+        for x in range(x0 - radius, x0 + radius + 1):
+            if is_clear(x - corner_px[0], y - corner_px[1], board_from_px, limits):
+                pixels[n, 0], pixels[n, 1] = x, y
+                n += 1
+    return pixels[:n]
+
+
+@njit(cache=True, nogil=True)
 def fit_corner(
     picture: NDArray[np.uint8],
     corner_px: NDArray[np.float64],
@@ -86,8 +113,7 @@ def fit_corner(
         corner_px: (2,) where it is expected, within about 2 px.
         px_from_board: (2, 2) linear map from the board around it; its columns are the edges.
         limits: as `is_clear` takes them.
-        told: (5,) written: x, y, standard error of one coordinate px, blur px, and contrast (step
-            between black and white over the rms of what is left). NaN when the fit fails.
+        told: (5,) written as `tell` does; NaN when the fit fails.
     """
     told[:] = np.nan
     radius = int(limits[0])
@@ -95,46 +121,32 @@ def fit_corner(
     height, width = picture.shape
     if x0 < radius or y0 < radius or x0 + radius >= width or y0 + radius >= height:
         return
-    board_from_px = np.linalg.inv(px_from_board)
-    p = np.zeros(N_PARAMETERS)
+    pixels = clear_pixels(corner_px, np.linalg.inv(px_from_board), limits)
+    n = len(pixels)
+    if n <= 2 * N_PARAMETERS:
+        return
+    # From the corner's own pixel: the gradient's origin is not far from what it turns about.
+    p, slopes = np.zeros(N_PARAMETERS), np.empty(N_PARAMETERS)
     p[0], p[1] = corner_px[0] - x0, corner_px[1] - y0
     p[2] = math.atan2(px_from_board[1, 0], px_from_board[0, 0])
     p[3] = math.atan2(px_from_board[1, 1], px_from_board[0, 1])
-    p[4], p[5] = _FIRST_BLUR_PX, 1.0
-    first = p[:2].copy()
-    slopes = np.empty(N_PARAMETERS)
+    p[4], p[5] = FIRST_BLUR_PX, 1.0
+    expected = p.copy()
     normal, right = np.empty((N_PARAMETERS, N_PARAMETERS)), np.empty(N_PARAMETERS)
-    is_settled = False
-    n, squares = 0, 0.0
-    for number in range(_MOST_STEPS):
-        normal[:], right[:] = 0.0, 0.0
-        n, squares = 0, 0.0
-        for row in range(-radius, radius + 1):
-            for column in range(-radius, radius + 1):
-                if not is_clear(column - first[0], row - first[1], board_from_px, limits):
-                    continue
-                left = picture[y0 + row, x0 + column] - predict(column, row, p, slopes)
-                n += 1
-                squares += left * left
-                add_pixel(left, slopes, normal, right)
-        if n <= 2 * N_PARAMETERS:
+    for number in range(MOST_STEPS):
+        normal[:], right[:], squares = 0.0, 0.0, 0.0
+        for k in range(n):
+            x, y = pixels[k, 0], pixels[k, 1]
+            residual = picture[y, x] - predict(x - x0, y - y0, p, slopes)
+            squares += residual * residual
+            add_pixel(residual, slopes, normal, right)
+        rests = has_settled(p, normal, right, _N_SHAPE, number)
+        off = max(abs(p[0] - expected[0]), abs(p[1] - expected[1]))
+        if not off < limits[0]:
             return
-        step = solve_step(normal, right, 5, number == 0)
-        p += step
-        p[4] = max(p[4], _LEAST_BLUR_PX)
-        if not (abs(p[0] - first[0]) < limits[0] and abs(p[1] - first[1]) < limits[0]):
+        if rests:
+            tell(x0 + p[0], y0 + p[1], p, _N_SHAPE, squares / (n - N_PARAMETERS), normal, told)
             return
-        if number > 1 and abs(step[0]) < _SETTLED_PX and abs(step[1]) < _SETTLED_PX:
-            is_settled = True
-            break
-    if not is_settled:
-        return
-    variance = squares / (n - N_PARAMETERS)
-    covariance = np.linalg.inv(normal)
-    told[0], told[1] = x0 + p[0], y0 + p[1]
-    told[2] = math.sqrt(max(0.5 * variance * (covariance[0, 0] + covariance[1, 1]), 0.0))
-    told[3] = p[4]
-    told[4] = 2.0 * abs(p[5]) / math.sqrt(variance + 1e-12)
 
 
 @njit(cache=True, nogil=True)

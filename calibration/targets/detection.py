@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from calibration.targets.boards import Board
 from calibration.targets.circle_kernels import fit_circles
-from calibration.targets.corner_kernels import N_TOLD, fit_corners
+from calibration.targets.corner_kernels import fit_corners
+from calibration.targets.mark_kernels import N_TOLD
 from navapp.geometry.transform import FloatArray
 
 # Edges are straight over so much of a square, and lenses bend no line within so many pixels.

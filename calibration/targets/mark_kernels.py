@@ -1,4 +1,8 @@
-"""What the fits of corners and of discs share: a blurred step, and Gauss-Newton's step."""
+"""What the fits of corners and of discs share: a blurred step, and Gauss-Newton's steps.
+
+Parameters are the mark's place x and y, its shape, the blur last of it; then amplitude, mean and
+the gradient along x and y: `n_shape` of them come before the amplitude.
+"""
 
 import math
 
@@ -6,6 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+# Of every mark is told: x, y, standard error of one coordinate px, blur px, and contrast (step
+# between black and white over the rms of what is left).
+N_TOLD = 5
+MOST_STEPS = 30
+FIRST_BLUR_PX, _LEAST_BLUR_PX = 1.2, 0.15
+_SETTLED_PX = 1e-4
 _ROOT_2 = math.sqrt(2.0)
 _ROOT_2_OVER_PI = math.sqrt(2.0 / math.pi)
 
@@ -19,14 +29,14 @@ def edge(distance_px: float, blur_px: float) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True)
 def add_pixel(
-    left: float,
+    residual: float,
     slopes: NDArray[np.float64],
     normal: NDArray[np.float64],
     right: NDArray[np.float64],
 ) -> None:
     """Add one residual to the lower half of the normal equations."""
     for i in range(len(slopes)):
-        right[i] += slopes[i] * left
+        right[i] += slopes[i] * residual
         for j in range(i + 1):
             normal[i, j] += slopes[i] * slopes[j]
 
@@ -47,3 +57,55 @@ def solve_step(
     if is_first:
         step[:n_shape] = 0.0
     return step
+
+
+@njit(cache=True, nogil=True)
+def has_settled(
+    p: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    right: NDArray[np.float64],
+    n_shape: int,
+    number: int,
+) -> bool:
+    """Take a step; whether the mark rests.
+
+    Args:
+        p: parameters, in place.
+        normal: (n, n) lower half of the normal equations, in place.
+        right: (n,) their right side.
+        n_shape: parameters before the amplitude.
+        number: of the step, from 0.
+    """
+    step = solve_step(normal, right, n_shape, number == 0)
+    p += step
+    p[n_shape - 1] = max(p[n_shape - 1], _LEAST_BLUR_PX)
+    rests: bool = number > 1 and abs(step[0]) < _SETTLED_PX and abs(step[1]) < _SETTLED_PX
+    return rests
+
+
+@njit(cache=True, nogil=True)
+def tell(
+    x: float,
+    y: float,
+    p: NDArray[np.float64],
+    n_shape: int,
+    variance: float,
+    normal: NDArray[np.float64],
+    told: NDArray[np.float64],
+) -> None:
+    """Write what is told of a mark.
+
+    Args:
+        x: of the mark, px.
+        y: of the mark, px.
+        p: parameters.
+        n_shape: of them, before the amplitude.
+        variance: of what is left of a pixel.
+        normal: (n, n) normal equations.
+        told: (5,) written.
+    """
+    covariance = np.linalg.inv(normal)
+    told[0], told[1] = x, y
+    told[2] = math.sqrt(max(0.5 * variance * (covariance[0, 0] + covariance[1, 1]), 0.0))
+    told[3] = p[n_shape - 1]
+    told[4] = 2.0 * abs(p[n_shape]) / math.sqrt(variance + 1e-12)
