@@ -90,8 +90,7 @@ def uncertainty(found: Calibration, depth_mm: float) -> str:
     y = (np.arange(_MAP_ROWS) + 0.5) / _MAP_ROWS * model.height
     u, v = np.meshgrid(x, y)
     points_mm = found.rig.left.rays(np.column_stack([u.ravel(), v.ravel()])) * depth_mm
-    covariance = found.solved.covariance[: model.n_rig, : model.n_rig]
-    told = bounds_mm(model, shared, covariance, points_mm)
+    told = bounds_mm(model, shared, found.solved.rig_covariance, points_mm)
     pixels = found.rig.right.project(found.rig.right_from_left.apply(points_mm))
     is_seen = ((pixels >= 0.0) & (pixels < (model.width, model.height))).all(axis=1)
     told = np.where(is_seen, told, np.nan).reshape(u.shape)

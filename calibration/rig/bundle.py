@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from calibration.rig.equilibration import equilibrated, unit_sizes
 from calibration.rig.parameters import RigModel, lens, placement, shape_mm
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
@@ -55,11 +56,15 @@ class Bundle:
     @property
     def covariance(self) -> FloatArray:
         """(n_shared, n_shared) of the shared numbers."""
-        size = 1.0 / np.sqrt(np.maximum(np.diag(self.normal), 1e-300))
-        scaled = self.normal * size[:, None] * size[None, :]
+        sizes = unit_sizes(self.normal)
+        scaled = equilibrated(self.normal, sizes)
         inverse = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True)
-        covariance: FloatArray = inverse * size[:, None] * size[None, :] * self.scale**2
-        return covariance
+        return equilibrated(inverse, sizes) * self.scale**2
+
+    @property
+    def rig_covariance(self) -> FloatArray:
+        """(n_rig, n_rig) of the rig's numbers, without the board's."""
+        return self.covariance[: self.model.n_rig, : self.model.n_rig]
 
     @property
     def rms_px(self) -> float:
@@ -286,8 +291,8 @@ class _Linearised:
 
 def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
     """Solution of a symmetric system whose numbers have very different units."""
-    size = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    scaled = normal * size[:, None] * size[None, :]
+    sizes = unit_sizes(normal)
+    scaled = equilibrated(normal, sizes)
     scaled[np.diag_indices_from(scaled)] += _RIDGE
-    solution: FloatArray = size * np.linalg.solve(scaled, size * right)
+    solution: FloatArray = sizes * np.linalg.solve(scaled, sizes * right)
     return solution

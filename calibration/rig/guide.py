@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 
 from calibration.rig.bundle import Bundle, projected
+from calibration.rig.equilibration import equilibrated, unit_sizes
 from calibration.rig.parameters import RigModel
 from calibration.rig.start import matrix_of, vector_of
 from calibration.rig.uncertainty import triangulation_slopes, working_points_mm
@@ -49,7 +50,7 @@ def wanted_view(
     if len(points_mm) == 0:
         return None
     slopes = triangulation_slopes(model, shared, points_mm).reshape(-1, model.n_rig)
-    size = 1.0 / np.sqrt(np.maximum(np.diag(solved.normal), 1e-300))
+    sizes = unit_sizes(solved.normal)
     normal = solved.normal / max(solved.scale, 1e-6) ** 2
     best: tuple[float, FloatArray] | None = None
     for pose in candidates(board, model, shared, depth_mm):
@@ -58,9 +59,9 @@ def wanted_view(
         told = information(board, pose, model, shared, sigma_px)
         if told is None:
             continue
-        scaled = (normal + told) * size[:, None] * size[None, :]
+        scaled = equilibrated(normal + told, sizes)
         scaled[np.diag_indices_from(scaled)] += 1e-14 * np.trace(scaled)
-        covariance = np.linalg.inv(scaled) * size[:, None] * size[None, :]
+        covariance = equilibrated(np.linalg.inv(scaled), sizes)
         cost = float(np.einsum("ij,jk,ik->", slopes, covariance, slopes))
         if best is None or cost < best[0]:
             best = (cost, pose)

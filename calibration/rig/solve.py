@@ -207,7 +207,7 @@ def _bounds(solved: Bundle, held_out: HeldOut, points_mm: FloatArray) -> FloatAr
     bends, pictures in motion), rigs of different views differ by more: the jackknife sees it.
     """
     model = solved.model
-    covariance = solved.covariance[: model.n_rig, : model.n_rig]
+    covariance = solved.rig_covariance
     formal = bounds_mm(model, solved.shared, covariance, points_mm)
     slopes = triangulation_slopes(model, solved.shared, points_mm)
     off = held_out.rigs[:, : model.n_rig] - held_out.rigs[:, : model.n_rig].mean(axis=0)

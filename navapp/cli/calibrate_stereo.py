@@ -153,7 +153,7 @@ def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> 
             "nearest_mark_mm": found.covered.depth_mm[0],
             "farthest_mark_mm": found.covered.depth_mm[1],
         },
-        covariance=found.solved.covariance[: found.solved.model.n_rig, : found.solved.model.n_rig],
+        covariance=found.solved.rig_covariance,
     )
     if is_unit(found.board):
         quality = replace(quality, length_unit="square")
@@ -176,7 +176,7 @@ def content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
     """The result for programs."""
     quality = rig.quality
     solved = found.solved
-    sigmas = np.sqrt(np.diag(solved.covariance)[: solved.model.n_rig])
+    sigmas = np.sqrt(np.diag(solved.rig_covariance))
     ratios = found.length_ratios
     return {
         "accepted": quality is not None and quality.is_accepted,

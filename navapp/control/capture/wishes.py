@@ -149,8 +149,7 @@ def volume_bounds_mm(solved: Bundle, depth_mm: tuple[float, float]) -> FloatArra
     points_mm = working_points_mm(model, solved.shared, depth_mm)
     if len(points_mm) == 0:
         return np.empty(0)
-    covariance = solved.covariance[: model.n_rig, : model.n_rig]
-    return bounds_mm(model, solved.shared, covariance, points_mm)
+    return bounds_mm(model, solved.shared, solved.rig_covariance, points_mm)
 
 
 def noise_px(solved: Bundle) -> float:
