@@ -46,9 +46,9 @@ class Look:
 
 def look_at(frame: StereoFrame, board: Board) -> Look:
     """Find the board in both pictures, side by side."""
-    right = beside(lambda: find_board(luma(frame.right), board))
-    left = find_board(luma(frame.left), board)
-    return Look(frame, left, right.result())
+    with beside(lambda: find_board(luma(frame.right), board)) as right:
+        left = find_board(luma(frame.left), board)
+        return Look(frame, left, right.result())
 
 
 class Shutter:

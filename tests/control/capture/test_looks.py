@@ -1,10 +1,13 @@
 from dataclasses import replace
+from threading import Event
+from time import sleep
 
 import numpy as np
 import pytest
 
 from drivers.frames import StereoFrame
-from navapp.control.capture.looks import Look, Shutter, moved_px
+from navapp.control.capture import looks
+from navapp.control.capture.looks import Look, Shutter, look_at, moved_px
 from navapp.control.capture.wishes import starting_view
 from tests.calibration.marks import BOARD, drawn_rig, seen_pair
 
@@ -25,6 +28,24 @@ def look(number: int, shift_px: float = 0.0, blur_px: float = 0.6, noise_px: flo
 
 def unmet(shutter: Shutter, one: Look, kept=()) -> list[str]:
     return [check.name for check in shutter.checks(one, list(kept)) if not check.is_met]
+
+
+def test_an_error_in_the_left_picture_leaves_no_work_on_the_right_one(monkeypatch):
+    has_begun, has_ended = Event(), Event()
+
+    def finder(picture, board):
+        if picture[0, 0]:
+            has_begun.set()
+            sleep(0.2)
+            has_ended.set()
+            return None
+        assert has_begun.wait(10.0)
+        raise ValueError("left")
+
+    monkeypatch.setattr(looks, "find_board", finder)
+    with pytest.raises(ValueError, match="left"):
+        look_at(StereoFrame(BLACK, BLACK + 255, 0, 0, 0, 0, "x"), BOARD)
+    assert has_ended.is_set()
 
 
 def test_a_sharp_still_new_view_is_good():
