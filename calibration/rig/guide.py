@@ -11,7 +11,12 @@ from calibration.rig.parameters import RigModel
 from calibration.rig.start import matrix_of, vector_of
 from calibration.rig.uncertainty import triangulation_slopes, working_points_mm
 from calibration.targets.boards import Board
-from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from navapp.geometry.transform import (
+    FloatArray,
+    RigidTransform,
+    angle_between_rad,
+    rotation_from_vector,
+)
 
 # Where, how far and how turned a view may be asked for.
 _PLACES = (-0.55, 0.0, 0.55)
@@ -54,7 +59,8 @@ def wanted_view(
     normal = solved.normal / max(solved.scale, 1e-6) ** 2
     best: tuple[float, FloatArray] | None = None
     for pose in candidates(board, model, shared, depth_mm):
-        if any(_is_same(rotation_from_vector(pose[:3]), turn) for turn in avoid):
+        rotation = matrix_of(pose)[:3, :3]
+        if any(angle_between_rad(rotation, turn) < _SAME_RAD for turn in avoid):
             continue
         told = information(board, pose, model, shared, sigma_px)
         if told is None:
@@ -68,10 +74,6 @@ def wanted_view(
     if best is None:
         return None
     return RigidTransform("left", "board", matrix_of(best[1]))
-
-
-def _is_same(a: FloatArray, b: FloatArray) -> bool:
-    return bool(0.5 * (np.trace(a.T @ b) - 1.0) > np.cos(_SAME_RAD))
 
 
 def information(

@@ -13,7 +13,7 @@ from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
 from calibration.targets.pairs import SeenPair
 from navapp.geometry.camera import Camera
-from navapp.geometry.transform import FloatArray
+from navapp.geometry.transform import FloatArray, angle_between_rad
 
 # Blur against the usual of the same camera; residuals against the usual of all views.
 _TOO_BLURRED, _TOO_FAR = 1.8, 3.0
@@ -143,7 +143,6 @@ def _rms(residual_px: FloatArray) -> float:
 
 
 def _is_same(a: FloatArray, b: FloatArray) -> bool:
-    between = np.linalg.inv(a) @ b
-    angle = np.arccos(np.clip(0.5 * (np.trace(between[:3, :3]) - 1.0), -1.0, 1.0))
-    apart = np.linalg.norm(a[:3, 3] - b[:3, 3])
-    return bool(angle < _SAME_RAD and apart < _SAME_SHARE * np.linalg.norm(a[:3, 3]))
+    turn_rad = angle_between_rad(a[:3, :3], b[:3, :3])
+    apart_mm = np.linalg.norm(a[:3, 3] - b[:3, 3])
+    return bool(turn_rad < _SAME_RAD and apart_mm < _SAME_SHARE * np.linalg.norm(a[:3, 3]))

@@ -182,9 +182,14 @@ def vector_from_rotation(rotation: ArrayLike) -> FloatArray:
     return half_turn if half_turn @ axis >= 0.0 else -half_turn
 
 
+def angle_between_rad(a: FloatArray, b: FloatArray) -> float:
+    """Angle in rad, 0 to pi, of the turn from one (3, 3) rotation to another."""
+    return float(np.linalg.norm(vector_from_rotation(a.T @ b)))
+
+
 def rotation_angle_deg(a: RigidTransform, b: RigidTransform) -> float:
     """Angle in deg between the rotations of two poses of the same body."""
-    return float(np.degrees(np.linalg.norm(vector_from_rotation(a.rotation.T @ b.rotation))))
+    return float(np.degrees(angle_between_rad(a.rotation, b.rotation)))
 
 
 def skew(vector: ArrayLike) -> FloatArray:

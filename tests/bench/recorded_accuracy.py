@@ -24,7 +24,7 @@ import numpy as np
 from navapp.cli.main import run
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.ply import read_ply
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.values import BoneModel
 
 ORDERS = ("forward", "pingpong", "each")
@@ -123,8 +123,7 @@ def _scored(
             pose = RigidTransform("left", bone_name, frame["camera_from_model"])
             true = truth[frame["index"]]
             tre_mm = mean_tre_mm(pose, true, bone, np.empty((0, 3)))
-            cosine = 0.5 * (np.trace(pose.rotation.T @ true.rotation) - 1.0)
-            turn_deg = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+            turn_deg = rotation_angle_deg(pose, true)
         bound_mm = frame["predicted_tre_mm"]
         yield Scored(
             frame["index"], frame["status"], tuple(frame["reasons"]), tre_mm, turn_deg,

@@ -8,7 +8,7 @@ import numpy as np
 from calibration.rig.bundle import Bundle, solve_bundle
 from calibration.rig.guide import wanted_view
 from calibration.rig.parameters import RigModel, packed, unpacked
-from calibration.rig.start import pose_of, start_poses, start_rig
+from calibration.rig.start import matrix_of, pose_of, start_poses, start_rig
 from calibration.rig.uncertainty import bounds_mm, working_points_mm
 from calibration.rig.views import DroppedPair, misfits
 from calibration.targets.boards import Board
@@ -183,4 +183,4 @@ def measured_pose(board: Board, seen: SeenBoard, camera: Camera) -> RigidTransfo
     vector = pose_of(board, seen, camera)
     if vector is None:
         return None
-    return RigidTransform.from_parts("left", "board", rotation_from_vector(vector[:3]), vector[3:])
+    return RigidTransform("left", "board", matrix_of(vector))
