@@ -38,7 +38,7 @@ def device_line(view: View, device: DeviceLine, width: int) -> Content:
     level = health_level(device.health)
     word = device.health.value
     shown = word.upper() if device.health in _TROUBLES else word
-    head = f"{view.mark(level)} {cut(device.kind, 10, view.symbols):<10} {shown:<8}"
+    head = f"{level.mark(view.symbols)} {cut(device.kind, 10, view.symbols):<10} {shown:<8}"
     more = cut(f"{device.name} {device.detail}", max(width - len(head), 0), view.symbols)
     return Content.assemble((head, level.value), (more, "$text-muted"))
 
@@ -50,5 +50,5 @@ def _in_pairs(view: View, devices: list[DeviceLine], width: int) -> list[Content
         level = health_level(device.health)
         name = cut(device.kind, half - 3, view.symbols).ljust(half - 2)
         style = "$foreground" if device.health is DeviceHealth.OK else "$text-muted"
-        cells.append(Content.assemble((f"{view.mark(level)} ", level.value), (name, style)))
+        cells.append(Content.assemble((f"{level.mark(view.symbols)} ", level.value), (name, style)))
     return [Content("").join(cells[i : i + 2]) for i in range(0, len(cells), 2)]

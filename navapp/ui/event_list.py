@@ -26,7 +26,7 @@ def event_line(view: View, event: Event, width: int) -> Content:
     """Time since the session's start, symbol, word and text."""
     level = event_level(event.level)
     is_quiet = level is Level.QUIET
-    mark = " " if is_quiet else view.mark(level)
+    mark = " " if is_quiet else level.mark(view.symbols)
     style = "$foreground" if is_quiet else level.value
     head = f" {view.clock(event.time_ns):>6} "
     text = cut(f"{_WORDS[event.level]}{event.text}", max(width - len(head) - 3, 0), view.symbols)

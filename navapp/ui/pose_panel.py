@@ -52,7 +52,7 @@ def navigable_line(view: View, width: int) -> Content:
         if more > 0 and not view.is_silent and not view.snapshot.is_candidate
         else ""
     )
-    text = f" {view.mark(view.level)} NAVIGABLE  {word}"
+    text = f" {view.level.mark(view.symbols)} NAVIGABLE  {word}"
     return Content.styled(f"{text}{hint.rjust(width - len(text) - 1)} "[:width], view.level.band)
 
 
@@ -91,7 +91,7 @@ def _candidate(view: View, width: int) -> list[Content]:
     snapshot, verdict = view.snapshot, view.snapshot.verdict
     status = Status.LOST if verdict is None else verdict.status
     level = _STATUS_LEVELS[status]
-    lines = [Content.styled(f"{view.mark(level)} judged {status.value}", level.value)]
+    lines = [Content.styled(f"{level.mark(view.symbols)} judged {status.value}", level.value)]
     figures = [_figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"), *_fit(snapshot)]
     accept = ("a", "bold $foreground"), " accept   "
     asks = [

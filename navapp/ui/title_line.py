@@ -54,5 +54,5 @@ def _state(view: View) -> Content:
     stage = snapshot.stage
     parts += [(f"{stage.number} {stage.name.upper()}", "bold $foreground"), "  "]
     level = view.state_level
-    parts.append((f"{view.mark(level)} {view.state_word}", level.value))
+    parts.append((f"{level.mark(view.symbols)} {view.state_word}", level.value))
     return Content.assemble(*parts)

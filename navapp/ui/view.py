@@ -23,6 +23,15 @@ class Level(Enum):
         """Style of a filled line."""
         return _BANDS[self]
 
+    def mark(self, symbols: Symbols) -> str:
+        """Its symbol."""
+        return {
+            Level.OK: symbols.ok,
+            Level.ATTENTION: symbols.attention,
+            Level.BAD: symbols.bad,
+            Level.QUIET: symbols.absent,
+        }[self]
+
 
 _BANDS = {
     Level.OK: "bold $background on $success",
@@ -138,16 +147,6 @@ class View:
         if self.snapshot.is_candidate:
             return f"left view {dot} CANDIDATE, not accepted"
         return "left view" if self.is_navigable else f"left view {dot} NO GUIDES"
-
-    def mark(self, level: Level) -> str:
-        """The symbol of a level."""
-        symbols = self.symbols
-        return {
-            Level.OK: symbols.ok,
-            Level.ATTENTION: symbols.attention,
-            Level.BAD: symbols.bad,
-            Level.QUIET: symbols.absent,
-        }[level]
 
     def clock(self, time_ns: int) -> str:
         """Minutes and seconds since the session's start, `mm:ss`."""

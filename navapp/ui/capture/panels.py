@@ -33,16 +33,6 @@ class CaptureView:
             return "NOT ACCEPTED", Level.BAD
         return ("ENOUGH", Level.OK) if snapshot.is_enough else ("CAPTURING", Level.ATTENTION)
 
-    def mark(self, level: Level) -> str:
-        """The symbol of a level."""
-        symbols = self.symbols
-        return {
-            Level.OK: symbols.ok,
-            Level.ATTENTION: symbols.attention,
-            Level.BAD: symbols.bad,
-            Level.QUIET: symbols.absent,
-        }[level]
-
 
 class CaptureTitle(Lines[CaptureView]):
     """Camera at the left, pairs and state at the right."""
@@ -53,7 +43,7 @@ class CaptureTitle(Lines[CaptureView]):
         word, level = view.state
         right = Content.assemble(
             (f"{snapshot.n_kept} pairs", "bold $foreground"), "  ",
-            (f"{view.mark(level)} {word}", level.value), " ",
+            (f"{level.mark(view.symbols)} {word}", level.value), " ",
         )  # fmt: skip
         is_simulated = snapshot.camera.startswith("sim:")
         left = Content.assemble(
@@ -109,7 +99,11 @@ class CheckLine(Lines[CaptureView]):
             level = Level.OK if check.is_met else Level.ATTENTION
             name = check.name if check.is_met else f"not {check.name}"
             told = "" if check.name in ("seen", "new") and check.is_met else f" {check.text}"
-            parts += ["  ", (f"{view.mark(level)} {name}", level.value), (told, "$text-muted")]
+            parts += [
+                "  ",
+                (f"{level.mark(view.symbols)} {name}", level.value),
+                (told, "$text-muted"),
+            ]
         return [Content.assemble(*parts).truncate(width)]
 
 
