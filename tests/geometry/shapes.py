@@ -54,6 +54,17 @@ def camera(distortion=(), width: int = 640, height: int = 480, focal_px: float =
     return Camera(matrix, np.asarray(distortion, dtype=float), width, height)
 
 
+def assert_same_rig(after: StereoRig, before: StereoRig) -> None:
+    """Asserts that a rig came back from a file: cameras to the bit, place to its last digits."""
+    np.testing.assert_allclose(
+        after.right_from_left.matrix, before.right_from_left.matrix, rtol=0, atol=1e-9
+    )
+    for a, b in ((after.left, before.left), (after.right, before.right)):
+        np.testing.assert_array_equal(a.matrix, b.matrix)
+        np.testing.assert_array_equal(a.distortion, b.distortion)
+    assert (after.width, after.height) == (before.width, before.height)
+
+
 def toed_in_rig() -> StereoRig:
     """Distorted, turned towards each other, with different intrinsics."""
     left = camera((-0.21, 0.09, 8e-4, -6e-4, 0.01))

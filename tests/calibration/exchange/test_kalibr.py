@@ -10,7 +10,7 @@ import yaml
 from calibration.exchange.kalibr import read_kalibr, write_kalibr
 from navapp.errors import RigError
 from navapp.geometry.rig import StereoRig
-from tests.geometry.shapes import STRONG, camera, toed_in_rig
+from tests.geometry.shapes import STRONG, assert_same_rig, camera, toed_in_rig
 
 FOREIGN = """\
 cam0:
@@ -48,14 +48,7 @@ def plain_rig() -> StereoRig:
 def test_a_chain_comes_back(tmp_path: Path) -> None:
     rig = plain_rig()
     write_kalibr(tmp_path / "camchain.yaml", rig)
-    again = read_kalibr(tmp_path / "camchain.yaml")
-    np.testing.assert_allclose(
-        again.right_from_left.matrix, rig.right_from_left.matrix, rtol=0, atol=1e-9
-    )
-    for before, after in ((rig.left, again.left), (rig.right, again.right)):
-        np.testing.assert_array_equal(after.matrix, before.matrix)
-        np.testing.assert_array_equal(after.distortion, before.distortion)
-    assert (again.width, again.height) == (640, 480)
+    assert_same_rig(read_kalibr(tmp_path / "camchain.yaml"), rig)
 
 
 def test_what_is_written_is_in_metres(tmp_path: Path) -> None:

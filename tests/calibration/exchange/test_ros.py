@@ -11,7 +11,7 @@ from calibration.exchange.ros import read_ros, write_ros
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import RigQuality
-from tests.geometry.shapes import STRONG, camera, toed_in_rig
+from tests.geometry.shapes import STRONG, assert_same_rig, camera, toed_in_rig
 
 # As ROS' camera_calibration prints it: six decimals, metres, 60 mm of baseline, no toe-in.
 FOREIGN = """\
@@ -54,14 +54,7 @@ def foreign(folder: Path, left: str = FOREIGN, right: str = FOREIGN) -> Path:
 def test_a_pair_comes_back(tmp_path: Path) -> None:
     rig = toed_in_rig()
     write_ros(tmp_path / "pair", rig)
-    again = read_ros(tmp_path / "pair")
-    np.testing.assert_allclose(
-        again.right_from_left.matrix, rig.right_from_left.matrix, rtol=0, atol=1e-9
-    )
-    for before, after in ((rig.left, again.left), (rig.right, again.right)):
-        np.testing.assert_array_equal(after.matrix, before.matrix)
-        np.testing.assert_array_equal(after.distortion, before.distortion)
-    assert (again.width, again.height) == (640, 480)
+    assert_same_rig(read_ros(tmp_path / "pair"), rig)
     assert sorted(path.name for path in (tmp_path / "pair").iterdir()) == [
         "left.yaml", "right.yaml",
     ]  # fmt: skip
