@@ -1,7 +1,8 @@
 """A room without pictures: black frames, and a line that answers what the test says."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
 from drivers.no_projector import NoProjector
 from navapp.control.controller import SessionController, SessionOptions
-from navapp.control.executors import Executor, InlineExecutor
+from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
 from navapp.control.results import FrameResult
 from navapp.control.session import SessionHooks
 from navapp.control.states import Accept, Command, Event, Register, Snapshot
@@ -255,6 +256,22 @@ def navigating(bench: Bench) -> Bench:
     bench.frames(1)
     assert bench.state == "navigating"
     return bench
+
+
+@contextmanager
+def hanging_registration(monkeypatch) -> Iterator[Bench]:
+    """A bench whose registration has begun on its worker and waits for the script's gate."""
+    bench = Bench(monkeypatch, executor=ThreadExecutor())
+    gate = bench.script.gate = threading.Event()
+    try:
+        bench.frames(1)
+        bench.do(Register())
+        bench.frames(1)
+        assert bench.script.started.wait(5.0)
+        yield bench
+    finally:
+        gate.set()
+        bench.controller.close()
 
 
 def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) -> None:

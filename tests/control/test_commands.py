@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from navapp.control.executors import ThreadExecutor
 from navapp.control.session import SessionHooks
 from navapp.control.states import (
     Accept,
@@ -17,7 +16,15 @@ from navapp.control.states import (
     Show,
 )
 from navapp.values import Reason
-from tests.control.fakes import LOST, Bench, a_pose, answer, navigating, wait_for
+from tests.control.fakes import (
+    LOST,
+    Bench,
+    a_pose,
+    answer,
+    hanging_registration,
+    navigating,
+    wait_for,
+)
 
 
 def test_lost_candidates_are_never_offered(bench: Bench) -> None:
@@ -80,15 +87,7 @@ def test_commands_out_of_place_are_refused_and_change_nothing(bench: Bench, comm
 
 
 def test_a_registration_can_be_cancelled_while_it_hangs(monkeypatch) -> None:
-    import threading
-
-    bench = Bench(monkeypatch, executor=ThreadExecutor())
-    bench.script.gate = threading.Event()
-    try:
-        bench.frames(1)
-        bench.do(Register())
-        bench.frames(1)
-        assert bench.script.started.wait(5.0)
+    with hanging_registration(monkeypatch) as bench:
         assert bench.do(Cancel()).state.value == "ready"
         assert bench.snapshot.progress is None
         bench.script.gate.set()
@@ -97,10 +96,6 @@ def test_a_registration_can_be_cancelled_while_it_hangs(monkeypatch) -> None:
         bench.script.gate = None
         bench.do(Register())
         wait_for(lambda: bench.frames(1).state.value == "review", "the second try")
-    finally:
-        if bench.script.gate is not None:
-            bench.script.gate.set()
-        bench.controller.close()
 
 
 def test_a_proposed_pose_is_judged_as_it_stands(bench: Bench) -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from navapp.control.executors import InlineExecutor, ThreadExecutor
+from navapp.control.executors import InlineExecutor
 from navapp.control.interlocks import navigable
 from navapp.control.recorder import RecordingStopped
 from navapp.control.session import SessionHooks
@@ -31,6 +31,7 @@ from tests.control.fakes import (
     a_plan,
     a_pose,
     answer,
+    hanging_registration,
     navigating,
     wait_for,
 )
@@ -129,15 +130,7 @@ def test_a_failed_registration_keeps_the_accepted_track(bench: Bench) -> None:
 
 
 def test_a_running_registration_does_not_stop_the_pictures(monkeypatch) -> None:
-    import threading
-
-    bench = Bench(monkeypatch, executor=ThreadExecutor())
-    bench.script.gate = threading.Event()
-    try:
-        bench.frames(1)
-        bench.do(Register())
-        bench.frames(1)
-        assert bench.script.started.wait(5.0)
+    with hanging_registration(monkeypatch) as bench:
         before = len(bench.results)
         snapshot = bench.frames(5)
         assert len(bench.results) == before + 5
@@ -147,9 +140,6 @@ def test_a_running_registration_does_not_stop_the_pictures(monkeypatch) -> None:
         bench.script.gate.set()
         wait_for(lambda: bench.frames(1).state.value == "review", "the candidate")
         assert bench.script.calls.count("register femur") == 1
-    finally:
-        bench.script.gate.set()
-        bench.controller.close()
 
 
 def test_a_worker_that_ends_between_two_frames_is_used_from_the_next_one(monkeypatch) -> None:
