@@ -15,9 +15,9 @@ from navapp.registration.multi_start import (
     tilted_starts,
 )
 from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
+from navapp.registration.pose_sampler import PoseSampler
 from navapp.registration.register import Outcome, Registration, register
 from navapp.registration.scene import Scene
-from navapp.registration.sliding import Sliding
 
 __all__ = [
     "BimccSettings",
@@ -26,10 +26,10 @@ __all__ = [
     "InitialSettings",
     "Landmarks",
     "Outcome",
+    "PoseSampler",
     "Registration",
     "RegistrationModel",
     "Scene",
-    "Sliding",
     "distinct",
     "estimate_at",
     "explained_share",

@@ -16,7 +16,7 @@ import numpy as np
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import DepthMap, RegistrationModel, Sliding
+from navapp.registration import DepthMap, PoseSampler, RegistrationModel
 from navapp.tracking.first_look import doubted
 from navapp.tracking.follower import Fit, Follower
 from navapp.tracking.locator import LocatorSettings
@@ -89,8 +89,8 @@ class BuriedBone:
         self._stepper = Follower(meter, model, one_step, settings.tracking)
 
     @cached_property
-    def _sliding(self) -> Sliding:
-        return Sliding(self._model)
+    def _sampler(self) -> PoseSampler:
+        return PoseSampler(self._model)
 
     def found(
         self,
@@ -108,7 +108,7 @@ class BuriedBone:
             on_progress: told the share done; may raise to cancel.
         """
         depth = DepthMap.of(self._meter.geometry, measured.disparity)
-        found = self._sliding.search(
+        found = self._sampler.search(
             depth, rough, _N_PLACES, lambda share: on_progress(_SEARCH_SHARE * share)
         )
         places = self._placed(pair, [one.scene_from_bone for one in found])
@@ -150,7 +150,7 @@ class BuriedBone:
             fit, _ = self._stepper.follow(pair, start, is_near=True)
             if fit is not None and np.isfinite(fit.estimate.covariance).all():
                 depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
-                score = self._sliding.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
+                score = self._sampler.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
                 places.append(Place(fit, score))
         return places
 

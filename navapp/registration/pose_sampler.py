@@ -1,4 +1,4 @@
-"""A bone that is partly buried: poses that slide along the surface, scored by what they show.
+"""A bone that is partly buried: poses are drawn, and scored on a map of measured depth.
 
 Tissue that lies on a bone continues its surface. A fit pairs with it as gladly as with the bone and
 slides away, even from the true pose. Two things tell the true one: more of the model lies on the
@@ -18,7 +18,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import Candidate, distinct
-from navapp.registration.sliding_kernels import SurfacePoints, score_poses
+from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
 
 # Always the same draws: the same pictures give the same pose.
 _SEED = 20
@@ -65,8 +65,8 @@ _CLIMBS = (
 )
 
 
-class Sliding:
-    """Looks for one bone in maps of depth; holds only what is constant."""
+class PoseSampler:
+    """Draws poses of one bone and scores them on maps of depth; holds only what is constant."""
 
     def __init__(self, model: RegistrationModel) -> None:
         """Put the model's points in an order in which the first n are spread evenly."""

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from navapp.geometry.zbuffer import projected_box, render_rectified
-from navapp.registration import DepthMap, Sliding, is_same_pose
+from navapp.registration import DepthMap, PoseSampler, is_same_pose
 from navapp.registration.initial_kernels import Optics
-from navapp.registration.sliding import spread_order
-from navapp.registration.sliding_kernels import SurfacePoints, score_poses
+from navapp.registration.pose_sampler import spread_order
+from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
 from navapp.values import DisparityMap, Origin
-from tests.reference import sliding_reference as reference
+from tests.reference import pose_sampler_reference as reference
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
 
 CENTRE_MM = femur().mesh.centroid_mm
 
 
 @cache
-def sliding() -> Sliding:
-    return Sliding(femur_for_registration())
+def sampler() -> PoseSampler:
+    return PoseSampler(femur_for_registration())
 
 
 def seen_map(noise_mm: float = 0.1) -> DisparityMap:
@@ -59,9 +59,9 @@ def test_scores_as_the_reference() -> None:
 def test_a_rough_pose_leads_to_the_true_one() -> None:
     depth = DepthMap.of(GEOMETRY, seen_map())
     rough = TRUE.moved((12.0, -9.0, 5.0, 0.12, -0.1, 0.08), TRUE.apply(CENTRE_MM))
-    best = sliding().search(depth, rough, 4)[0]
+    best = sampler().search(depth, rough, 4)[0]
     assert is_same_pose(best.scene_from_bone, TRUE, femur_for_registration().centre_mm)
-    assert best.score > sliding().score(depth, rough, 0.3, 3000) + 0.2
+    assert best.score > sampler().score(depth, rough, 0.3, 3000) + 0.2
 
 
 def test_what_is_seen_through_costs() -> None:
@@ -71,7 +71,7 @@ def test_what_is_seen_through_costs() -> None:
         TRUE.moved((*(shift_mm * ray), 0.0, 0.0, 0.0), np.zeros(3)) for shift_mm in (-20.0, 20.0)
     )
     true, before, behind = (
-        sliding().score(depth, pose, 0.3, 3000) for pose in (TRUE, nearer, further)
+        sampler().score(depth, pose, 0.3, 3000) for pose in (TRUE, nearer, further)
     )
     assert before < -0.5 < behind < 0.3 < true
 
@@ -102,5 +102,5 @@ def test_any_first_points_are_spread() -> None:
 
 def test_the_same_map_gives_the_same_bits() -> None:
     depth = DepthMap.of(GEOMETRY, seen_map())
-    first, second = (sliding().search(depth, TRUE, 1)[0].scene_from_bone for _ in range(2))
+    first, second = (sampler().search(depth, TRUE, 1)[0].scene_from_bone for _ in range(2))
     assert first.matrix.tobytes() == second.matrix.tobytes()
