@@ -17,10 +17,10 @@ import numpy as np
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import DepthMap, PoseSampler, RegistrationModel
+from navapp.tracking.correlated_residuals import shown_ratio2
 from navapp.tracking.first_look import doubted
 from navapp.tracking.follower import Fit, Follower
 from navapp.tracking.locator import LocatorSettings
-from navapp.tracking.smooth_misfit import shown_ratio2
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 from navapp.values import LineTimings
 

@@ -14,10 +14,10 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
 from navapp.tracking.contours import ContourMeter
+from navapp.tracking.correlated_residuals import with_correlated_residuals
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge, within_tolerance
 from navapp.tracking.pair_doubts import with_pair_doubts
-from navapp.tracking.smooth_misfit import with_smooth_misfit
 from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
@@ -72,7 +72,7 @@ class FitJudge:
             coarse_px = self.coarse_px(pair, fit, coarse)
             fit = self._contours.joined(pair, fit, coarse_px)
             if fit.measured.view is not None:
-                fit = replace(fit, estimate=with_smooth_misfit(fit.estimate))
+                fit = replace(fit, estimate=with_correlated_residuals(fit.estimate))
             view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
             verdict = self._judge.judge(
                 self._model, fit.estimate, found, goal, predicted, coarse_px, view

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking.smooth_misfit import is_misfit, shown_ratio2, with_smooth_misfit
+from navapp.tracking.correlated_residuals import is_misfit, shown_ratio2, with_correlated_residuals
 from navapp.values import PoseEstimate, Reason
 
 CLAIMED_MM, KERNEL_MM = 0.2, 0.24
@@ -26,20 +26,22 @@ def test_the_kernel_hides_nothing_of_the_residuals(ratio: float) -> None:
 
 def test_noise_alone_changes_nothing() -> None:
     quiet = estimate(0.55)
-    assert with_smooth_misfit(quiet).covariance == pytest.approx(quiet.covariance)
-    assert with_smooth_misfit(quiet).reasons == ()
+    assert with_correlated_residuals(quiet).covariance == pytest.approx(quiet.covariance)
+    assert with_correlated_residuals(quiet).reasons == ()
 
 
 def test_what_goes_together_over_40_px_counts_so_often() -> None:
     """A window of 11 px says it (40 / 11)^2 times, and each time the same."""
     loose = estimate(0.8)
     growth = 1.0 + (0.8**2 - 0.6**2) * (40.0 / 11.0) ** 2
-    assert np.trace(with_smooth_misfit(loose).covariance) == pytest.approx(6.0 * growth, rel=0.05)
+    assert np.trace(with_correlated_residuals(loose).covariance) == pytest.approx(
+        6.0 * growth, rel=0.05
+    )
     assert not is_misfit(loose)
 
 
 def test_more_in_common_than_noise_is_a_misfit() -> None:
-    doubted = with_smooth_misfit(estimate(0.95))
+    doubted = with_correlated_residuals(estimate(0.95))
     assert Reason.SURFACE_MISFIT in doubted.reasons
     saturated = replace(estimate(0.9), rms_mm=1.0)
     assert is_misfit(saturated)

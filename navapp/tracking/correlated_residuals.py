@@ -15,7 +15,7 @@ from navapp.values import PoseEstimate, Reason
 # Standard deviation of residuals over the one they claim: the right poses of simulated femurs,
 # which lie in the open, reach so much and no more (docs/accuracy.md).
 _NOISE_RATIO = 0.6
-# More smooth misfit than noise is no fit.
+# More correlated residuals than noise is no fit.
 _LARGEST_RATIO2 = 2.0 * _NOISE_RATIO**2
 
 
@@ -34,7 +34,7 @@ def is_misfit(estimate: PoseEstimate) -> bool:
     return shown_ratio2(estimate) > _LARGEST_RATIO2
 
 
-def with_smooth_misfit(estimate: PoseEstimate) -> PoseEstimate:
+def with_correlated_residuals(estimate: PoseEstimate) -> PoseEstimate:
     """An estimate on the model with what its residuals show beyond noise in its covariance.
 
     That part goes together over as many pixels as errors of a free measurement do, noise over a

@@ -1,6 +1,6 @@
 """What fits on the model leave beyond noise, printed as the table of docs/accuracy.md.
 
-usage: python -m tests.bench.smooth_misfit [--seeds N] [--first SEED]
+usage: python -m tests.bench.correlated_residuals [--seeds N] [--first SEED]
 
 One frame of each of N simulated knees, femur and tibia, fitted from next to the truth: how much
 residuals show of the noise that they claim, and the pose's error beside its bound, as the points
@@ -16,8 +16,8 @@ import numpy as np
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import Line
+from navapp.tracking.correlated_residuals import shown_ratio2, with_correlated_residuals
 from navapp.tracking.locator import NEAR_VIEW
-from navapp.tracking.smooth_misfit import shown_ratio2, with_smooth_misfit
 from navapp.values import BoneModel, Reason, predicted_tre_mm, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -75,7 +75,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             continue
         fit = line._fit_judge._contours.joined(pair, fit, line._fit_judge.coarse_px(pair, fit))
         targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
-        widened = with_smooth_misfit(fit.estimate)
+        widened = with_correlated_residuals(fit.estimate)
         bounds_mm = (
             predicted_tre_mm(one, line.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit.estimate, widened)
