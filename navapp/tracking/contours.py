@@ -64,7 +64,7 @@ class ContourMeter:
         self._model = model
         self._geometry = geometry
         found = ridge_edges(model.seen_mesh)
-        self._ridges = Ridges(
+        self.ridges = Ridges(
             found.vertices_mm, found.edges, found.faces, found.opposite, found.planes
         )
 
@@ -145,7 +145,7 @@ class ContourMeter:
         depth_mm: NDArray[np.float32],
         box: Box,
     ) -> Steps:
-        rim = find_rim(self._ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye)
+        rim = find_rim(self.ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye)
         rim = thin_rim(_only(rim, is_outline(rim, depth_mm, box.x, box.y)))
         offset_px = find_steps(picture, rim, _DARKER)
         is_found = np.isfinite(offset_px)

@@ -15,13 +15,12 @@ import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
-from navapp.tracking import Line
 from navapp.tracking.correlated_residuals import shown_ratio2, with_correlated_residuals
-from navapp.tracking.locator import NEAR_VIEW
 from navapp.values import BoneModel, Reason, predicted_tre_mm, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
+from tests.bench.line_parts import LineParts
 
 _BONES = ("femur", "tibia")
 _START_OFF_MM, _START_OFF_DEG, _STARTS = 0.5, 0.5, 3
@@ -65,19 +64,19 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
     left, right = (sensor.picture(world.render(eye, time_ns), eye, 0) for eye in ("left", "right"))
     mesh = world.anatomy.bones[name]
     bone = BoneModel(name, TriangleMesh(mesh.vertices_mm, mesh.faces), side)
-    line = Line(world.rig, bone)
-    true = line._rectified(world.left_from_body(name, time_ns))
-    pair, _ = line._rectified_pair(left, right, true, NEAR_VIEW)
+    parts = LineParts(world.rig, bone)
+    true = parts.rectified(world.left_from_body(name, time_ns))
+    pair = parts.pair(left, right, true)
     for _ in range(_STARTS):
         off = rng.normal(0.0, np.repeat([_START_OFF_MM, np.radians(_START_OFF_DEG)], 3))
-        fit = line.locator.locate(pair, true.moved(off, true.apply(line.centre_mm)))
+        fit = parts.locator.locate(pair, true.moved(off, true.apply(parts.centre_mm)))
         if fit is None or fit.measured.view is None:
             continue
-        fit = line._fit_judge._contours.joined(pair, fit, line._fit_judge.coarse_px(pair, fit))
+        fit = parts.with_outline(pair, fit)
         targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
         widened = with_correlated_residuals(fit.estimate)
         bounds_mm = (
-            predicted_tre_mm(one, line.centre_mm, targets[:: max(1, len(targets) // 200)])
+            predicted_tre_mm(one, parts.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit.estimate, widened)
         )
         error_mm = mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)

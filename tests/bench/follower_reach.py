@@ -12,10 +12,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from navapp.tracking import Line
 from navapp.tracking.follower import ON_MODEL, fitted, moved_surface_mm
 from navapp.values import BoneModel, Reason
 from tests.bench.bone_scenes import Sequence, disturbed, simulated_sequence
+from tests.bench.line_parts import LineParts
 
 _SHIFTS_MM = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 _SEQUENCES = ("opening", "drilling")
@@ -44,14 +44,14 @@ def rounds(
     sequence: Sequence, shift_mm: float, n_seeds: int
 ) -> Iterator[tuple[float, float, float]]:
     """Off before, share of the samples that answer, off after; infinite without a fit."""
-    line = Line(sequence.rig, BoneModel("femur", sequence.mesh))
-    model, meter = line.model, line._meter
-    radius_mm = np.linalg.norm(model.hull_mm - line.centre_mm, axis=1).mean()
+    parts = LineParts(sequence.rig, BoneModel("femur", sequence.mesh))
+    model, meter = parts.model, parts.meter
+    radius_mm = np.linalg.norm(model.hull_mm - parts.centre_mm, axis=1).mean()
     for scene in sequence.scenes:
         for seed in range(n_seeds):
             turn_deg = float(np.degrees(shift_mm / radius_mm))
-            start = disturbed(scene.pose, line.centre_mm, turn_deg, shift_mm, seed)
-            expected = meter.expected(scene.pair, start, line.settings.locator.tracking)
+            start = disturbed(scene.pose, parts.centre_mm, turn_deg, shift_mm, seed)
+            expected = meter.expected(scene.pair, start, parts.tracking)
             assert expected is not None
             measured = meter.sampled(expected)
             found = fitted(measured, model, start, ON_MODEL)

@@ -23,13 +23,13 @@ from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.blocks import near
-from navapp.tracking import Goal, Line
+from navapp.tracking import Goal
 from navapp.tracking.contour_kernels import missing_share, sample_across, strongest_edge
 from navapp.tracking.follower import Fit
-from navapp.tracking.locator import NEAR_VIEW
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
 from navapp.values import BoneModel, predicted_tre_mm, visible_vertices
 from tests.bench.first_registration import Case, simulated
+from tests.bench.line_parts import LineParts
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
 DARKER = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 1.01)
@@ -58,11 +58,11 @@ def main() -> int:
     shares: dict[float, list[float]] = {size: [] for size in SIZES}
     for seed in range(options.first, options.first + options.seeds):
         case = simulated(seed)
-        line = Line(case.rig, case.bone)
-        edges += edges_of(case, line)
-        rows += joined(case, line, seed)
+        parts = LineParts(case.rig, case.bone)
+        edges += edges_of(case, parts)
+        rows += joined(case, parts, seed)
         for size in SIZES:
-            sized = line if size == 1.0 else Line(case.rig, _sized(case.bone, size))
+            sized = parts if size == 1.0 else LineParts(case.rig, _sized(case.bone, size))
             shares[size] += near_shares(case, sized, seed)
     print("| darker behind by | edges | within 0.5 px | median px | MAD px |")
     print("|---|---|---|---|---|")
@@ -88,16 +88,16 @@ def _sized(bone: BoneModel, size: float) -> BoneModel:
     return replace(bone, mesh=TriangleMesh(scaled_mm, bone.mesh.faces))
 
 
-def edges_of(case: Case, line: Line) -> Iterator[Edge]:
+def edges_of(case: Case, parts: LineParts) -> Iterator[Edge]:
     """Of the left picture, at the true pose."""
     frame = case.frames[0]
-    true = line._rectified(frame.true)
-    pair, _ = line._rectified_pair(frame.left, frame.right, true, NEAR_VIEW)
-    expected = line._meter.expected(pair, true, line.settings.locator.tracking)
+    true = parts.rectified(frame.true)
+    pair = parts.pair(frame.left, frame.right, true)
+    expected = parts.meter.expected(pair, true, parts.tracking)
     if expected is None:
         return
     wide, flank = np.empty(31), np.empty(17)
-    for pixel, normal in outline(line, true, expected.view):
+    for pixel, normal in outline(parts, true, expected.view):
         if not sample_across(pair.left, tuple(pixel), tuple(normal), wide):
             continue
         at = strongest_edge(wide)
@@ -107,60 +107,53 @@ def edges_of(case: Case, line: Line) -> Iterator[Edge]:
 
 
 def outline(
-    line: Line, pose: RigidTransform, view: RenderedView
+    parts: LineParts, pose: RigidTransform, view: RenderedView
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pixel and normal of each point of it in the left picture."""
-    geometry = line._meter.geometry
+    geometry = parts.meter.geometry
     eye = Eye(0.0, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
-    rim = find_rim(
-        line._fit_judge._contours._ridges,
-        np.array(pose.rotation),
-        np.array(pose.translation_mm),
-        eye,
-    )
+    turn, shift_mm = np.array(pose.rotation), np.array(pose.translation_mm)
+    rim = find_rim(parts.contours.ridges, turn, shift_mm, eye)
     seen = is_outline(rim, view.depth_mm, view.box.x, view.box.y)
     rim = thin_rim(Rim(*(part[seen] for part in rim)))
     yield from zip(rim.pixel, rim.normal, strict=True)
 
 
-def joined(case: Case, line: Line, seed: int) -> Iterator[tuple[float, float, float, float]]:
+def joined(case: Case, parts: LineParts, seed: int) -> Iterator[tuple[float, float, float, float]]:
     """Error and bound of the surface alone, then of both; nothing when the bone is not found."""
-    true = line._rectified(case.frames[0].true)
-    pair, fit = located(case, line, seed)
+    true = parts.rectified(case.frames[0].true)
+    pair, fit = located(case, parts, seed)
     if fit is None:
         return
-    coarse_px = line._fit_judge.coarse_px(pair, fit)
     answer: list[float] = []
-    for one in (fit, line._fit_judge._contours.joined(pair, fit, coarse_px)):
-        mesh = line.model.bone.mesh
+    for one in (fit, parts.with_outline(pair, fit)):
+        mesh = parts.model.bone.mesh
         targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
-        bound_mm = predicted_tre_mm(one.estimate, line.centre_mm, targets[:: len(targets) // 200])
+        bound_mm = predicted_tre_mm(one.estimate, parts.centre_mm, targets[:: len(targets) // 200])
         answer += [mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
     yield answer[0], answer[1], answer[2], answer[3]
 
 
-def located(case: Case, line: Line, seed: int) -> tuple[RectifiedPair, Fit | None]:
+def located(case: Case, parts: LineParts, seed: int) -> tuple[RectifiedPair, Fit | None]:
     """The surface's fit from next to the truth; None when the bone is not found."""
     frame, rng = case.frames[0], np.random.default_rng([seed, 3])
-    true = line._rectified(frame.true)
+    true = parts.rectified(frame.true)
     off = np.concatenate(
         [rng.normal(0.0, START_OFF_MM, 3), np.radians(rng.normal(0.0, START_OFF_DEG, 3))]
     )
-    start = true.moved(off, true.apply(line.centre_mm))
-    pair, _ = line._rectified_pair(frame.left, frame.right, start, NEAR_VIEW)
-    fit = line.locator.locate(pair, start)
+    start = true.moved(off, true.apply(parts.centre_mm))
+    pair = parts.pair(frame.left, frame.right, start)
+    fit = parts.locator.locate(pair, start)
     return pair, None if fit is None or fit.measured.view is None else fit
 
 
-def near_shares(case: Case, line: Line, seed: int) -> Iterator[float]:
+def near_shares(case: Case, parts: LineParts, seed: int) -> Iterator[float]:
     """Share of the edges that the fit allows; nothing without a fit, or with too few edges."""
-    pair, fit = located(case, line, seed)
+    pair, fit = located(case, parts, seed)
     if fit is None:
         return
-    measured, coarse_px = fit.measured, line._fit_judge.coarse_px(pair, fit)
-    block = line._fit_judge._contours.block(
-        pair, fit.pose, measured.view, measured.disparity, coarse_px
-    )
+    measured, coarse_px = fit.measured, parts.judge.coarse_px(pair, fit)
+    block = parts.contours.block(pair, fit.pose, measured.view, measured.disparity, coarse_px)
     weight = 1.0 / block.n_sharing
     if weight.sum() >= FEWEST:
         yield float(weight[near(block, fit.estimate.covariance)].sum() / weight.sum())

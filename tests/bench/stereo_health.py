@@ -26,8 +26,10 @@ from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.stereo import measure_health
 from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking.locator import WIDE_VIEW
 from navapp.tracking.pair_doubts import pair_doubts
 from navapp.values import BoneModel, Reason, Status
+from tests.bench.line_parts import LineParts
 
 OFFSETS_PX = (0.0, 0.15, 0.3, 0.5, -0.5, 1.0)
 GOAL = Goal(np.empty((0, 3)), 2.0)
@@ -60,8 +62,7 @@ def main() -> int:
         rig = read_rig(phantom / "rig.yml")
         for sequence in sorted(path.parent for path in phantom.glob("*/prior.json")):
             for turn_px in OFFSETS_PX:
-                line = Line(turned(rig, turn_px), bone)
-                rows = list(_followed(line, sequence))
+                rows = list(_followed(turned(rig, turn_px), bone, sequence))
                 print(_table_row(f"{phantom.name}/{sequence.name}", turn_px, rows), flush=True)
     return 0
 
@@ -76,8 +77,9 @@ def turned(rig: StereoRig, row_offset_px: float) -> StereoRig:
     return replace(rig, right_from_left=moved)
 
 
-def _followed(line: Line, sequence: Path) -> Iterator[Row]:
+def _followed(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[Row]:
     """Every frame from its own truth."""
+    line, parts = Line(rig, bone), LineParts(rig, bone)
     for entry in json.loads((sequence / "truth.json").read_text(encoding="utf-8"))["frames"]:
         truth = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
         left, right = (
@@ -85,12 +87,12 @@ def _followed(line: Line, sequence: Path) -> Iterator[Row]:
             for side in ("left", "right")
         )
         tracked, _ = line.track(left, right, 0, TrackState.at_rest(truth, 0), GOAL)
-        pose = line._rectified(truth)
-        pair, _ = line._rectified_pair(left, right, pose)
-        fit = line.locator.locate(pair, pose)
+        pose = parts.rectified(truth)
+        pair = parts.pair(left, right, pose, WIDE_VIEW)
+        fit = parts.locator.locate(pair, pose)
         if fit is None:
             continue
-        depth_mm = float(fit.pose.apply(line.centre_mm)[2])
+        depth_mm = float(fit.pose.apply(parts.centre_mm)[2])
         started = time.perf_counter()
         geometry = pair.geometry
         health = measure_health(pair, fit.measured.disparity, geometry.disparity_px(depth_mm))
@@ -103,7 +105,7 @@ def _followed(line: Line, sequence: Path) -> Iterator[Row]:
             Reason.ROWS_DISAGREE in doubts,
             sum(doubt is not Reason.ROWS_DISAGREE for doubt in doubts),
             tracked.verdict.status is Status.OK,
-            np.nan if found is None else mean_tre_mm(found, truth, line.model.bone, _NO_TARGETS),
+            np.nan if found is None else mean_tre_mm(found, truth, bone, _NO_TARGETS),
             cost_ms,
         )
 

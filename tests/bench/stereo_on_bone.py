@@ -19,7 +19,7 @@ import numpy as np
 from navapp.geometry import Box
 from navapp.geometry.zbuffer import render_rectified
 from navapp.stereo import match_on_support, match_surface, smoothed
-from navapp.tracking import Goal, Line
+from navapp.tracking import Goal
 from navapp.values import BoneModel, DisparityMap, LineTimings, Status
 from tests.bench.bone_scenes import (
     Scene,
@@ -30,6 +30,7 @@ from tests.bench.bone_scenes import (
     sequences,
     tre_mm,
 )
+from tests.bench.line_parts import LineParts
 from tests.bench.sgbm import match_sgbm
 
 _DISTURBANCES = ((1.0, 0.6), (2.0, 2.0), (5.0, 5.0), (8.0, 8.0))
@@ -137,20 +138,20 @@ def free(sequence: Sequence) -> None:
 
 def guided(sequence: Sequence, n_seeds: int) -> None:
     """With a pose that is disturbed by an angle and a length."""
-    line = Line(sequence.rig, BoneModel("femur", sequence.mesh))
+    parts = LineParts(sequence.rig, BoneModel("femur", sequence.mesh))
     for angle_deg, length_mm in _DISTURBANCES:
         before, after, signed, n_silent = [], [], [], 0
         for scene in sequence.scenes:
             for seed in range(n_seeds):
-                start = disturbed(scene.pose, line.centre_mm, angle_deg, length_mm, seed)
-                fit = line.locator.locate(scene.pair, start)
+                start = disturbed(scene.pose, parts.centre_mm, angle_deg, length_mm, seed)
+                fit = parts.locator.locate(scene.pair, start)
                 before.append(tre_mm(start, scene.pose, sequence.mesh))
                 if fit is None:
                     after.append(np.inf)
                     continue
                 after.append(tre_mm(fit.pose, scene.pose, sequence.mesh))
                 if after[-1] > _CAUGHT_MM:
-                    judged = line._fit_judge.judged(scene.pair, fit, _GOAL, LineTimings())
+                    judged = parts.judge.judged(scene.pair, fit, _GOAL, LineTimings())
                     n_silent += judged.verdict.status is not Status.LOST
                 signed.append(np.median(depth_error_mm(scene, fit.measured.disparity, sequence)))
         report_guided(f"{sequence.name} {angle_deg:g} deg {length_mm:g} mm", before, after, signed)

@@ -1,0 +1,41 @@
+"""The parts of a line, each on its own, joined as `Line` joins them."""
+
+from navapp.geometry.rectification import Image, RectifiedPair
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import RegistrationModel
+from navapp.tracking.contours import ContourMeter
+from navapp.tracking.fit_judge import FitJudge
+from navapp.tracking.follower import Fit
+from navapp.tracking.line import LineSettings
+from navapp.tracking.locator import NEAR_VIEW, Locator
+from navapp.tracking.surface_meter import Margins, SurfaceMeter
+from navapp.values import BoneModel
+
+
+class LineParts:
+    """Of one rig and one bone, with the settings of every line."""
+
+    def __init__(self, rig: StereoRig, bone: BoneModel) -> None:
+        settings = LineSettings()
+        self.tracking = settings.locator.tracking
+        self.model = RegistrationModel(bone)
+        self.centre_mm = self.model.centre_mm
+        self.meter = SurfaceMeter(rig, self.model, settings.depth_mm, settings.max_points)
+        self.judge = FitJudge(self.meter, self.model, rig.quality)
+        self.locator = Locator(self.meter, self.model, self.judge.score, settings.locator)
+        self.contours = ContourMeter(self.model, self.meter.geometry)
+
+    def rectified(self, left_from_bone: RigidTransform) -> RigidTransform:
+        """The same pose in the rectified left camera."""
+        return self.meter.geometry.rectified_from_left @ left_from_bone
+
+    def pair(
+        self, left: Image, right: Image, around: RigidTransform, margins: Margins = NEAR_VIEW
+    ) -> RectifiedPair:
+        """The pictures rectified around a pose in the rectified left camera."""
+        return self.meter.rectified(left, right, around, margins)[0]
+
+    def with_outline(self, pair: RectifiedPair, fit: Fit) -> Fit:
+        """A fit of the surface, joined with the outline."""
+        return self.contours.joined(pair, fit, self.judge.coarse_px(pair, fit))
