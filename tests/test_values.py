@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
+from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.rectification import Box
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import (
     BoneModel,

@@ -67,13 +67,8 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> Pair:
     """Both pictures grey and rectified; without a rig they are taken as they are."""
     import time
 
-    from navapp.geometry.rectification import (
-        Box,
-        RectifiedGeometry,
-        RectifiedPair,
-        Rectifier,
-        luma,
-    )
+    from navapp.geometry.box import Box
+    from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair, Rectifier, luma
     from navapp.geometry.rig_files import read_rig
     from navapp.geometry.transform import RigidTransform
 

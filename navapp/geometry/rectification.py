@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from navapp.errors import RigError
 from navapp.geometry.bands import beside
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
+from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -23,61 +24,6 @@ Image = NDArray[np.uint8]
 
 # Pixels on either side that interpolation and sub-pixel steps ask for.
 TAPS_PX = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A rectangle of pixels: columns x .. x + width - 1, rows y .. y + height - 1."""
-
-    x: int
-    y: int
-    width: int
-    height: int
-
-    def grown(self, margin_px: int) -> "Box":
-        """Larger by a margin on every side."""
-        return Box(
-            self.x - margin_px,
-            self.y - margin_px,
-            self.width + 2 * margin_px,
-            self.height + 2 * margin_px,
-        )
-
-    def clipped(self, width: int, height: int) -> "Box":
-        """The part inside a picture; its width or height may be 0."""
-        x0, y0 = min(max(self.x, 0), width), min(max(self.y, 0), height)
-        x1 = min(max(self.x + self.width, x0), width)
-        y1 = min(max(self.y + self.height, y0), height)
-        return Box(x0, y0, x1 - x0, y1 - y0)
-
-    @property
-    def is_empty(self) -> bool:
-        """No pixel is inside."""
-        return self.width <= 0 or self.height <= 0
-
-    @property
-    def slices(self) -> tuple[slice, slice]:
-        """Its rows and columns, to index a picture with; it must be clipped."""
-        return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
-
-    def overlap(self, other: "Box") -> float:
-        """Intersection over union, 0 to 1."""
-        x0, y0 = max(self.x, other.x), max(self.y, other.y)
-        x1 = min(self.x + self.width, other.x + other.width)
-        y1 = min(self.y + self.height, other.y + other.height)
-        shared = max(0, x1 - x0) * max(0, y1 - y0)
-        union = self.width * self.height + other.width * other.height - shared
-        return shared / union if union > 0 else 0.0
-
-    @classmethod
-    def around(cls, pixels: FloatArray) -> "Box | None":
-        """The smallest box around pixel positions (N, 2); None when none is finite."""
-        finite = pixels[np.isfinite(pixels).all(axis=1)]
-        if len(finite) == 0:
-            return None
-        low = np.floor(finite.min(axis=0)).astype(int)
-        high = np.ceil(finite.max(axis=0)).astype(int)
-        return cls(int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
+from navapp.geometry.box import Box
 from navapp.geometry.float_lane_kernels import LANES, lanes_for
-from navapp.geometry.rectification import TAPS_PX, Box, Image
+from navapp.geometry.rectification import TAPS_PX, Image
 from navapp.geometry.resample_kernels import Places, resample_rows
 
 

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
+from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.rectification import Box, RectifiedGeometry
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer_kernels import (
     bounds_of_points,

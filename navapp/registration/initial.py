@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import run_both
+from navapp.geometry.box import Box
 from navapp.geometry.directions import ViewCone
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.registration.bimcc import MIN_POINTS, fit_coarsely
 from navapp.registration.edge_tables import EdgeTables, edge_tables, scaled_optics

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.health_kernels import measure_rows
 from navapp.values import DisparityMap, Origin
 

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import beside
+from navapp.geometry.box import Box
 from navapp.geometry.mesh_edges import ridge_edges
-from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair
+from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.geometry.zbuffer_kernels import known_range

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from navapp.geometry.box import Box
 from navapp.geometry.directions import ViewCone
-from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier, luma
+from navapp.geometry.rectification import Image, RectifiedPair, Rectifier, luma
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import (
     Candidate,

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, Image, RectifiedPair, Rectifier
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box
+from navapp.geometry.box import Box
 from navapp.geometry.transform import FloatArray
 
 

@@ -22,7 +22,8 @@ import numpy as np
 
 from drivers.frames import StereoFrame
 from navapp.evaluation import mean_tre_mm
-from navapp.geometry.rectification import Box, RectifiedPair, Rectifier, luma
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import projected_box

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from navapp.geometry.bilinear import bilinear
-from navapp.geometry.rectification import Box, Rectifier, undistorted
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Rectifier, undistorted
 from navapp.geometry.rig_files import read_rig
 from tests.geometry.shapes import STRONG, camera, toed_in_rig
 

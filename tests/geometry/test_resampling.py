@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from navapp.geometry.rectification import Box
+from navapp.geometry.box import Box
 from navapp.geometry.resampling import find_places, resampled
 from tests.reference.resample_reference import resample_slowly
 

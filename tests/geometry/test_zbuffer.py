@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.box import Box
 from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.rectification import Box, RectifiedGeometry
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.geometry.zbuffer import (
     projected_box,

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, RectifiedGeometry, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import RigidTransform
 
 WIDTH, HEIGHT = 320, 120

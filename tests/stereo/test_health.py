@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo import measure_health
 from navapp.values import DisparityMap, Origin
 from tests.stereo.pairs import HEIGHT, WIDTH, geometry, texture

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import projected_box, render_rectified
 from navapp.tracking.contours import ContourMeter

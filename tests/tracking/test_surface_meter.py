@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navapp.geometry.rectification import Box
+from navapp.geometry.box import Box
 from navapp.tracking.surface_meter import CoarseMap, without_gap_rims
 from navapp.values import DisparityMap
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands, run_both
-from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.byte_lane_kernels import lanes_for
 from navapp.stereo.matching.census_kernels import census_rows
 from navapp.stereo.matching.choice_kernels import Choice, choose_rows

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
-from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.census_sgm import matched_map
 from navapp.stereo.matching.consistency import at_partner, view_difference_px
 from navapp.stereo.matching.gradient_kernels import match_rows

@@ -6,7 +6,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Image, RectifiedPair
 
 MAX_DISPARITIES = 1024
 

@@ -11,7 +11,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Box, Image, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import Image, RectifiedPair
 
 # What windows and the steps at the ends of a search ask for beside a box.
 _WINDOW_PX = 8

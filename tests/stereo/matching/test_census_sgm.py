@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from navapp.geometry.bands import in_row_bands, pool, run_both
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.matching.census_sgm import CensusSettings, TwoViewDisparity, match_census
 from navapp.values import Origin
 from tests.stereo.pairs import HEIGHT, WIDTH, geometry, shifted_pair, texture

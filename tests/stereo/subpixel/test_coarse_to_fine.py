@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
 from navapp.stereo.subpixel.refine import refine
 from navapp.values import Origin

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, half_box, halved
 from tests.stereo.pairs import geometry
 

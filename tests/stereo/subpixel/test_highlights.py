@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel.highlights import without_highlights
 from tests.stereo.pairs import HEIGHT, WIDTH, shifted_pair
 

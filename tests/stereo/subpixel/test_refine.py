@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from navapp.geometry.rectification import Box, RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel import refine as module
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.subpixel.refine_kernels import refine_rows
