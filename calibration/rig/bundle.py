@@ -7,13 +7,12 @@ standard errors.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import cv2
 import numpy as np
 
 from calibration.rig.equilibration import equilibrated, unit_sizes
-from calibration.rig.parameters import RigModel, lens, placement, shape_mm
+from calibration.rig.parameters import RigModel, shape_mm
+from calibration.rig.projection import projected
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
 from calibration.targets.pairs import SeenPair
@@ -38,7 +37,7 @@ class Bundle:
     Attributes:
         model: which numbers were solved for.
         shared: (n_shared,) `parameters` tells their order.
-        poses: (V, 6) rotation vector and translation, left camera from board.
+        left_from_board: (V, 6) rotation vector and translation of each view.
         normal: (n_shared, n_shared) information about the shared numbers, the poses eliminated.
         scale: robust standard deviation of what is left, in units of the marks' standard errors.
         residuals_px: per view (n, 2) and (m, 2): seen less predicted, left and right.
@@ -47,7 +46,7 @@ class Bundle:
 
     model: RigModel
     shared: FloatArray
-    poses: FloatArray
+    left_from_board: FloatArray
     normal: FloatArray
     scale: float
     residuals_px: list[tuple[FloatArray, FloatArray]]
@@ -78,7 +77,7 @@ def solve_bundle(
     pairs: Sequence[SeenPair],
     model: RigModel,
     shared: FloatArray,
-    poses: FloatArray,
+    left_from_board: FloatArray,
     *,
     is_fixed: bool = False,
 ) -> Bundle:
@@ -89,21 +88,22 @@ def solve_bundle(
         pairs: V views.
         model: which numbers are solved for.
         shared: (n_shared,) start.
-        poses: (V, 6) start, left camera from board.
+        left_from_board: (V, 6) start.
         is_fixed: leave the shared numbers as they are and solve for the poses alone.
     """
-    shared, poses = shared.copy(), poses.copy()
+    shared, left_from_board = shared.copy(), left_from_board.copy()
     damping, is_settled = _FIRST_DAMPING, False
     views = _Views(board, pairs, model)
-    linear = _Linearised(views, shared, poses)
+    linear = _Linearised(views, shared, left_from_board)
     for _ in range(_MOST_STEPS):
         step_shared, step_poses = linear.step(damping, is_fixed)
-        trial = _Linearised(views, shared + step_shared, poses + step_poses, linear.scale)
+        moved = left_from_board + step_poses
+        trial = _Linearised(views, shared + step_shared, moved, linear.scale)
         if trial.cost <= linear.cost * (1.0 + 1e-12):
             gain = 1.0 - trial.cost / max(linear.cost, 1e-300)
-            shared, poses = shared + step_shared, poses + step_poses
+            shared, left_from_board = shared + step_shared, moved
             # The next step weighs by what is left now.
-            linear = _Linearised(views, shared, poses)
+            linear = _Linearised(views, shared, left_from_board)
             damping = max(damping * 0.1, 1e-9)
             if gain < _SETTLED:
                 is_settled = True
@@ -114,58 +114,12 @@ def solve_bundle(
         else:
             damping *= 10.0
     n = 2 * sum(len(pair.left.ids) + len(pair.right.ids) for pair in pairs)
-    n_solved = (0 if is_fixed else model.n_shared) + poses.size
+    n_solved = (0 if is_fixed else model.n_shared) + left_from_board.size
     # What was solved for takes its part of the noise with it.
     scale = linear.scale * (n / max(n - n_solved, 1)) ** 0.5
-    return Bundle(model, shared, poses, linear.reduced(), scale, linear.residuals_px, is_settled)
-
-
-def projected(
-    points_mm: FloatArray,
-    pose: FloatArray,
-    model: RigModel,
-    shared: FloatArray,
-    number: int,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Pixels of points in one camera of the rig, and their slopes.
-
-    Args:
-        points_mm: (n, 3) in the board's frame.
-        pose: (6,) left camera from board.
-        model: of the rig.
-        shared: its numbers.
-        number: 0 left, 1 right camera.
-
-    Returns:
-        (n, 2) pixels; (2n, n_rig) slopes by the rig's numbers; (2n, 6) by the pose; (2n, 3) by the
-        points' own coordinates, a translation of all along each axis of the board.
-    """
-    matrix, distortion = lens(model, shared, number)
-    rotation: Any = pose[:3]
-    translation: Any = pose[3:]
-    by_rig = np.zeros((2 * len(points_mm), model.n_rig))
-    chain: Any = None
-    if number == 1:
-        between = placement(model, shared)
-        chain = cv2.composeRT(rotation, translation, *between)
-        rotation, translation = chain[0].ravel(), chain[1].ravel()
-    pixels, slopes = cv2.projectPoints(points_mm, rotation, translation, matrix, distortion)
-    slopes = np.asarray(slopes, dtype=np.float64)
-    by_rotation, by_translation = slopes[:, :3], slopes[:, 3:6]
-    first = number * model.n_camera
-    by_rig[:, first : first + model.n_camera] = slopes[:, 6 : 6 + model.n_camera]
-    by_pose: FloatArray = np.hstack([by_rotation, by_translation])
-    if chain is not None:
-        chain = [np.asarray(part, dtype=np.float64) for part in chain]
-        _, _, rr1, rt1, rr2, rt2, tr1, tt1, tr2, tt2 = chain
-        place = 2 * model.n_camera
-        by_rig[:, place : place + 3] = by_rotation @ rr2 + by_translation @ tr2
-        by_rig[:, place + 3 : place + 6] = by_rotation @ rt2 + by_translation @ tt2
-        by_pose[:, :3] = by_rotation @ rr1 + by_translation @ tr1
-        by_pose[:, 3:] = by_rotation @ rt1 + by_translation @ tt1
-    turn = np.asarray(cv2.Rodrigues(rotation)[0], dtype=np.float64)
-    pixels_px = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-    return pixels_px, by_rig, by_pose, np.asarray(by_translation @ turn, dtype=np.float64)
+    return Bundle(
+        model, shared, left_from_board, linear.reduced(), scale, linear.residuals_px, is_settled
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -181,7 +135,11 @@ class _Linearised:
     """Residuals and normal equations at one place."""
 
     def __init__(
-        self, views: _Views, shared: FloatArray, poses: FloatArray, scale: float | None = None
+        self,
+        views: _Views,
+        shared: FloatArray,
+        left_from_board: FloatArray,
+        scale: float | None = None,
     ) -> None:
         self._model, self._shared = views.model, shared
         self._views = [
@@ -189,7 +147,7 @@ class _Linearised:
                 self._seen(views.board, seen, pose, number)
                 for number, seen in enumerate((pair.left, pair.right))
             ]
-            for pair, pose in zip(views.pairs, poses, strict=True)
+            for pair, pose in zip(views.pairs, left_from_board, strict=True)
         ]
         self.residuals_px = [(view[0][0], view[1][0]) for view in self._views]
         lengths = np.concatenate(
@@ -210,14 +168,16 @@ class _Linearised:
         self._expect_board(np.array(_EXPECTED_SHARE_OFF) * views.board.spacing_mm)
 
     def _seen(
-        self, board: Board, seen: SeenBoard, pose: FloatArray, number: int
+        self, board: Board, seen: SeenBoard, left_from_board: FloatArray, number: int
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Residuals (n, 2), slopes by the shared numbers and by the pose, standard errors (n,)."""
         model = self._model
         points_mm = board.points_mm[seen.ids]
         if model.n_marks:
             points_mm = points_mm + shape_mm(model, self._shared)[seen.ids]
-        pixels, by_rig, by_pose, by_point = projected(points_mm, pose, model, self._shared, number)
+        pixels, by_rig, by_pose, by_point = projected(
+            points_mm, left_from_board, model, self._shared, number
+        )
         by_shared = np.zeros((len(by_rig), model.n_shared))
         by_shared[:, : model.n_rig] = by_rig
         if model.n_marks:

@@ -55,7 +55,9 @@ def hold_out(
     for fold in range(min(N_FOLDS, n_views)):
         is_out = np.arange(n_views) % N_FOLDS == fold
         kept = [pair for pair, out in zip(pairs, is_out, strict=True) if not out]
-        solved = solve_bundle(board, kept, whole.model, whole.shared, whole.poses[~is_out])
+        solved = solve_bundle(
+            board, kept, whole.model, whole.shared, whole.left_from_board[~is_out]
+        )
         rigs.append(solved.shared)
         for view in np.flatnonzero(is_out):
             judged = look_at(board, [pairs[int(view)]], solved)

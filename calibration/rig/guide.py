@@ -5,9 +5,10 @@ from functools import cache
 
 import numpy as np
 
-from calibration.rig.bundle import Bundle, projected
+from calibration.rig.bundle import Bundle
 from calibration.rig.equilibration import equilibrated, unit_sizes
 from calibration.rig.parameters import RigModel
+from calibration.rig.projection import projected
 from calibration.rig.start import matrix_of, vector_of
 from calibration.rig.uncertainty import triangulation_slopes, working_points_mm
 from calibration.targets.boards import Board
@@ -77,7 +78,7 @@ def wanted_view(
 
 
 def information(
-    board: Board, pose: FloatArray, model: RigModel, shared: FloatArray, sigma_px: float
+    board: Board, left_from_board: FloatArray, model: RigModel, shared: FloatArray, sigma_px: float
 ) -> FloatArray | None:
     """(n_rig, n_rig) what one view would tell of the rig, its own pose eliminated.
 
@@ -86,7 +87,9 @@ def information(
     n = model.n_rig
     normal, mixed, own = np.zeros((n, n)), np.zeros((n, 6)), np.zeros((6, 6))
     for number in range(2):
-        pixels, by_rig, by_pose, _ = projected(board.points_mm, pose, model, shared, number)
+        pixels, by_rig, by_pose, _ = projected(
+            board.points_mm, left_from_board, model, shared, number
+        )
         limit = (model.width - _EDGE_PX, model.height - _EDGE_PX)
         is_seen = (pixels > _EDGE_PX).all(axis=1) & (pixels < limit).all(axis=1)
         if is_seen.mean() < (_LEAST_SEEN if board.kind == "charuco" else 1.0):
@@ -103,7 +106,7 @@ def information(
 def candidates(
     board: Board, model: RigModel, shared: FloatArray, depth_mm: tuple[float, float]
 ) -> list[FloatArray]:
-    """(6,) poses all over the working volume, tilted to all sides."""
+    """(6,) left_from_board all over the working volume, tilted to all sides."""
     middle = board.points_mm.mean(axis=0)
     poses = []
     for share in _DEPTH_SHARES:

@@ -63,7 +63,7 @@ def shown_depth_mm(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> t
     """Nearest and farthest mark that the left camera saw."""
     depths = [
         (board.points_mm[pair.left.ids] @ pose[:3, :3].T + pose[:3, 3])[:, 2]
-        for pair, pose in zip(pairs, map(matrix_of, solved.poses), strict=True)
+        for pair, pose in zip(pairs, map(matrix_of, solved.left_from_board), strict=True)
     ]
     return float(min(one.min() for one in depths)), float(max(one.max() for one in depths))
 
@@ -82,7 +82,7 @@ def coverage(
         marked = occupied(np.vstack([getattr(pair, side).pixels for pair in pairs]), size)
         shares.append(float((marked & asked).sum() / max(asked.sum(), 1)))
     tilts = []
-    for pair, vector in zip(pairs, solved.poses, strict=True):
+    for pair, vector in zip(pairs, solved.left_from_board, strict=True):
         pose = matrix_of(vector)
         line = pose[:3, :3] @ board.points_mm[pair.left.ids].mean(axis=0) + pose[:3, 3]
         cosine = abs(pose[:3, 2] @ line) / np.linalg.norm(line)

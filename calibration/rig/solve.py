@@ -182,7 +182,7 @@ class _Work:
             [packed(model, unpacked(solved.model, solved.shared))[: model.n_rig],
              np.zeros(model.n_shared - model.n_rig)]
         )  # fmt: skip
-        richer = solve_bundle(self._board, pairs, model, shared, solved.poses)
+        richer = solve_bundle(self._board, pairs, model, shared, solved.left_from_board)
         self._step()
         return richer
 

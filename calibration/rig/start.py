@@ -50,7 +50,7 @@ def start_rig(board: Board, pairs: Sequence[SeenPair], size: tuple[int, int]) ->
 def start_poses(
     board: Board, pairs: Sequence[SeenPair], model: RigModel, shared: FloatArray
 ) -> FloatArray:
-    """(V, 6) poses of the board, left camera from board, under a rig; as one picture tells them."""
+    """(V, 6) left_from_board of each view under a rig, as one picture tells it."""
     rig = unpacked(model, shared)
     left_from_right = np.linalg.inv(rig.right_from_left.matrix)
     poses = []

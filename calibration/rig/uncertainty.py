@@ -7,8 +7,8 @@ expect.
 
 import numpy as np
 
-from calibration.rig.bundle import projected
 from calibration.rig.parameters import RigModel, unpacked
+from calibration.rig.projection import projected
 from navapp.geometry.transform import FloatArray
 
 _COLUMNS, _ROWS, _DEPTHS = 7, 5, 3

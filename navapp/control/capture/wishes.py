@@ -128,14 +128,14 @@ def _solved(
     bad = {one.index for one in more}
     is_good = np.array([pair.index not in bad for pair in used])
     used = [pair for pair in used if pair.index not in bad]
-    solved = solve_bundle(board, used, model, solved.shared, solved.poses[is_good])
+    solved = solve_bundle(board, used, model, solved.shared, solved.left_from_board[is_good])
     return solved, used, out + more
 
 
 def _poses(board: Board, pairs: Sequence[SeenPair], last: Wish) -> FloatArray:
     """Where the last solve had them, and a first guess of new ones."""
     assert last.solved is not None  # noqa: S101 (for the type checker: the caller looked)
-    known = dict(zip(last.indices, last.solved.poses, strict=True))
+    known = dict(zip(last.indices, last.solved.left_from_board, strict=True))
     new = [pair for pair in pairs if pair.index not in known]
     if new:
         guessed = start_poses(board, new, last.solved.model, last.solved.shared)
