@@ -2,14 +2,13 @@
 
 from navapp.stereo.chains import (
     StereoAnswer,
-    are_swapped,
     match_baseline,
-    match_coarsely,
     match_on_support,
     match_scene,
     match_surface,
     smoothed,
 )
+from navapp.stereo.coarse import are_swapped, match_coarsely
 from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.surface import reproject

@@ -8,23 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo.coarse import LEAST_AGREEMENT, Evidence, clipped, coarse_surface
 from navapp.stereo.matching.census_sgm import CensusSettings, match_census
 from navapp.stereo.matching.consistency import speckle_free
 from navapp.stereo.matching.gradient import GradientSettings, match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, seen_from_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
-from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
-from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
+from navapp.stereo.subpixel.coarse_to_fine import refine_surface
 from navapp.stereo.subpixel.refine import refine
 from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, LineTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
-# Below this share of left-right agreement the two pictures do not show the same scene that way
-# round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
-_LEAST_AGREEMENT, _MOST_AGREE = 0.15, 0.5
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
 _NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
 # Chance and repeated texture confirm a few per cent of any support, in specks.
@@ -40,11 +37,6 @@ _WIDE_SEARCH_PX = 160
 # A claimed sigma below this says no more.
 _BEST_SIGMA_PX = np.float32(0.1)
 
-# At half resolution a larger window holds two sides of a crest or a rim.
-_SURFACE_CENSUS = CensusSettings(radius_x=3, radius_y=2, p1=5, p2=30)
-# So few are soon matched as they are; at half resolution too little of the picture is left.
-_FEW_CELLS = 3_000_000
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoAnswer:
@@ -54,15 +46,6 @@ class StereoAnswer:
     matched: DisparityMap
     reasons: tuple[str, ...]
     timings: LineTimings
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Evidence:
-    """What the fill asks besides the left map, at full resolution: the other view, and trust."""
-
-    right_px: NDArray[np.float32]
-    right_x0: int
-    confidence: NDArray[np.float32]
 
 
 def match_scene(
@@ -83,12 +66,12 @@ def match_scene(
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
     """
     started = time.perf_counter_ns()
-    pair = _clipped(pair)
+    pair = clipped(pair)
     found = match_census(pair, band_px, _settings_for(band_px))
-    if not found.agreement >= _LEAST_AGREEMENT:
+    if not found.agreement >= LEAST_AGREEMENT:
         return _nothing(pair, _why(found.agreement), started)
     left = refine_scene(pair, found.left)
-    evidence = _Evidence(found.right_px, found.right_x0, found.confidence)
+    evidence = Evidence(found.right_px, found.right_x0, found.confidence)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
     return _answer(pair, left, evidence, fill, started)
 
@@ -106,50 +89,13 @@ def match_surface(
     tell where; `refine_surface` measures. Arguments as for `match_scene`.
     """
     started = time.perf_counter_ns()
-    pair = _clipped(pair)
-    coarse = _coarse(pair, band_px)
-    if not coarse.agreement >= _LEAST_AGREEMENT:
+    pair = clipped(pair)
+    coarse = coarse_surface(pair, band_px)
+    if not coarse.agreement >= LEAST_AGREEMENT:
         return _nothing(pair, _why(coarse.agreement), started)
     left = refine_surface(pair, coarse.surface_px)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
     return _answer(pair, left, coarse.evidence, fill, started)
-
-
-def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray[np.float32]:
-    """What lies where, to about a pixel: for what hides a surface, not for measuring it.
-
-    Arguments as for `match_scene`.
-
-    Returns:
-        (h, w) disparity over the part of `pair.box` inside the pictures, NaN where unknown; all
-        unknown when the pictures hardly agree.
-    """
-    pair = _clipped(pair)
-    is_half = _is_wide(pair, band_px)
-    small = halved(pair, band_px) if is_half else pair
-    band_px = (band_px[0] / 2.0, band_px[1] / 2.0) if is_half else band_px
-    found = match_census(small, band_px, _SURFACE_CENSUS)
-    if not found.agreement >= _LEAST_AGREEMENT:
-        return np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
-    surface_px = calmed(found.left.disparity_px)
-    return doubled_disparity(surface_px, pair.box) if is_half else surface_px
-
-
-def are_swapped(
-    given: RectifiedPair, band_px: tuple[float, float], exchanged: RectifiedPair
-) -> bool:
-    """Whether two pictures show one scene the other way round only.
-
-    Exchanged, disparities have the other sign: the band that holds the scene holds nothing.
-
-    Args:
-        given: as the pictures came.
-        band_px: smallest and largest disparity of the scene around the box.
-        exchanged: the same, left called right before they were rectified.
-    """
-    if _coarse(_clipped(given), band_px).agreement >= _LEAST_AGREEMENT:
-        return False
-    return _coarse(_clipped(exchanged), band_px).agreement >= _MOST_AGREE
 
 
 def match_on_support(
@@ -176,7 +122,7 @@ def match_on_support(
         return StereoAnswer(left, left, (), LineTimings(stereo_ms=_ms(started)))
     # What the right camera sees of the support is all that is known of its view.
     right_px = seen_from_right(support_px, left.x, pair.geometry.width)
-    evidence = _Evidence(right_px, 0, _by_sigma(left))
+    evidence = Evidence(right_px, 0, _by_sigma(left))
     fill = FillSettings(max_gap_px=max_gap_px)
     return _answer(pair, left, evidence, fill, started, np.isfinite(support_px))
 
@@ -184,7 +130,7 @@ def match_on_support(
 def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoAnswer:
     """The paper's state of the art: gradient magnitudes, winner takes all, Gaussian; no fill."""
     started = time.perf_counter_ns()
-    pair = _clipped(pair)
+    pair = clipped(pair)
     matched = match_gradient(pair, band_px)
     # Matches of chance stand alone.
     in_patches = _without_specks(matched).matched_share
@@ -221,7 +167,7 @@ def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) ->
 def _answer(
     pair: RectifiedPair,
     left: DisparityMap,
-    evidence: _Evidence,
+    evidence: Evidence,
     fill: FillSettings | None,
     started_ns: int,
     is_expected: NDArray[np.bool_] | None = None,
@@ -239,39 +185,6 @@ def _answer(
     return StereoAnswer(filled, left, (), replace(timings, fill_ms=_ms(started_ns)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Coarse:
-    """A matched surface without steps, at full resolution, and what else the matcher saw."""
-
-    surface_px: NDArray[np.float32]
-    evidence: _Evidence
-    agreement: float
-
-
-def _coarse(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
-    return (_coarse_at_half if _is_wide(pair, band_px) else _coarse_at_full)(pair, band_px)
-
-
-def _is_wide(pair: RectifiedPair, band_px: tuple[float, float]) -> bool:
-    return pair.box.width * pair.box.height * (band_px[1] - band_px[0]) > _FEW_CELLS
-
-
-def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
-    found = match_census(pair, band_px, _SURFACE_CENSUS)
-    evidence = _Evidence(found.right_px, found.right_x0, found.confidence)
-    return _Coarse(without_steps(found.left.disparity_px), evidence, found.agreement)
-
-
-def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> _Coarse:
-    low, high = band_px
-    found = match_census(halved(pair, band_px), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
-    surface_px = doubled_disparity(without_steps(found.left.disparity_px), pair.box)
-    right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
-    right_px = np.float32(2.0) * doubled(found.right_px, right)
-    evidence = _Evidence(right_px, right.x, doubled(found.confidence, pair.box))
-    return _Coarse(surface_px, evidence, found.agreement)
-
-
 def _by_sigma(left: DisparityMap) -> NDArray[np.float32]:
     """(h, w) confidence, 0 to 1: the smaller the claimed sigma, the larger; 0 where unmatched."""
     sigma_px = np.maximum(left.sigma_px, _BEST_SIGMA_PX)
@@ -283,12 +196,6 @@ def _settings_for(band_px: tuple[float, float]) -> CensusSettings:
     if band_px[1] - band_px[0] < _WIDE_SEARCH_PX:
         return CensusSettings()
     return CensusSettings(radius_x=4, radius_y=3, p1=20, p2=120)
-
-
-def _clipped(pair: RectifiedPair) -> RectifiedPair:
-    """The pair with the part of its box that lies in the pictures."""
-    height, width = pair.left.shape[:2]
-    return replace(pair, box=pair.box.clipped(width, height))
 
 
 def _without_specks(found: DisparityMap) -> DisparityMap:

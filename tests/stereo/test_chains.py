@@ -12,7 +12,6 @@ from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo import chains
 from navapp.stereo.chains import (
     StereoAnswer,
-    are_swapped,
     match_on_support,
     match_scene,
     match_surface,
@@ -69,23 +68,6 @@ def edge_distance_px() -> np.ndarray:
     is_outline[1:] |= label[1:] != label[:-1]
     is_outline[:, 1:] |= label[:, 1:] != label[:, :-1]
     return distance_transform_edt(~is_outline)
-
-
-@pytest.mark.parametrize(("band_px", "divisor"), [(FULL, 1), (HALF, 2)])
-def test_many_cells_are_matched_at_half_resolution(
-    band_px: tuple[float, float], divisor: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked = []
-
-    def spy(pair, band_px, settings):
-        asked.append((pair.left.shape, band_px))
-        return match_census(pair, band_px, settings)
-
-    match_census = chains.match_census
-    monkeypatch.setattr(chains, "match_census", spy)
-    match_surface(scene(INSIDE), band_px, fills=False)
-    low, high = band_px
-    assert asked == [((HEIGHT // divisor, WIDTH // divisor), (low / divisor, high / divisor))]
 
 
 @EVERY_RESOLUTION
@@ -382,22 +364,3 @@ def test_of_a_box_that_leaves_the_picture_the_inside_is_matched(chain, fills: bo
     error = found.disparity_px - TRUTH[:180, 200:]
     assert np.nanmedian(np.abs(error)) < 0.1
     assert found.matched_share > 0.7
-
-
-@EVERY_RESOLUTION
-def test_the_order_of_two_pictures_is_told_by_which_way_round_they_agree(
-    band_px: tuple[float, float],
-) -> None:
-    right_way = scene(INSIDE)
-    assert not are_swapped(right_way, band_px, swapped(right_way))
-    assert are_swapped(swapped(right_way), band_px, right_way)
-
-
-def test_pictures_that_agree_neither_way_are_not_called_swapped() -> None:
-    right_way = scene(INSIDE)
-    black = replace(right_way, right=np.zeros_like(right_way.right))
-    noise = np.random.default_rng(1).integers(0, 255, right_way.right.shape).astype(np.uint8)
-    unrelated = replace(right_way, right=noise)
-    for pair in (black, unrelated):
-        assert not are_swapped(pair, FULL, swapped(pair))
-        assert not are_swapped(swapped(pair), FULL, pair)
