@@ -16,7 +16,7 @@ from navapp.stereo.occlusion.classify import classify, seen_from_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface
-from navapp.stereo.subpixel.refine import refine
+from navapp.stereo.subpixel.refine import RefineSettings, refine
 from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, LineTimings
 
@@ -104,6 +104,8 @@ def match_on_support(
     *,
     fills: bool,
     max_gap_px: int | None = None,
+    settings: RefineSettings | None = None,
+    spacing_px: int = 1,
 ) -> StereoAnswer:
     """Sub-pixel matching where a predicted surface says what to expect.
 
@@ -112,9 +114,11 @@ def match_on_support(
         support_px: (h, w) float32 expected disparity; NaN where none is expected, nor filled.
         fills: from what was measured, never from the support.
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
+        settings: of the refinement.
+        spacing_px: from window to window.
     """
     started = time.perf_counter_ns()
-    left = _without_specks(refine(pair, support_px))
+    left = _without_specks(refine(pair, support_px, settings, spacing_px))
     n_expected = int(np.isfinite(support_px).sum())
     if left.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
         return _nothing(pair, _NOT_CONFIRMED, started)

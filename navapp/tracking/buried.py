@@ -118,7 +118,9 @@ class BuriedBone:
             places = self._improved(pair, places, one, random)
         return self._rested(pair, places)
 
-    def followed(self, pair: RectifiedPair, predicted: RigidTransform) -> Iterator[Fit]:
+    def followed(
+        self, pair: RectifiedPair, predicted: RigidTransform, *, searches: bool
+    ) -> Iterator[Fit]:
         """The bone from one frame to the next: where the prediction rests, then the best around it.
 
         The time of a fit is that of everything that was tried for it.
@@ -126,11 +128,14 @@ class BuriedBone:
         Args:
             pair: rectified pictures.
             predicted: rectified camera from bone.
+            searches: around the prediction, too, which takes long.
         """
         started_ns = time.perf_counter_ns()
         fit, _ = self._follower.follow(pair, predicted, is_near=True)
         if fit is not None:
             yield _timed(fit, started_ns)
+        if not searches:
+            return
         started_ns = time.perf_counter_ns()
         random = np.random.default_rng(_SEED)
         twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations

@@ -117,7 +117,7 @@ class Line:
         if state.n_lost == 0:
             start = self._rectified(expected)
             pair, timings = self._rectified_pair(left, right, start, NEAR_VIEW)
-            tracked = self._near(pair, start, predicted, goal, timings)
+            tracked = self._near(pair, start, predicted, goal, timings, state.is_search_due)
         if tracked.verdict.status is Status.LOST:
             if not self.locator.is_baseline:
                 boxes = self._boxes.followed(boxes, left)
@@ -136,6 +136,7 @@ class Line:
         predicted: RigidTransform,
         goal: Goal,
         timings: LineTimings,
+        searches: bool,
     ) -> TrackedFrame:
         """The answer near an expected pose; when its place is in doubt, that of a buried bone."""
         # What may hide the bone does not depend on where exactly it is.
@@ -145,7 +146,7 @@ class Line:
         answers = [self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse)]
         if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
             return answers[0]
-        for buried in self._buried.followed(pair, start):
+        for buried in self._buried.followed(pair, start, searches=searches):
             timings = answers[-1].timings
             answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
             if answers[-1].verdict.status is Status.OK:

@@ -12,6 +12,9 @@ from navapp.values import Reason, Status, TrackedFrame, Verdict
 _DAMPING = 0.7
 # A gap longer than this says nothing about the velocity any more.
 _MAX_GAP_NS = 400_000_000
+# A search for a buried bone that keeps finding nothing is made again after twice as many frames, at
+# most so many: it takes as long as ten frames do (docs/accuracy.md).
+_MOST_BETWEEN_SEARCHES = 8
 # What speaks against a pose's place, not against its accuracy.
 _AGAINST = frozenset(
     {
@@ -35,6 +38,7 @@ class TrackState:
         captured_ns: when that was.
         velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
         n_lost: frames lost since then.
+        n_doubted: frames in a row, up to now, whose answer's place was in doubt.
         box: of the bone in the newest picture, and what it looks like; None before the first.
         cause: what was found to be wrong for good, until a frame is OK.
     """
@@ -43,6 +47,7 @@ class TrackState:
     captured_ns: int
     velocity: FloatArray
     n_lost: int = 0
+    n_doubted: int = 0
     box: BoxState | None = None
     cause: Reason | None = None
 
@@ -52,6 +57,12 @@ class TrackState:
     ) -> "TrackState":
         """A pose without motion, and what is wrong for good with what was found there."""
         return cls(left_from_bone, captured_ns, np.zeros(6), cause=cause)
+
+    @property
+    def is_search_due(self) -> bool:
+        """Whether the next frame, if in doubt as well, is worth a long search: ever more rarely."""
+        n = self.n_doubted
+        return n % _MOST_BETWEEN_SEARCHES == 0 or (n < _MOST_BETWEEN_SEARCHES and n & (n - 1) == 0)
 
     def predicted(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
         """The pose expected at a moment; where it was last seen after a long gap."""
@@ -80,7 +91,8 @@ class TrackState:
         velocity = np.zeros(6)
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
             velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
-        return TrackState(pose, captured_ns, velocity, 0, self.box, verdict.cause)
+        n_doubted = self.n_doubted + 1 if is_place_doubted(verdict) else 0
+        return TrackState(pose, captured_ns, velocity, 0, n_doubted, self.box, verdict.cause)
 
 
 def is_place_doubted(verdict: Verdict) -> bool:

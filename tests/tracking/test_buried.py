@@ -36,8 +36,10 @@ def test_a_rough_pose_leads_to_the_bone() -> None:
 def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
     a = room()
     predicted, pair = off(a, (1.6, -1.2, 1.4, 0.02, -0.02, 0.01))
-    *_, best = a.line._buried.followed(pair, predicted)
+    *_, best = a.line._buried.followed(pair, predicted, searches=True)
     assert error_mm(a, best) < 0.2
+    without = list(a.line._buried.followed(pair, predicted, searches=False))
+    assert all(error_mm(a, fit) > 0.5 for fit in without)
 
 
 def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search(monkeypatch) -> None:

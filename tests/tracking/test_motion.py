@@ -137,3 +137,24 @@ def test_what_is_wrong_for_good_is_remembered_until_a_frame_is_ok() -> None:
         state = state.updated(found.because(state.cause), number * PERIOD_NS, CENTRE)
         assert state.cause is Reason.OTHER_SIDE
     assert state.updated(frame(START), 3 * PERIOD_NS, CENTRE).cause is None
+
+
+def doubtful(pose: RigidTransform) -> TrackedFrame:
+    return replace(frame(pose), verdict=Verdict(Status.DEGRADED, 1.0, (Reason.SURFACE_MISFIT,)))
+
+
+def test_a_search_that_finds_nothing_is_made_ever_more_rarely() -> None:
+    state, due = TrackState.at_rest(START, 0), []
+    for number in range(33):
+        if state.is_search_due:
+            due.append(number)
+        state = state.updated(doubtful(START), PERIOD_NS * number, CENTRE)
+    assert due == [0, 1, 2, 4, 8, 16, 24, 32]
+
+
+def test_after_a_sure_frame_the_next_doubt_is_searched_at_once() -> None:
+    state = TrackState.at_rest(START, 0)
+    for _ in range(3):
+        state = state.updated(doubtful(START), PERIOD_NS, CENTRE)
+    assert not state.is_search_due
+    assert state.updated(frame(START), PERIOD_NS, CENTRE).is_search_due

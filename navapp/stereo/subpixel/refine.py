@@ -50,7 +50,10 @@ class RefineSettings:
 
 
 def refine(
-    pair: RectifiedPair, support_px: NDArray[np.float32], settings: RefineSettings | None = None
+    pair: RectifiedPair,
+    support_px: NDArray[np.float32],
+    settings: RefineSettings | None = None,
+    spacing_px: int = 1,
 ) -> DisparityMap:
     """Measure the disparity near a support.
 
@@ -59,6 +62,8 @@ def refine(
         support_px: (h, w) float32 disparity over the box, NaN where nothing is expected; within
             about half a pixel a step of the truth.
         settings: of the refinement.
+        spacing_px: so far apart are the windows; the pixels from one to the next take what it says
+            of the support. Neighbouring windows share most of their pixels: little is lost.
 
     Returns:
         The map over `pair.box`; pixels that did not settle, correlate or show texture are unknown.
@@ -70,7 +75,10 @@ def refine(
     Source: inverse-compositional image correlation (Pan et al. 2013) with gain and offset, on the
     model's own surface instead of a plane.
     """
-    return _accepted(pair, support_px, settings or RefineSettings(), 1)
+    settings = settings or RefineSettings()
+    support = _checked(pair, support_px)
+    offset, quality = _steps(pair, support, settings, spacing_px)
+    return _accepted(pair, support, offset, quality, settings, spacing_px)
 
 
 def refine_samples(
@@ -80,39 +88,46 @@ def refine_samples(
     stride_px: int,
 ) -> DisparityMap:
     """As `refine`, but only every `stride_px`-th pixel each way; the map holds only those."""
-    return _accepted(pair, support_px, settings, stride_px)
+    support = _checked(pair, support_px)
+    offset, quality = _steps(pair, support, settings, stride_px)
+    support, offset = (np.ascontiguousarray(a[::stride_px, ::stride_px]) for a in (support, offset))
+    return _accepted(pair, support, offset, quality, settings, 1)
 
 
-def _accepted(
-    pair: RectifiedPair,
-    support_px: NDArray[np.float32],
-    settings: RefineSettings,
-    stride_px: int,
-) -> DisparityMap:
-    """Every window that is good enough."""
+def _checked(pair: RectifiedPair, support_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The support as the kernels take it."""
     box = pair.box
     if pair.left.ndim != 2 or support_px.shape != (box.height, box.width):
         raise ValueError("refine needs grey pictures and a support of the box's size")
     height, width = pair.left.shape
     if box.clipped(width, height) != box:
         raise ValueError(f"the box {box} reaches beyond the picture of {width}x{height}")
-    support = np.ascontiguousarray(support_px, dtype=np.float32)
-    offset, quality = _steps(pair, support, settings, stride_px)
-    thinned = [np.ascontiguousarray(a[::stride_px, ::stride_px]) for a in (support, offset)]
-    disparity, sigma = (np.empty_like(thinned[0]) for _ in range(2))
-    origin = np.empty(disparity.shape, dtype=np.uint8)
+    return np.ascontiguousarray(support_px, dtype=np.float32)
+
+
+def _accepted(
+    pair: RectifiedPair,
+    support: NDArray[np.float32],
+    offset: NDArray[np.float32],
+    quality: NDArray[np.float32],
+    settings: RefineSettings,
+    spacing_px: int,
+) -> DisparityMap:
+    """Every pixel whose window is good enough."""
+    disparity, sigma = (np.empty_like(support) for _ in range(2))
+    origin = np.empty(support.shape, dtype=np.uint8)
     limits = (
         settings.last_step_px,
         settings.max_sigma_px,
         settings.min_correlation,
         settings.max_roughness_px,
     )
-    fixed = (*thinned, quality, limits, settings.systematic_px)
+    fixed = (support, offset, quality, spacing_px, limits, settings.systematic_px)
     in_row_bands(
         len(disparity),
         lambda first, last: accept_rows(*fixed, (first, last), disparity, sigma, origin),
     )
-    return DisparityMap(disparity, sigma, origin, box.x, box.y)
+    return DisparityMap(disparity, sigma, origin, pair.box.x, pair.box.y)
 
 
 def _steps(

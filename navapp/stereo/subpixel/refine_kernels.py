@@ -192,10 +192,41 @@ def refine_rows(
 
 
 @njit(cache=True, nogil=True)
+def claim_sigmas(
+    said: NDArray[np.float32],
+    limits: tuple[float, float, float, float],
+    added_px2: np.float32,
+    claimed: NDArray[np.float32],
+) -> None:
+    """Sigma px of a row of windows, NaN of those that are not good enough.
+
+    Args:
+        said: (4 w,) of one row's quality.
+        limits: as of `accept_rows`.
+        added_px2: to the variance.
+        claimed: (w,) in place.
+    """
+    step, most_sigma, least_correlation, most_rough = limits
+    unknown = np.float32(np.nan)
+    for x in range(claimed.shape[0]):
+        one = said[N_QUALITIES * x + SIGMA]
+        # Every comparison with NaN is false.
+        accepts = (
+            (abs(said[N_QUALITIES * x + STEP]) <= step)
+            & (one <= most_sigma)
+            & (said[N_QUALITIES * x + CORRELATION] >= least_correlation)
+            & (said[N_QUALITIES * x + ROUGHNESS] <= most_rough)
+        )
+        total = np.sqrt(one * one + added_px2)
+        claimed[x] = total if accepts else unknown
+
+
+@njit(cache=True, nogil=True)
 def accept_rows(
     support: NDArray[np.float32],
     offset: NDArray[np.float32],
     quality: NDArray[np.float32],
+    spacing: int,
     limits: tuple[float, float, float, float],
     systematic_px: float,
     rows: tuple[int, int],
@@ -203,12 +234,13 @@ def accept_rows(
     sigma: NDArray[np.float32],
     is_matched: NDArray[np.uint8],
 ) -> None:
-    """Disparity and claimed sigma of the windows that are good enough; NaN elsewhere.
+    """Disparity and claimed sigma of the pixels whose windows are good enough; NaN elsewhere.
 
     Args:
         support: (h, w) disparity px.
         offset: (h, w) px, added to it.
-        quality: (h, w, 4) as `refine_rows` leaves it.
+        quality: (h / spacing, w / spacing, 4) as `refine_rows` leaves it.
+        spacing: px; a window stands for so many pixels each way from its own on.
         limits: largest step px, largest sigma px, least correlation, largest roughness px.
         systematic_px: added to sigma, squared.
         rows: first, and after the last.
@@ -216,25 +248,25 @@ def accept_rows(
         sigma: (h, w) in place.
         is_matched: (h, w) in place, 1 or 0.
     """
-    step, most_sigma, least_correlation, most_rough = limits
-    unknown, added = np.float32(np.nan), np.float32(systematic_px**2)
+    unknown, width = np.float32(np.nan), support.shape[1]
+    claimed = np.empty(quality.shape[1], dtype=np.float32)
     # One array a loop: the compiler sees that nothing overlaps, and takes several pixels at once.
     for y in range(rows[0], rows[1]):
-        said, row_sigma, row_disparity = quality[y].ravel(), sigma[y], disparity[y]
-        row_support, row_offset, row_matched = support[y], offset[y], is_matched[y]
-        for x in range(row_sigma.shape[0]):
-            one = said[N_QUALITIES * x + SIGMA]
-            # Every comparison with NaN is false.
-            accepts = (
-                (abs(said[N_QUALITIES * x + STEP]) <= step)
-                & (one <= most_sigma)
-                & (said[N_QUALITIES * x + CORRELATION] >= least_correlation)
-                & (said[N_QUALITIES * x + ROUGHNESS] <= most_rough)
+        if y == rows[0] or y % spacing == 0:
+            claim_sigmas(
+                quality[y // spacing].ravel(), limits, np.float32(systematic_px**2), claimed
             )
-            total = np.sqrt(one * one + added)
-            row_sigma[x] = total if accepts else unknown
-        for x in range(row_sigma.shape[0]):
+        row_sigma, row_disparity, row_matched = sigma[y], disparity[y], is_matched[y]
+        row_support, row_offset = support[y], offset[y]
+        for phase in range(spacing):
+            for x in range((width - phase + spacing - 1) // spacing):
+                row_sigma[x * spacing + phase] = claimed[x]
+        for x in range(width):
             found = row_support[x] + row_offset[x]
             row_disparity[x] = unknown if np.isnan(row_sigma[x]) else found
-        for x in range(row_sigma.shape[0]):
-            row_matched[x] = not np.isnan(row_sigma[x])
+        for x in range(width):
+            row_matched[x] = not np.isnan(row_disparity[x])
+        if spacing > 1:
+            # A window may stand for pixels without support.
+            for x in range(width):
+                row_sigma[x] = unknown if np.isnan(row_disparity[x]) else row_sigma[x]

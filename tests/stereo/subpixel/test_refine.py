@@ -156,6 +156,26 @@ def test_with_a_stride_the_same_windows_answer_the_same(stride: int) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
+@pytest.mark.parametrize("spacing", [2, 3, 5])
+def test_windows_that_lie_apart_speak_for_the_pixels_between_them(spacing: int) -> None:
+    support = in_box(SLANT + 0.2)
+    support[10:20, 10:31] = np.nan
+    settings = RefineSettings(n_steps=1, last_step_px=0.5)
+    apart = refine(pair_with(SLANT), support, settings, spacing)
+    thin = refine_samples(pair_with(SLANT), support, settings, spacing)
+    first = np.s_[::spacing, ::spacing]
+    np.testing.assert_array_equal(apart.disparity_px[first], thin.disparity_px)
+    np.testing.assert_array_equal(apart.sigma_px[first], thin.sigma_px)
+    # The offset is the window's, the slant each pixel's own.
+    rows, columns = (np.arange(n) // spacing * spacing for n in support.shape)
+    offset = (apart.disparity_px - support)[np.ix_(rows, columns)]
+    expected = np.where(np.isnan(support), np.nan, support + offset)
+    np.testing.assert_allclose(apart.disparity_px, expected, atol=1e-5)
+    is_known = np.isfinite(expected)
+    np.testing.assert_array_equal(apart.origin > 0, is_known)
+    np.testing.assert_array_equal(np.isfinite(apart.sigma_px), is_known)
+
+
 @pytest.mark.parametrize("stride", [2, 4, 6, 7])
 def test_every_thread_begins_at_a_row_of_samples(
     stride: int, monkeypatch: pytest.MonkeyPatch
