@@ -17,14 +17,14 @@ from navapp.config import Configuration, FaultSection, SimulationSection
 from navapp.errors import ConfigurationError, DeviceError, RigError, WrongDevice
 from navapp.geometry import Rectifier, RigidTransform, StereoRig, TriangleMesh, read_rig
 from navapp.geometry.transform import FloatArray
-from sim_devices.camera import SimulatedCamera
+from sim_devices.camera import Scene, SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.hand import Hand
 from sim_devices.rigs import WORKING_DISTANCE_MM
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
-from sim_devices.sheet import PrintedSheet, SheetScene
+from sim_devices.sheet import PrintedSheet, SheetInView, SheetScene
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 
@@ -71,18 +71,21 @@ class OpenedDevices:
     simulation: Simulation | None = None
 
 
-def open_live(configuration: Configuration, *, is_headless: bool) -> OpenedDevices:
+def open_live(
+    configuration: Configuration, *, is_headless: bool, board: Board | None = None
+) -> OpenedDevices:
     """Open the configured devices.
 
     Args:
         configuration: in force.
+        board: that is held into a simulated view, when the configuration says so.
         is_headless: nobody watches; a simulated camera then waits to be read.
 
     Raises:
         DeviceError, RigError, ConfigurationError.
     """
     if configuration.camera.backend == "simulated":
-        return _open_simulated(configuration, is_headless=is_headless)
+        return _open_simulated(configuration, board, is_headless=is_headless)
     return _open_third_party(configuration)
 
 
@@ -179,13 +182,15 @@ def _configured_rig(configuration: Configuration) -> StereoRig:
     return read_rig(configuration.camera.rig)
 
 
-def _open_simulated(configuration: Configuration, *, is_headless: bool) -> OpenedDevices:
+def _open_simulated(
+    configuration: Configuration, board: Board | None, *, is_headless: bool
+) -> OpenedDevices:
     settings = configuration.camera.simulated
     world = World(_scenario(settings))
     is_stepped = is_headless if settings.stepped is None else settings.stepped
     clock: Clock = ManualClock() if is_stepped else SystemClock()
     camera = SimulatedCamera(
-        world,
+        _with_board(world, board, settings),
         clock,
         is_stepped=is_stepped,
         rate_hz=configuration.camera.rate_hz,
@@ -204,6 +209,16 @@ def _open_simulated(configuration: Configuration, *, is_headless: bool) -> Opene
     return OpenedDevices(devices, rig, reopen, _simulation(world, camera))
 
 
+def _with_board(world: World, board: Board | None, settings: SimulationSection) -> Scene:
+    """The room, with a board held into the view when there is one to be shown."""
+    if board is None or settings.board_s is None:
+        return world
+    hand = _hand_with(board, settings.seed)
+    from_s, to_s = settings.board_s
+    shown_ns = (round(from_s * 1e9), round(to_s * 1e9))
+    return SheetInView(world, _printed(board), hand.left_from_body, shown_ns)
+
+
 def _scenario(settings: SimulationSection) -> Scenario:
     return Scenario(
         seed=settings.seed,
@@ -217,7 +232,8 @@ def _scenario(settings: SimulationSection) -> Scenario:
 
 
 def _fault(section: FaultSection) -> Fault:
-    return Fault(FaultKind(section.kind), section.start_s, section.duration_s, section.delay_s)
+    kind = FaultKind(section.kind)
+    return Fault(kind, section.start_s, section.duration_s, section.delay_s, section.turn_deg)
 
 
 def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
