@@ -91,7 +91,9 @@ def _board(configuration: "Configuration") -> "Board | None":
     if path is None:
         if configuration.camera.simulated.board_s is not None:
             raise ConfigurationError(
-                "there is no board to be shown", subject="calibration.board", remedy="name its file"
+                "there is no board to be shown",
+                subject="calibration.board",
+                remedy="name its file in [calibration] board",
             )
         return None
     board = read_board(path)

@@ -259,7 +259,7 @@ def test_a_board_to_be_shown_must_be_named(
     path = tmp_path / "x.toml"
     path.write_text("[camera.simulated]\nboard_s = [0.0, 1.0]\n", encoding="utf-8")
     assert run(["--quiet", "--config", str(path), "run", "--headless", "--frames", "1"]) == 2
-    assert "calibration.board" in capsys.readouterr().err
+    assert "[calibration] board" in capsys.readouterr().err
     options = boarded(tmp_path)
     (tmp_path / "board.json").write_text(json.dumps({**BOARD, "square_mm": 1.0, "marker_mm": 0.7}))
     assert run([*options, "--frames", "1"]) == 2
