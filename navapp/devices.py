@@ -96,11 +96,13 @@ class OpenedCapture:
     Attributes:
         camera: opened.
         clock: of its frames.
+        reopen: opens it again when it was lost.
         hand: holds the board in front of simulated cameras, else None.
     """
 
     camera: StereoCamera
     clock: Clock
+    reopen: Callable[[], StereoCamera]
     hand: Hand | None = None
 
 
@@ -119,7 +121,7 @@ def open_capture(configuration: Configuration, board: Board, *, is_headless: boo
         clock = SystemClock()
         camera = _third_party_camera(configuration, clock)
         camera.open()
-        return OpenedCapture(camera, clock)
+        return OpenedCapture(camera, clock, _reopener(camera, camera.open))
     settings = configuration.camera.simulated
     hand = _hand_with(board, settings.seed)
     scene = SheetScene(_printed(board), hand.left_from_body)
@@ -137,7 +139,7 @@ def open_capture(configuration: Configuration, board: Board, *, is_headless: boo
         skew_ns=round(settings.skew_ms * 1e6),
     )
     simulated.open()
-    return OpenedCapture(simulated, sim_clock, hand)
+    return OpenedCapture(simulated, sim_clock, _reopener(simulated, simulated.open), hand)
 
 
 def _printed(board: Board) -> PrintedSheet:
@@ -204,7 +206,7 @@ def _open_simulated(
     else:
         rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
     _open_fitting(camera, rig)
-    reopen = _reopener(camera, rig)
+    reopen = _reopener(camera, lambda: _open_fitting(camera, rig))
     devices = _device_set(configuration, camera, clock, rig)
     return OpenedDevices(devices, rig, reopen, _simulation(world, camera))
 
@@ -261,7 +263,7 @@ def _open_third_party(configuration: Configuration) -> OpenedDevices:
     camera = _third_party_camera(configuration, clock)
     rig = _configured_rig(configuration)
     _open_fitting(camera, rig)
-    reopen = _reopener(camera, rig)
+    reopen = _reopener(camera, lambda: _open_fitting(camera, rig))
     return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
 
 
@@ -319,19 +321,19 @@ def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
         )
 
 
-def _reopener(camera: StereoCamera, rig: StereoRig) -> Callable[[], StereoCamera]:
+def _reopener(camera: StereoCamera, open_again: Callable[[], None]) -> Callable[[], StereoCamera]:
     """Opens the camera again, and refuses another one that was put in its place."""
     serials = camera.info.serials
 
     def reopen() -> StereoCamera:
-        _open_fitting(camera, rig)
+        open_again()
         found = camera.info.serials
         if found != serials:
             camera.close()
             raise WrongDevice(
-                f"camera {camera.info.name} has serial numbers {found}, the session's {serials}",
+                f"camera {camera.info.name} has serial numbers {found}, it began with {serials}",
                 subject=camera.info.name,
-                remedy="connect the cameras that the session began with",
+                remedy="connect the cameras that it began with",
             )
         return camera
 
