@@ -70,7 +70,7 @@ def _picture_doubts(health: StereoHealth) -> list[Reason]:
 
 
 def _is_off(health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float) -> bool:
-    return _row_cost_mm(health, geometry, depth_mm) > OK_ERROR_MM
+    return bool(_row_cost_mm(health, geometry, depth_mm) > OK_ERROR_MM)
 
 
 def _row_cost_mm(health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float) -> float:
