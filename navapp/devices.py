@@ -17,14 +17,14 @@ from navapp.config import Configuration, FaultSection, SimulationSection
 from navapp.errors import ConfigurationError, DeviceError, RigError, WrongDevice
 from navapp.geometry import Rectifier, RigidTransform, StereoRig, TriangleMesh, read_rig
 from navapp.geometry.transform import FloatArray
-from sim_devices.camera import SimulatedCamera
+from sim_devices.camera import Scene, SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.hand import Hand
 from sim_devices.rigs import WORKING_DISTANCE_MM
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
-from sim_devices.sheet import PrintedSheet, SheetScene
+from sim_devices.sheet import PrintedSheet, SheetInView, SheetScene
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 
@@ -71,18 +71,21 @@ class OpenedDevices:
     simulation: Simulation | None = None
 
 
-def open_live(configuration: Configuration, *, is_headless: bool) -> OpenedDevices:
+def open_live(
+    configuration: Configuration, *, is_headless: bool, board: Board | None = None
+) -> OpenedDevices:
     """Open the configured devices.
 
     Args:
         configuration: in force.
+        board: that is held into a simulated view, when the configuration says so.
         is_headless: nobody watches; a simulated camera then waits to be read.
 
     Raises:
         DeviceError, RigError, ConfigurationError.
     """
     if configuration.camera.backend == "simulated":
-        return _open_simulated(configuration, is_headless=is_headless)
+        return _open_simulated(configuration, board, is_headless=is_headless)
     return _open_third_party(configuration)
 
 
@@ -93,11 +96,13 @@ class OpenedCapture:
     Attributes:
         camera: opened.
         clock: of its frames.
+        reopen: opens it again when it was lost.
         hand: holds the board in front of simulated cameras, else None.
     """
 
     camera: StereoCamera
     clock: Clock
+    reopen: Callable[[], StereoCamera]
     hand: Hand | None = None
 
 
@@ -116,7 +121,7 @@ def open_capture(configuration: Configuration, board: Board, *, is_headless: boo
         clock = SystemClock()
         camera = _third_party_camera(configuration, clock)
         camera.open()
-        return OpenedCapture(camera, clock)
+        return OpenedCapture(camera, clock, _reopener(camera, camera.open))
     settings = configuration.camera.simulated
     hand = _hand_with(board, settings.seed)
     scene = SheetScene(_printed(board), hand.left_from_body)
@@ -134,7 +139,7 @@ def open_capture(configuration: Configuration, board: Board, *, is_headless: boo
         skew_ns=round(settings.skew_ms * 1e6),
     )
     simulated.open()
-    return OpenedCapture(simulated, sim_clock, hand)
+    return OpenedCapture(simulated, sim_clock, _reopener(simulated, simulated.open), hand)
 
 
 def _printed(board: Board) -> PrintedSheet:
@@ -179,13 +184,15 @@ def _configured_rig(configuration: Configuration) -> StereoRig:
     return read_rig(configuration.camera.rig)
 
 
-def _open_simulated(configuration: Configuration, *, is_headless: bool) -> OpenedDevices:
+def _open_simulated(
+    configuration: Configuration, board: Board | None, *, is_headless: bool
+) -> OpenedDevices:
     settings = configuration.camera.simulated
     world = World(_scenario(settings))
     is_stepped = is_headless if settings.stepped is None else settings.stepped
     clock: Clock = ManualClock() if is_stepped else SystemClock()
     camera = SimulatedCamera(
-        world,
+        _with_board(world, board, settings),
         clock,
         is_stepped=is_stepped,
         rate_hz=configuration.camera.rate_hz,
@@ -199,9 +206,19 @@ def _open_simulated(configuration: Configuration, *, is_headless: bool) -> Opene
     else:
         rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
     _open_fitting(camera, rig)
-    reopen = _reopener(camera, rig)
+    reopen = _reopener(camera, lambda: _open_fitting(camera, rig))
     devices = _device_set(configuration, camera, clock, rig)
     return OpenedDevices(devices, rig, reopen, _simulation(world, camera))
+
+
+def _with_board(world: World, board: Board | None, settings: SimulationSection) -> Scene:
+    """The room, with a board held into the view when there is one to be shown."""
+    if board is None or settings.board_s is None:
+        return world
+    hand = _hand_with(board, settings.seed)
+    from_s, to_s = settings.board_s
+    shown_ns = (round(from_s * 1e9), round(to_s * 1e9))
+    return SheetInView(world, _printed(board), hand.left_from_body, shown_ns)
 
 
 def _scenario(settings: SimulationSection) -> Scenario:
@@ -217,7 +234,8 @@ def _scenario(settings: SimulationSection) -> Scenario:
 
 
 def _fault(section: FaultSection) -> Fault:
-    return Fault(FaultKind(section.kind), section.start_s, section.duration_s, section.delay_s)
+    kind = FaultKind(section.kind)
+    return Fault(kind, section.start_s, section.duration_s, section.delay_s, section.turn_deg)
 
 
 def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
@@ -245,7 +263,7 @@ def _open_third_party(configuration: Configuration) -> OpenedDevices:
     camera = _third_party_camera(configuration, clock)
     rig = _configured_rig(configuration)
     _open_fitting(camera, rig)
-    reopen = _reopener(camera, rig)
+    reopen = _reopener(camera, lambda: _open_fitting(camera, rig))
     return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
 
 
@@ -303,19 +321,19 @@ def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
         )
 
 
-def _reopener(camera: StereoCamera, rig: StereoRig) -> Callable[[], StereoCamera]:
+def _reopener(camera: StereoCamera, open_again: Callable[[], None]) -> Callable[[], StereoCamera]:
     """Opens the camera again, and refuses another one that was put in its place."""
     serials = camera.info.serials
 
     def reopen() -> StereoCamera:
-        _open_fitting(camera, rig)
+        open_again()
         found = camera.info.serials
         if found != serials:
             camera.close()
             raise WrongDevice(
-                f"camera {camera.info.name} has serial numbers {found}, the session's {serials}",
+                f"camera {camera.info.name} has serial numbers {found}, it began with {serials}",
                 subject=camera.info.name,
-                remedy="connect the cameras that the session began with",
+                remedy="connect the cameras that it began with",
             )
         return camera
 

@@ -22,6 +22,7 @@ from navapp.errors import (
 )
 from navapp.geometry.rig import StereoRig
 from sim_devices.faults import FaultKind, FaultScript
+from sim_devices.rigs import NO_TURN, Turn
 from sim_devices.sensor import Eye, SensorModel
 
 NOMINAL_EXPOSURE_MS = 8.0
@@ -40,8 +41,13 @@ class Scene(Protocol):
         """The two cameras at full size."""
         ...
 
-    def render(self, eye: Eye, time_ns: int, scale: float = 1.0) -> NDArray[np.float32]:
-        """(H, W, 3) float32 BGR radiance at a world time, 1.0 = full well at nominal exposure."""
+    def render(
+        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> NDArray[np.float32]:
+        """(H, W, 3) float32 BGR radiance at a world time, 1.0 = full well at nominal exposure.
+
+        The right eye is turned about its own axes by the rotation vector `turn_rad`.
+        """
         ...
 
 
@@ -304,7 +310,8 @@ class SimulatedCamera:
         if self._faults.is_active(blackout, world_time_ns):
             radiance = np.zeros((self._rig.height, self._rig.width, 3), np.float32)
         else:
-            radiance = self._world.render(eye, world_time_ns, self._scale)
+            turn_rad = self._faults.turn_rad(world_time_ns)
+            radiance = self._world.render(eye, world_time_ns, self._scale, turn_rad)
         controls = self._controls
         sensor = self._nominal_sensor.adjusted(
             controls["exposure_ms"] / NOMINAL_EXPOSURE_MS, controls["gain_db"]

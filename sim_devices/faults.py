@@ -22,6 +22,8 @@ class FaultKind(Enum):
     """No light reaches the right sensor."""
     WRONG_SERIAL = "wrong_serial"
     """Opened now, it is another camera."""
+    TURN = "turn"
+    """The right camera is turned where it stands, as if somebody had bumped into it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +35,18 @@ class Fault:
         start_s: since the camera was opened for the first time.
         duration_s: infinite for a fault that stays.
         delay_s: of a DELAY: how much later frames come.
+        turn_deg: of a TURN, about the right camera's axes: x moves its picture up and down, y
+            sideways, z turns it in its plane.
 
     Raises:
-        ValueError: a negative or missing time.
+        ValueError: a negative or missing time, a turn that is no number.
     """
 
     kind: FaultKind
     start_s: float
     duration_s: float
     delay_s: float = 0.3
+    turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.start_s) and self.start_s >= 0.0):
@@ -50,6 +55,8 @@ class Fault:
             raise ValueError("duration_s must be positive")
         if not (math.isfinite(self.delay_s) and self.delay_s >= 0.0):
             raise ValueError("delay_s must not be negative")
+        if not all(math.isfinite(angle) for angle in self.turn_deg):
+            raise ValueError("turn_deg must be three numbers")
 
     @property
     def start_ns(self) -> int:
@@ -81,6 +88,16 @@ class FaultScript:
             if fault.kind is FaultKind.DELAY and fault.is_active(elapsed_ns)
         )
         return round(max(delays_s, default=0.0) * 1e9)
+
+    def turn_rad(self, elapsed_ns: int) -> tuple[float, float, float]:
+        """Rotation vector by which the right camera is turned then; of several turns the last."""
+        turns_deg = [
+            fault.turn_deg
+            for fault in self.faults
+            if fault.kind is FaultKind.TURN and fault.is_active(elapsed_ns)
+        ]
+        x, y, z = turns_deg[-1] if turns_deg else (0.0, 0.0, 0.0)
+        return math.radians(x), math.radians(y), math.radians(z)
 
     def first_moment_ns(self, kind: FaultKind, after_ns: int, until_ns: int) -> int | None:
         """The first moment of `after_ns` <= t <= `until_ns` at which that fault happens."""

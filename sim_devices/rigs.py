@@ -7,6 +7,11 @@ import numpy as np
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from sim_devices.sensor import Eye
+
+# Rotation vector about a camera's own axes.
+Turn = tuple[float, float, float]
+NO_TURN: Turn = (0.0, 0.0, 0.0)
 
 NATIVE_WIDTH = 1280
 NATIVE_HEIGHT = 720
@@ -34,6 +39,14 @@ def default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> Stere
         name="sim:rig",
     )
     return rig if factor == 1.0 else rig.scaled(factor)
+
+
+def camera_from_left(rig: StereoRig, eye: Eye, turn_rad: Turn = NO_TURN) -> RigidTransform:
+    """Where an eye stands, the right one turned about its own axes since the rig was measured."""
+    if eye == "left":
+        return RigidTransform.identity("left", "left")
+    turn = rotation_from_vector(turn_rad)
+    return RigidTransform.from_parts("right", "right", turn, np.zeros(3)) @ rig.right_from_left
 
 
 def _camera(

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
-from sim_devices.rigs import default_rig
+from sim_devices.camera import Scene
+from sim_devices.rigs import NO_TURN, Turn, camera_from_left, default_rig
 from sim_devices.sensor import Eye
 from sim_devices.sheet_kernels import draw_sheet
 
@@ -76,6 +77,7 @@ class SheetScene:
         sheet: that is shown.
         left_from_sheet: its pose at a world time in ns; the caller moves it.
         rig: of the two cameras; the simulated room's when absent.
+        ground: radiance of what is not the sheet.
     """
 
     def __init__(
@@ -83,20 +85,22 @@ class SheetScene:
         sheet: PrintedSheet,
         left_from_sheet: Callable[[int], RigidTransform],
         rig: StereoRig | None = None,
+        ground: float = _GROUND,
     ) -> None:
         self.rig = rig or default_rig()
+        self._ground = ground
         self._sheet = sheet
         self._left_from_sheet = left_from_sheet
         self._levels = _levels(sheet.white)
         self._rays: dict[tuple[Eye, float], tuple[Camera, FloatArray]] = {}
 
-    def render(self, eye: Eye, time_ns: int, scale: float = 1.0) -> NDArray[np.float32]:
+    def render(
+        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure."""
         camera, rays = self._optics(eye, scale)
-        pose = self._left_from_sheet(time_ns)
-        if eye == "right":
-            pose = self.rig.right_from_left @ pose
-        picture = np.full((camera.height, camera.width), _GROUND, np.float32)
+        pose = camera_from_left(self.rig, eye, turn_rad) @ self._left_from_sheet(time_ns)
+        picture = np.full((camera.height, camera.width), self._ground, np.float32)
         box = _box(camera, pose.apply(self._sheet.corners_mm))
         if box is not None:
             self._draw(camera, rays, pose, box, picture)
@@ -129,7 +133,7 @@ class SheetScene:
         # The third row is the inverse of the depth: positive in front of the camera.
         homography = pixels @ np.linalg.inv(plane)
         shade = _AMBIENT + (1.0 - _AMBIENT) * abs(towards)
-        draw_sheet(rays, homography, texture, _N_SAMPLES, _GROUND, shade, box, picture)
+        draw_sheet(rays, homography, texture, _N_SAMPLES, self._ground, shade, box, picture)
 
     def _level(self, camera: Camera, camera_from_sheet: RigidTransform) -> _Level:
         """The coarsest level of which two pixels are no longer than one of the picture."""
@@ -149,6 +153,39 @@ class SheetScene:
             rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
             self._rays[key] = camera, np.ascontiguousarray(rays.reshape(*u.shape, 2))
         return self._rays[key]
+
+
+class SheetInView:
+    """A scene into whose view a sheet is held for a while, in front of everything else.
+
+    Args:
+        behind: the scene.
+        sheet: that is held.
+        left_from_sheet: its pose at a world time in ns.
+        shown_ns: from when to when.
+    """
+
+    def __init__(
+        self,
+        behind: Scene,
+        sheet: PrintedSheet,
+        left_from_sheet: Callable[[int], RigidTransform],
+        shown_ns: tuple[int, int],
+    ) -> None:
+        self.rig = behind.rig
+        self._behind, self._shown_ns = behind, shown_ns
+        # Not a number where the sheet does not hide what is behind it.
+        self._sheet = SheetScene(sheet, left_from_sheet, behind.rig, ground=np.nan)
+
+    def render(
+        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> NDArray[np.float32]:
+        """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure."""
+        radiance = self._behind.render(eye, time_ns, scale, turn_rad)
+        if not self._shown_ns[0] <= time_ns < self._shown_ns[1]:
+            return radiance
+        sheet = self._sheet.render(eye, time_ns, scale, turn_rad)
+        return np.where(np.isnan(sheet), radiance, sheet)
 
 
 def _levels(white: NDArray[np.uint8]) -> list[_Level]:

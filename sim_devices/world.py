@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Iterator
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +22,12 @@ from sim_devices.layout import (
 from sim_devices.materials import material_table
 from sim_devices.motion import LegMotion, drill_motion, sweep_offset_mm
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import NO_TURN, Turn, camera_from_left, default_rig
 from sim_devices.scenario import Scenario
+from sim_devices.sensor import Eye
 from sim_devices.stages import STAGES, Site, entry_point, worn_patch
 from sim_devices.textures import noise_tile
 from sim_devices.tissue import SKIN_BELOW_TOP_MM, make_drape, make_tissue, trimmed
-
-Eye = Literal["left", "right"]
 
 _TISSUE_FOLLOWS = 0.9
 # How far from the joint line the surgeon laid the bones bare.
@@ -83,7 +81,7 @@ class World:
             _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
         )
         self._lock = threading.Lock()
-        self._renderers: dict[tuple[str, Eye, float], Renderer] = {}
+        self._renderers: dict[tuple[str, Eye, float, Turn], Renderer] = {}
         self._parts: dict[str, tuple[Part, ...]] = {}
         self._stage = ""
         self.set_stage(scenario.stage)
@@ -154,16 +152,19 @@ class World:
             thickness = worn(mesh, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
         return thickness
 
-    def render(self, eye: Eye, time_ns: int, scale: float = 1.0) -> NDArray[np.float32]:
+    def render(
+        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure.
 
         Args:
             eye: which camera.
             time_ns: world time.
             scale: of the picture against the rig's.
+            turn_rad: of the right eye, about its own axes.
         """
-        renderer, parts = self._renderer(eye, scale)
-        poses, camera_from_table = self._poses(eye, parts, time_ns)
+        renderer, parts = self._renderer(eye, scale, turn_rad)
+        poses, camera_from_table = self._poses(eye, parts, time_ns, turn_rad)
         return renderer.render(poses, camera_from_table)
 
     def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
@@ -172,14 +173,17 @@ class World:
         poses, camera_from_table = self._poses(eye, parts, time_ns)
         return renderer.depth(poses, camera_from_table)
 
-    def _renderer(self, eye: Eye, scale: float) -> tuple[Renderer, tuple[Part, ...]]:
+    def _renderer(
+        self, eye: Eye, scale: float, turn_rad: Turn = NO_TURN
+    ) -> tuple[Renderer, tuple[Part, ...]]:
+        """That of an eye as it stands: what lies still is drawn once and kept."""
         with self._lock:
             stage = self._stage
             parts = self._parts.get(stage)
             if parts is None:
                 parts = tuple(self._sided(part) for part in STAGES[stage](self._site))
                 self._parts[stage] = parts
-            key = (stage, eye, scale)
+            key = (stage, eye, scale, turn_rad)
             if key not in self._renderers:
                 rig = self.rig if scale == 1.0 else self.rig.scaled(scale)
                 camera = rig.left if eye == "left" else rig.right
@@ -197,17 +201,15 @@ class World:
         return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
 
     def _poses(
-        self, eye: Eye, parts: tuple[Part, ...], time_ns: int
+        self, eye: Eye, parts: tuple[Part, ...], time_ns: int, turn_rad: Turn = NO_TURN
     ) -> tuple[dict[str, RigidTransform], RigidTransform]:
         """camera_from_body of everything in the scene, and camera_from_table."""
-        camera_from_left = (
-            RigidTransform.identity("left", "left") if eye == "left" else self.rig.right_from_left
-        )
+        seen_from = camera_from_left(self.rig, eye, turn_rad)
         poses = {
-            body: camera_from_left @ self.left_from_body(body, time_ns)
+            body: seen_from @ self.left_from_body(body, time_ns)
             for body in dict.fromkeys(part.body for part in parts)
         }
-        return poses, camera_from_left @ self._left_from_table
+        return poses, seen_from @ self._left_from_table
 
     def _table_from_body(self, body: str, time_s: float) -> RigidTransform:
         """As for a right knee."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import ResultError, UsageError
+from navapp.errors import DeviceError, ResultError, UsageError
 
 if TYPE_CHECKING:
     from calibration.rig.solve import Calibration
@@ -34,6 +34,8 @@ when the rig is accepted, rig.yml. Without a screen a simulated hand follows eve
 """
 # Without a screen: some twenty views in a row that cannot be had.
 _MOST_FRAMES_A_PAIR = 600
+# As in a session without a screen.
+_LOST_NS = 10_000_000_000
 
 
 def add_parser(subparsers: Any) -> None:
@@ -106,6 +108,7 @@ def _capture(opened: "OpenedCapture", solver: "_Solver", options: argparse.Names
         store=solver.folder,
         solve=solver,
         hand=opened.hand,
+        reopen=opened.reopen,
     )
 
 
@@ -153,11 +156,14 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
     from navapp.control.capture.states import Finish, Follow
 
     capture.submit(Follow(is_on=True))
-    told, n_kept, n_waited = 0, 0, 0
+    told, n_kept, n_waited, well_ns = 0, 0, 0, capture.snapshot.time_ns
     snapshot = capture.step()
     while not snapshot.is_enough:
         n_waited = 0 if snapshot.n_kept > n_kept else n_waited + 1
         n_kept = snapshot.n_kept
+        well_ns = well_ns if snapshot.trouble else snapshot.time_ns
+        if snapshot.time_ns - well_ns > _LOST_NS:
+            raise DeviceError(f"{snapshot.trouble}, but nothing came; {n_kept} pairs are kept")
         if n_waited > _MOST_FRAMES_A_PAIR:
             raise ResultError(
                 f"no wanted view can be taken after {n_kept} pairs ({snapshot.wish})",

@@ -54,8 +54,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             remedy="check the rig with pictures of its own cameras",
         )
     section = load(find_file(options.config)).calibration
-    worst_length = section.accept_mm / float(np.mean(section.working_depth_mm))
-    found = check_rig(board, rig, pairs.seen, worst_length)
+    found = check_rig(board, rig, pairs.seen, section.worst_length)
     found = replace(found, reasons=(*_of_record(rig), *found.reasons))
     write_json(options.json, "calibrate check", _content(found, len(pairs.unseen)))
     if options.json != "-":

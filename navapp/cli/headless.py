@@ -15,7 +15,7 @@ from navapp.control.controller import SessionController
 from navapp.control.operators import Operator
 from navapp.control.results import FrameResult
 from navapp.control.runner import run_headless
-from navapp.errors import DeviceError, PriorError, ResultError, RigError
+from navapp.errors import NavappError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
 from navapp.values import Prior, StageSpec
 
@@ -118,29 +118,32 @@ def follow(controller: SessionController, operator: Operator, log: FrameLog) -> 
 def finish(
     frames: Sequence[dict[str, Any]],
     seconds: float,
-    lost_device: DeviceError | None,
+    failure: NavappError | None,
     options: argparse.Namespace,
     diagnostics: Diagnostics,
+    rig: dict[str, Any] | None = None,
 ) -> int:
     """Write the result, tell its summary, and answer with the exit code.
 
     Args:
         frames: entries of the result.
         seconds: that they took.
-        lost_device: why the session ended early, or None.
+        failure: the fault that the session ended in, or None.
         options: of the verb.
         diagnostics: takes the summary.
+        rig: what a live session found out about its rig.
 
     Raises:
-        DeviceError: the one that ended the session.
+        NavappError: that fault.
         ResultError: no frame was OK.
     """
     summary = summarise(frames, seconds)
-    write_json(options.json, options.verb, {"frames": frames, "summary": summary})
+    told = {} if rig is None else {"rig": rig}
+    write_json(options.json, options.verb, {"frames": frames, "summary": summary, **told})
     if options.json != "-":
         diagnostics.say(summary_text(summary))
-    if lost_device is not None:
-        raise lost_device
+    if failure is not None:
+        raise failure
     if summary["ok"] == 0:
         raise ResultError("no frame was OK", remedy="see the reasons in --json")
     return 0

@@ -8,10 +8,12 @@ from datetime import date
 from typing import TYPE_CHECKING
 
 from navapp.cli.diagnostics import Diagnostics
-from navapp.errors import UsageError
+from navapp.errors import ConfigurationError, UsageError
 
 if TYPE_CHECKING:
+    from calibration.targets.boards import Board
     from navapp.config import Configuration
+    from navapp.control.board_watch import BoardWatch
     from navapp.control.controller import SessionController
     from navapp.control.results import FrameListener
     from navapp.control.session import SessionHooks
@@ -28,6 +30,7 @@ class LiveSession:
         opened: devices, and the simulation when there is one.
         plan, prior: of the patient.
         stage: to start in.
+        board: whose lengths are known, None when none is configured.
     """
 
     configuration: "Configuration"
@@ -35,6 +38,7 @@ class LiveSession:
     plan: "Plan"
     prior: "Prior"
     stage: "StageSpec"
+    board: "Board | None" = None
 
 
 def prepared(
@@ -57,7 +61,8 @@ def prepared(
     stage = stage_by_name(options.stage or configuration.stages.first)
     plan = None if given.path is None else read_plan(given.path)
     prior = None if given.prior is None else read_prior(given.prior)
-    opened = open_live(configuration, is_headless=options.headless)
+    board = _board(configuration)
+    opened = open_live(configuration, is_headless=options.headless, board=board)
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         check_not_expired(opened.rig, date.today())
@@ -71,7 +76,34 @@ def prepared(
         if options.headless:
             check_start(prior, stage)
         undo.pop_all()
-    return LiveSession(configuration, opened, plan, prior, stage)
+    return LiveSession(configuration, opened, plan, prior, stage, board)
+
+
+def _board(configuration: "Configuration") -> "Board | None":
+    """The board that the configuration names.
+
+    Raises:
+        InputError: its file; ConfigurationError: its lengths are not known in mm.
+    """
+    from calibration.targets.boards import read_board
+
+    path = configuration.calibration.board
+    if path is None:
+        if configuration.camera.simulated.board_s is not None:
+            raise ConfigurationError(
+                "there is no board to be shown",
+                subject="calibration.board",
+                remedy="name its file in [calibration] board",
+            )
+        return None
+    board = read_board(path)
+    if board.spacing_mm == 1.0:
+        raise ConfigurationError(
+            f"board {path} is its own unit of length",
+            subject="calibration.board",
+            remedy="measure it, and give its lengths in mm",
+        )
+    return board
 
 
 def controller_of(
@@ -99,6 +131,22 @@ def controller_of(
             is_recording=configuration.recording.folder is not None,
         ),
         hooks=_listening(session, on_frame, undo),
+        board_watch=_board_watch(session, is_inline=is_inline),
+    )
+
+
+def _board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None":
+    """What measures the rig whenever the board is seen; None without a board."""
+    if session.board is None:
+        return None
+    from calibration.rig.known_length import LengthMeter
+    from navapp.control.board_watch import BoardWatch
+    from navapp.control.executors import InlineExecutor, ThreadExecutor
+
+    return BoardWatch(
+        LengthMeter(session.board, session.opened.rig),
+        session.configuration.calibration.worst_length,
+        InlineExecutor() if is_inline else ThreadExecutor("rig watch"),
     )
 
 

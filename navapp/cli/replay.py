@@ -106,7 +106,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         undo.callback(controller.close)
         seconds = follow(controller, replay.operator, log)
     frames = [frame_to_json(result, None) for result in log.results]
-    return finish(frames, seconds, controller.lost_device, options, diagnostics)
+    return finish(frames, seconds, controller.failure, options, diagnostics)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -177,12 +177,19 @@ def _operation(
     """The recorded operator, so that the same poses come out, or one that only follows."""
     from navapp.control.executors import InlineExecutor, RecordedExecutor
     from navapp.control.operators import RecordedOperator, ReplayOperator
+    from navapp.control.states import DistrustRig
 
     is_changed = bool(options.prior or options.bone or options.method or options.start)
     if session is None or is_changed or options.order != "forward":
         return ReplayOperator(each_frame=options.order == "each"), InlineExecutor()
     events = session.events
-    return RecordedOperator(events.commands), RecordedExecutor(events.take_overs)
+    # What was said of the recorded rig says nothing of another one.
+    commands = [
+        (after, command)
+        for after, command in events.commands
+        if not (options.rig and isinstance(command, DistrustRig))
+    ]
+    return RecordedOperator(commands), RecordedExecutor(events.take_overs)
 
 
 def _stage_of(bone: str, plan: "Plan") -> "StageSpec":

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from navapp.control.results import FrameResult
-from navapp.control.states import SessionState
+from navapp.control.states import SessionState, Snapshot
 from navapp.values import Reason, Status
 
 
@@ -40,6 +40,23 @@ def frame_to_json(result: FrameResult, tre_mm: float | None) -> dict[str, Any]:
             "judge": timings.judge_ms,
             "overlay": timings.overlay_ms,
             "total": timings.total_ms,
+        },
+    }
+
+
+def rig_to_json(snapshot: Snapshot) -> dict[str, Any]:
+    """The `rig` object of a live session: is it believed, and what a known length said last."""
+    check = snapshot.length_check
+    return {
+        "name": snapshot.rig_name,
+        "alarm": snapshot.rig_alarm or None,
+        "length_check": None
+        if check is None
+        else {
+            "length_100_mm": {"mean": 100.0 * check.ratio, "bound_95": 100.0 * check.bound},
+            "looks": check.n_looks,
+            "within": check.is_within,
+            "age_s": (snapshot.time_ns - check.captured_ns) / 1e9,
         },
     }
 

@@ -103,7 +103,7 @@ def _run_headless(
     diagnostics: Diagnostics,
 ) -> int:
     from navapp.cli.headless import FrameLog, finish, follow
-    from navapp.cli.results import frame_to_json
+    from navapp.cli.results import frame_to_json, rig_to_json
     from navapp.control.operators import ScriptedOperator
 
     log = FrameLog(options.frames, diagnostics)
@@ -113,7 +113,8 @@ def _run_headless(
         undo.callback(controller.close)
         seconds = follow(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
-    return finish(frames, seconds, controller.lost_device, options, diagnostics)
+    rig = rig_to_json(controller.snapshot)
+    return finish(frames, seconds, controller.failure, options, diagnostics, rig)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> float | None:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 def _rising(values: tuple[float, float]) -> tuple[float, float]:
@@ -29,8 +30,9 @@ class FaultSection(Section):
     """One scripted fault of the simulated camera; seconds since it was opened first."""
 
     kind: Literal[
-        "unplug", "freeze", "drop", "delay", "blackout_left", "blackout_right", "wrong_serial"
-    ]
+        "unplug", "freeze", "drop", "delay", "blackout_left", "blackout_right", "wrong_serial",
+        "turn",
+    ]  # fmt: skip
     """What goes wrong."""
     start_s: Annotated[float, Field(ge=0.0)]
     """When it begins."""
@@ -38,11 +40,15 @@ class FaultSection(Section):
     """How long it lasts; inf: for good."""
     delay_s: Annotated[float, Field(ge=0.0)] = 0.3
     """Of a delay: how much later frames come."""
+    turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of a turn of the right camera about its axes: x up and down, y sideways, z in its plane."""
 
     @model_validator(mode="after")
     def _has_its_own_keys(self) -> Self:
         if "delay_s" in self.model_fields_set and self.kind != "delay":
             raise ValueError(f"delay_s belongs to a delay, not to {self.kind}")
+        if ("turn_deg" in self.model_fields_set) is not (self.kind == "turn"):
+            raise ValueError("turn_deg belongs to a turn, and a turn needs it")
         return self
 
 
@@ -71,8 +77,10 @@ class SimulationSection(Section):
     """The right camera exposes later by this."""
     grey: bool = False
     """Grey pictures, like those of an OAK camera."""
+    board_s: Annotated[tuple[NotNegative, Positive], AfterValidator(_rising)] | None = None
+    """From when to when, in seconds, the board of [calibration] is held into the view."""
     faults: tuple[FaultSection, ...] = ()
-    """Scripted faults: tables with kind, start_s, duration_s and, of a delay, delay_s."""
+    """Scripted faults: kind, start_s, duration_s; delay_s of a delay, turn_deg of a turn."""
 
 
 class CameraSection(BaseModel):
@@ -151,6 +159,13 @@ class CalibrationSection(Section):
     """Nearest and farthest surface of the working volume."""
     valid_days: Annotated[int, Field(gt=0)] = 180
     """A rig is refused when it is older."""
+    board: str | None = None
+    """A board's file (JSON, mm): whenever a session sees that board, it measures the rig by it."""
+
+    @property
+    def worst_length(self) -> float:
+        """Share of a length, and so of a depth, that may be wrong."""
+        return self.accept_mm / (0.5 * sum(self.working_depth_mm))
 
 
 class StagesSection(Section):

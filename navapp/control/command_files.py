@@ -8,6 +8,7 @@ from navapp.control.states import (
     Blank,
     Cancel,
     Command,
+    DistrustRig,
     EnterStage,
     Interrupt,
     Propose,
@@ -41,6 +42,8 @@ def command_to_json(command: Command) -> dict[str, Any]:
     if isinstance(command, Propose):
         pose = command.left_from_bone
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
+    if isinstance(command, DistrustRig):
+        return {"command": "distrust_rig", "why": command.why}
     return {"command": _NAMES[type(command)]}
 
 
@@ -57,6 +60,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
         if name == "propose":
             matrix = value["camera_from_model"]
             return Propose(RigidTransform("left", str(value["bone"]), matrix))
+        if name == "distrust_rig":
+            return DistrustRig(str(value["why"]))
         command: Command = _PLAIN[str(name)]()
         return command
     except (KeyError, ValueError, TypeError) as error:

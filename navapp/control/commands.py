@@ -2,6 +2,7 @@
 
 from navapp.control.camera_link import CameraLink
 from navapp.control.display_link import DisplayLink
+from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session, with_bound
 from navapp.control.stages import stage_by_number
 from navapp.control.states import (
@@ -9,6 +10,7 @@ from navapp.control.states import (
     Blank,
     Cancel,
     Command,
+    DistrustRig,
     EnterStage,
     EventLevel,
     Interrupt,
@@ -27,10 +29,13 @@ from navapp.values import Status
 class Commands:
     """Obeys, or refuses with a reason that the operator reads."""
 
-    def __init__(self, session: Session, camera: CameraLink, display: DisplayLink) -> None:
+    def __init__(
+        self, session: Session, camera: CameraLink, display: DisplayLink, rig: RigWatch
+    ) -> None:
         self._session = session
         self._camera = camera
         self._display = display
+        self._rig = rig
 
     def handle(self, command: Command) -> None:
         """Do what is asked."""
@@ -56,6 +61,8 @@ class Commands:
             case Interrupt():
                 self._session.lose_sight()
                 self._session.fall_back("the camera was lost here when this was recorded")
+            case DistrustRig():
+                self._rig.distrust(command)
             case Quit():
                 self._on_quit()
 
@@ -143,7 +150,9 @@ class Commands:
 
     def _can_look(self, what: str) -> bool:
         session = self._session
-        if session.state is SessionState.FAULT:
+        if session.rig_error is not None:
+            self._refuse(what, session.rig_error.problem)
+        elif session.state is SessionState.FAULT:
             self._refuse(what, "the camera is lost")
         elif not session.pursuit.is_planned(session.stage):
             self._refuse(what, f"the plan has no model of the {session.stage.bone}")

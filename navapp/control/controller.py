@@ -1,7 +1,8 @@
 """The session controller: owns the loop, the states and the devices.
 
     OFFLINE -> STARTING -> READY -> REGISTERING -> REVIEW -> NAVIGATING <-> SUSPENDED
-    FAULT from everywhere, and back to READY or SUSPENDED when the camera returns.
+    FAULT from everywhere: when the camera is lost, and back to READY or SUSPENDED when it returns;
+    when the rig has moved, and never back.
 
 `step` handles one command or one frame and returns a snapshot. The controller never sees the truth.
 """
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 from drivers.frames import StereoFrame
 from drivers.interfaces import DeviceSet
+from navapp.control.board_watch import BoardWatch
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
 from navapp.control.display_link import DisplayLink
@@ -20,11 +22,12 @@ from navapp.control.executors import Executor
 from navapp.control.pictures import compose
 from navapp.control.pursuit import Pursuit
 from navapp.control.results import FrameResult
+from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session, SessionHooks, with_bound
 from navapp.control.snapshots import SnapshotMaker
 from navapp.control.stages import STAGES
 from navapp.control.states import Blank, Command, EventLevel, Interrupt, SessionState, Snapshot
-from navapp.errors import DeviceError, EndOfSequence
+from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import make_preview
 from navapp.tracking import LineSettings
@@ -35,7 +38,6 @@ from navapp.values import (
     Plan,
     Prior,
     StageSpec,
-    Status,
     TrackedFrame,
 )
 
@@ -61,7 +63,7 @@ class SessionController:
     """Runs one session on an opened set of devices.
 
     Attributes:
-        lost_device: why the session stands in FAULT; None when it does not.
+        lost_device: why the camera is lost; None when it is not.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class SessionController:
         executor: Executor,
         options: SessionOptions | None = None,
         hooks: SessionHooks | None = None,
+        board_watch: BoardWatch | None = None,
     ) -> None:
         options, hooks = options or SessionOptions(), hooks or SessionHooks()
         self._overlay_valid_ms = options.overlay_valid_ms
@@ -88,11 +91,18 @@ class SessionController:
         self._queue: deque[Command] = deque()
         self._lock = threading.Lock()
         self._session = Session(devices.clock, hooks, self._pursuit, options.first_stage)
-        self._commands = Commands(self._session, self._camera, self._display)
+        self._watch = RigWatch(self._session, self._display, board_watch)
+        self._commands = Commands(self._session, self._camera, self._display, self._watch)
         self._maker = SnapshotMaker(
-            self._session, self._camera, self._display, devices, rig, plan, options.is_recording
-        )
+            self._session, self._camera, self._display, devices, rig, self._watch, plan,
+            options.is_recording,
+        )  # fmt: skip
         self._snapshot = self._maker.make()
+
+    @property
+    def failure(self) -> NavappError | None:
+        """Why the session stands in FAULT; None when it does not."""
+        return self._session.rig_error or self.lost_device
 
     @property
     def snapshot(self) -> Snapshot:
@@ -121,6 +131,7 @@ class SessionController:
             self._commands.handle(command)
         else:
             self._take_over(session.sequence + 1)
+            self._watch.take_over()
             frame = self._next_frame(timeout_s)
             if frame is not None:
                 self._handle_frame(frame)
@@ -135,6 +146,7 @@ class SessionController:
         self._session.is_over = True
         self._pursuit.drop()
         self._executor.close()
+        self._watch.close()
         self._camera.close()
         self._devices.close()
         self._session.state = SessionState.OFFLINE
@@ -166,9 +178,8 @@ class SessionController:
         session.sequence = frame.sequence
         if session.state is SessionState.STARTING:
             session.change(SessionState.READY, "pictures arrive")
-        session.tracked = self._look_for_bone(frame)
-        session.tracked_at_ns = frame.captured_ns
-        self._change_with_verdict()
+        session.take(self._look_for_bone(frame), frame.captured_ns)
+        self._watch.after(frame)
         snapshot = self._maker.make()
         picture, overlay_ms = self._show(frame, snapshot)
         timings = LineTimings() if session.tracked is None else session.tracked.timings
@@ -201,18 +212,6 @@ class SessionController:
             return self._pursuit.follow(stage, frame)
         return None
 
-    def _change_with_verdict(self) -> None:
-        session = self._session
-        if session.tracked is None:
-            return
-        verdict = session.tracked.verdict
-        is_lost = verdict.status is Status.LOST
-        if session.state is SessionState.NAVIGATING and is_lost:
-            why = f": {verdict.reasons[0].value}" if verdict.reasons else ""
-            session.change(SessionState.SUSPENDED, f"bone lost{why}", EventLevel.ALARM)
-        elif session.state is SessionState.SUSPENDED and not is_lost:
-            session.change(SessionState.NAVIGATING, "bone found again")
-
     def _show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
         """Compose, show until it expires, keep a preview; also how long composing took."""
         started_ns = time.perf_counter_ns()
@@ -221,7 +220,9 @@ class SessionController:
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
-        if self._display.show(image, valid_until_ns, has_guides=has_guides):
+        # The screen shows the live picture in a fault as well, the display shows nothing.
+        is_shown = snapshot.state is not SessionState.FAULT
+        if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
             self._session.event("device", self._display.trouble, EventLevel.ALARM)
         self._session.preview = make_preview(image)
         age_ns = self._session.clock.now_ns() - frame.captured_ns

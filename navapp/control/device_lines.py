@@ -1,6 +1,7 @@
 """What the devices panel says."""
 
 from drivers.interfaces import CameraInfo, DisplayInfo, MirrorMount, PowerState, ProjectorControl
+from navapp.control.length_check import LengthCheck
 from navapp.control.states import DeviceHealth, DeviceLine
 from navapp.errors import DeviceError
 
@@ -44,3 +45,15 @@ def mirror_line(mirror: MirrorMount) -> DeviceLine:
         return DeviceLine("mirror", info.name, DeviceHealth.ABSENT, f"fixed, {angle}")
     health = DeviceHealth.TROUBLE if angle_deg is None else DeviceHealth.OK
     return DeviceLine("mirror", info.name, health, angle)
+
+
+def rig_line(name: str, problem: str, check: LengthCheck | None, now_ns: int) -> DeviceLine:
+    """The rig itself: what is wrong with it, or what a known length in view said of it last."""
+    if problem:
+        return DeviceLine("rig", name, DeviceHealth.TROUBLE, problem)
+    if check is None:
+        return DeviceLine("rig", name, DeviceHealth.OK, "not checked: show the board")
+    is_doubted = check.is_judged and not check.is_within
+    health = DeviceHealth.TROUBLE if is_doubted else DeviceHealth.OK
+    age_s = max(now_ns - check.captured_ns, 0) // 1_000_000_000
+    return DeviceLine("rig", name, health, f"{check}, {age_s} s ago")

@@ -82,14 +82,19 @@ class InlineExecutor:
 
 
 class ThreadExecutor:
-    """Runs a job in a worker thread: the loop never waits for it."""
+    """Runs a job in a worker thread: the loop never waits for it.
 
-    def __init__(self) -> None:
+    Args:
+        name: of the thread.
+    """
+
+    def __init__(self, name: str = "registration") -> None:
+        self._name = name
         self._threads: list[threading.Thread] = []
 
     def start(self, job: Job[T]) -> None:
         """Begin in the background."""
-        thread = threading.Thread(target=job.run, name="registration", daemon=True)
+        thread = threading.Thread(target=job.run, name=self._name, daemon=True)
         self._threads = [other for other in self._threads if other.is_alive()] + [thread]
         thread.start()
 

@@ -15,7 +15,9 @@ def navigable(snapshot: Snapshot) -> tuple[Reason, ...]:
     reasons: list[Reason] = []
     if snapshot.is_blanked:
         reasons.append(Reason.BLANKED)
-    if snapshot.state is SessionState.FAULT:
+    if snapshot.rig_alarm:
+        reasons.append(Reason.RIG_MOVED)
+    elif snapshot.state is SessionState.FAULT:
         reasons.append(Reason.DEVICE_FAULT)
     if snapshot.is_camera_silent:
         reasons.append(Reason.CAMERA_SILENT)

@@ -17,8 +17,8 @@ def run_headless(
 ) -> Snapshot:
     """Step until the source ends or `is_done`; the operator answers every snapshot.
 
-    A camera that stays away for `_PATIENCE_NS` ends it as well: nobody is there to mend it. The
-    controller's `lost_device` then says why.
+    A fault that stays for `_PATIENCE_NS` ends it as well: nobody is there to mend it. The
+    controller's `failure` then says why.
     """
     snapshot = controller.snapshot
     last_well_ns = snapshot.time_ns

@@ -12,8 +12,8 @@ from navapp.control.rates import RateMeter
 from navapp.control.recorder import RecordingStopped
 from navapp.control.results import FrameListener
 from navapp.control.states import Command, Event, EventLevel, SessionState
-from navapp.errors import UsageError
-from navapp.values import StageSpec, TrackedFrame, Verdict
+from navapp.errors import RigError, UsageError
+from navapp.values import Reason, StageSpec, Status, TrackedFrame, Verdict
 
 _EVENTS_SHOWN = 60
 
@@ -45,6 +45,7 @@ class Session:
         preview: of the newest picture, None before the first.
         meter: how fast frames are handled.
         is_over: nothing is handled any more.
+        rig_error: why the rig is not believed any more; None while it is.
     """
 
     def __init__(
@@ -60,6 +61,7 @@ class Session:
         self.preview: Image | None = None
         self.meter = RateMeter()
         self.is_over = False
+        self.rig_error: RigError | None = None
         self._events: deque[Event] = deque(maxlen=_EVENTS_SHOWN)
         self.enter(stage)
 
@@ -84,10 +86,34 @@ class Session:
             except UsageError as error:
                 self.event("stage", str(error), EventLevel.WARNING)
 
+    def take(self, tracked: TrackedFrame | None, captured_ns: int) -> None:
+        """Take over a frame's answer: a bone that is lost suspends, its return resumes."""
+        self.tracked, self.tracked_at_ns = tracked, captured_ns
+        if tracked is None:
+            return
+        verdict = tracked.verdict
+        is_lost = verdict.status is Status.LOST
+        if self.state is SessionState.NAVIGATING and is_lost:
+            why = f": {verdict.reasons[0].value}" if verdict.reasons else ""
+            self.change(SessionState.SUSPENDED, f"bone lost{why}", EventLevel.ALARM)
+        elif self.state is SessionState.SUSPENDED and not is_lost:
+            self.change(SessionState.NAVIGATING, "bone found again")
+
     def lose_sight(self) -> None:
-        """What the loss of the camera does to what is known of the bone."""
+        """What the loss of the camera or of the rig does to what is known of the bone."""
         self.pursuit.drop()
         self.tracked = None
+
+    def distrust_rig(self, why: str) -> None:
+        """What a rig that has moved does to the session: a fault that does not end."""
+        if self.rig_error is not None:
+            return
+        self.rig_error = RigError(
+            f"{Reason.RIG_MOVED.value} ({why})",
+            remedy="check the rig on the board, or calibrate it",
+        )
+        self.lose_sight()
+        self.change(SessionState.FAULT, self.rig_error.problem, EventLevel.ALARM)
 
     def change(self, state: SessionState, text: str, level: EventLevel = EventLevel.INFO) -> None:
         """Stand elsewhere from now on, and tell why."""
@@ -96,6 +122,9 @@ class Session:
 
     def fall_back(self, text: str, level: EventLevel = EventLevel.INFO) -> None:
         """To where the session stands without a candidate."""
+        if self.rig_error is not None:
+            self.change(SessionState.FAULT, text, level)
+            return
         is_known = self.pursuit.is_accepted(self.stage)
         self.change(SessionState.SUSPENDED if is_known else SessionState.READY, text, level)
 

@@ -4,9 +4,16 @@ from dataclasses import dataclass, replace
 
 from drivers.interfaces import DeviceSet
 from navapp.control.camera_link import CameraLink
-from navapp.control.device_lines import camera_line, display_line, mirror_line, projector_line
+from navapp.control.device_lines import (
+    camera_line,
+    display_line,
+    mirror_line,
+    projector_line,
+    rig_line,
+)
 from navapp.control.display_link import DisplayLink
 from navapp.control.interlocks import navigable
+from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.stages import STAGES
 from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
@@ -24,6 +31,7 @@ class SnapshotMaker:
         display: in use.
         devices: the others.
         rig: of the camera.
+        rig_watch: that watches it.
         plan: of the operation.
         is_recording: the session is kept in a folder.
     """
@@ -33,6 +41,7 @@ class SnapshotMaker:
     display: DisplayLink
     devices: DeviceSet
     rig: StereoRig
+    rig_watch: RigWatch
     plan: Plan
     is_recording: bool
 
@@ -67,6 +76,8 @@ class SnapshotMaker:
             sequence=session.sequence,
             is_bone_planned=bone is not None,
             is_camera_silent=self.camera.is_silent,
+            rig_alarm="" if session.rig_error is None else session.rig_error.problem,
+            length_check=self.rig_watch.length_check,
             is_over=session.is_over,
         )
         return replace(draft, reasons=navigable(draft))
@@ -77,12 +88,17 @@ class SnapshotMaker:
         return self.camera.camera.info.is_simulated or self.rig.name.startswith("sim:")
 
     def _device_lines(self) -> tuple[DeviceLine, ...]:
-        return (
+        lines = (
             camera_line(self.camera.camera.info, self.camera.trouble),
             display_line(self.display.display.info, self.display.trouble),
             projector_line(self.devices.projector),
             mirror_line(self.devices.mirror),
         )
+        if self.session.rig_error is None and not self.rig_watch.has_board:
+            return lines
+        problem = "" if self.session.rig_error is None else self.session.rig_error.problem
+        check, now_ns = self.rig_watch.length_check, self.session.clock.now_ns()
+        return (*lines, rig_line(self.rig.name, problem, check, now_ns))
 
     def _progress(self) -> Progress | None:
         share = self.session.pursuit.progress

@@ -6,6 +6,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.control.length_check import LengthCheck
 from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, StageSpec, Verdict
 
@@ -78,6 +79,13 @@ class Interrupt:
 
 
 @dataclass(frozen=True, slots=True)
+class DistrustRig:
+    """The rig has moved: nothing that it measures is believed any more in this session."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Quit:
     """End the session."""
 
@@ -93,6 +101,7 @@ Command = (
     | EnterStage
     | Reconnect
     | Interrupt
+    | DistrustRig
     | Quit
 )
 
@@ -191,6 +200,8 @@ class Snapshot:
             the first frame.
         is_bone_planned: the plan has a model of the stage's bone.
         is_camera_silent: no picture has come for longer than the camera's period explains.
+        rig_alarm: why the rig is not believed any more; empty while it is.
+        length_check: the newest look at a known length, None before one.
         events: the newest, oldest first.
     """
 
@@ -216,6 +227,8 @@ class Snapshot:
     sequence: int = -1
     is_bone_planned: bool = True
     is_camera_silent: bool = False
+    rig_alarm: str = ""
+    length_check: LengthCheck | None = None
     is_simulated: bool = False
     is_recording: bool = False
     is_over: bool = False

@@ -14,7 +14,7 @@ from navapp.values import PoseEstimate, Reason
 
 # Standard deviation of residuals over the one they claim: the right poses of simulated femurs,
 # which lie in the open, reach so much and no more (docs/accuracy.md).
-_NOISE_RATIO = 0.7
+_NOISE_RATIO = 0.65
 # More correlated residuals than noise is no fit.
 _LARGEST_RATIO2 = 2.0 * _NOISE_RATIO**2
 

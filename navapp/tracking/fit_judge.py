@@ -17,7 +17,7 @@ from navapp.tracking.contours import ContourMeter
 from navapp.tracking.correlated_residuals import with_correlated_residuals
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge, within_tolerance
-from navapp.tracking.pair_doubts import with_pair_doubts
+from navapp.tracking.pair_doubts import row_check, with_pair_doubts
 from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
@@ -78,11 +78,12 @@ class FitJudge:
                 self._model, fit.estimate, found, goal, predicted, coarse_px, view
             )
             verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
+            rows = row_check(health.result(), geometry, depth_mm)
             verdict = within_tolerance(verdict, goal)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
-        return TrackedFrame(self._model.bone.name, estimate, verdict, timings)
+        return TrackedFrame(self._model.bone.name, estimate, verdict, timings, rows)
 
     def lost(self, reason: Reason, timings: LineTimings | None = None) -> TrackedFrame:
         """The answer when there is no fit to judge."""

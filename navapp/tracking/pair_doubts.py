@@ -6,7 +6,7 @@ from dataclasses import replace
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.stereo import PictureHealth, StereoHealth
 from navapp.tracking.judge import OK_ERROR_MM
-from navapp.values import Reason, Status, Verdict
+from navapp.values import Reason, RowCheck, Status, Verdict
 
 _SURE_SIGMAS = 3.0
 # A bone fills half of its box and more; what lies around it may be black.
@@ -43,15 +43,34 @@ def pair_doubts(
     turned a camera about that line turned it as far about others, and a turn that moves a picture
     sideways by v px moves the measured depth by z^2 / (f B) v.
     """
+    doubts = _picture_doubts(health)
+    doubts += [Reason.ROWS_DISAGREE] * (health.has_lost_rows or _is_off(health, geometry, depth_mm))
+    return tuple(doubts)
+
+
+def row_check(
+    health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float
+) -> RowCheck | None:
+    """What a pair says of its rig; None when its pictures or its points are too poor to tell.
+
+    Rows that are lost tell nothing either: what is matched where nothing is to be matched looks
+    the same.
+    """
+    if math.isnan(health.row_offset_px) or _picture_doubts(health):
+        return None
+    return RowCheck(health.row_offset_px, _is_off(health, geometry, depth_mm))
+
+
+def _picture_doubts(health: StereoHealth) -> list[Reason]:
     both = (health.left, health.right)
     is_dark = any(one.dark_share > _UNUSABLE_SHARE for one in both)
     is_clipped = any(one.saturated_share > _UNUSABLE_SHARE for one in both)
     doubts = [Reason.PICTURE_DARK] * is_dark + [Reason.PICTURE_OVEREXPOSED] * is_clipped
-    if not doubts:
-        doubts += [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
-    is_off = health.has_lost_rows or bool(_row_cost_mm(health, geometry, depth_mm) > OK_ERROR_MM)
-    doubts += [Reason.ROWS_DISAGREE] * is_off
-    return tuple(doubts)
+    return doubts or [Reason.PICTURES_UNLIKE] * _are_unlike(*both)
+
+
+def _is_off(health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float) -> bool:
+    return bool(_row_cost_mm(health, geometry, depth_mm) > OK_ERROR_MM)
 
 
 def _row_cost_mm(health: StereoHealth, geometry: RectifiedGeometry, depth_mm: float) -> float:

@@ -96,9 +96,10 @@ def _to_neighbour(step: int) -> Callable[[Snapshot], Command]:
 
 
 def _has_failed_device(snapshot: Snapshot) -> bool:
-    healths = {device.health for device in snapshot.devices}
+    # A rig that has moved is not opened again.
+    healths = {device.health for device in snapshot.devices if device.kind != "rig"}
     is_failed = bool(healths & {DeviceHealth.TROUBLE, DeviceHealth.LOST})
-    return is_failed or snapshot.state is SessionState.FAULT
+    return is_failed or (snapshot.state is SessionState.FAULT and not snapshot.rig_alarm)
 
 
 def _stage_action(number: int) -> Action:

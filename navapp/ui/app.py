@@ -12,7 +12,7 @@ from textual.binding import BindingType
 from textual.screen import Screen
 
 from navapp.control.states import DeviceHealth, EventLevel, Quit, SessionState, Snapshot
-from navapp.errors import DeviceError, NavappError
+from navapp.errors import DeviceError, NavappError, RigError
 from navapp.ui.actions import ACTION_OF_KEY_EVERYWHERE, ACTION_OF_NAME, bindings, is_possible
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
@@ -200,6 +200,8 @@ def _fault(snapshot: Snapshot) -> NavappError | None:
     """The fault that the session ended in, with its last alarm's text."""
     if snapshot.state is not SessionState.FAULT:
         return None
+    if snapshot.rig_alarm:
+        return RigError(snapshot.rig_alarm, remedy="check the rig on the board, or calibrate it")
     alarms = [event.text for event in snapshot.events if event.level is EventLevel.ALARM]
     text = alarms[-1] if alarms else "the session ended in a fault"
     is_device = any(device.health is DeviceHealth.LOST for device in snapshot.devices)

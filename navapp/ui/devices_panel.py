@@ -24,7 +24,10 @@ class DevicesPanel(TextView):
             return [device_line(view, device, width) for device in devices]
         troubles = [device for device in devices if device.health in _TROUBLES]
         if not troubles:
-            return _in_pairs(view, devices, width)
+            if len(devices) > 2 * height:
+                # What is not there gives way to what is.
+                devices.sort(key=lambda device: device.health is DeviceHealth.ABSENT)
+            return _in_pairs(view, devices[: 2 * height], width)
         shown = troubles[: max(height - 1, 1)]
         lines = [device_line(view, device, width) for device in shown]
         rest = len(devices) - len(shown)

@@ -96,7 +96,8 @@ class View:
     @property
     def is_picture_old(self) -> bool:
         """The preview is the last one before the camera fell silent."""
-        is_stopped = self.snapshot.is_camera_silent or self.snapshot.state is SessionState.FAULT
+        is_fault = self.snapshot.state is SessionState.FAULT and not self.snapshot.rig_alarm
+        is_stopped = self.snapshot.is_camera_silent or is_fault
         return is_stopped and self.snapshot.preview is not None
 
     @property
@@ -142,6 +143,8 @@ class View:
             return f"left view {dot} FROZEN, no answer"
         if self.is_picture_old:
             return f"left view {dot} OLD PICTURE, no new one comes"
+        if self.snapshot.rig_alarm:
+            return f"left view {dot} RIG MOVED, the display is dark"
         if self.snapshot.is_blanked:
             return f"left view {dot} BLANKED, the display is dark"
         if self.snapshot.is_candidate:

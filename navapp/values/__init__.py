@@ -4,7 +4,7 @@ Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectificati
 """
 
 from navapp.values.bones import AspectGraph, BoneModel, Side, visible_vertices
-from navapp.values.measured import DisparityMap, Origin, SurfaceCloud
+from navapp.values.measured import DisparityMap, Origin, RowCheck, SurfaceCloud
 from navapp.values.pictures import OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
 from navapp.values.verdicts import (
@@ -29,6 +29,7 @@ __all__ = [
     "PoseEstimate",
     "Prior",
     "Reason",
+    "RowCheck",
     "Side",
     "StageSpec",
     "Status",

@@ -61,6 +61,19 @@ class DisparityMap:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class RowCheck:
+    """What the rows of a usable pair say of its rig.
+
+    Attributes:
+        offset_px: how much lower the right picture shows what the left one shows.
+        is_off: surely, and by more than may be wrong.
+    """
+
+    offset_px: float
+    is_off: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceCloud:
     """Points seen by the stereo camera, in the rectified left camera.

@@ -7,6 +7,7 @@ from enum import Enum
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.values.measured import RowCheck
 
 
 class Reason(Enum):
@@ -42,6 +43,7 @@ class Reason(Enum):
     BLANKED = "blanked by the operator"
     CAMERA_SILENT = "the camera sends no picture"
     DEVICE_FAULT = "a device has failed"
+    RIG_MOVED = "rig moved, recalibrate"
     POSE_TOO_OLD = "the pose is too old"
     STAGE_WITHOUT_BONE = "the plan has no model of this stage's bone"
 
@@ -80,6 +82,7 @@ _REMEDIES = {
     Reason.BLANKED: "press the show key to leave blank",
     Reason.CAMERA_SILENT: "check the camera's cable",
     Reason.DEVICE_FAULT: "see the events, then check the device",
+    Reason.RIG_MOVED: "end the session and calibrate the rig; the events say how it was found",
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }
@@ -191,12 +194,21 @@ class LineTimings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedFrame:
-    """What the line answers for one frame and one bone."""
+    """What the line answers for one frame and one bone.
+
+    Attributes:
+        bone: its name.
+        estimate: of its pose, None without one.
+        verdict: of the judge.
+        timings: of the line's steps.
+        rows: what the pair says of the rig itself; None when it says nothing.
+    """
 
     bone: str
     estimate: PoseEstimate | None
     verdict: Verdict
     timings: LineTimings
+    rows: RowCheck | None = None
 
     @property
     def left_from_bone(self) -> RigidTransform | None:

@@ -21,6 +21,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import Line, TrackState
 from navapp.values import BoneModel, Prior, Status, TrackedFrame
 from sim_devices.anatomy import KneeSpec, make_knee
+from sim_devices.rigs import NO_TURN, Turn
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
@@ -62,11 +63,13 @@ class Loop:
         number = round(time_ns * 1e-9 * _RATE_HZ) % (2 * _RENDERED - 2)
         return round(min(number, 2 * _RENDERED - 2 - number) * 1e9 / _RATE_HZ)
 
-    def render(self, eye: str, time_ns: int, scale: float = 1.0) -> np.ndarray:
+    def render(
+        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> np.ndarray:
         """As the world's."""
         key = (eye, self.world_ns(time_ns))
         if key not in self._rendered:
-            self._rendered[key] = self.world.render(eye, key[1], scale)
+            self._rendered[key] = self.world.render(eye, key[1], scale, turn_rad)
         return self._rendered[key]
 
 

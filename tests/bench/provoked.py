@@ -13,6 +13,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking import Goal, Line, TrackState
 from navapp.values import BoneModel, Prior, Status, TrackedFrame, visible_vertices
 from sim_devices.motion import LegMotion, smooth_step
+from sim_devices.rigs import NO_TURN, Turn
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import Eye, SensorModel
 from sim_devices.world import World
@@ -116,10 +117,12 @@ class Theatre:
         """Of the femur."""
         return self.world.left_from_body("femur", time_ns)
 
-    def render(self, eye: Eye, time_ns: int, scale: float = 1.0) -> np.ndarray:
+    def render(
+        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> np.ndarray:
         """As the world's, disturbed while the event lasts."""
         event, time_s = self.event, time_ns / 1e9
-        radiance = self.world.render(eye, time_ns, scale)
+        radiance = self.world.render(eye, time_ns, scale, turn_rad)
         if not event.is_on(time_s):
             return radiance
         if event.covered_share:

@@ -91,3 +91,28 @@ def test_a_camera_that_is_not_installed_is_refused(board, tmp_path, capsys):
 
 def test_a_number_of_pairs_is_at_least_one(board, tmp_path):
     assert capture(board, tmp_path / "out", "--headless", "--pairs", "0") == 2
+
+
+@pytest.mark.slow
+def test_a_camera_that_is_unplugged_for_a_while_costs_no_pair(board, tmp_path):
+    config, result = tmp_path / "navapp.toml", tmp_path / "result.json"
+    fault = '{kind = "unplug", start_s = 4.0, duration_s = 3.0}'
+    config.write_text(f"[camera.simulated]\nfaults = [{fault}]\n")
+    out = tmp_path / "out"
+    arguments = ("--headless", "--pairs", "8", "--json", str(result))
+    # Whether eight pairs are enough to be accepted is not the question.
+    assert capture(board, out, *arguments, config=config) in (0, 4)
+    assert json.loads(result.read_text())["pairs_kept"] == 8
+    assert len(list(out.glob("left_*.png"))) == len(list(out.glob("right_*.png"))) == 8
+
+
+def test_a_camera_that_stays_away_ends_the_capture_and_keeps_its_pairs(board, tmp_path, capsys):
+    config, out = tmp_path / "navapp.toml", tmp_path / "out"
+    fault = '{kind = "unplug", start_s = 4.0, duration_s = inf}'
+    config.write_text(f"[camera.simulated]\nfaults = [{fault}]\n")
+    assert capture(board, out, "--headless", config=config) == 5
+    told = capsys.readouterr().err
+    assert "unplugged" in told
+    n_kept = len(list(out.glob("left_*.png")))
+    assert n_kept >= 1
+    assert f"{n_kept} pairs are kept" in told

@@ -30,6 +30,7 @@ CHANGED: dict[str, Any] = {
             "stepped": True,
             "skew_ms": -3.5,
             "grey": True,
+            "board_s": [0.0, 8.0],
             "faults": [
                 {"kind": "freeze", "start_s": 1.5, "duration_s": float("inf")},
                 {"kind": "delay", "start_s": 0, "duration_s": 2, "delay_s": 0.1},
@@ -48,6 +49,7 @@ CHANGED: dict[str, Any] = {
         "accept_mm": 0.5,
         "working_depth_mm": [400.0, 500.0],
         "valid_days": 30,
+        "board": "board.json",
     },
     "overlay": {},
     "stages": {"first": "3"},
@@ -267,7 +269,8 @@ A_FAULT = {"kind": "drop", "start_s": 0.0, "duration_s": 1.0}
 
 def test_every_fault_of_the_simulated_camera_can_be_scripted():
     for kind in FaultKind:
-        content = nested("camera.simulated.faults", [{**A_FAULT, "kind": kind.value}])
+        turn = {"turn_deg": [0.02, 0.0, 0.0]} if kind is FaultKind.TURN else {}
+        content = nested("camera.simulated.faults", [{**A_FAULT, "kind": kind.value, **turn}])
         assert parse(content, "x").camera.simulated.faults[0].kind == kind.value
 
 
@@ -283,6 +286,8 @@ def test_every_fault_of_the_simulated_camera_can_be_scripted():
         ({"duration_s": "1"}, "faults.1.duration_s"),
         ({"delay_s": 0.1}, "faults.1: value error, delay_s belongs to a delay, not to drop"),
         ({"kind": "delay", "delay_s": -0.1}, "faults.1.delay_s"),
+        ({"kind": "turn"}, "turn_deg belongs to a turn, and a turn needs it"),
+        ({"turn_deg": [0.0, 0.1, 0.0]}, "turn_deg belongs to a turn, and a turn needs it"),
         ({"strt_s": 1.0}, "faults.1.strt_s': did you mean 'start_s'?"),
     ],
 )

@@ -12,6 +12,7 @@ from drivers.fixed_mirror import FixedMirror
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
 from drivers.no_projector import NoProjector
+from navapp.control.board_watch import BoardWatch
 from navapp.control.controller import SessionController, SessionOptions
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
 from navapp.control.results import FrameResult
@@ -178,6 +179,7 @@ class Bench:
         projector: ProjectorControl | None = None,
         mirror: MirrorMount | None = None,
         hooks: SessionHooks | None = None,
+        board_watch: BoardWatch | None = None,
     ) -> None:
         self.script = Script()
         line = type("ScriptedLine", (FakeLine,), {"script": self.script})
@@ -202,6 +204,7 @@ class Bench:
             Prior({"femur": a_pose()}),
             executor=executor or InlineExecutor(),
             options=options,
+            board_watch=board_watch,
             hooks=replace(
                 given,
                 on_frame=(self.results.append,),

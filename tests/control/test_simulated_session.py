@@ -1,5 +1,6 @@
 """Sessions in the simulated room, with the real line."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
 
 import pytest
@@ -8,6 +9,7 @@ from drivers.clock import ManualClock, SystemClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet
 from drivers.no_projector import NoProjector
+from navapp.control.board_watch import BoardWatch
 from navapp.control.controller import SessionController
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.operators import ScriptedOperator
@@ -16,7 +18,7 @@ from navapp.control.session import SessionHooks
 from navapp.control.states import Accept, Propose, Register, Reject
 from navapp.errors import WrongDevice
 from navapp.values import Plan, Status
-from sim_devices.camera import SimulatedCamera
+from sim_devices.camera import Scene, SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.scenario import Scenario
@@ -34,13 +36,15 @@ class SimulatedRoom:
 
     def __init__(
         self, undo: ExitStack, *, scale: float = 1.0, is_live: bool = False,
-        faults: FaultScript | None = None, n_frames: int | None = None,
+        faults: FaultScript | None = None, n_frames: int | None = None, rate_hz: float = 15.0,
+        seen: Callable[[World], Scene] = lambda world: world,
+        board_watch: BoardWatch | None = None,
     ) -> None:  # fmt: skip
         world = World(Scenario(seed=SEED, motion="still"))
         self.clock = SystemClock() if is_live else ManualClock()
         self.camera = SimulatedCamera(
-            world, self.clock, is_stepped=not is_live, scale=scale, n_frames=n_frames,
-            sensor=SensorModel(seed=SEED), faults=faults,
+            seen(world), self.clock, is_stepped=not is_live, scale=scale, n_frames=n_frames,
+            sensor=SensorModel(seed=SEED), faults=faults, rate_hz=rate_hz,
         )  # fmt: skip
         self.camera.open()
         rig = world.rig if scale == 1.0 else world.rig.scaled(scale)
@@ -55,6 +59,7 @@ class SimulatedRoom:
             Plan({"femur": femur_of(world)}),
             nominal_prior(world),
             executor=ThreadExecutor() if is_live else InlineExecutor(),
+            board_watch=board_watch,
             hooks=SessionHooks(
                 on_frame=(self.results.append,),
                 on_command=(lambda command, sequence: self.commands.append(command),),

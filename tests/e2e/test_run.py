@@ -189,3 +189,78 @@ def renumber(session: Path) -> None:
         entry["sequence"] = with_gaps(entry["sequence"] - offset) + offset
         lines.append(json.dumps(entry))
     (session / "events.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+BOARDED = """
+[camera]
+rate_hz = 2.0
+[camera.simulated]
+motion = "still"
+board_s = [0.0, 60.0]
+{faults}
+[calibration]
+board = "{board}"
+"""
+BOARD = {
+    "type": "charuco", "squares_x": 9, "squares_y": 6, "square_mm": 12.0, "marker_mm": 9.0,
+    "dictionary": "DICT_4X4_100",
+}  # fmt: skip
+
+
+def boarded(folder: Path, faults: str = "") -> list[str]:
+    """Options of a session that is shown a board for as long as it lasts."""
+    (folder / "board.json").write_text(json.dumps(BOARD), encoding="utf-8")
+    text = BOARDED.format(faults=faults, board=(folder / "board.json").as_posix())
+    (folder / "boarded.toml").write_text(text, encoding="utf-8")
+    (folder / "idle.toml").write_text('[[step]]\ndo = "show"\n', encoding="utf-8")
+    options = ["--quiet", "--config", str(folder / "boarded.toml"), "run", "--headless"]
+    return [*options, "--operator", str(folder / "idle.toml")]
+
+
+@pytest.mark.slow
+def test_a_board_in_view_checks_the_rig(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    run([*boarded(tmp_path), "--frames", "14", "--json", str(out)])
+    rig = result(out)["rig"]
+    assert rig["alarm"] is None
+    check = rig["length_check"]
+    assert check["within"]
+    assert check["looks"] >= 3
+    assert check["length_100_mm"]["mean"] == pytest.approx(100.0, abs=0.02)
+    assert 0.0 <= check["age_s"] <= 3.0
+
+
+@pytest.mark.slow
+def test_a_board_in_view_finds_a_camera_that_turned_sideways_and_so_does_the_replay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # A third of a pixel.
+    faults = (
+        'faults = [{kind = "turn", start_s = 3.0, duration_s = inf, turn_deg = [0, 0.0123, 0]}]'
+    )
+    out, again, session = tmp_path / "a.json", tmp_path / "b.json", tmp_path / "session"
+    options = [*boarded(tmp_path, faults), "--frames", "30"]
+    assert run([*options, "--record", str(session), "--json", str(out)]) == 3
+    assert "rig moved, recalibrate (100 mm on the board" in capsys.readouterr().err
+    content = result(out)
+    assert content["rig"]["length_check"]["length_100_mm"]["mean"] == pytest.approx(
+        100.12, abs=0.02
+    )
+    states = [frame["state"] for frame in content["frames"]]
+    assert states[0] != "fault"
+    assert states[-1] == "fault"
+    assert run(["--quiet", "replay", str(session), "--json", str(again)]) == 3
+    assert [frame["state"] for frame in result(again)["frames"]] == states
+
+
+def test_a_board_to_be_shown_must_be_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.toml"
+    path.write_text("[camera.simulated]\nboard_s = [0.0, 1.0]\n", encoding="utf-8")
+    assert run(["--quiet", "--config", str(path), "run", "--headless", "--frames", "1"]) == 2
+    assert "[calibration] board" in capsys.readouterr().err
+    options = boarded(tmp_path)
+    (tmp_path / "board.json").write_text(json.dumps({**BOARD, "square_mm": 1.0, "marker_mm": 0.7}))
+    assert run([*options, "--frames", "1"]) == 2
+    assert "unit of length" in capsys.readouterr().err

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
+from sim_devices.rigs import NO_TURN, Turn
 
 
 def plain_rig(width: int = 64, height: int = 48) -> StereoRig:
@@ -22,14 +23,18 @@ class PlainWorld:
         self.rig = plain_rig(width, height)
         self.bodies = ("femur",)
         self.rendered: list[tuple[str, int]] = []
+        self.turns_rad: list[Turn] = []
 
     def left_from_body(self, body: str, time_ns: int) -> RigidTransform:
         return RigidTransform.from_parts(
             "left", body, np.eye(3), (0.0, 0.0, 400.0 + time_ns * 1e-9)
         )
 
-    def render(self, eye: str, time_ns: int, scale: float = 1.0) -> NDArray[np.float32]:
+    def render(
+        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+    ) -> NDArray[np.float32]:
         self.rendered.append((eye, time_ns))
+        self.turns_rad.append(turn_rad)
         rig = self.rig.scaled(scale)
         level = 0.1 + 0.2 * (time_ns * 1e-9 % 4.0)
         ramp = np.linspace(0.0, 0.1, rig.width, dtype=np.float32) + np.float32(level)

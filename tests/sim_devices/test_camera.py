@@ -69,9 +69,9 @@ def test_slow_rendering_lowers_the_rate_of_a_free_running_camera():
     bench = Bench(is_stepped=False)
     render = bench.world.render
 
-    def slow(eye, time_ns, scale=1.0):
+    def slow(eye, time_ns, *how):
         bench.clock.advance_ns(round(0.08 * S))
-        return render(eye, time_ns, scale)
+        return render(eye, time_ns, *how)
 
     bench.world.render = slow
     frames = [bench.camera.read(1.0) for _ in range(4)]
@@ -285,10 +285,10 @@ def test_closing_and_reopening_ends_the_read_of_the_old_opening():
     bench = Bench()
     render = bench.world.render
 
-    def reopen(eye, time_ns, scale=1.0):
+    def reopen(eye, time_ns, *how):
         bench.camera.close()
         bench.camera.open()
-        return render(eye, time_ns, scale)
+        return render(eye, time_ns, *how)
 
     bench.world.render = reopen
     with pytest.raises(DeviceLost):
@@ -315,3 +315,10 @@ def test_reader_thread_hands_out_the_newest_frame_and_the_loss():
     with pytest.raises(DeviceLost):
         slot.take(1.0)
     assert reader.stop()
+
+
+def test_a_turn_reaches_the_world_while_it_lasts():
+    bench = Bench(Fault(FaultKind.TURN, 0.1, 0.1, turn_deg=(0.0, 90.0, 0.0)))
+    bench.captured_s(3)
+    still, turned = (0.0, 0.0, 0.0), (0.0, np.pi / 2, 0.0)
+    assert bench.world.turns_rad == [still, still, turned, turned, still, still]

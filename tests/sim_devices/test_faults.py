@@ -32,6 +32,20 @@ def test_longest_active_delay_counts():
     ]
 
 
+def test_a_turn_lasts_as_long_as_it_is_written_and_the_last_one_counts():
+    script = FaultScript(
+        (
+            Fault(FaultKind.TURN, 1.0, 2.0, turn_deg=(0.0, 90.0, 0.0)),
+            Fault(FaultKind.TURN, 2.0, 5.0, turn_deg=(180.0, 0.0, 0.0)),
+        )
+    )
+    found = [script.turn_rad(round(t * S)) for t in (0.5, 1.5, 2.5, 7.5)]
+    quarter, half = (0.0, math.pi / 2, 0.0), (math.pi, 0.0, 0.0)
+    assert found == [(0.0, 0.0, 0.0), quarter, half, (0.0, 0.0, 0.0)]
+    with pytest.raises(ValueError, match="three numbers"):
+        Fault(FaultKind.TURN, 0.0, 1.0, turn_deg=(0.0, math.nan, 0.0))
+
+
 def test_first_moment_finds_faults_that_began_earlier_or_in_between():
     script = FaultScript((Fault(FaultKind.UNPLUG, 2.0, 1.0), Fault(FaultKind.UNPLUG, 5.0, 1.0)))
     find = script.first_moment_ns

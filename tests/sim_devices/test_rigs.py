@@ -3,7 +3,13 @@ import pytest
 
 from navapp.geometry.rectification import Rectifier
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
-from sim_devices.rigs import BASELINE_MM, TOE_IN_DEG, WORKING_DISTANCE_MM, default_rig
+from sim_devices.rigs import (
+    BASELINE_MM,
+    TOE_IN_DEG,
+    WORKING_DISTANCE_MM,
+    camera_from_left,
+    default_rig,
+)
 
 
 def test_the_rig_has_the_promised_size_baseline_and_focal_length():
@@ -39,3 +45,17 @@ def test_another_size_is_the_same_rig_scaled():
 def test_another_shape_is_refused():
     with pytest.raises(ValueError, match="16:9"):
         default_rig(640, 480)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_turned_right_eye_shows_everything_elsewhere(axis: int) -> None:
+    """About x its picture moves across the rows, about y along them; the left one stays."""
+    rig, turn = default_rig(), [0.0, 0.0, 0.0]
+    turn[axis] = np.radians(0.02)
+    point = np.array([[5.0, -8.0, 450.0]])
+    before = rig.right.project(rig.right_from_left.apply(point))
+    after = rig.right.project(camera_from_left(rig, "right", tuple(turn)).apply(point))
+    moved = np.abs(after - before)[0]
+    assert moved[1 - axis] == pytest.approx(1398.0 * turn[axis], rel=0.02)
+    assert moved[axis] < 0.02
+    assert np.array_equal(camera_from_left(rig, "left", tuple(turn)).matrix, np.eye(4))

@@ -12,7 +12,7 @@ from calibration.targets.drawing import drawn, rastered
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from sim_devices.rigs import default_rig
 from sim_devices.sensor import SensorModel
-from sim_devices.sheet import PrintedSheet, SheetScene
+from sim_devices.sheet import PrintedSheet, SheetInView, SheetScene
 from sim_devices.sheet_kernels import draw_sheet
 from tests.reference.sheet_reference import sheet_reference
 
@@ -115,3 +115,24 @@ def test_a_sheet_is_a_grey_picture_with_a_size():
         PrintedSheet(np.zeros((4, 4, 3), np.uint8), 4.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="grey picture"):
         PrintedSheet(np.zeros((4, 4), np.uint8), 0.0, 0.0, 0.0)
+
+
+def test_a_sheet_hides_what_is_behind_it_while_it_is_held() -> None:
+    class Bright:
+        rig = default_rig()
+
+        def render(self, eye, time_ns, *how) -> np.ndarray:
+            return np.full((720, 1280, 3), 0.77, np.float32)
+
+    pose = held(450.0, (0.1, 0.2, 0.0))
+    scene = SheetInView(Bright(), sheet_of(), lambda time_ns: pose, (10, 20))
+    alone = SheetScene(sheet_of(), lambda time_ns: pose).render("right", 0)
+    for time_ns in (9, 20):
+        assert (scene.render("right", time_ns) == np.float32(0.77)).all()
+    shown = scene.render("right", 10)
+    is_behind = shown == np.float32(0.77)
+    assert 0.05 < np.mean(~is_behind) < 0.5
+    assert np.array_equal(shown[~is_behind], alone[~is_behind])
+    # Where the sheet ends is no more than a pixel's work.
+    beside = cv2.erode(is_behind[:, :, 0].astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    assert (alone[beside] == np.float32(0.08)).all()

@@ -7,8 +7,8 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.stereo import PictureHealth, StereoHealth
 from navapp.tracking import Line, TrackState
-from navapp.tracking.pair_doubts import pair_doubts
-from navapp.values import Reason, Status
+from navapp.tracking.pair_doubts import pair_doubts, row_check
+from navapp.values import Reason, RowCheck, Status
 from tests.registration.shapes import GEOMETRY
 from tests.tracking.rooms import GOAL, room
 
@@ -50,6 +50,27 @@ def test_an_unusable_picture_is_named(bad: PictureHealth, reason: Reason | None)
     expected = () if reason is None else (reason,)
     assert doubts(StereoHealth(bad, GOOD)) == expected
     assert doubts(StereoHealth(GOOD, bad)) == expected
+
+
+def test_usable_pairs_say_how_their_rows_stand() -> None:
+    off = row_check(StereoHealth(GOOD, GOOD, -1.05 * LIMIT_PX, 0.01, 100), GEOMETRY, DEPTH_MM)
+    assert off == RowCheck(-1.05 * LIMIT_PX, True)
+    within = row_check(StereoHealth(GOOD, GOOD, 0.95 * LIMIT_PX, 0.01, 100), GEOMETRY, DEPTH_MM)
+    assert within == RowCheck(0.95 * LIMIT_PX, False)
+
+
+@pytest.mark.parametrize(
+    "health",
+    [
+        StereoHealth(GOOD, GOOD),
+        StereoHealth(GOOD, GOOD, n_points=90, correlation=0.1),
+        StereoHealth(PictureHealth(0.8, 0.0, 0.2), GOOD, 3.0 * LIMIT_PX, 0.01, 100),
+        StereoHealth(GOOD, PictureHealth(0.0, 0.0, 0.07), 3.0 * LIMIT_PX, 0.01, 100),
+    ],
+    ids=["few points", "lost rows", "dark", "unlike"],
+)
+def test_poor_pairs_say_nothing_of_the_rig(health: StereoHealth) -> None:
+    assert row_check(health, GEOMETRY, DEPTH_MM) is None
 
 
 def tracked(line: Line, *, dark: str = "") -> tuple[Status, tuple[Reason, ...]]:

@@ -130,6 +130,27 @@ def test_troubles_that_do_not_fit_are_counted() -> None:
     assert lines_of(DevicesPanel(), view, WIDTH, DEVICE_LINES)[1] == "and 4 more in trouble"
 
 
+def test_a_device_that_is_not_there_gives_way_to_one_that_is() -> None:
+    rig = DeviceLine("rig", "sim:rig", DeviceHealth.OK, "not checked: show the board")
+    view = view_of(snapshots.navigating(devices=(*snapshots.DEVICES, rig)))
+    lines = lines_of(DevicesPanel(), view, WIDTH, DEVICE_LINES)
+    assert len(lines) == DEVICE_LINES
+    assert "rig" in lines[1]
+    assert "projector" not in " ".join(lines)
+
+
+def test_a_rig_that_moved_is_said_over_a_live_picture() -> None:
+    snapshot = snapshots.navigating(
+        state=SessionState.FAULT, reasons=(Reason.RIG_MOVED,), rig_alarm="rig moved, recalibrate"
+    )
+    view = view_of(snapshot)
+    assert view.level is Level.BAD
+    assert view.picture_title == "left view · RIG MOVED, the display is dark"
+    text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
+    assert "NAVIGABLE  NO" in text
+    assert "rig moved, recalibrate" in text
+
+
 def test_no_devices_are_no_lines() -> None:
     assert lines_of(DevicesPanel(), view_of(snapshots.navigating(devices=())), WIDTH, 2) == []
 

@@ -6,6 +6,7 @@ from calibration.targets.boards import Board
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
+from navapp.control.camera_link import CameraLink, Reopen
 from navapp.control.capture.following import Following
 from navapp.control.capture.interfaces import BoardHand, CaptureSettings, PairStore, Solve
 from navapp.control.capture.kept import KeptPairs
@@ -28,9 +29,8 @@ from navapp.control.capture.states import (
 from navapp.control.capture.wishes import N_STARTING, Wish, measured_pose, next_wish
 from navapp.control.capture.words import Way, way
 from navapp.control.executors import Executor, Job
-from navapp.control.sources import open_source
 from navapp.control.states import Progress
-from navapp.errors import NavappError
+from navapp.errors import DeviceError, NavappError
 from navapp.geometry.transform import FloatArray
 
 _WAIT_S = 0.1
@@ -53,6 +53,7 @@ class Capture:
         store: of the raw pairs.
         solve: what `Finish` does with the pairs; runs in the executor.
         hand: that holds a simulated board, else None.
+        reopen: opens a lost camera again; None: its loss is the end.
     """
 
     def __init__(
@@ -66,10 +67,11 @@ class Capture:
         store: PairStore,
         solve: Solve,
         hand: BoardHand | None = None,
+        reopen: Reopen | None = None,
     ) -> None:
         info = camera.info
         self._name, self._size = info.name, (info.width, info.height)
-        self._source, self._clock = open_source(camera), clock
+        self._camera, self._clock = CameraLink(camera, clock, reopen), clock
         self._board, self._settings, self._executor = board, settings, executor
         self._solve, self._following = solve, Following(hand)
         self._middle_mm = board.points_mm.mean(axis=0)
@@ -99,11 +101,12 @@ class Capture:
         """Take a frame, do what is due, and tell.
 
         Raises:
-            DeviceError: the camera; InputError: the folder; EndOfSequence: a finite source.
+            DeviceError: a camera that nobody opens again; InputError: the folder; EndOfSequence: a
+                finite source.
         """
         while (command := self._next_command()) is not None:
             self._do(command)
-        frame = self._source.take(_WAIT_S)
+        frame = self._next_frame()
         if frame is not None:
             self._frame = frame
             if self._looking is None and self._phase is CapturePhase.CAPTURING:
@@ -122,7 +125,7 @@ class Capture:
             if job is not None:
                 job.cancel()
         self._executor.close()
-        self._source.close()
+        self._camera.close()
 
     @property
     def is_enough(self) -> bool:
@@ -131,6 +134,23 @@ class Capture:
         if n < self._n_least:
             return False
         return asked.n_pairs is not None or (bound is not None and bound <= asked.stop_mm)
+
+    def _next_frame(self) -> StereoFrame | None:
+        if self._camera.is_down:
+            if self._camera.wait_for_return(_WAIT_S):
+                self._tell(f"camera {self._name} is back")
+            return None
+        try:
+            return self._camera.take(_WAIT_S)
+        except DeviceError as error:
+            if not self._camera.can_return:
+                raise
+            # What was seen before says nothing of what is held there afterwards.
+            self._frame = self._look = self._way = None
+            self._checks, self._is_told_to_take = (), False
+            self._shutter.forget_last()
+            self._tell(str(error))
+            return None
 
     def _next_command(self) -> CaptureCommand | None:
         try:
@@ -149,7 +169,7 @@ class Capture:
             case _ if self._phase is not CapturePhase.CAPTURING:
                 pass
             case Take():
-                self._is_told_to_take = True
+                self._is_told_to_take = not self._camera.is_down
             case DropLast():
                 if (pair := self._kept.drop_last()) is not None:
                     self._tell(f"pair {pair.index} dropped")
@@ -172,6 +192,8 @@ class Capture:
         self._looking = None
         if job.error is not None:
             raise job.error
+        if self._camera.is_down:
+            return
         look = self._look = job.result
         if look is None or self._phase is not CapturePhase.CAPTURING:
             return
@@ -268,6 +290,7 @@ class Capture:
             time_ns=self._clock.now_ns(),
             phase=self._phase,
             camera=self._name,
+            trouble=self._trouble,
             has_hand=self._following.has_hand,
             is_following=self._following.is_on,
             pictures=previews(
@@ -286,6 +309,12 @@ class Capture:
             events=tuple(self._events),
             outcome=self._outcome,
         )
+
+    @property
+    def _trouble(self) -> str:
+        if self._camera.is_down:
+            return f"{self._camera.trouble or 'the camera is lost'}; it is opened again, wait"
+        return "the camera sends no picture: check its cable" if self._camera.is_silent else ""
 
     def _wish_text(self) -> str:
         if self._phase is CapturePhase.SOLVING:

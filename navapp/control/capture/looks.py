@@ -58,6 +58,10 @@ class Shutter:
         self._sharpest = [np.inf, np.inf]
         self._last: Look | None = None
 
+    def forget_last(self) -> None:
+        """The next look follows on none: how fast the board is cannot be told from before."""
+        self._last = None
+
     def checks(self, look: Look, kept: Sequence[SeenPair]) -> tuple[Check, ...]:
         """Seen, sharp, still, new: all must hold."""
         last, self._last = self._last, look

@@ -96,6 +96,7 @@ class CaptureSnapshot:
         time_ns: of the newest frame.
         phase: what it is busy with.
         camera: its name; a simulated one begins with `sim:`.
+        trouble: what is wrong with it; empty when nothing is.
         has_hand: the board is held by a simulated hand.
         is_following: that hand goes where the board is wanted.
         pictures: left and right, small, BGR, with marks and the outline of the wanted view.
@@ -131,3 +132,4 @@ class CaptureSnapshot:
     progress: Progress | None
     events: tuple[str, ...]
     outcome: Outcome | None = None
+    trouble: str = ""

@@ -25,6 +25,8 @@ class CaptureView:
     def state(self) -> tuple[str, Level]:
         """A word and how it stands."""
         snapshot = self.snapshot
+        if snapshot.trouble:
+            return "NO CAMERA", Level.BAD
         if snapshot.phase is CapturePhase.SOLVING:
             return "SOLVING", Level.QUIET
         if snapshot.outcome is not None:
@@ -57,7 +59,7 @@ class CaptureTitle(Lines[CaptureView]):
 
 
 class WishLines(Lines[CaptureView]):
-    """Where the board is wanted, or what became of the solve."""
+    """Where the board is wanted, or what became of the solve; first of all a camera's trouble."""
 
     def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
         """Two lines."""
@@ -71,6 +73,9 @@ class WishLines(Lines[CaptureView]):
             level = Level.OK if view.snapshot.is_enough else Level.ATTENTION
             first, rest = _broken(view.snapshot.wish, width - 10)
         head = "outcome " if outcome is not None else "wanted  "
+        if view.snapshot.trouble:
+            head, level = "camera  ", Level.BAD
+            first, rest = _broken(view.snapshot.trouble, width - 10)
         return [
             Content.assemble((f" {head}", "$text-muted"), (first, level.value)),
             Content.assemble("         ", (cut(rest, max(width - 10, 0), symbols), level.value)),

@@ -76,7 +76,7 @@ class Room:
         del self.kept[index]
 
 
-def capture_in(room: Room, monkeypatch, solve=None, **asked) -> Capture:
+def capture_in(room: Room, monkeypatch, solve=None, reopen=None, **asked) -> Capture:
     monkeypatch.setattr("navapp.control.capture.capture.look_at", room.look)
     settings = CaptureSettings(DEPTH_MM, **{"stop_mm": 0.15, **asked})
     return Capture(
@@ -85,6 +85,7 @@ def capture_in(room: Room, monkeypatch, solve=None, **asked) -> Capture:
         store=room,
         solve=solve or (lambda pairs, report: Outcome(True, ())),
         hand=room,
+        reopen=reopen,
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from navapp.control.capture.states import (
     Take,
 )
 from navapp.control.capture.wishes import starting_view
-from navapp.errors import InputError, ResultError
+from navapp.errors import DeviceLost, InputError, ResultError
 from navapp.geometry.transform import RigidTransform
 from tests.calibration.marks import BOARD
 from tests.control.capture.rooms import DEPTH_MM, Room, capture_in, steps
@@ -211,3 +211,75 @@ def test_a_full_disk_ends_the_capture_in_a_sentence(room, monkeypatch):
     with pytest.raises(InputError, match="No space"):
         steps(capture, 1)
     assert np.size(list(room.kept)) == 0
+
+
+def lose_camera(room, capture) -> None:
+    """The camera is gone, and cannot be opened."""
+    read = room.read
+
+    def gone(*_):
+        room.clock.advance_ns(100_000_000)
+        raise DeviceLost("the camera was unplugged")
+
+    room.read = room.open = gone
+    capture.step()
+
+    def plug_in() -> None:
+        room.read, room.open = read, lambda: None
+
+    room.plug_in = plug_in
+
+
+def reopening(room, monkeypatch):
+    def reopen():
+        room.open()
+        return room
+
+    room.open = lambda: None
+    return capture_in(room, monkeypatch, reopen=reopen)
+
+
+def test_a_lost_camera_is_said_waited_for_and_everything_kept_stays(room, monkeypatch):
+    capture = reopening(room, monkeypatch)
+    at_start(room)
+    before = steps(capture, 6)
+    assert before.n_kept == 1
+    assert before.trouble == ""
+    lose_camera(room, capture)
+    capture.submit(Take())
+    lost = steps(capture, 40)
+    assert lost.trouble.startswith("the camera was unplugged")
+    assert lost.pictures is None
+    assert lost.checks == ()
+    assert lost.n_kept == 1
+    assert sum("unplugged" in text for text in lost.events) == 1
+    room.plug_in()
+    back = steps(capture, 20)
+    assert back.trouble == ""
+    assert back.pictures is not None
+    assert "camera sim:room is back" in back.events
+    # Where it was held before, the board is not wanted again; nothing was taken unasked.
+    assert back.n_kept == 1
+    assert list(room.kept) == [0]
+    snapshot = followed(capture, lambda s: s.n_kept == 4)
+    assert list(room.kept) == [0, 1, 2, 3]
+    assert snapshot.phase is CapturePhase.CAPTURING
+
+
+def test_a_board_is_not_called_still_by_what_was_seen_before_the_loss(room, monkeypatch):
+    capture = reopening(room, monkeypatch)
+    at_start(room, aside_mm=60.0)
+    steps(capture, 4)
+    lose_camera(room, capture)
+    room.plug_in()
+    while capture.snapshot.trouble:
+        capture.step()
+    first = next(s for s in (capture.step() for _ in range(9)) if s.checks)
+    assert not next(check for check in first.checks if check.name == "still").is_met
+
+
+def test_the_loss_of_a_camera_that_nobody_opens_again_is_the_end(room, monkeypatch):
+    capture = capture_in(room, monkeypatch)
+    steps(capture, 2)
+    with pytest.raises(DeviceLost, match="unplugged"):
+        lose_camera(room, capture)

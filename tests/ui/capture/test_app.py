@@ -21,7 +21,7 @@ from navapp.control.capture.states import (
 )
 from navapp.control.states import Progress
 from navapp.ui.capture.app import CaptureApp
-from navapp.ui.capture.panels import CaptureView, CoverageMap
+from navapp.ui.capture.panels import CaptureView, CoverageMap, WishLines
 from navapp.ui.symbols import ASCII, UNICODE
 
 
@@ -217,3 +217,15 @@ def test_the_map_shows_every_cell():
             sign = told[row // 2][2 * column]
             is_kept = sign == "#" or sign == ("^" if row % 2 == 0 else "_")
             assert is_kept == SEEKING.covered[0, row, column]
+
+
+def test_a_lost_camera_comes_before_everything_else() -> None:
+    snapshot = change(
+        SEEKING, trouble="the camera was unplugged", pictures=None, is_enough=True,
+        outcome=Outcome(is_accepted=True, sentences=()),
+    )  # fmt: skip
+    view = CaptureView(snapshot, UNICODE)
+    assert view.state[0] == "NO CAMERA"
+    lines = [line.plain for line in WishLines("wish").build(view, 80, 2)]
+    assert "the camera was unplugged" in lines[0]
+    assert "accepted" not in " ".join(lines)

@@ -1,0 +1,108 @@
+"""Whether the rig still stands as it was calibrated: the rows of live pairs, a known length.
+
+Both only ever take trust away: what the rig has lost, no good frame gives back.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from drivers.frames import StereoFrame
+from navapp.control.board_watch import BoardWatch
+from navapp.control.display_link import DisplayLink
+from navapp.control.length_check import LengthCheck
+from navapp.control.session import Session
+from navapp.control.states import DistrustRig, EventLevel
+from navapp.values import RowCheck
+
+# Longer than a breath takes: a leg that moves between the two exposures of a pair moves to and fro,
+# and the rows it puts off change their sign.
+_WINDOW_NS = 5_000_000_000
+_LEAST_SPAN_NS, _FEWEST_PAIRS = 4_000_000_000, 10
+# A single pair may be wrong either way.
+_MOST_SHARE = 0.9
+
+
+class RowWatch:
+    """Rows that disagree for longer, and more of one mind, than anything but a moved rig does."""
+
+    def __init__(self) -> None:
+        self._told: deque[tuple[int, RowCheck]] = deque()
+
+    def add(self, rows: RowCheck | None, captured_ns: int) -> str:
+        """What is wrong with the rig, after one more pair; empty while nothing is sure."""
+        while self._told and captured_ns - self._told[0][0] > _WINDOW_NS:
+            self._told.popleft()
+        if rows is None:
+            return ""
+        self._told.append((captured_ns, rows))
+        span_ns = captured_ns - self._told[0][0]
+        if span_ns < _LEAST_SPAN_NS or len(self._told) < _FEWEST_PAIRS:
+            return ""
+        signs = np.array([np.sign(one.offset_px) * one.is_off for _, one in self._told])
+        if max(np.mean(signs > 0), np.mean(signs < 0)) < _MOST_SHARE:
+            return ""
+        offset_px = float(np.median([one.offset_px for _, one in self._told]))
+        where = "low" if offset_px > 0 else "high"
+        return f"the right picture shows everything {abs(offset_px):.2f} px too {where}"
+
+
+class RigWatch:
+    """Watches the rig of a session, and ends all trust in it.
+
+    Args:
+        session: that is told.
+        display: goes dark.
+        board: looks for a known length; None: nobody does.
+    """
+
+    def __init__(self, session: Session, display: DisplayLink, board: BoardWatch | None) -> None:
+        self._session, self._display, self._board = session, display, board
+        self._rows = RowWatch()
+
+    @property
+    def has_board(self) -> bool:
+        """A known length is looked for."""
+        return self._board is not None
+
+    @property
+    def length_check(self) -> LengthCheck | None:
+        """The newest, None before the first."""
+        return None if self._board is None else self._board.newest
+
+    def take_over(self) -> None:
+        """Before a frame: what a look at an earlier one has found."""
+        session = self._session
+        found = None if self._board is None else self._board.take_over(session.clock.now_ns())
+        if found is None or session.rig_error is not None:
+            return
+        if found.is_off:
+            # A replay cannot look again as fast as the session did: it is told.
+            command = DistrustRig(str(found))
+            session.tell(session.hooks.on_command, command, session.sequence)
+            self.distrust(command)
+        elif found.is_within:
+            session.event("rig", f"rig checked: {found}")
+        else:
+            session.event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)
+
+    def after(self, frame: StereoFrame) -> None:
+        """After a frame: what its rows say; and another look for the board when it is time."""
+        if self._session.rig_error is not None:
+            return
+        tracked = self._session.tracked
+        why = self._rows.add(None if tracked is None else tracked.rows, frame.captured_ns)
+        if why:
+            self.distrust(DistrustRig(why))
+        elif self._board is not None:
+            self._board.look(frame)
+
+    def distrust(self, command: DistrustRig) -> None:
+        """Dark, and for good."""
+        self._display.darken()
+        self._session.distrust_rig(command.why)
+
+    def close(self) -> None:
+        """Wait for a look that still runs."""
+        if self._board is not None:
+            self._board.close()
