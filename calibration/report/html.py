@@ -30,18 +30,13 @@ def write_report(path: str | Path, found: Calibration, limits: Limits) -> None:
 def page(found: Calibration, limits: Limits) -> str:
     """The report as HTML."""
     name = escape(found.rig.name or "stereo rig")
-    middle_mm = float(np.mean(found.depth_mm))
     parts = [
         f"<h1>Calibration of {name}</h1>",
         _verdict(found),
         "<h2>What it measures</h2>",
         _table(_figures(found, limits)),
         "<h2>What a point in space is worth</h2>",
-        plots.uncertainty(found, middle_mm),
-        _note(
-            "Predicted error that 95 % of triangulated points stay below, from the covariance of "
-            "the solved rig. Most of it is one common shift of everything that is seen."
-        ),
+        _uncertainty(found),
         "<h2>What is left at the marks</h2>",
         plots.residuals(found),
         _note(
@@ -88,13 +83,27 @@ def _verdict(found: Calibration) -> str:
     return f'<div class="verdict bad"><b>Not accepted.</b><ul>{reasons}</ul></div>'
 
 
+def _uncertainty(found: Calibration) -> str:
+    if len(found.bounds_mm) == 0:
+        return _note("Nothing: no part of the working volume is seen by both cameras.")
+    return plots.uncertainty(found, float(np.mean(found.depth_mm))) + _note(
+        "Predicted error that 95 % of triangulated points stay below, from the covariance of "
+        "the solved rig. Most of it is one common shift of everything that is seen."
+    )
+
+
 def _figures(found: Calibration, limits: Limits) -> list[tuple[str, str, str]]:
     ratios, bounds = found.length_ratios, found.bounds_mm
     near, far = found.depth_mm
+    told = "unknown"
+    if len(bounds):
+        told = (
+            f"{np.median(bounds):.2f} mm (middle), {np.quantile(bounds, 0.95):.2f} mm (nearly all)"
+        )
     rows = [
         (
             "predicted error at the working volume",
-            f"{np.median(bounds):.2f} mm (middle), {np.quantile(bounds, 0.95):.2f} mm (nearly all)",
+            told,
             f"95 %; {near:.0f} to {far:.0f} mm away; at most {limits.accept_mm:.2f} mm",
         ),
         ("rms of what is left", f"{found.solved.rms_px:.3f} px", found.solved.model.name),
