@@ -1,4 +1,4 @@
-"""Folders of picture files: a printed board as the simulated rig photographs it, at half its size."""
+"""Folders of picture files: a board as the simulated rig photographs it, at half its size."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.targets.boards import Board, board_from
 from calibration.targets.drawing import drawn, rastered
-from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from sim_devices.rigs import default_rig
 from sim_devices.sensor import Eye, SensorModel
 from sim_devices.sheet import PrintedSheet, SheetScene

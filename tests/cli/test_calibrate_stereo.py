@@ -31,7 +31,7 @@ N_PAIRS = len(GOOD_VIEWS)
 
 @dataclass(frozen=True)
 class Ended:
-    """How the command ended: its code, JSON, sentence on stderr, and the rig file if there is one."""
+    """The command's exit code, JSON, sentence on stderr, and rig file if there is one."""
 
     code: int
     told: dict

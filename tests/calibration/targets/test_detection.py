@@ -97,9 +97,9 @@ def test_corners_beyond_the_picture_are_no_answer_and_no_crash(monkeypatch):
     """OpenCV finds a part of a larger chessboard, and continues it as far as it was asked for."""
     board = BOARDS["chessboard"]
     picture = picture_of(board, CAMERA, facing(board, 380.0, np.array(TURNS[0])))
-    _, corners = cv2.findChessboardCorners(picture, (8, 5))
+    corners = np.reshape(cv2.findChessboardCorners(picture, (8, 5))[1], (-1, 2))
     assert find_board(picture, board) is not None
-    beyond = corners + np.array([0.0, 480.0 - corners[-1, 0, 1] + 0.5], np.float32)
+    beyond = corners + np.array([0.0, 480.5 - corners[-1, 1]], np.float32)
     monkeypatch.setattr(cv2, "findChessboardCorners", lambda *_, **__: (True, beyond))
     assert find_board(picture, board) is None
 
