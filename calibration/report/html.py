@@ -8,6 +8,7 @@ import numpy as np
 from calibration.report import plots
 from calibration.rig.judge import Limits
 from calibration.rig.solve import Calibration
+from navapp.geometry.rig import StereoRig
 from navapp.geometry.whole_files import write_whole
 
 _STYLE = """
@@ -48,6 +49,7 @@ def page(found: Calibration, limits: Limits) -> str:
         "<h2>Where the board was shown</h2>",
         plots.coverage(found),
         _note(
+            "Cells without a mark, where the working volume is seen, are orange. "
             f"Marks lay between {found.covered.depth_mm[0]:.0f} and "
             f"{found.covered.depth_mm[1]:.0f} mm; the board was tilted by "
             f"{np.median(found.covered.tilts_deg):.0f} deg (median), "
@@ -132,7 +134,7 @@ def _numbers(found: Calibration) -> list[tuple[str, str, str]]:
     model, shared = found.solved.model, found.solved.shared
     sigma = np.sqrt(np.maximum(np.diag(found.solved.covariance), 0.0))
     lens = ("fx, px", "fy, px", "cx, px", "cy, px", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-    rows = [("baseline", f"{found.rig.baseline_mm:.3f} mm", "")]
+    rows = [*_record(found.rig), ("baseline", f"{found.rig.baseline_mm:.3f} mm", "")]
     for number, side in enumerate(("left", "right")):
         for k in range(model.n_camera):
             at = number * model.n_camera + k
@@ -142,6 +144,14 @@ def _numbers(found: Calibration) -> list[tuple[str, str, str]]:
     for k, name in enumerate(names):
         value, error = shared[place + k], sigma[place + k]
         rows.append((name, f"{value:.6g}", f"&plusmn; {error:.2g}"))
+    return rows
+
+
+def _record(rig: StereoRig) -> list[tuple[str, str, str]]:
+    """Which rig it is, and how long it may be used."""
+    rows = [("rig id", rig.rig_id, f"pictures of {rig.width} x {rig.height} px")]
+    if rig.quality is not None and rig.quality.made_on is not None:
+        rows.append(("made on", str(rig.quality.made_on), f"expires on {rig.quality.expires_on}"))
     return rows
 
 
