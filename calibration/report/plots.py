@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from calibration.rig.judge import occupied
 from calibration.rig.lengths import epipolar_px
 from calibration.rig.solve import Calibration
 from calibration.rig.uncertainty import bounds_mm
@@ -45,20 +44,20 @@ def residuals(found: Calibration) -> str:
 
 def coverage(found: Calibration) -> str:
     """Where marks were seen in both pictures, and where none were though the rig is used there."""
-    size, rig = (found.solved.model.width, found.solved.model.height), found.rig
-    seen_mm = (found.points_mm, rig.right_from_left.apply(found.points_mm))
-    needed = [camera.project(at) for camera, at in zip((rig.left, rig.right), seen_mm, strict=True)]
-
     from matplotlib.colors import ListedColormap
+
+    model = found.solved.model
 
     def draw(figure: Any) -> None:
         for number, side in enumerate(("left", "right")):
             share = getattr(found.covered, side)
             axes = _picture_axes(figure, number, found, f"{side}: {100 * share:.0f} % covered")
             marks = np.vstack([getattr(pair, side).pixels for pair in found.pairs])
-            bare = occupied(needed[number], size) & ~occupied(marks, size)
-            rows, columns = bare.shape
-            edges = np.linspace(0, size[0], columns + 1), np.linspace(0, size[1], rows + 1)
+            bare = found.covered.bare[number]
+            edges = [
+                np.linspace(0.0, side_px, n + 1)
+                for side_px, n in zip((model.width, model.height), bare.shape[::-1], strict=True)
+            ]
             shade = np.ma.masked_where(~bare, np.ones(bare.shape))
             axes.pcolormesh(*edges, shade, cmap=ListedColormap([_PALE]))
             axes.plot(marks[:, 0], marks[:, 1], ".", color=_BLUE, markersize=1.5)

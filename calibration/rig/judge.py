@@ -15,6 +15,8 @@ from calibration.targets.pairs import SeenPair
 from navapp.geometry.transform import FloatArray
 
 _CELLS_X, _CELLS_Y = 8, 6
+# Points of the working volume enough that no cell lies between them.
+_FINENESS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,7 @@ class Coverage:
 
     Attributes:
         left, right: shares of the cells that the working volume needs, with marks in them.
+        bare: (2, 6, 8) bool, left and right: cells that it needs, without any.
         depth_mm: nearest and farthest mark.
         tilts_deg: (V,) of the board's normal against the optical axis, per view; of both cameras
             the smaller. A board parallel to the picture tells no focal length, wherever it is.
@@ -57,6 +60,7 @@ class Coverage:
 
     left: float
     right: float
+    bare: NDArray[np.bool_]
     depth_mm: tuple[float, float]
     tilts_deg: FloatArray
 
@@ -76,18 +80,20 @@ def coverage(
     """How well the views cover what the rig will be used for."""
     size = (solved.model.width, solved.model.height)
     rig = unpacked(solved.model, solved.shared)
-    points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm)
+    points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm, _FINENESS)
     needed = (rig.left.project(points_mm), rig.right.project(rig.right_from_left.apply(points_mm)))
-    shares = []
+    shares, bare = [], []
     for side, wanted in zip(("left", "right"), needed, strict=True):
         asked = occupied(wanted, size)
         marked = occupied(np.vstack([getattr(pair, side).pixels for pair in pairs]), size)
         shares.append(float((marked & asked).sum() / max(asked.sum(), 1)))
+        bare.append(asked & ~marked)
     # The board's normal in the left camera; both axes are the last rows of their rotations.
     normals = np.array([matrix_of(vector)[:3, 2] for vector in solved.left_from_board])
     axes = np.array([[0.0, 0.0, 1.0], rig.right_from_left.rotation[2]])
     tilts = np.degrees(np.arccos(np.minimum(np.abs(normals @ axes.T).max(axis=1), 1.0)))
-    return Coverage(shares[0], shares[1], shown_depth_mm(board, pairs, solved), tilts)
+    shown_mm = shown_depth_mm(board, pairs, solved)
+    return Coverage(shares[0], shares[1], np.array(bare), shown_mm, tilts)
 
 
 def occupied(pixels: FloatArray, size: tuple[int, int]) -> NDArray[np.bool_]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibration.rig.judge import occupied
 from calibration.rig.lengths import triangulated_mm
 from calibration.rig.solve import solve_rig
 from calibration.rig.uncertainty import working_points_mm
@@ -123,8 +124,13 @@ def test_a_board_that_stays_in_the_middle_is_refused(world):
         seen_pair(i, world[0], drawn_pose(rng, small, aside_mm=3.0), rng, board=small)
         for i in range(14)
     ]
-    _, reasons = reasons_of(pairs, board=small)
+    found, reasons = reasons_of(pairs, board=small)
     assert any("one part of the left picture" in reason for reason in reasons)
+    # What both cameras see for certain is asked for without a hole.
+    for number, side in enumerate(("left", "right")):
+        marked = occupied(np.vstack([getattr(pair, side).pixels for pair in found.pairs]), SIZE)
+        assert (found.covered.bare[number] | marked)[1:5, 2:6].all()
+        assert not (found.covered.bare[number] & marked).any()
 
 
 def test_a_wrong_square_is_seen_by_a_known_distance(world):
