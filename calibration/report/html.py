@@ -8,6 +8,7 @@ import numpy as np
 from calibration.report import plots
 from calibration.rig.judge import Limits
 from calibration.rig.solve import Calibration
+from navapp.geometry.rig import StereoRig
 from navapp.geometry.whole_files import write_whole
 
 _STYLE = """
@@ -30,18 +31,13 @@ def write_report(path: str | Path, found: Calibration, limits: Limits) -> None:
 def page(found: Calibration, limits: Limits) -> str:
     """The report as HTML."""
     name = escape(found.rig.name or "stereo rig")
-    middle_mm = float(np.mean(found.depth_mm))
     parts = [
         f"<h1>Calibration of {name}</h1>",
         _verdict(found),
         "<h2>What it measures</h2>",
         _table(_figures(found, limits)),
         "<h2>What a point in space is worth</h2>",
-        plots.uncertainty(found, middle_mm),
-        _note(
-            "Predicted error that 95 % of triangulated points stay below, from the covariance of "
-            "the solved rig. Most of it is one common shift of everything that is seen."
-        ),
+        _uncertainty(found),
         "<h2>What is left at the marks</h2>",
         plots.residuals(found),
         _note(
@@ -53,6 +49,7 @@ def page(found: Calibration, limits: Limits) -> str:
         "<h2>Where the board was shown</h2>",
         plots.coverage(found),
         _note(
+            "Cells without a mark, where the working volume is seen, are orange. "
             f"Marks lay between {found.covered.depth_mm[0]:.0f} and "
             f"{found.covered.depth_mm[1]:.0f} mm; the board was tilted by "
             f"{np.median(found.covered.tilts_deg):.0f} deg (median), "
@@ -88,13 +85,27 @@ def _verdict(found: Calibration) -> str:
     return f'<div class="verdict bad"><b>Not accepted.</b><ul>{reasons}</ul></div>'
 
 
+def _uncertainty(found: Calibration) -> str:
+    if len(found.bounds_mm) == 0:
+        return _note("Nothing: no part of the working volume is seen by both cameras.")
+    return plots.uncertainty(found, float(np.mean(found.depth_mm))) + _note(
+        "Predicted error that 95 % of triangulated points stay below, from the covariance of "
+        "the solved rig. Most of it is one common shift of everything that is seen."
+    )
+
+
 def _figures(found: Calibration, limits: Limits) -> list[tuple[str, str, str]]:
     ratios, bounds = found.length_ratios, found.bounds_mm
     near, far = found.depth_mm
+    told = "unknown"
+    if len(bounds):
+        told = (
+            f"{np.median(bounds):.2f} mm (middle), {np.quantile(bounds, 0.95):.2f} mm (nearly all)"
+        )
     rows = [
         (
             "predicted error at the working volume",
-            f"{np.median(bounds):.2f} mm (middle), {np.quantile(bounds, 0.95):.2f} mm (nearly all)",
+            told,
             f"95 %; {near:.0f} to {far:.0f} mm away; at most {limits.accept_mm:.2f} mm",
         ),
         ("rms of what is left", f"{found.solved.rms_px:.3f} px", found.solved.model.name),
@@ -123,7 +134,7 @@ def _numbers(found: Calibration) -> list[tuple[str, str, str]]:
     model, shared = found.solved.model, found.solved.shared
     sigma = np.sqrt(np.maximum(np.diag(found.solved.covariance), 0.0))
     lens = ("fx, px", "fy, px", "cx, px", "cy, px", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-    rows = [("baseline", f"{found.rig.baseline_mm:.3f} mm", "")]
+    rows = [*_record(found.rig), ("baseline", f"{found.rig.baseline_mm:.3f} mm", "")]
     for number, side in enumerate(("left", "right")):
         for k in range(model.n_camera):
             at = number * model.n_camera + k
@@ -133,6 +144,14 @@ def _numbers(found: Calibration) -> list[tuple[str, str, str]]:
     for k, name in enumerate(names):
         value, error = shared[place + k], sigma[place + k]
         rows.append((name, f"{value:.6g}", f"&plusmn; {error:.2g}"))
+    return rows
+
+
+def _record(rig: StereoRig) -> list[tuple[str, str, str]]:
+    """Which rig it is, and how long it may be used."""
+    rows = [("rig id", rig.rig_id, f"pictures of {rig.width} x {rig.height} px")]
+    if rig.quality is not None and rig.quality.made_on is not None:
+        rows.append(("made on", str(rig.quality.made_on), f"expires on {rig.quality.expires_on}"))
     return rows
 
 

@@ -15,8 +15,8 @@ from calibration.rig.solve import Calibration
 from calibration.rig.uncertainty import bounds_mm
 from navapp.geometry.transform import FloatArray
 
-_BLUE, _ORANGE, _GREY = "#2b6cb0", "#c05621", "#718096"
-_MAP_COLUMNS, _MAP_ROWS = 24, 14
+_BLUE, _ORANGE, _PALE, _GREY = "#2b6cb0", "#c05621", "#fbd38d", "#718096"
+_MAP_COLUMNS, _MAP_ROWS = 48, 27
 
 
 def residuals(found: Calibration) -> str:
@@ -33,21 +33,34 @@ def residuals(found: Calibration) -> str:
                     marks[:, 0], marks[:, 1], arrows[:, 0], arrows[:, 1],
                     angles="xy", scale_units="xy", scale=1.0, color=_BLUE, width=0.0015,
                 )  # fmt: skip
-        figure.suptitle(f"what is left at every mark, {factor:.0f} times as long", fontsize=9)
+        figure.suptitle(
+            f"what is left at every mark, {factor:.0f} times as long as it is "
+            f"(the largest coordinate is {largest:.3f} px)",
+            fontsize=9,
+        )
 
     return _svg(draw, (9.6, 3.1))
 
 
 def coverage(found: Calibration) -> str:
-    """Where marks were seen in both pictures."""
+    """Where marks were seen in both pictures, and where none were though the rig is used there."""
+    from matplotlib.colors import ListedColormap
+
+    model = found.solved.model
 
     def draw(figure: Any) -> None:
         for number, side in enumerate(("left", "right")):
             share = getattr(found.covered, side)
             axes = _picture_axes(figure, number, found, f"{side}: {100 * share:.0f} % covered")
-            for pair in found.pairs:
-                marks = getattr(pair, side).pixels
-                axes.plot(marks[:, 0], marks[:, 1], ".", color=_BLUE, markersize=1.5)
+            marks = np.vstack([getattr(pair, side).pixels for pair in found.pairs])
+            bare = found.covered.bare[number]
+            edges = [
+                np.linspace(0.0, side_px, n + 1)
+                for side_px, n in zip((model.width, model.height), bare.shape[::-1], strict=True)
+            ]
+            shade = np.ma.masked_where(~bare, np.ones(bare.shape))
+            axes.pcolormesh(*edges, shade, cmap=ListedColormap([_PALE]))
+            axes.plot(marks[:, 0], marks[:, 1], ".", color=_BLUE, markersize=1.5)
 
     return _svg(draw, (9.6, 3.1))
 
@@ -90,7 +103,10 @@ def uncertainty(found: Calibration, depth_mm: float) -> str:
     y = (np.arange(_MAP_ROWS) + 0.5) / _MAP_ROWS * model.height
     u, v = np.meshgrid(x, y)
     points_mm = found.rig.left.rays(np.column_stack([u.ravel(), v.ravel()])) * depth_mm
-    told = bounds_mm(model, shared, found.solved.rig_covariance, points_mm)
+    covariance = found.solved.rig_covariance
+    # In the working volume the solve may know of more than its covariance does.
+    formal = bounds_mm(model, shared, covariance, found.points_mm)
+    told = bounds_mm(model, shared, covariance, points_mm) * np.median(found.bounds_mm / formal)
     pixels = found.rig.right.project(found.rig.right_from_left.apply(points_mm))
     is_seen = ((pixels >= 0.0) & (pixels < (model.width, model.height))).all(axis=1)
     told = np.where(is_seen, told, np.nan).reshape(u.shape)
@@ -98,7 +114,7 @@ def uncertainty(found: Calibration, depth_mm: float) -> str:
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()
         shown = axes.contourf(u, v, told, levels=8, cmap="viridis")
-        figure.colorbar(shown, ax=axes, label="mm")
+        figure.colorbar(shown, ax=axes, label="95 % error, mm")
         axes.set(xlim=(0, model.width), ylim=(model.height, 0), aspect="equal")
         axes.set_title(f"at {depth_mm:.0f} mm, where both cameras see it", fontsize=9)
 
@@ -127,5 +143,5 @@ def _svg(draw: Callable[[Any], None], size_inch: tuple[float, float]) -> str:
         draw(figure)
         file = io.StringIO()
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
-    text = file.getvalue()
-    return re.sub(r"^.*?(?=<svg)", "", text, count=1, flags=re.DOTALL)
+    # Inside a page neither a head nor a record of who drew it is wanted.
+    return re.sub(r"^.*?(?=<svg)|<metadata>.*?</metadata>", "", file.getvalue(), flags=re.DOTALL)

@@ -15,6 +15,8 @@ from calibration.targets.pairs import SeenPair
 from navapp.geometry.transform import FloatArray
 
 _CELLS_X, _CELLS_Y = 8, 6
+# Points of the working volume enough that no cell lies between them.
+_FINENESS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +27,8 @@ class Limits:
         fewest_pairs: that must be used.
         least_coverage: share of the cells of a picture, of those where the working volume is seen,
             that must hold marks.
-        least_tilt_deg: a third of the views must show the board turned away by as much.
+        least_tilt_deg: a third of the views must show the board turned out of the picture's plane
+            by as much.
         worst_rms_px: of what is left.
         worst_held_out: held-out over solved residuals.
         accept_mm: largest predicted 95 % error in the working volume.
@@ -49,12 +52,15 @@ class Coverage:
 
     Attributes:
         left, right: shares of the cells that the working volume needs, with marks in them.
+        bare: (2, 6, 8) bool, left and right: cells that it needs, without any.
         depth_mm: nearest and farthest mark.
-        tilts_deg: (V,) of the board's normal against the line to the cameras, per view.
+        tilts_deg: (V,) of the board's normal against the optical axis, per view; of both cameras
+            the smaller. A board parallel to the picture tells no focal length, wherever it is.
     """
 
     left: float
     right: float
+    bare: NDArray[np.bool_]
     depth_mm: tuple[float, float]
     tilts_deg: FloatArray
 
@@ -74,21 +80,20 @@ def coverage(
     """How well the views cover what the rig will be used for."""
     size = (solved.model.width, solved.model.height)
     rig = unpacked(solved.model, solved.shared)
-    points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm)
+    points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm, _FINENESS)
     needed = (rig.left.project(points_mm), rig.right.project(rig.right_from_left.apply(points_mm)))
-    shares = []
+    shares, bare = [], []
     for side, wanted in zip(("left", "right"), needed, strict=True):
         asked = occupied(wanted, size)
         marked = occupied(np.vstack([getattr(pair, side).pixels for pair in pairs]), size)
         shares.append(float((marked & asked).sum() / max(asked.sum(), 1)))
-    tilts = []
-    for pair, vector in zip(pairs, solved.left_from_board, strict=True):
-        pose = matrix_of(vector)
-        line = pose[:3, :3] @ board.points_mm[pair.left.ids].mean(axis=0) + pose[:3, 3]
-        cosine = abs(pose[:3, 2] @ line) / np.linalg.norm(line)
-        tilts.append(np.degrees(np.arccos(min(cosine, 1.0))))
+        bare.append(asked & ~marked)
+    # The board's normal in the left camera; both axes are the last rows of their rotations.
+    normals = np.array([matrix_of(vector)[:3, 2] for vector in solved.left_from_board])
+    axes = np.array([[0.0, 0.0, 1.0], rig.right_from_left.rotation[2]])
+    tilts = np.degrees(np.arccos(np.minimum(np.abs(normals @ axes.T).max(axis=1), 1.0)))
     shown_mm = shown_depth_mm(board, pairs, solved)
-    return Coverage(shares[0], shares[1], shown_mm, np.array(tilts))
+    return Coverage(shares[0], shares[1], np.array(bare), shown_mm, tilts)
 
 
 def occupied(pixels: FloatArray, size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -108,19 +113,52 @@ def refusals(
     solved: Bundle,
     covered: Coverage,
     held_out_rms_px: float,
-    bound_mm: float,
+    bound_mm: float | None,
     limits: Limits,
     known_distance_mm: float | None,
 ) -> list[str]:
-    """Why a calibration is not accepted; empty when it is. One sentence each."""
-    reasons = []
+    """Why a calibration is not accepted; empty when it is. One sentence each.
+
+    Args:
+        board: that was shown.
+        n_pairs: that were used.
+        solved: with them.
+        covered: where and how they show the board.
+        held_out_rms_px: of views that the rig was not solved with.
+        bound_mm: predicted 95 % error in nearly all of the working volume; None: neither camera
+            sees a part of it that the other one sees.
+        limits: what is asked.
+        known_distance_mm: a length that was measured by hand.
+    """
+    few = []
     if n_pairs < limits.fewest_pairs:
-        reasons.append(f"only {n_pairs} pairs can be used, {limits.fewest_pairs} are needed")
+        few = [f"only {n_pairs} pairs can be used, {limits.fewest_pairs} are needed"]
+    if not solved.rms_px <= limits.worst_rms_px:
+        # All else would be told of a rig that is none.
+        return [
+            *few,
+            f"the marks fit badly ({solved.rms_px:.2f} px rms, {limits.worst_rms_px:.2f} px are "
+            "allowed): pictures of different instants, or not the board of its file",
+        ]
+    return [
+        *few,
+        *_of_sides(solved),
+        *_of_views(covered, limits),
+        *_of_prediction(solved, held_out_rms_px, bound_mm, limits),
+        *_of_known_distance(board, solved, known_distance_mm, limits.known_share),
+    ]
+
+
+def _of_sides(solved: Bundle) -> list[str]:
     _, translation_mm = placement(solved.model, solved.shared)
-    if translation_mm[0] > 0.0:
-        reasons.append(
-            "the right camera stands left of the left one: left and right pictures are swapped"
-        )
+    if translation_mm[0] <= 0.0:
+        return []
+    return ["the right camera stands left of the left one: left and right pictures are swapped"]
+
+
+def _of_views(covered: Coverage, limits: Limits) -> list[str]:
+    """Where and how the board was shown."""
+    reasons = []
     turned = float(np.quantile(covered.tilts_deg, 2.0 / 3.0))
     if turned < limits.least_tilt_deg:
         reasons.append(
@@ -135,30 +173,37 @@ def refusals(
                 f"{100 * share:.0f} % of where the working volume is seen, "
                 f"{100 * limits.least_coverage:.0f} % are needed"
             )
+    return reasons
+
+
+def _of_prediction(
+    solved: Bundle, held_out_rms_px: float, bound_mm: float | None, limits: Limits
+) -> list[str]:
+    """What the rig is worth on other views, and in the working volume."""
+    reasons = []
     if not solved.is_settled:
         reasons.append("the solve did not come to rest: the views do not fix the rig")
-    if not solved.rms_px <= limits.worst_rms_px:
-        reasons.append(
-            f"the marks fit badly: {solved.rms_px:.2f} px rms, "
-            f"{limits.worst_rms_px:.2f} px are allowed"
-        )
     if not held_out_rms_px <= limits.worst_held_out * solved.rms_px:
         reasons.append(
             f"held-out views fit worse ({held_out_rms_px:.3f} px) than those solved with "
             f"({solved.rms_px:.3f} px)"
         )
-    if not bound_mm <= limits.accept_mm:
+    if bound_mm is None:
+        reasons.append("no part of the working volume is seen by both cameras")
+    elif not bound_mm <= limits.accept_mm:
         reasons.append(
             f"the predicted 95 % error in the working volume is {bound_mm:.2f} mm, "
             f"{limits.accept_mm:.2f} mm are allowed"
         )
-    if known_distance_mm is not None:
-        reasons += _known_distance(board, solved, known_distance_mm, limits.known_share)
     return reasons
 
 
-def _known_distance(board: Board, solved: Bundle, known_mm: float, allowed: float) -> list[str]:
+def _of_known_distance(
+    board: Board, solved: Bundle, known_mm: float | None, allowed: float
+) -> list[str]:
     """A length that was measured by hand: between the cameras, or along the board."""
+    if known_mm is None:
+        return []
     model = solved.model
     baseline_mm = float(np.linalg.norm(placement(model, solved.shared)[1]))
     row = board.points_mm[: board.columns - int(board.has_squares)]

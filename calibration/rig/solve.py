@@ -38,7 +38,8 @@ class Calibration:
         solved: the bundle.
         held_out: what views say of rigs solved without them.
         held_out_rms_px: of views that were set aside, or of `held_out`.
-        bounds_mm: (n,) predicted 95 % errors of points of the working volume.
+        bounds_mm: (n,) predicted 95 % errors of points of the working volume; none when both
+            cameras see nothing of it.
         points_mm: (n, 3) these points, in the left camera's frame.
         depth_mm: nearest and farthest surface of that volume.
         covered: where and how the board was shown.
@@ -97,7 +98,7 @@ def solve_rig(
     bounds = _bounds(solved, held_out, points_mm)
     covered = coverage(board, kept, solved, depth_mm)
     judged = look_at(board, aside, solved).rms_px if aside else held_out.rms_px
-    worst_mm = float(np.quantile(bounds, 0.95)) if len(bounds) else np.inf
+    worst_mm = float(np.quantile(bounds, 0.95)) if len(bounds) else None
     reasons = [
         f"pair {one.index}: {one.reason}" for one in dropped if one.fault in FAULTS_OF_CAPTURE
     ]
@@ -105,7 +106,7 @@ def solve_rig(
         board, len(kept), solved, covered, judged, worst_mm, limits, known_distance_mm
     )
     rig = unpacked(solved.model, solved.shared)
-    quality = RigQuality(not reasons, tuple(reasons), worst_mm if np.isfinite(worst_mm) else None)
+    quality = RigQuality(not reasons, tuple(reasons), worst_mm)
     epipolar, ratios = epipolar_px(rig, kept), length_ratios(board, rig, kept)
     on_progress(1.0)
     return Calibration(
@@ -206,6 +207,8 @@ def _bounds(solved: Bundle, held_out: HeldOut, points_mm: FloatArray) -> FloatAr
     The formal covariance believes that marks err independently. Where they do not (a board that
     bends, pictures in motion), rigs of different views differ by more: the jackknife sees it.
     """
+    if len(points_mm) == 0:
+        return np.empty(0)
     model = solved.model
     covariance = solved.rig_covariance
     formal = bounds_mm(model, solved.shared, covariance, points_mm)

@@ -17,7 +17,7 @@ _SHARE = 0.95
 
 
 def working_points_mm(
-    model: RigModel, shared: FloatArray, depth_mm: tuple[float, float]
+    model: RigModel, shared: FloatArray, depth_mm: tuple[float, float], fineness: int = 1
 ) -> FloatArray:
     """(n, 3) points of a working volume in the left camera's frame.
 
@@ -25,11 +25,12 @@ def working_points_mm(
         model: of the rig.
         shared: its numbers.
         depth_mm: nearest and farthest surface; the volume is what both cameras see between them.
+        fineness: so many times as many points along x and y.
     """
     rig = unpacked(model, shared)
+    n_x, n_y = fineness * _COLUMNS, fineness * _ROWS
     x, y = np.meshgrid(
-        (np.arange(_COLUMNS) + 0.5) / _COLUMNS * model.width,
-        (np.arange(_ROWS) + 0.5) / _ROWS * model.height,
+        (np.arange(n_x) + 0.5) / n_x * model.width, (np.arange(n_y) + 0.5) / n_y * model.height
     )
     rays = rig.left.rays(np.column_stack([x.ravel(), y.ravel()]))
     points_mm = np.vstack([rays * z for z in np.linspace(*depth_mm, _DEPTHS)])

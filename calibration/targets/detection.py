@@ -83,7 +83,7 @@ def _find_chessboard(picture: Image, board: Board) -> tuple[NDArray[np.intp], Fl
         is_found, corners = cv2.findChessboardCornersSB(
             picture, size, flags=cv2.CALIB_CB_EXHAUSTIVE
         )
-    if not is_found:
+    if not is_found or not _are_inside(picture, corners):
         return None
     corners = _refined(picture, corners)
     if _is_turned(picture, board, corners):
@@ -107,6 +107,12 @@ _FINDERS: dict[str, Any] = {
     "circles": _find_circles,
     "circles_asymmetric": _find_circles,
 }
+
+
+def _are_inside(picture: Image, corners: Any) -> bool:
+    """A board of another size than was asked for is continued beyond the picture's edges."""
+    pixels = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+    return bool((pixels >= 0.0).all() and (pixels < picture.shape[::-1]).all())
 
 
 def _flat_ids(ids: Any) -> NDArray[np.intp]:

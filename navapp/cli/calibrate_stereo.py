@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from calibration.targets.pairs import SeenPair
     from navapp.config import CalibrationSection
     from navapp.geometry.rig import StereoRig
+    from navapp.geometry.transform import FloatArray
 
 _EXAMPLE = """\
 examples:
@@ -143,7 +144,7 @@ def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> 
             "holdout_rms_px": found.held_out_rms_px,
             "epipolar_rms_px": found.epipolar_rms_px,
             "length_error_share": length_error(found),
-            "uncertainty_median_mm": float(np.median(found.bounds_mm)),
+            "uncertainty_median_mm": _quantile(found.bounds_mm, 0.5),
             "views_used": len(found.pairs),
             "views_dropped": len(found.dropped),
             "coverage_left": found.covered.left,
@@ -172,6 +173,11 @@ def length_error(found: "Calibration") -> float:
     return float(np.sqrt(np.mean((found.length_ratios - 1.0) ** 2)))
 
 
+def _quantile(values: "FloatArray", share: float) -> float:
+    """NaN of none."""
+    return float(np.quantile(values, share)) if len(values) else math.nan
+
+
 def content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
     """The result for programs."""
     quality = rig.quality
@@ -190,8 +196,8 @@ def content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
             "sd": 100.0 * float(ratios.std()) if len(ratios) else None,
         },
         "uncertainty_mm": {
-            "median": float(np.median(found.bounds_mm)) if len(found.bounds_mm) else None,
-            "p95": float(np.quantile(found.bounds_mm, 0.95)) if len(found.bounds_mm) else None,
+            "median": _quantile(found.bounds_mm, 0.5),
+            "p95": _quantile(found.bounds_mm, 0.95),
         },
         "views_used": len(found.pairs),
         "views_dropped": [{"index": one.index, "reason": one.reason} for one in found.dropped],
@@ -227,7 +233,7 @@ def tell(found: "Calibration", rig: "StereoRig", diagnostics: Diagnostics) -> No
             f"a length of 100 mm on the board is measured as {length['mean']:.2f} +- "
             f"{length['sd']:.2f} mm; baseline {rig.baseline_mm:.2f} mm"
         )
-    if bound["median"] is not None:
+    if len(found.bounds_mm):
         diagnostics.say(
             f"95 % of triangulated points in the working volume are right to {bound['median']:.2f} "
             f"mm (middle of the volume), {bound['p95']:.2f} mm (nearly all of it)"

@@ -8,7 +8,9 @@ by calibrateCamera, then stereoCalibrate with these cameras held, or free, on th
 
 Bone: vertices of the femur that face the left camera in the registration frames, projected by the
 true rig and triangulated by the solved one; no fit is removed, then one common shift.
-Drawn rigs have corners with noise of 0.05 px and no pictures.
+Drawn rigs have corners with noise of 0.05 px and no pictures; their errors are those of points all
+over the working volume, where a bone may be. Of the accepted ones the worst median, the worst 95 %
+and the largest error are told, each over all of them.
 """
 
 import argparse
@@ -226,7 +228,7 @@ def bone(folder: Path) -> FloatArray:
 
 def drawn(n_rigs: int) -> None:
     """Rigs whose truth is known: does the prediction hold, and who is accepted?"""
-    errors, bounds, worst_accepted, n_accepted = [], [], 0.0, 0
+    errors, bounds, accepted = [], [], []
     for seed in range(_FIRST_SEED, _FIRST_SEED + n_rigs):
         rng = np.random.default_rng(seed)
         true = drawn_rig(rng)
@@ -236,17 +238,17 @@ def drawn(n_rigs: int) -> None:
         errors.append(error)
         bounds.append(found.bounds_mm)
         if found.rig.quality is not None and found.rig.quality.is_accepted:
-            n_accepted += 1
-            worst_accepted = max(worst_accepted, float(np.median(error)))
+            accepted.append(np.quantile(error, (0.5, 0.95, 1.0)))
+    worst = np.max(accepted, axis=0) if accepted else np.full(3, np.nan)
     all_errors, all_bounds = np.concatenate(errors), np.concatenate(bounds)
     print()
     print("| drawn rigs | error median mm | predicted 95 % median mm | ratio | holds | accepted "
-          "| worst accepted (median of its volume) mm |")  # fmt: skip
-    print("|---|" + "---|" * 6)
+          "| accepted, worst median mm | worst 95 % mm | largest mm |")  # fmt: skip
+    print("|---|" + "---|" * 8)
     ratio = np.median(all_bounds) / np.median(all_errors)
     print(f"| {n_rigs} | {np.median(all_errors):.3f} | {np.median(all_bounds):.3f} | {ratio:.1f} "
-          f"| {100 * np.mean(all_errors < all_bounds):.0f} % | {n_accepted} "
-          f"| {worst_accepted:.3f} |")  # fmt: skip
+          f"| {100 * np.mean(all_errors < all_bounds):.0f} % | {len(accepted)} "
+          f"| {' | '.join(f'{one:.3f}' for one in worst)} |")  # fmt: skip
 
 
 if __name__ == "__main__":

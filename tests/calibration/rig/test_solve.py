@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibration.rig.judge import occupied
 from calibration.rig.lengths import triangulated_mm
 from calibration.rig.solve import solve_rig
 from calibration.rig.uncertainty import working_points_mm
@@ -100,9 +101,14 @@ def test_too_few_views_are_refused(world):
             solve_rig(BOARD, world[1][:n], SIZE)
 
 
-def test_frontal_views_are_refused(world):
+@pytest.mark.parametrize("aside_mm", [60.0, 200.0])
+def test_frontal_views_are_refused(world, aside_mm):
+    """Also at the picture's edges, where the line of sight meets the board aslant."""
     rng = np.random.default_rng(2)
-    pairs = [seen_pair(i, world[0], drawn_pose(rng, tilt_deg=3.0), rng) for i in range(14)]
+    poses = [drawn_pose(rng, tilt_deg=3.0, aside_mm=aside_mm) for _ in range(24)]
+    drawn = [seen_pair(i, world[0], pose, rng) for i, pose in enumerate(poses)]
+    pairs = [pair for pair in drawn if min(len(pair.left.ids), len(pair.right.ids)) > 12]
+    assert len(pairs) >= 14
     assert any("frontally" in reason for reason in reasons_of(pairs)[1])
 
 
@@ -118,8 +124,13 @@ def test_a_board_that_stays_in_the_middle_is_refused(world):
         seen_pair(i, world[0], drawn_pose(rng, small, aside_mm=3.0), rng, board=small)
         for i in range(14)
     ]
-    _, reasons = reasons_of(pairs, board=small)
+    found, reasons = reasons_of(pairs, board=small)
     assert any("one part of the left picture" in reason for reason in reasons)
+    # What both cameras see for certain is asked for without a hole.
+    for number, side in enumerate(("left", "right")):
+        marked = occupied(np.vstack([getattr(pair, side).pixels for pair in found.pairs]), SIZE)
+        assert (found.covered.bare[number] | marked)[1:5, 2:6].all()
+        assert not (found.covered.bare[number] & marked).any()
 
 
 def test_a_wrong_square_is_seen_by_a_known_distance(world):

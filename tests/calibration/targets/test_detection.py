@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 
@@ -90,6 +91,17 @@ def test_a_chessboard_begins_at_its_black_square_however_it_is_held():
         assert seen is not None
         true_px = CAMERA.project(pose.apply(board.points_mm))
         assert np.abs(seen.pixels - true_px).max() < 0.2
+
+
+def test_corners_beyond_the_picture_are_no_answer_and_no_crash(monkeypatch):
+    """OpenCV finds a part of a larger chessboard, and continues it as far as it was asked for."""
+    board = BOARDS["chessboard"]
+    picture = picture_of(board, CAMERA, facing(board, 380.0, np.array(TURNS[0])))
+    corners = np.reshape(cv2.findChessboardCorners(picture, (8, 5))[1], (-1, 2))
+    assert find_board(picture, board) is not None
+    beyond = corners + np.array([0.0, 480.5 - corners[-1, 1]], np.float32)
+    monkeypatch.setattr(cv2, "findChessboardCorners", lambda *_, **__: (True, beyond))
+    assert find_board(picture, board) is None
 
 
 def test_no_board_is_no_answer():
