@@ -91,6 +91,11 @@ class Pursuit:
         """Share done of the search that runs; None when none runs."""
         return None if self._search is None else self._search.job.progress
 
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """Bones of which a pose was accepted, in that order."""
+        return tuple(self._tracks)
+
     def is_planned(self, stage: StageSpec) -> bool:
         """The plan has a model of the stage's bone."""
         return stage.bone in self._plan.bones
@@ -194,6 +199,20 @@ class Pursuit:
             self._goal(stage),
         )
         return tracked
+
+    def register_now(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Register a bone without a review: the best answer, if not lost, is its pose from now on.
+
+        For replays, where nobody is there to be asked.
+        """
+        left, right, goal = frame.left, frame.right, self._goal(stage)
+        answers = self._searching_line(stage).register(left, right, self._prior, goal)
+        best = answers[0] if answers else _unjudged(stage.bone)
+        pose, verdict = best.left_from_bone, best.verdict
+        if pose is not None and verdict.status is not Status.LOST:
+            track = TrackState.at_rest(pose, frame.captured_ns, verdict.cause)
+            self._tracks[stage.bone] = track
+        return best
 
     def _searching_line(self, stage: StageSpec) -> Line:
         """The bone's line, which knows its edges when there is no pose to start from."""
