@@ -10,6 +10,7 @@ from drivers.frames import StereoFrame
 from navapp.control.pursuit import Pursuit
 from navapp.control.stages import stage_of
 from navapp.control.states import OtherBone
+from navapp.geometry.transform import RigidTransform
 from navapp.tracking import is_place_doubted
 from navapp.values import StageSpec, Status, TrackedFrame, Verdict
 
@@ -27,12 +28,14 @@ class _Sight:
         ok_ns: when the newest frame in which it was OK was captured; None when there was none.
         n_rests: so many turns it lets pass now.
         next_rests: so many after the next answer, if that leaves its place in doubt, too.
+        beside: where the stage's bone was in the same frame; None when that was not OK.
     """
 
     verdict: Verdict
     ok_ns: int | None = None
     n_rests: int = 0
     next_rests: int = 0
+    beside: RigidTransform | None = None
 
 
 class Companions:
@@ -51,26 +54,37 @@ class Companions:
         self._n_frames = 0
         self._sights: dict[str, _Sight] = {}
 
-    def follow(self, stage: StageSpec, frame: StereoFrame) -> dict[str, TrackedFrame]:
+    def follow(
+        self, stage: StageSpec, frame: StereoFrame, active: TrackedFrame | None
+    ) -> dict[str, TrackedFrame]:
         """Follow one of them into a frame, if it is one's turn: each by its own stage's goal.
+
+        The bones of a leg move together, but for what the knee bends: where the active one has
+        gone since, the other one is expected to have gone, too.
 
         Args:
             stage: in force; its bone is no companion.
             frame: the next one.
+            active: what was said of the stage's bone in that frame; None while it is not followed.
         """
         turn, is_rest = divmod(self._n_frames, 2)
         self._n_frames += 1
         names = self._names(stage)
         self._sights.pop(stage.bone, None)
+        if active is None:
+            # From one candidate to another nothing has moved.
+            self._sights = {one: replace(s, beside=None) for one, s in self._sights.items()}
         if is_rest or not names:
             return {}
         name = names[turn % len(names)]
         if self._is_resting(name):
             return {}
-        own, pursuit = stage_of(name), self._pursuit
-        is_known = pursuit.is_accepted(own)
-        tracked = pursuit.follow(own, frame) if is_known else pursuit.register_now(own, frame)
-        self._remember(name, tracked.verdict, frame.captured_ns)
+        own, beside = stage_of(name), _well_known(active)
+        if self._pursuit.is_accepted(own):
+            tracked = self._pursuit.follow(own, frame, self._moved(name, beside))
+        else:
+            tracked = self._pursuit.register_now(own, frame)
+        self._remember(name, tracked.verdict, frame.captured_ns, beside)
         return {name: tracked}
 
     def forget(self) -> None:
@@ -100,11 +114,28 @@ class Companions:
         self._sights[name] = replace(sight, n_rests=sight.n_rests - 1)
         return True
 
-    def _remember(self, name: str, verdict: Verdict, captured_ns: int) -> None:
+    def _moved(self, name: str, beside: RigidTransform | None) -> RigidTransform | None:
+        """How the stage's bone has moved since a bone's last turn, if that is known."""
+        sight = self._sights.get(name)
+        before = None if sight is None else sight.beside
+        if beside is None or before is None or before.source != beside.source:
+            return None
+        return beside @ before.inverse()
+
+    def _remember(
+        self, name: str, verdict: Verdict, captured_ns: int, beside: RigidTransform | None
+    ) -> None:
         before = self._sights.get(name, _Sight(verdict))
         ok_ns = captured_ns if verdict.status is Status.OK else before.ok_ns
+        n_rests = next_rests = 0
         if is_place_doubted(verdict):
             n_rests = before.next_rests
-            self._sights[name] = _Sight(verdict, ok_ns, n_rests, min(2 * n_rests + 1, _MOST_RESTS))
-        else:
-            self._sights[name] = _Sight(verdict, ok_ns)
+            next_rests = min(2 * n_rests + 1, _MOST_RESTS)
+        self._sights[name] = _Sight(verdict, ok_ns, n_rests, next_rests, beside)
+
+
+def _well_known(active: TrackedFrame | None) -> RigidTransform | None:
+    """Where the stage's bone is, when that is OK."""
+    if active is None or active.verdict.status is not Status.OK:
+        return None
+    return active.left_from_bone

@@ -189,13 +189,22 @@ class Pursuit:
         self._candidates[0] = replace(candidate, tracked=tracked, track=track)
         return tracked
 
-    def follow(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
-        """Follow the accepted bone into a frame."""
+    def follow(
+        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None = None
+    ) -> TrackedFrame:
+        """Follow the accepted bone into a frame.
+
+        Args:
+            stage: whose bone, and by whose goal.
+            frame: the next one.
+            moved: in the left camera, how something that the bone goes with has moved meanwhile.
+        """
+        track = self._tracks[stage.bone]
         tracked, self._tracks[stage.bone] = self._line(stage).track(
             frame.left,
             frame.right,
             frame.captured_ns,
-            self._tracks[stage.bone],
+            track if moved is None else track.carried(moved),
             self._goal(stage),
         )
         return tracked

@@ -125,6 +125,52 @@ def test_a_bone_whose_stage_returns_goes_on_from_a_fresh_track(bench: Bench) -> 
     assert [one.name for one in bench.snapshot.others] == ["tibia"]
 
 
+def expected_x_mm(bench: Bench, *moves_mm: float, active: Status = Status.OK) -> list[float]:
+    """Where the femur, never seen to move, is expected while the active tibia is at places."""
+    first = len(bench.script.tracks)
+    for x_mm in moves_mm:
+        pose = a_pose("tibia", x_mm=x_mm)
+        bench.script.tracked_of["tibia"] = answer(active, pose=pose)
+        bench.frames(2)
+    said = [track for track in bench.script.tracks[first:] if track[0] == "femur"]
+    return [state.left_from_bone.translation_mm[0] for _, state, _ in said]
+
+
+def test_an_other_is_expected_to_have_gone_with_the_active_bone(bench: Bench) -> None:
+    accepted(bench, "femur", "tibia")
+    bench.frames(2)
+    assert expected_x_mm(bench, 3.0, 3.0, 7.0, 6.0) == pytest.approx([3.0, 0.0, 4.0, -1.0])
+
+
+def test_a_lost_other_goes_along_until_it_is_found(bench: Bench) -> None:
+    accepted(bench, "femur", "tibia")
+    bench.frames(2)
+    bench.script.tracked_of["femur"] = LOST_OF["femur"]
+    # From the second loss on every other turn is a rest.
+    assert expected_x_mm(bench, 3.0, 5.0, 6.0, 9.0) == pytest.approx([3.0, 5.0, 9.0])
+
+
+def test_with_an_active_bone_in_doubt_nothing_is_said_to_have_moved(bench: Bench) -> None:
+    accepted(bench, "femur", "tibia")
+    bench.frames(2)
+    doubted = expected_x_mm(bench, 3.0, 9.0, active=Status.DEGRADED)
+    assert doubted == [0.0, 0.0]
+    # Nor by what it does until it is known again.
+    assert expected_x_mm(bench, 12.0, 14.0) == pytest.approx([0.0, 2.0])
+
+
+def test_a_new_registration_of_the_active_bone_moves_nothing(bench: Bench) -> None:
+    accepted(bench, "femur", "tibia")
+    # The other's turns are the frames between which all of this happens.
+    while turns(bench, 1) != ["femur"]:
+        pass
+    bench.script.found = [answer(pose=a_pose("tibia", x_mm=20.0))]
+    bench.do(Register())
+    bench.frames(1)
+    bench.do(Accept())
+    assert expected_x_mm(bench, 20.0, 21.0) == pytest.approx([0.0, 1.0])
+
+
 def test_a_lost_other_disturbs_nothing_and_says_since_when(bench: Bench) -> None:
     accepted(bench, "femur", "tibia")
     bench.frames(2)
