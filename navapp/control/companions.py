@@ -29,6 +29,7 @@ class _Sight:
         n_rests: so many turns it lets pass now.
         next_rests: so many after the next answer, if that leaves its place in doubt, too.
         beside: where the stage's bone was in the same frame; None when that was not OK.
+        lineage: of that pose.
     """
 
     verdict: Verdict
@@ -36,6 +37,7 @@ class _Sight:
     n_rests: int = 0
     next_rests: int = 0
     beside: RigidTransform | None = None
+    lineage: int = 0
 
 
 class Companions:
@@ -65,15 +67,12 @@ class Companions:
         Args:
             stage: in force; its bone is no companion.
             frame: the next one.
-            active: what was said of the stage's bone in that frame; None while it is not followed.
+            active: what was said of the stage's bone in that frame.
         """
         turn, is_rest = divmod(self._n_frames, 2)
         self._n_frames += 1
         names = self._names(stage)
         self._sights.pop(stage.bone, None)
-        if active is None:
-            # From one candidate to another nothing has moved.
-            self._sights = {one: replace(s, beside=None) for one, s in self._sights.items()}
         if is_rest or not names:
             return {}
         name = names[turn % len(names)]
@@ -117,10 +116,11 @@ class Companions:
     def _moved(self, name: str, beside: RigidTransform | None) -> RigidTransform | None:
         """How the stage's bone has moved since a bone's last turn, if that is known."""
         sight = self._sights.get(name)
-        before = None if sight is None else sight.beside
-        if beside is None or before is None or before.source != beside.source:
+        if sight is None or sight.beside is None or beside is None:
             return None
-        return beside @ before.inverse()
+        # From one candidate to another nothing has moved.
+        is_same = (sight.lineage, sight.beside.source) == (self._pursuit.lineage, beside.source)
+        return beside @ sight.beside.inverse() if is_same else None
 
     def _remember(
         self, name: str, verdict: Verdict, captured_ns: int, beside: RigidTransform | None
@@ -131,7 +131,8 @@ class Companions:
         if is_place_doubted(verdict):
             n_rests = before.next_rests
             next_rests = min(2 * n_rests + 1, _MOST_RESTS)
-        self._sights[name] = _Sight(verdict, ok_ns, n_rests, next_rests, beside)
+        lineage = self._pursuit.lineage
+        self._sights[name] = _Sight(verdict, ok_ns, n_rests, next_rests, beside, lineage)
 
 
 def _well_known(active: TrackedFrame | None) -> RigidTransform | None:

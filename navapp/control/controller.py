@@ -178,9 +178,7 @@ class SessionController:
         snapshot = self._maker.make()
         picture, overlay_ms = self._show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
-        is_followed = session.state in (SessionState.NAVIGATING, SessionState.SUSPENDED)
-        active = session.tracked if is_followed else None
-        others = session.companions.follow(session.stage, frame, active)
+        others = session.companions.follow(session.stage, frame, session.tracked)
         timings = LineTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,

@@ -6,7 +6,7 @@ import pytest
 
 from navapp.control.controller import SessionOptions
 from navapp.control.interlocks import is_current
-from navapp.control.states import Accept, EnterStage, OtherBone, Register
+from navapp.control.states import Accept, EnterStage, OtherBone, Register, Reject
 from navapp.errors import DeviceLost
 from navapp.values import Reason, Status
 from tests.control.fakes import LOST, PERIOD_NS, Bench, a_plan, a_pose, answer, navigating
@@ -157,6 +157,22 @@ def test_with_an_active_bone_in_doubt_nothing_is_said_to_have_moved(bench: Bench
     assert doubted == [0.0, 0.0]
     # Nor by what it does until it is known again.
     assert expected_x_mm(bench, 12.0, 14.0) == pytest.approx([0.0, 2.0])
+
+
+def test_from_one_candidate_to_the_next_nothing_has_moved(bench: Bench) -> None:
+    navigating(bench)
+    bench.do(EnterStage(5))
+    bench.script.found = [FOUND["tibia"]] * 2
+    bench.do(Register())
+    bench.script.tracked_of = dict(FOUND)
+    bench.frames(2)
+    assert expected_x_mm(bench, 2.0) == pytest.approx([2.0])
+    bench.do(Reject())
+    assert bench.state == "review"
+    assert expected_x_mm(bench, 30.0) == pytest.approx([0.0])
+    bench.do(Accept())
+    # What was accepted is the candidate that was followed until then.
+    assert expected_x_mm(bench, 31.0) == pytest.approx([1.0])
 
 
 def test_a_new_registration_of_the_active_bone_moves_nothing(bench: Bench) -> None:
