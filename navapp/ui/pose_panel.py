@@ -110,7 +110,7 @@ def _other(view: View, other: OtherBone, width: int) -> Content:
             word = f"{view.symbols.at_most:>2}{bound} mm"
         elif other.verdict.status is Status.OK:
             level, word = Level.QUIET, " old"
-    name, said = f"{other.name:<7.7} ", f"{view.mark(level)}{word}"
+    name, said = f"{other.name:<7.7} ", f"{level.mark(view.symbols)}{word}"
     age = _age(None if view.is_silent else other.age_ms).rjust(width - len(name) - len(said))
     return Content.assemble((name, "$text-muted"), (said, level.value), (age, "$text-muted"))
 
