@@ -44,7 +44,7 @@ class Simulation:
         side: of the knee.
         targets: `bone/name` -> point, mm, bone coordinates.
         curves: vessels and nerves beside the femur.
-        nominal_left_from_femur: how the knee was laid on the table; a rough start.
+        nominal_left_from_bone: how the knee was laid on the table; rough starts.
         approach_axis, approach_half_angle_deg: of the approach cone.
         oracle: the truth, for evaluation after the run only.
         set_stage: tells the room which stage is in force.
@@ -54,7 +54,7 @@ class Simulation:
     side: Literal["left", "right"]
     targets: Mapping[str, FloatArray]
     curves: Mapping[str, FloatArray]
-    nominal_left_from_femur: RigidTransform
+    nominal_left_from_bone: Mapping[str, RigidTransform]
     approach_axis: FloatArray
     approach_half_angle_deg: float
     oracle: TruthOracle
@@ -250,7 +250,10 @@ def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
             name: np.asarray(points)[np.asarray(points)[:, 2] > joint_z_mm]
             for name, points in anatomy.curves.items()
         },
-        nominal_left_from_femur=world.nominal_left_from_femur,
+        nominal_left_from_bone={
+            "femur": world.nominal_left_from_femur,
+            "tibia": world.nominal_left_from_tibia,
+        },
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,
         oracle=TruthOracle(world, camera.world_time_ns),

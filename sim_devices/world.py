@@ -102,6 +102,11 @@ class World:
         return self._seen(self._nominal)
 
     @property
+    def nominal_left_from_tibia(self) -> RigidTransform:
+        """Where the tibia lies according to the book: the knee bent as it is at rest."""
+        return self._seen(self._nominal @ self._femur_from_tibia)
+
+    @property
     def approach_axis(self) -> FloatArray:
         """(3,) unit vector in femur model coordinates from the bone towards the cameras."""
         femur_from_left = self.nominal_left_from_femur.inverse()

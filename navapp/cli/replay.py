@@ -47,6 +47,13 @@ def add_parser(subparsers: Any) -> None:
         "--bone", metavar="NAME", help="bone to follow (default: the first stage's)"
     )
     parser.add_argument(
+        "--also",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="one more bone, registered from the prior and followed at half rate; repeatable",
+    )
+    parser.add_argument(
         "--order",
         choices=("forward", "pingpong", "each"),
         default="forward",
@@ -74,6 +81,7 @@ class _Replay:
     method: "Method"
     operator: "Operator"
     executor: "Executor"
+    also: "tuple[StageSpec, ...]" = ()
     is_as_recorded: bool = False
     warnings: tuple[str, ...] = ()
 
@@ -94,7 +102,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         diagnostics.warn(warning)
     check_accepted(replay.rig, options.allow_unaccepted, diagnostics)
     if not replay.is_as_recorded:
-        check_start(replay.prior, replay.stage)
+        for stage in (replay.stage, *replay.also):
+            check_start(replay.prior, stage)
     opened = open_recording(options.sequence, settings, replay.rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
     with ExitStack() as undo:
@@ -105,7 +114,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         controller = _controller(replay, opened, configuration, listeners)
         undo.callback(controller.close)
         seconds = follow(controller, replay.operator, log)
-    frames = [frame_to_json(result, None) for result in log.results]
+    frames = [frame_to_json(result, {}) for result in log.results]
     return finish(frames, seconds, controller.failure, options, diagnostics)
 
 
@@ -113,6 +122,10 @@ def _check(options: argparse.Namespace) -> None:
     """Refuse what is known to be wrong before anything is read."""
     if options.order == "pingpong" and options.frames is None:
         raise UsageError("--order pingpong has no end", remedy="add --frames N")
+    if options.order == "each" and options.also:
+        raise UsageError(
+            "--order each follows no bone from frame to frame", remedy="leave --also out"
+        )
     check_writable(options.json)
 
 
@@ -151,15 +164,20 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     if rig_path is None:
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
     plan = read_plan(plan_path)
+    first = stage_by_name(stage) if options.bone is None else _stage_of(options.bone, plan)
+    also = tuple(_stage_of(name, plan) for name in dict.fromkeys(options.also))
+    if first.bone in {other.bone for other in also}:
+        raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
     operator, executor = _operation(session, options)
     return _Replay(
         read_rig(rig_path),
         plan,
         Prior() if prior_path is None else read_prior(prior_path),
-        stage_by_name(stage) if options.bone is None else _stage_of(options.bone, plan),
+        first,
         method,
         operator,
         executor,
+        also,
         isinstance(operator, RecordedOperator),
         _warnings(session),
     )
@@ -179,7 +197,9 @@ def _operation(
     from navapp.control.operators import RecordedOperator, ReplayOperator
     from navapp.control.states import DistrustRig
 
-    is_changed = bool(options.prior or options.bone or options.method or options.start)
+    is_changed = bool(
+        options.prior or options.bone or options.also or options.method or options.start
+    )
     if session is None or is_changed or options.order != "forward":
         return ReplayOperator(each_frame=options.order == "each"), InlineExecutor()
     events = session.events
@@ -194,15 +214,11 @@ def _operation(
 
 def _stage_of(bone: str, plan: "Plan") -> "StageSpec":
     """The first stage that follows a bone."""
-    from navapp.control.stages import STAGES
+    from navapp.control.stages import stage_of
 
     if bone not in plan.bones:
         raise UsageError(f"the plan has no bone '{bone}'", remedy=f"it has {', '.join(plan.bones)}")
-    for stage in STAGES:
-        if stage.bone == bone:
-            return stage
-    known = ", ".join(sorted({stage.bone for stage in STAGES}))
-    raise UsageError(f"no stage follows the bone '{bone}'", remedy=f"use one of {known}")
+    return stage_of(bone)
 
 
 def _controller(
@@ -227,6 +243,7 @@ def _controller(
             ),
             first_stage=replay.stage,
             overlay_valid_ms=configuration.display.valid_ms,
+            also=tuple(stage.bone for stage in replay.also),
         ),
         hooks=SessionHooks(on_frame=tuple(listeners)),
     )

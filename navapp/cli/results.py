@@ -1,37 +1,52 @@
 """What `run` and `replay` answer: frames, their summary, and both for people."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from navapp.control.results import FrameResult
 from navapp.control.states import SessionState, Snapshot
-from navapp.values import Reason, Status
+from navapp.values import LineTimings, Reason, Status, TrackedFrame
 
 
-def frame_to_json(result: FrameResult, tre_mm: float | None) -> dict[str, Any]:
-    """One entry of `frames`."""
-    tracked = result.tracked
-    pose = None if tracked is None else tracked.left_from_bone
-    estimate = None if tracked is None else tracked.estimate
-    timings = result.timings
+def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> dict[str, Any]:
+    """One entry of `frames`.
+
+    Args:
+        result: of the frame.
+        tre_mm: bone -> error, of the bones whose truth is known.
+    """
     return {
         "index": result.frame.index,
+        "state": result.state.value,
+        "stage": result.stage.name,
+        "bone": result.stage.bone,
+        **_answer_to_json(result.tracked, result.timings, tre_mm.get(result.stage.bone)),
+        "bodies": {
+            name: _answer_to_json(tracked, tracked.timings, tre_mm.get(name))
+            for name, tracked in result.others.items()
+        },
+    }
+
+
+def _answer_to_json(
+    tracked: TrackedFrame | None, timings: LineTimings, tre_mm: float | None
+) -> dict[str, Any]:
+    """What was said of one bone."""
+    pose = None if tracked is None else tracked.left_from_bone
+    estimate = None if tracked is None else tracked.estimate
+    return {
         "status": Status.LOST.value if tracked is None else tracked.verdict.status.value,
         "reasons": (
             [Reason.NOT_NAVIGATING.value]
             if tracked is None
             else [reason.value for reason in tracked.verdict.reasons]
         ),
-        "state": result.state.value,
-        "stage": result.stage.name,
-        "bone": result.stage.bone,
         "camera_from_model": None if pose is None else pose.to_list(),
         "covariance": None if estimate is None else estimate.covariance.tolist(),
         "predicted_tre_mm": None if tracked is None else tracked.verdict.predicted_tre_mm,
         "tre_mm": tre_mm,
-        "bodies": {},
         "timing_ms": {
             "rectify": timings.rectify_ms,
             "stereo": timings.stereo_ms,
@@ -62,20 +77,23 @@ def rig_to_json(snapshot: Snapshot) -> dict[str, Any]:
 
 
 def frame_text(result: FrameResult) -> str:
-    """One frame for people: number, state, verdict, time, and what is wrong with it."""
+    """One frame for people: number, state, verdict, time, what is wrong with it, other bones."""
     verdict = None if result.tracked is None else result.tracked.verdict
     word = "-" if verdict is None else verdict.status.value
     reasons = () if verdict is None else verdict.reasons
     why = "".join(f"; {reason.value}" for reason in reasons)
+    others = "".join(
+        f" | {name} {tracked.verdict.status.value} {tracked.timings.total_ms:.0f} ms"
+        for name, tracked in result.others.items()
+    )
     return (
         f"frame {result.frame.index} {result.state.value} {word} "
-        f"{result.timings.total_ms:.0f} ms{why}"
+        f"{result.timings.total_ms:.0f} ms{why}{others}"
     )
 
 
 def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any]:
     """The `summary` object."""
-    statuses = [frame["status"] for frame in frames]
     totals = [frame["timing_ms"]["total"] for frame in frames if frame["timing_ms"]["total"] > 0]
     # Every pose that was accepted and followed, OK or not: leaving out the doubtful ones would
     # flatter. What was offered for review and refused is no result of tracking.
@@ -85,10 +103,8 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
         if frame["tre_mm"] is not None and frame["state"] == SessionState.NAVIGATING.value
     ]
     return {
-        "frames": len(frames),
-        "ok": statuses.count("OK"),
-        "degraded": statuses.count("DEGRADED"),
-        "lost": statuses.count("LOST"),
+        **_counted(frames),
+        "bodies": _bodies(frames),
         "fps": len(frames) / seconds if seconds > 0 and frames else None,
         "latency_ms": (
             {f"p{q}": float(np.percentile(totals, q)) for q in (50, 95, 99)}
@@ -107,12 +123,32 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
     }
 
 
+def _bodies(frames: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
+    """The other bones' answers, counted for each."""
+    turns: dict[str, list[dict[str, Any]]] = {}
+    for frame in frames:
+        for name, answer in frame["bodies"].items():
+            turns.setdefault(name, []).append(answer)
+    return {name: _counted(answers) for name, answers in turns.items()}
+
+
+def _counted(answers: Sequence[dict[str, Any]]) -> dict[str, int]:
+    statuses = [answer["status"] for answer in answers]
+    counts = {status.value.lower(): statuses.count(status.value) for status in Status}
+    return {"frames": len(answers), **counts}
+
+
+def _counted_text(counts: dict[str, int]) -> str:
+    return (
+        f"{counts['frames']} frames: {counts['ok']} OK, {counts['degraded']} degraded, "
+        f"{counts['lost']} lost"
+    )
+
+
 def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
-    lines = [
-        f"{summary['frames']} frames: {summary['ok']} OK, {summary['degraded']} degraded, "
-        f"{summary['lost']} lost"
-    ]
+    lines = [_counted_text(summary)]
+    lines += [f"beside it {name}: {_counted_text(n)}" for name, n in summary["bodies"].items()]
     latency, tre = summary["latency_ms"], summary["tre_mm"]
     if summary["fps"] is not None and latency["p50"] is not None:
         lines.append(

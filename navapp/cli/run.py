@@ -117,18 +117,24 @@ def _run_headless(
     return finish(frames, seconds, controller.failure, options, diagnostics, rig)
 
 
-def _tre_mm(result: "FrameResult", session: LiveSession) -> float | None:
-    """Join a frame with the truth, after the run."""
+def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:
+    """Join a frame with the truth, after the run: by bone, of those whose pose is known."""
+    from navapp.control.stages import stage_of
     from navapp.evaluation import mean_tre_mm
 
-    simulation, tracked = session.opened.simulation, result.tracked
-    if simulation is None or tracked is None or tracked.left_from_bone is None:
-        return None
-    if tracked.bone not in simulation.oracle.bodies:
-        return None
-    true = simulation.oracle.left_from_body(tracked.bone, result.frame.captured_ns)
-    targets = session.plan.targets_of(result.stage.targets)
-    return mean_tre_mm(tracked.left_from_bone, true, session.plan.bones[tracked.bone], targets)
+    simulation, plan = session.opened.simulation, session.plan
+    if simulation is None:
+        return {}
+    answers = [(result.stage, result.tracked)]
+    answers += [(stage_of(name), tracked) for name, tracked in result.others.items()]
+    errors_mm: dict[str, float | None] = {}
+    for stage, tracked in answers:
+        pose = None if tracked is None else tracked.left_from_bone
+        if pose is not None and stage.bone in simulation.oracle.bodies:
+            true = simulation.oracle.left_from_body(stage.bone, result.frame.captured_ns)
+            targets = plan.targets_of(stage.targets)
+            errors_mm[stage.bone] = mean_tre_mm(pose, true, plan.bones[stage.bone], targets)
+    return errors_mm
 
 
 def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: Diagnostics) -> int:

@@ -18,7 +18,7 @@ def built_in_plan(simulation: Simulation) -> Plan:
 def nominal_prior(simulation: Simulation) -> Prior:
     """How the simulated knee was meant to lie on the table."""
     return Prior(
-        {"femur": simulation.nominal_left_from_femur},
+        simulation.nominal_left_from_bone,
         simulation.approach_axis,
         simulation.approach_half_angle_deg,
     )

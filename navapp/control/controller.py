@@ -17,6 +17,7 @@ from drivers.interfaces import DeviceSet
 from navapp.control.board_watch import BoardWatch
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
+from navapp.control.companions import Companions
 from navapp.control.display_link import DisplayLink
 from navapp.control.executors import Executor
 from navapp.control.pictures import compose
@@ -51,12 +52,14 @@ class SessionOptions:
         first_stage: stage in force at the start.
         overlay_valid_ms: how long a picture may stay on the display without a newer one.
         is_recording: the session is kept in a folder.
+        also: bones that are registered from the prior and followed beside the stage's, unasked.
     """
 
     line: LineSettings = field(default_factory=LineSettings)
     first_stage: StageSpec = STAGES[0]
     overlay_valid_ms: float = 500.0
     is_recording: bool = False
+    also: tuple[str, ...] = ()
 
 
 class SessionController:
@@ -90,7 +93,10 @@ class SessionController:
         self.lost_device: DeviceError | None = None
         self._queue: deque[Command] = deque()
         self._lock = threading.Lock()
-        self._session = Session(devices.clock, hooks, self._pursuit, options.first_stage)
+        companions = Companions(self._pursuit, options.also)
+        self._session = Session(
+            devices.clock, hooks, self._pursuit, companions, options.first_stage
+        )
         self._watch = RigWatch(self._session, self._display, board_watch)
         self._commands = Commands(self._session, self._camera, self._display, self._watch)
         self._maker = SnapshotMaker(
@@ -182,6 +188,8 @@ class SessionController:
         self._watch.after(frame)
         snapshot = self._maker.make()
         picture, overlay_ms = self._show(frame, snapshot)
+        # Only now: the active bone's picture never waits for another bone.
+        others = session.companions.follow(session.stage, frame, session.tracked)
         timings = LineTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,
@@ -191,6 +199,7 @@ class SessionController:
             picture,
             replace(timings, overlay_ms=overlay_ms),
             snapshot.is_navigable,
+            others,
         )
         is_stepped = self._camera.camera.info.is_stepped
         session.meter.add(

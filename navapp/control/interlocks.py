@@ -1,6 +1,6 @@
 """The one answer to «may guides be shown?»: display, overlay, log and screen all use it."""
 
-from navapp.control.states import SessionState, Snapshot
+from navapp.control.states import OtherBone, SessionState, Snapshot
 from navapp.values import Reason, Status
 
 # A pose older than this shows where the bone was, not where it is.
@@ -30,6 +30,12 @@ def navigable(snapshot: Snapshot) -> tuple[Reason, ...]:
     if snapshot.state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
         reasons += _of_pose(snapshot)
     return tuple(reasons)
+
+
+def is_current(other: OtherBone) -> bool:
+    """Whether what is known of another bone may be shown as where it is now."""
+    is_ok = other.verdict is not None and other.verdict.status is Status.OK
+    return is_ok and other.age_ms is not None and other.age_ms <= MAX_POSE_AGE_MS
 
 
 def _of_pose(snapshot: Snapshot) -> list[Reason]:

@@ -60,7 +60,12 @@ class SearchOutcome:
 
 
 class Pursuit:
-    """What is known of the bones of one session; one of them, the stage's, is looked for."""
+    """What is known of the bones of one session; one of them, the stage's, is looked for.
+
+    Attributes:
+        lineage: another number when what is said of the stage's bone is of another candidate or
+            track than before, and not of the same one a frame later.
+    """
 
     def __init__(
         self,
@@ -80,6 +85,7 @@ class Pursuit:
         self._tracks: dict[str, TrackState] = {}
         self._candidates: list[Candidate] = []
         self._search: _Search | None = None
+        self.lineage = 0
 
     @property
     def candidate(self) -> Candidate | None:
@@ -90,6 +96,11 @@ class Pursuit:
     def progress(self) -> float | None:
         """Share done of the search that runs; None when none runs."""
         return None if self._search is None else self._search.job.progress
+
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """Bones of which a pose was accepted, in that order."""
+        return tuple(self._tracks)
 
     def is_planned(self, stage: StageSpec) -> bool:
         """The plan has a model of the stage's bone."""
@@ -119,6 +130,7 @@ class Pursuit:
         if search is None or not self._executor.take_due(search.job, next_sequence):
             return None
         self._search = None
+        self.lineage += 1
         if isinstance(search.job.error, JobCancelled):
             return None
         if search.job.error is not None:
@@ -150,6 +162,7 @@ class Pursuit:
             self._search.job.cancel()
             self._search = None
         self._candidates = []
+        self.lineage += 1
 
     def propose(self, stage: StageSpec, pose: RigidTransform, now_ns: int) -> None:
         """Put a pose under review that will be judged as it stands."""
@@ -171,6 +184,7 @@ class Pursuit:
 
     def reject(self) -> Candidate:
         """Take the candidate out; the next one, if any, comes under review."""
+        self.lineage += 1
         return self._candidates.pop(0)
 
     def review(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
@@ -184,16 +198,39 @@ class Pursuit:
         self._candidates[0] = replace(candidate, tracked=tracked, track=track)
         return tracked
 
-    def follow(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
-        """Follow the accepted bone into a frame."""
+    def follow(
+        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None = None
+    ) -> TrackedFrame:
+        """Follow the accepted bone into a frame.
+
+        Args:
+            stage: whose bone, and by whose goal.
+            frame: the next one.
+            moved: in the left camera, how something that the bone goes with has moved meanwhile.
+        """
+        track = self._tracks[stage.bone]
         tracked, self._tracks[stage.bone] = self._line(stage).track(
             frame.left,
             frame.right,
             frame.captured_ns,
-            self._tracks[stage.bone],
+            track if moved is None else track.carried(moved),
             self._goal(stage),
         )
         return tracked
+
+    def register_now(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Register a bone without a review: the best answer, if not lost, is its pose from now on.
+
+        For replays, where nobody is there to be asked.
+        """
+        left, right, goal = frame.left, frame.right, self._goal(stage)
+        answers = self._searching_line(stage).register(left, right, self._prior, goal)
+        best = answers[0] if answers else _unjudged(stage.bone)
+        pose, verdict = best.left_from_bone, best.verdict
+        if pose is not None and verdict.status is not Status.LOST:
+            track = TrackState.at_rest(pose, frame.captured_ns, verdict.cause)
+            self._tracks[stage.bone] = track
+        return best
 
     def _searching_line(self, stage: StageSpec) -> Line:
         """The bone's line, which knows its edges when there is no pose to start from."""

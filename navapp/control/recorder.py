@@ -3,7 +3,7 @@
 session.json   version, plan, options       rig.yml, prior.json, plan/
 frames.csv     one line a frame              left_*.png, right_*.png
 events.jsonl   commands, events and when a registration was taken over
-poses.jsonl    pose and verdict of every frame
+poses.jsonl    poses and verdicts of every frame
 """
 
 import json
@@ -19,6 +19,7 @@ from navapp.control.command_files import command_to_json
 from navapp.control.results import FrameResult
 from navapp.control.states import Command, Event
 from navapp.errors import InputError, NavappError
+from navapp.values import TrackedFrame
 
 
 class FrameSink(Protocol):
@@ -96,9 +97,6 @@ class SessionRecorder:
 
     def on_frame(self, result: FrameResult) -> None:
         """A frame was handled."""
-        tracked = result.tracked
-        pose = None if tracked is None else tracked.left_from_bone
-        verdict = None if tracked is None else tracked.verdict
         self._attempt(lambda: self._frames.add(result.frame, self._with_pictures))
         self._last_sequence = result.frame.sequence
         self._write(
@@ -107,8 +105,8 @@ class SessionRecorder:
                 "sequence": result.frame.sequence,
                 "bone": result.stage.bone,
                 "state": result.state.value,
-                "status": None if verdict is None else verdict.status.value,
-                "camera_from_model": None if pose is None else pose.to_list(),
+                **_said(result.tracked),
+                "bodies": {name: _said(tracked) for name, tracked in result.others.items()},
             },
         )
 
@@ -157,3 +155,12 @@ class SessionRecorder:
     def _write(self, stream: TextIO, value: dict[str, Any]) -> None:
         line = json.dumps(value) + "\n"
         self._attempt(lambda: (stream.write(line), stream.flush()))
+
+
+def _said(tracked: TrackedFrame | None) -> dict[str, Any]:
+    """Status and pose of one bone."""
+    pose = None if tracked is None else tracked.left_from_bone
+    return {
+        "status": None if tracked is None else tracked.verdict.status.value,
+        "camera_from_model": None if pose is None else pose.to_list(),
+    }

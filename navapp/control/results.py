@@ -1,7 +1,7 @@
 """What the controller tells its listeners about every frame."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
 from navapp.control.states import SessionState
@@ -20,6 +20,7 @@ class FrameResult:
         picture: what was made for the display.
         timings: of the line and the overlay.
         is_navigable: guides are in the picture.
+        others: bones beside the active one whose turn it was in this very frame.
     """
 
     frame: StereoFrame
@@ -29,6 +30,7 @@ class FrameResult:
     picture: OverlayPicture
     timings: LineTimings
     is_navigable: bool
+    others: Mapping[str, TrackedFrame] = field(default_factory=dict)
 
 
 FrameListener = Callable[[FrameResult], None]

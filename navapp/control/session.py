@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock
 from navapp.control.camera_link import Reopen
+from navapp.control.companions import Companions
 from navapp.control.pictures import Image
 from navapp.control.pursuit import Pursuit
 from navapp.control.rates import RateMeter
@@ -37,6 +38,7 @@ class Session:
         clock: of the session.
         hooks: who is told.
         pursuit: of the stage's bone.
+        companions: the other bones that are followed beside it.
         state: where the session stands.
         stage: in force.
         tracked: the newest answer on the stage's bone, None when there is none that counts.
@@ -49,11 +51,17 @@ class Session:
     """
 
     def __init__(
-        self, clock: Clock, hooks: SessionHooks, pursuit: Pursuit, stage: StageSpec
+        self,
+        clock: Clock,
+        hooks: SessionHooks,
+        pursuit: Pursuit,
+        companions: Companions,
+        stage: StageSpec,
     ) -> None:
         self.clock = clock
         self.hooks = hooks
         self.pursuit = pursuit
+        self.companions = companions
         self.state = SessionState.STARTING
         self.tracked: TrackedFrame | None = None
         self.tracked_at_ns = 0
@@ -100,8 +108,9 @@ class Session:
             self.change(SessionState.NAVIGATING, "bone found again")
 
     def lose_sight(self) -> None:
-        """What the loss of the camera or of the rig does to what is known of the bone."""
+        """What the loss of the camera or of the rig does to what is known of the bones."""
         self.pursuit.drop()
+        self.companions.forget()
         self.tracked = None
 
     def distrust_rig(self, why: str) -> None:

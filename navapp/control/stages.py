@@ -78,6 +78,19 @@ def stage_by_number(number: int) -> StageSpec:
     raise UsageError(f"there is no stage {number}", remedy=f"choose 1 to {len(STAGES)}")
 
 
+def stage_of(bone: str) -> StageSpec:
+    """The first stage that follows a bone: its goal is the bone's, whatever stage is in force.
+
+    Raises:
+        UsageError: none does.
+    """
+    for stage in STAGES:
+        if stage.bone == bone:
+            return stage
+    known = ", ".join(sorted({stage.bone for stage in STAGES}))
+    raise UsageError(f"no stage follows the bone '{bone}'", remedy=f"use one of {known}")
+
+
 def stage_by_name(name: str) -> StageSpec:
     """The stage with that name, or with that number as text.
 

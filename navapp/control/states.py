@@ -181,6 +181,21 @@ class Progress:
     share: float
 
 
+@dataclass(frozen=True, slots=True)
+class OtherBone:
+    """A bone that is followed beside the stage's; never drawn.
+
+    Attributes:
+        name: of the bone.
+        verdict: on the newest frame that was its turn, by its own stage's goal; None before one.
+        age_ms: since the newest frame in which it was OK, now; None when there was none.
+    """
+
+    name: str
+    verdict: Verdict | None = None
+    age_ms: float | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
     """All that a client may show, immutable; the newest wins.
@@ -196,6 +211,7 @@ class Snapshot:
         is_simulated: the pictures are not of this world.
         is_recording: the session is kept in a folder.
         pose_age_ms: of that pose, now.
+        others: the bones that are followed beside the stage's.
         preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
             the first frame.
         is_bone_planned: the plan has a model of the stage's bone.
@@ -215,6 +231,7 @@ class Snapshot:
     left_from_bone: RigidTransform | None = None
     is_candidate: bool = False
     pose_age_ms: float | None = None
+    others: tuple[OtherBone, ...] = ()
     preview: NDArray[np.uint8] | None = None
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()

@@ -3,6 +3,14 @@
 from navapp.tracking.judge import Goal
 from navapp.tracking.line import Line, LineSettings
 from navapp.tracking.locator import LocatorSettings, Method
-from navapp.tracking.motion import TrackState
+from navapp.tracking.motion import TrackState, is_place_doubted
 
-__all__ = ["Goal", "Line", "LineSettings", "LocatorSettings", "Method", "TrackState"]
+__all__ = [
+    "Goal",
+    "Line",
+    "LineSettings",
+    "LocatorSettings",
+    "Method",
+    "TrackState",
+    "is_place_doubted",
+]

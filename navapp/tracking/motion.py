@@ -73,6 +73,14 @@ class TrackState:
         twist = _DAMPING * seconds * self.velocity
         return self.left_from_bone.moved(twist, self.left_from_bone.apply(centre_mm))
 
+    def carried(self, moved: RigidTransform) -> "TrackState":
+        """As if it had moved with something else; what it does besides is not foreseen.
+
+        Args:
+            moved: motion of that, in the left camera.
+        """
+        return replace(self, left_from_bone=moved @ self.left_from_bone, velocity=np.zeros(6))
+
     def updated(
         self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
     ) -> "TrackState":

@@ -4,7 +4,8 @@ import textwrap
 
 from textual.content import Content
 
-from navapp.control.states import Snapshot
+from navapp.control.interlocks import is_current
+from navapp.control.states import OtherBone, Snapshot
 from navapp.ui.actions import is_acceptable
 from navapp.ui.gauges import Number, bar
 from navapp.ui.text_view import TextView
@@ -22,7 +23,11 @@ _STATUS_LEVELS = {
 
 
 class PosePanel(TextView):
-    """First line: navigable, yes or no. Last lines: the error. Between: figures, or the reason."""
+    """First line: navigable, yes or no. Last lines: the error. Between: figures, or the reason.
+
+    Above the error a line for each other bone that is followed: rms figures make room for them, a
+    reason or a question to the operator does not.
+    """
 
     def __init__(self) -> None:
         super().__init__("pose")
@@ -37,10 +42,18 @@ class PosePanel(TextView):
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """All lines, the gauge at the bottom."""
-        middle = _candidate(view, width) if view.snapshot.is_candidate else _middle(view, width)
+        if view.snapshot.is_candidate:
+            needed, more = _candidate(view, width), list[Content]()
+        else:
+            needed, more = _middle(view, width)
         room = max(height - 1 - _GAUGE_LINES, 0)
-        middle = (middle + [Content("")] * room)[:room]
-        return [navigable_line(view, width), *middle, *_error(view, width)]
+        needed = needed[:room]
+        others = [_other(view, other, width) for other in view.snapshot.others]
+        others = others[: room - len(needed)]
+        more = more[: room - len(needed) - len(others)]
+        free = [Content("")] * (room - len(needed) - len(more) - len(others))
+        above = [navigable_line(view, width), *needed, *more, *free]
+        return [*above, *others, *_error(view, width)]
 
 
 def navigable_line(view: View, width: int) -> Content:
@@ -73,17 +86,40 @@ def _other_reasons(view: View, width: int) -> list[Content]:
     return [Content.styled(text, "$text-muted") for text in texts]
 
 
-def _middle(view: View, width: int) -> list[Content]:
+def _middle(view: View, width: int) -> tuple[list[Content], list[Content]]:
+    """What must be read, and what may be left out."""
     if not view.is_navigable:
-        return [*reason_lines(view, width), *_other_reasons(view, width)]
+        return reason_lines(view, width), _other_reasons(view, width)
     snapshot = view.snapshot
-    return [
+    needed = [
         Content(""),
         _figure("age", Number.WHOLE, snapshot.pose_age_ms, "ms"),
         _figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"),
         _figure("occluded", Number.WHOLE, _occluded_percent(snapshot), "%"),
-        *_fit(snapshot),
     ]
+    return needed, _fit(snapshot)
+
+
+def _other(view: View, other: OtherBone, width: int) -> Content:
+    """Another bone: name, mark, bound and age; without a bound when it is not current."""
+    level, word = Level.QUIET, " -"
+    if other.verdict is not None and not view.is_silent:
+        level, word = _STATUS_LEVELS[other.verdict.status], f" {other.verdict.status.value}"
+        if is_current(other):
+            bound = Number.MM.text(other.verdict.predicted_tre_mm).strip()
+            word = f"{view.symbols.at_most:>2}{bound} mm"
+        elif other.verdict.status is Status.OK:
+            level, word = Level.QUIET, " old"
+    name, said = f"{other.name:<7.7} ", f"{level.mark(view.symbols)}{word}"
+    age = _age(None if view.is_silent else other.age_ms).rjust(width - len(name) - len(said))
+    return Content.assemble((name, "$text-muted"), (said, level.value), (age, "$text-muted"))
+
+
+def _age(age_ms: float | None) -> str:
+    """Of at most six characters, in seconds from one second on."""
+    if age_ms is None:
+        return "-"
+    return f"{age_ms:.0f} ms" if age_ms < 999.5 else f"{min(age_ms / 1e3, 9999.0):.0f} s"
 
 
 def _candidate(view: View, width: int) -> list[Content]:

@@ -22,7 +22,7 @@ from navapp.errors import DeviceError, DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.tracking import TrackState
+from navapp.tracking import Goal, TrackState
 from navapp.values import (
     BoneModel,
     LineTimings,
@@ -80,11 +80,14 @@ class Script:
 
     found: list[TrackedFrame] = field(default_factory=lambda: [answer()])
     tracked: TrackedFrame = field(default_factory=answer)
+    tracked_of: dict[str, TrackedFrame] = field(default_factory=dict)
     assessed: TrackedFrame = field(default_factory=answer)
     gate: threading.Event | None = None
     started: threading.Event = field(default_factory=threading.Event)
     error: Exception | None = None
     calls: list[str] = field(default_factory=list)
+    tracks: list[tuple[str, TrackState, Goal]] = field(default_factory=list)
+    on_track: Callable[[str], object] = lambda bone: None
 
 
 class FakeLine:
@@ -108,7 +111,9 @@ class FakeLine:
 
     def track(self, left, right, captured_ns, state: TrackState, goal):
         self.script.calls.append(f"track {self.bone.name}")
-        tracked = self.script.tracked
+        self.script.tracks.append((self.bone.name, state, goal))
+        self.script.on_track(self.bone.name)
+        tracked = self.script.tracked_of.get(self.bone.name, self.script.tracked)
         return tracked, state.updated(tracked, captured_ns, np.zeros(3))
 
     def assess(self, left, right, left_from_bone, goal):

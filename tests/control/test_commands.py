@@ -209,7 +209,7 @@ def test_a_stage_whose_bone_is_not_planned_shows_and_looks_for_nothing(bench: Be
         assert bench.do(command).state.value == "ready"
         assert "no model of the patella" in bench.refused()
     bench.frames(2)
-    assert len(bench.script.calls) == calls
+    assert not any("patella" in call for call in bench.script.calls[calls:])
 
 
 def test_changing_the_bone_during_a_review_drops_the_candidate(bench: Bench) -> None:

@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import pytest
 
-from navapp.control.interlocks import MAX_POSE_AGE_MS, navigable
+from navapp.control.interlocks import MAX_POSE_AGE_MS, is_current, navigable
 from navapp.control.stages import STAGES
-from navapp.control.states import SessionState, Snapshot
+from navapp.control.states import OtherBone, SessionState, Snapshot
 from navapp.values import Reason, Status, Verdict
 from tests.control.fakes import a_pose
 
@@ -68,6 +68,27 @@ def test_everything_that_is_wrong_is_named_the_most_urgent_first() -> None:
 
 def test_the_snapshots_own_answer_is_not_looked_at() -> None:
     assert navigable(replace(GOOD, reasons=(Reason.BLANKED,))) == ()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "age_ms", "is_so"),
+    [
+        (Verdict(Status.OK, 0.3), MAX_POSE_AGE_MS, True),
+        (Verdict(Status.OK, 0.3), MAX_POSE_AGE_MS + 1.0, False),
+        (Verdict(Status.DEGRADED, 0.3), 10.0, False),
+        (Verdict(Status.LOST), 10.0, False),
+        (None, None, False),
+    ],
+)
+def test_another_bone_is_current_only_when_ok_and_fresh(verdict, age_ms, is_so: bool) -> None:
+    assert is_current(OtherBone("tibia", verdict, age_ms)) == is_so
+
+
+def test_other_bones_neither_make_navigable_nor_prevent_it() -> None:
+    lost = (OtherBone("tibia", Verdict(Status.LOST), 9e9),)
+    assert navigable(replace(GOOD, others=lost)) == ()
+    well = (OtherBone("tibia", Verdict(Status.OK, 0.1), 1.0),)
+    assert navigable(replace(GOOD, others=well, left_from_bone=None)) == (Reason.BONE_LOST,)
 
 
 @pytest.mark.parametrize("reason", list(Reason))

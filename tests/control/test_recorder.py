@@ -87,6 +87,24 @@ def test_a_session_is_recorded_with_all_that_a_replay_needs(monkeypatch, tmp_pat
     assert poses[3]["camera_from_model"] is None
 
 
+def test_the_other_bones_are_kept_with_the_frame_whose_turn_they_were(
+    monkeypatch, tmp_path: Path
+) -> None:
+    bench, recorder = recorded(monkeypatch, tmp_path, Sink())
+    bench.script.tracked_of = {"tibia": answer(pose=a_pose("tibia", x_mm=5.0))}
+    for stage in (5, 1):
+        bench.do(EnterStage(stage))
+        bench.do(Register())
+        bench.frames(1)
+        bench.do(Accept())
+    bench.frames(4)
+    recorder.close()
+    poses = lines(tmp_path / "poses.jsonl")[-4:]
+    said = {"status": "OK", "camera_from_model": a_pose("tibia", x_mm=5.0).to_list()}
+    assert [line["bone"] for line in poses] == ["femur"] * 4
+    assert [line["bodies"] for line in poses] == [{"tibia": said}, {}] * 2
+
+
 def a_frame(monkeypatch, number: int):
     frame = Bench(monkeypatch).camera.read(0.1)
     return replace(frame, sequence=number)

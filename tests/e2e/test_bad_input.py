@@ -208,6 +208,27 @@ def test_a_bone_that_the_plan_does_not_have(pairs, rig, plan, prior, capsys) -> 
     refused([*replay(pairs, rig, plan, prior), "--bone", "tibia"], capsys, 2, "tibia", "femur")
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--also", "tibia"], ("no bone 'tibia'", "femur")),
+        (["--also", "femur"], ("the femur is followed anyway", "--also")),
+        (["--also", "femur", "--order", "each"], ("--order each", "--also")),
+    ],
+)
+def test_a_bone_beside_that_cannot_be_followed(
+    pairs, rig, plan, prior, capsys, options, words
+) -> None:
+    refused([*replay(pairs, rig, plan, prior), *options], capsys, 2, *words)
+
+
+def test_a_bone_beside_of_which_nothing_is_known(pairs, rig, prior, tmp_path, capsys) -> None:
+    bones = {name: replace(femur_model(), name=name) for name in ("femur", "tibia")}
+    write_plan(tmp_path / "two", Plan(bones))
+    arguments = [*replay(pairs, rig, tmp_path / "two", prior), "--also", "tibia"]
+    refused(arguments, capsys, 3, "where the tibia is", "camera_from_model_tibia")
+
+
 @pytest.mark.parametrize(("option", "word"), [("--frames", "0 frames"), ("--fps", "a rate of 0")])
 def test_a_replay_of_nothing(pairs, rig, plan, prior, capsys, option, word) -> None:
     refused([*replay(pairs, rig, plan, prior), option, "0"], capsys, 2, word)

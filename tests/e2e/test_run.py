@@ -1,5 +1,6 @@
 """`navapp run --headless` on the simulated rig, and the replay of what it recorded."""
 
+import itertools
 import json
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,52 @@ def test_a_recorded_session_replays_to_the_same_poses(tmp_path: Path, moving: Pa
     for a, b in zip(result(first)["frames"], result(second)["frames"], strict=True):
         assert a["camera_from_model"] == b["camera_from_model"]
         assert (a["state"], a["status"], a["reasons"]) == (b["state"], b["status"], b["reasons"])
+
+
+TWO_BONES = """
+[[step]]
+do = "register"
+[[step]]
+do = "stage"
+stage = "spacer"
+at_frame = 4
+[[step]]
+do = "register"
+[[step]]
+do = "stage"
+stage = "opening"
+at_frame = 13
+"""
+
+
+@pytest.mark.slow
+def test_two_bones_are_followed_at_once_and_replay_to_the_same_poses(
+    tmp_path: Path, moving: Path
+) -> None:
+    script, session = tmp_path / "script.toml", tmp_path / "session"
+    first, second = tmp_path / "a.json", tmp_path / "b.json"
+    script.write_text(TWO_BONES, encoding="utf-8")
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "22"]
+    options += ["--operator", str(script), "--record", str(session)]
+    assert run([*options, "--json", str(first)]) == 0
+    frames = result(first)["frames"]
+    for bone, other in (("tibia", "femur"), ("femur", "tibia")):
+        beside = [f for f in frames if f["bone"] == bone and f["bodies"]]
+        assert len(beside) >= 4
+        assert all(set(frame["bodies"]) == {other} for frame in beside)
+        assert all(b["index"] - a["index"] == 2 for a, b in itertools.pairwise(beside))
+        said = [frame["bodies"][other] for frame in beside]
+        assert all(one["status"] == "OK" and one["tre_mm"] < 0.4 for one in said)
+    # The femur's stage goes on from where the femur is by then, without being looked for.
+    back = frames[[f["bone"] for f in frames].index("tibia") :]
+    assert next(f for f in back if f["bone"] == "femur")["state"] == "navigating"
+    assert run(["--quiet", "replay", str(session), "--json", str(second)]) == 0
+    for a, b in zip(frames, result(second)["frames"], strict=True):
+        assert a["camera_from_model"] == b["camera_from_model"]
+        assert set(a["bodies"]) == set(b["bodies"])
+        for name, body in a["bodies"].items():
+            for key in ("status", "reasons", "camera_from_model", "covariance"):
+                assert body[key] == b["bodies"][name][key]
 
 
 def test_a_session_is_never_recorded_over_another(

@@ -113,6 +113,19 @@ def test_the_nominal_start_is_the_book_and_the_truth_is_off_by_the_placement_err
         assert 6.0 - 1e-9 <= shift <= 10.0 + 1e-9
 
 
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_by_the_book_the_knee_is_bent_as_it_is_at_rest(side):
+    simulated = world(replace(PLAIN, side=side))
+    true_femur, true_tibia = (simulated.left_from_body(name, 0) for name in ("femur", "tibia"))
+    nominal_tibia = simulated.nominal_left_from_tibia
+    np.testing.assert_allclose(
+        (simulated.nominal_left_from_femur.inverse() @ nominal_tibia).matrix,
+        (true_femur.inverse() @ true_tibia).matrix,
+        atol=1e-9,
+    )
+    assert rotation_angle_deg(true_tibia, nominal_tibia) >= 6.0
+
+
 def test_the_approach_axis_points_from_the_bone_to_the_cameras():
     axis = world().approach_axis
     assert np.linalg.norm(axis) == pytest.approx(1.0)

@@ -44,6 +44,16 @@ def test_a_steady_motion_goes_on_damped() -> None:
     np.testing.assert_allclose(state.velocity * PERIOD_NS / 1e9, STEP, atol=1e-9)
 
 
+def test_what_is_carried_is_expected_where_it_was_carried_to() -> None:
+    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    turn = rotation_from_vector((0.0, 0.1, -0.2))
+    motion = RigidTransform.from_parts("left", "left", turn, (4.0, -3.0, 2.0))
+    carried = state.carried(motion)
+    predicted = carried.predicted(2 * PERIOD_NS, CENTRE)
+    np.testing.assert_array_equal(predicted.matrix, (motion @ state.left_from_bone).matrix)
+    assert (carried.captured_ns, carried.n_lost) == (state.captured_ns, state.n_lost)
+
+
 def test_half_the_time_is_half_the_motion() -> None:
     state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
     half = state.predicted(PERIOD_NS + PERIOD_NS // 2, CENTRE)

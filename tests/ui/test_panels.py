@@ -10,6 +10,7 @@ from navapp.control.states import (
     DeviceLine,
     Event,
     EventLevel,
+    OtherBone,
     SessionState,
     Snapshot,
 )
@@ -95,6 +96,83 @@ def test_a_candidate_without_verdict_counts_as_lost() -> None:
     assert "judged LOST" in text
     assert "a accept" not in text
     assert "r reject" in text
+
+
+NONE = UNICODE.absent
+WELL = OtherBone("tibia", Verdict(Status.OK, 0.31), 133.4)
+OTHERS = (WELL, OtherBone("patella", Verdict(Status.LOST, 1.7), 12_345.0))
+
+
+@pytest.mark.parametrize(
+    ("other", "line"),
+    [
+        (WELL, "tibia   ● ≤0.31 mm 133 ms"),
+        (OtherBone("patella", Verdict(Status.OK, 0.3), 501.0), f"patella {NONE} old      501 ms"),
+        (dataclasses.replace(WELL, age_ms=2e10), f"tibia   {NONE} old      9999 s"),
+        (OtherBone("femur", Verdict(Status.DEGRADED, 0.2), 999.6), "femur   ▲ DEGRADED    1 s"),
+        (OTHERS[1], "patella ✗ LOST       12 s"),
+        (OtherBone("tibia", Verdict(Status.LOST, 0.4)), "tibia   ✗ LOST          -"),
+        (OtherBone("tibia"), f"tibia   {NONE} -             -"),
+    ],
+)  # fmt: skip
+def test_another_bone_is_one_line_with_a_bound_only_while_it_is_current(
+    other: OtherBone, line: str
+) -> None:
+    view = view_of(snapshots.navigating(others=(other,)))
+    assert lines_of(PosePanel(), view, WIDTH, POSE_LINES)[-3] == line
+
+
+def test_other_bones_take_the_room_of_the_rms_and_of_nothing_else() -> None:
+    alone = lines_of(PosePanel(), view_of(snapshots.navigating()), WIDTH, POSE_LINES)
+    view = view_of(snapshots.navigating(others=OTHERS))
+    lines = lines_of(PosePanel(), view, WIDTH, POSE_LINES)
+    assert lines[:5] == alone[:5]
+    assert lines[-2:] == alone[-2:]
+    assert [line.split()[0] for line in lines[5:7]] == ["tibia", "patella"]
+    assert len(lines) == POSE_LINES
+    wide = lines_of(PosePanel(), view, 40, 12)
+    assert all(any(word in line for line in wide) for word in ("rms", "expected", "tibia"))
+
+
+@pytest.mark.parametrize("reason", list(Reason))
+def test_other_bones_hide_no_reason_and_no_remedy(reason: Reason) -> None:
+    view = view_of(snapshots.suspended(reasons=(reason, Reason.BLANKED), others=OTHERS))
+    text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
+    assert reason.value in text
+    assert reason.remedy in text
+
+
+def test_other_bones_hide_no_question_to_the_operator() -> None:
+    for verdict in (None, Verdict(Status.DEGRADED, 2.4, (Reason.DEGENERATE,))):
+        alone, beside = (
+            lines_of(
+                PosePanel(),
+                view_of(snapshots.review(verdict=verdict, others=others)),
+                WIDTH,
+                POSE_LINES,
+            )
+            for others in ((), OTHERS)
+        )
+        assert set(filter(None, alone)) <= set(beside)
+
+
+def test_nothing_is_known_of_other_bones_in_a_silent_session() -> None:
+    view = view_of(snapshots.navigating(others=(WELL,)), is_silent=True)
+    (line,) = (line for line in lines_of(PosePanel(), view, WIDTH, POSE_LINES) if "tibia" in line)
+    assert line.split() == ["tibia", NONE, "-", "-"]
+
+
+@pytest.mark.parametrize("symbols", [UNICODE, ASCII])
+def test_other_bones_fit_the_small_panel(symbols: Symbols) -> None:
+    for name in ("femur", "tibia", "patella"):
+        for status in Status:
+            for age_ms in (None, 7.0, 499.9, 999.4, 1e12):
+                other = OtherBone(name, Verdict(status, 1.99), age_ms)
+                view = view_of(snapshots.navigating(others=(other,)), symbols)
+                line = lines_of(PosePanel(), view, WIDTH, POSE_LINES)[-3]
+                assert len(line) == WIDTH
+                assert name in line
+                assert line.isascii() or symbols is UNICODE
 
 
 @pytest.mark.parametrize("snapshot", [snapshots.starting(), snapshots.registering()])

@@ -1,0 +1,142 @@
+"""The bones beside the stage's: followed at half rate, so that none is forgotten.
+
+Once accepted, a bone is followed while another stage is in force, too: one such bone in every
+second frame, after the picture was shown. With three bones the two others take turns.
+"""
+
+from dataclasses import dataclass, replace
+
+from drivers.frames import StereoFrame
+from navapp.control.pursuit import Pursuit
+from navapp.control.stages import stage_of
+from navapp.control.states import OtherBone
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking import is_place_doubted
+from navapp.values import StageSpec, Status, TrackedFrame, Verdict
+
+# A bone whose place stays in doubt is searched for, which takes as long as many frames: from the
+# second such answer on it rests for 1, 3 and 7 turns, so that the active bone is not starved.
+_MOST_RESTS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class _Sight:
+    """What was last said of a bone.
+
+    Attributes:
+        verdict: that.
+        ok_ns: when the newest frame in which it was OK was captured; None when there was none.
+        n_rests: so many turns it lets pass now.
+        next_rests: so many after the next answer, if that leaves its place in doubt, too.
+        beside: where the stage's bone was in the same frame; None when that was not OK.
+        lineage: of that pose.
+    """
+
+    verdict: Verdict
+    ok_ns: int | None = None
+    n_rests: int = 0
+    next_rests: int = 0
+    beside: RigidTransform | None = None
+    lineage: int = 0
+
+
+class Companions:
+    """Whose turn it is, and what was last said of each.
+
+    Turns go by the count of handled frames, never by the time: a recorded session replays to them.
+
+    Args:
+        pursuit: of all bones of the session.
+        unasked: bones that are registered in their turns and taken without an operator's word.
+    """
+
+    def __init__(self, pursuit: Pursuit, unasked: tuple[str, ...] = ()) -> None:
+        self._pursuit = pursuit
+        self._unasked = unasked
+        self._n_frames = 0
+        self._sights: dict[str, _Sight] = {}
+
+    def follow(
+        self, stage: StageSpec, frame: StereoFrame, active: TrackedFrame | None
+    ) -> dict[str, TrackedFrame]:
+        """Follow one of them into a frame, if it is one's turn: each by its own stage's goal.
+
+        The bones of a leg move together, but for what the knee bends: where the active one has
+        gone since, the other one is expected to have gone, too.
+
+        Args:
+            stage: in force; its bone is no companion.
+            frame: the next one.
+            active: what was said of the stage's bone in that frame.
+        """
+        turn, is_rest = divmod(self._n_frames, 2)
+        self._n_frames += 1
+        names = self._names(stage)
+        self._sights.pop(stage.bone, None)
+        if is_rest or not names:
+            return {}
+        name = names[turn % len(names)]
+        if self._is_resting(name):
+            return {}
+        own, beside = stage_of(name), _well_known(active)
+        if self._pursuit.is_accepted(own):
+            tracked = self._pursuit.follow(own, frame, self._moved(name, beside))
+        else:
+            tracked = self._pursuit.register_now(own, frame)
+        self._remember(name, tracked.verdict, frame.captured_ns, beside)
+        return {name: tracked}
+
+    def forget(self) -> None:
+        """What was said says nothing any more; the tracks stay."""
+        self._sights = {}
+
+    def seen(self, stage: StageSpec, now_ns: int) -> tuple[OtherBone, ...]:
+        """What is known of each, as of now."""
+        return tuple(self._seen(name, now_ns) for name in self._names(stage))
+
+    def _seen(self, name: str, now_ns: int) -> OtherBone:
+        sight = self._sights.get(name)
+        if sight is None:
+            return OtherBone(name)
+        age_ms = None if sight.ok_ns is None else (now_ns - sight.ok_ns) / 1e6
+        return OtherBone(name, sight.verdict, age_ms)
+
+    def _names(self, stage: StageSpec) -> list[str]:
+        known = dict.fromkeys((*self._unasked, *self._pursuit.accepted))
+        return [name for name in known if name != stage.bone]
+
+    def _is_resting(self, name: str) -> bool:
+        """Whether it lets this turn pass."""
+        sight = self._sights.get(name)
+        if sight is None or sight.n_rests == 0:
+            return False
+        self._sights[name] = replace(sight, n_rests=sight.n_rests - 1)
+        return True
+
+    def _moved(self, name: str, beside: RigidTransform | None) -> RigidTransform | None:
+        """How the stage's bone has moved since a bone's last turn, if that is known."""
+        sight = self._sights.get(name)
+        if sight is None or sight.beside is None or beside is None:
+            return None
+        # From one candidate to another nothing has moved.
+        is_same = (sight.lineage, sight.beside.source) == (self._pursuit.lineage, beside.source)
+        return beside @ sight.beside.inverse() if is_same else None
+
+    def _remember(
+        self, name: str, verdict: Verdict, captured_ns: int, beside: RigidTransform | None
+    ) -> None:
+        before = self._sights.get(name, _Sight(verdict))
+        ok_ns = captured_ns if verdict.status is Status.OK else before.ok_ns
+        n_rests = next_rests = 0
+        if is_place_doubted(verdict):
+            n_rests = before.next_rests
+            next_rests = min(2 * n_rests + 1, _MOST_RESTS)
+        lineage = self._pursuit.lineage
+        self._sights[name] = _Sight(verdict, ok_ns, n_rests, next_rests, beside, lineage)
+
+
+def _well_known(active: TrackedFrame | None) -> RigidTransform | None:
+    """Where the stage's bone is, when that is OK."""
+    if active is None or active.verdict.status is not Status.OK:
+        return None
+    return active.left_from_bone

@@ -1,0 +1,59 @@
+"""What a frame and a session look like in JSON and in words."""
+
+from dataclasses import replace
+
+from navapp.cli.results import frame_text, frame_to_json, summarise, summary_text
+from navapp.control.results import FrameResult
+from navapp.values import Reason, Status
+from tests.control.fakes import Bench, a_pose, answer, navigating
+
+# What is said of the frame and not of a bone.
+OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies"}
+TIBIA = answer(Status.DEGRADED, Reason.COVERAGE_LOW, pose=a_pose("tibia", x_mm=4.0))
+
+
+def a_result(monkeypatch, **others) -> FrameResult:
+    return replace(navigating(Bench(monkeypatch)).results[-1], others=others)
+
+
+def test_another_bone_has_the_keys_of_the_frames_own_pose(monkeypatch) -> None:
+    frame = frame_to_json(a_result(monkeypatch, tibia=TIBIA), {"femur": 0.1, "tibia": 0.7})
+    tibia = frame["bodies"]["tibia"]
+    assert set(tibia) == set(frame) - OF_THE_FRAME
+    assert (frame["status"], tibia["status"]) == ("OK", "DEGRADED")
+    assert (frame["tre_mm"], tibia["tre_mm"]) == (0.1, 0.7)
+    assert tibia["reasons"] == [Reason.COVERAGE_LOW.value]
+    assert tibia["camera_from_model"] == a_pose("tibia", x_mm=4.0).to_list()
+    assert tibia["covariance"] == TIBIA.estimate.covariance.tolist()
+    assert tibia["predicted_tre_mm"] == TIBIA.verdict.predicted_tre_mm
+
+
+def test_a_frame_in_which_no_other_bone_had_its_turn_says_nothing_of_one(monkeypatch) -> None:
+    frame = frame_to_json(a_result(monkeypatch), {})
+    assert frame["bodies"] == {}
+    assert frame["tre_mm"] is None
+
+
+def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
+    lost = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
+    results = [
+        a_result(monkeypatch, tibia=TIBIA),
+        a_result(monkeypatch),
+        a_result(monkeypatch, tibia=lost),
+        a_result(monkeypatch, patella=answer(pose=a_pose("patella"))),
+    ]
+    summary = summarise([frame_to_json(result, {}) for result in results], 1.0)
+    counted = {key: summary[key] for key in ("frames", "ok", "degraded", "lost")}
+    assert counted == {"frames": 4, "ok": 4, "degraded": 0, "lost": 0}
+    assert summary["bodies"] == {
+        "tibia": {"frames": 2, "ok": 0, "degraded": 1, "lost": 1},
+        "patella": {"frames": 1, "ok": 1, "degraded": 0, "lost": 0},
+    }
+    lines = summary_text(summary).splitlines()
+    assert lines[0] == "4 frames: 4 OK, 0 degraded, 0 lost"
+    assert "beside it tibia: 2 frames: 0 OK, 1 degraded, 1 lost" in lines
+
+
+def test_a_line_a_frame_names_the_other_bones(monkeypatch) -> None:
+    assert frame_text(a_result(monkeypatch, tibia=TIBIA)).endswith(" | tibia DEGRADED 0 ms")
+    assert "tibia" not in frame_text(a_result(monkeypatch))
