@@ -33,7 +33,7 @@ def test_noise_alone_changes_nothing() -> None:
 def test_what_goes_together_over_40_px_counts_so_often() -> None:
     """A window of 11 px says it (40 / 11)^2 times, and each time the same."""
     loose = estimate(0.8)
-    growth = 1.0 + (0.8**2 - 0.6**2) * (40.0 / 11.0) ** 2
+    growth = 1.0 + (0.8**2 - 0.65**2) * (40.0 / 11.0) ** 2
     assert np.trace(with_correlated_residuals(loose).covariance) == pytest.approx(
         6.0 * growth, rel=0.05
     )
