@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from drivers.clock import Clock
+from drivers.escvp21_codes import faults, power_state
 from drivers.escvp21_line import EscVp21Line
 from drivers.interfaces import CommandResult, PowerState, ProjectorStatus
 from drivers.serial_port import Address
@@ -18,44 +19,10 @@ from navapp.errors import DeviceProtocolError, DeviceTimeout, UnsupportedControl
 BAUD_RATE = 9600
 SILENT = "does not answer: busy with its lamp, abnormal (lamp, heat), without mains or cable"
 
-_POWER = {
-    "00": PowerState.STANDBY,
-    "01": PowerState.ON,
-    "02": PowerState.WARMING,
-    "03": PowerState.COOLING,
-    "04": PowerState.STANDBY,
-    "05": PowerState.FAULT,
-    "09": PowerState.STANDBY,
-}
-_PASSING = (PowerState.WARMING, PowerState.COOLING)
-# The guide's numbers are hexadecimal.
-_FAULTS = {
-    0x01: "fan",
-    0x03: "lamp at power on",
-    0x04: "internal temperature",
-    0x06: "lamp",
-    0x07: "lamp cover",
-    0x08: "cinema filter",
-    0x09: "capacitor",
-    0x0A: "auto iris",
-    0x0B: "subsystem",
-    0x0C: "low air flow",
-    0x0D: "air-flow sensor",
-    0x0E: "power supply",
-    0x0F: "shutter",
-    0x10: "cooling element",
-    0x11: "cooling pump",
-    0x12: "static iris",
-    0x13: "power supply",
-    0x14: "exhaust shutter",
-    0x15: "obstacle",
-    0x16: "interface board",
-    0x17: "stack link",
-    0x18: "internal bus",
-}
 _HEX, _SWITCH = re.compile("[0-9A-F]{2}"), re.compile("ON|OFF")
 _KEYSTONE, _HOURS = re.compile(r"\d{1,3}"), re.compile(r"\d{1,6}( \d{1,6})*")
 _SERIAL = re.compile(r"[\x21-\x7e]{1,32}")
+_PASSING = (PowerState.WARMING, PowerState.COOLING)
 _POLL_NS = 1_000_000_000
 _SOURCE_S, _SETTING_S = 5.0, 3.0
 
@@ -164,13 +131,13 @@ class EscVp21Projector:
                 raise
             self._is_known = False
             return ProjectorStatus(PowerState.FAULT, faults=(SILENT,))
-        power = _POWER.get(code or "", PowerState.FAULT)
-        faults = self._faults()
+        power = power_state(code)
+        broken = faults(self._talk.ask("ERR", _HEX))
         if power is PowerState.FAULT:
-            faults = (*faults, f"power state {code or 'not told'}")
+            broken = (*broken, f"power state {code or 'not told'}")
         if power is not PowerState.ON:
             self._is_known = False
-            return ProjectorStatus(power, lamp_hours=self._lamp_hours(), faults=faults)
+            return ProjectorStatus(power, lamp_hours=self._lamp_hours(), faults=broken)
         return ProjectorStatus(
             power,
             source=self._talk.ask("SOURCE", _HEX),
@@ -178,7 +145,7 @@ class EscVp21Projector:
             flips_horizontally=self._is_on("HREVERSE"),
             flips_vertically=self._is_on("VREVERSE"),
             lamp_hours=self._lamp_hours(),
-            faults=faults,
+            faults=broken,
             serial=self._read_serial(),
             keystone=self._keystone(),
             is_frozen=self._is_on("FREEZE"),
@@ -192,7 +159,7 @@ class EscVp21Projector:
         return self._talk.line.deadline_ns(timeout_s)
 
     def _power(self) -> PowerState:
-        return _POWER.get(self._talk.ask("PWR", _HEX) or "", PowerState.FAULT)
+        return power_state(self._talk.ask("PWR", _HEX))
 
     def _settled_power(self, deadline_ns: int) -> PowerState:
         """The state once it is neither warming nor cooling, or at the end of the time."""
@@ -207,9 +174,7 @@ class EscVp21Projector:
         deadline_ns = self._deadline_ns(min(timeout_s, _SETTING_S))
         return self._set(name, "ON" if is_on else "OFF", _SWITCH, deadline_ns)
 
-    def _set(
-        self, name: str, value: str, form: re.Pattern[str], deadline_ns: int
-    ) -> CommandResult:
+    def _set(self, name: str, value: str, form: re.Pattern[str], deadline_ns: int) -> CommandResult:
         if not self._is_known:
             self._read_serial()
         self._talk.tell(f"{name} {value}", self._talk.line.remaining_s(deadline_ns))
@@ -266,8 +231,3 @@ class EscVp21Projector:
     def _lamp_hours(self) -> tuple[int, ...]:
         hours = self._talk.ask("LAMP", _HOURS)
         return () if hours is None else tuple(int(part) for part in hours.split())
-
-    def _faults(self) -> tuple[str, ...]:
-        text = self._talk.ask("ERR", _HEX)
-        code = 0 if text is None else int(text, 16)
-        return () if code == 0 else (_FAULTS.get(code, f"fault {code:02X}"),)

@@ -123,6 +123,14 @@ class SerialLine:
             remedy="check its cable, its mains and its state",
         )
 
+    def absence(self) -> DeviceLost:
+        """The error of a line that is not open."""
+        return DeviceLost(
+            f"the {self._subject} at {self._address.name} is not connected",
+            subject=self._subject,
+            remedy="check its cable, then open it again",
+        )
+
     def _receive(self, timeout_s: float) -> bool:
         port = self._opened()
         try:
@@ -135,9 +143,5 @@ class SerialLine:
 
     def _opened(self) -> Port:
         if self._port is None:
-            raise DeviceLost(
-                f"the {self._subject} at {self._address.name} is not connected",
-                subject=self._subject,
-                remedy="check its cable, then open it again",
-            )
+            raise self.absence()
         return self._port

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound, DeviceTimeout
 
 if TYPE_CHECKING:
-    from serial import SerialBase
+    from serial import Serial
 
 _WRITE_LIMIT_S = 2.0
 
@@ -148,19 +148,22 @@ def _failures() -> tuple[type[Exception], ...]:
     return (SerialException, OSError, termios.error, TypeError, ValueError)
 
 
-def _opened(name: str, baud_rate: int) -> "SerialBase":
+def _opened(name: str, baud_rate: int) -> "Serial":
     try:
         import serial
     except ImportError as error:
         raise DeviceError(
             "serial lines need the package pyserial", subject=name, remedy="install pyserial"
         ) from error
-    settings = {"baudrate": baud_rate, "timeout": 0.0, "write_timeout": _WRITE_LIMIT_S}
-    if "://" not in name:
-        # Of two programs that both ask for it alone, the second is refused.
-        settings["exclusive"] = True
     try:
-        return serial.serial_for_url(name, **settings)
+        port = serial.serial_for_url(
+            name, baud_rate, do_not_open=True, timeout=0.0, write_timeout=_WRITE_LIMIT_S
+        )
+        if "://" not in name:
+            # Of two programs that both ask for it alone, the second is refused.
+            port.exclusive = True
+        port.open()
+        return port
     except _failures() as error:
         raise DeviceNotFound(
             f"the line {name} cannot be opened ({error})",

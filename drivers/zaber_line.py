@@ -175,10 +175,8 @@ def checksum(text: str) -> str:
 
 def rejection(command: str, word: str) -> UnsupportedControl:
     """The error of a rejected command."""
-    return UnsupportedControl(
-        f"the mirror rejects '{command}': {_REJECTIONS.get(word, 'for an unknown reason')} ({word})",
-        subject="mirror",
-    )
+    why = _REJECTIONS.get(word, "for an unknown reason")
+    return UnsupportedControl(f"the mirror rejects '{command}': {why} ({word})", subject="mirror")
 
 
 def _misunderstood(text: str) -> DeviceProtocolError:

@@ -1,31 +1,18 @@
-"""A mirror on a Zaber rotary stage, over Zaber's ASCII protocol.
-
-A reply says OK when a command was accepted, not when the mirror has arrived: every motion is polled
-to its end, its warnings are looked at, and the position is read twice.
-"""
+"""A mirror on a Zaber rotary stage, over Zaber's ASCII protocol; angles from its home position."""
 
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.clock import Clock
 from drivers.interfaces import MirrorInfo
 from drivers.serial_port import Address
-from drivers.zaber_line import Reply, ZaberLine, rejection
-from drivers.zaber_warnings import costs_reference, is_harmless, named
-from navapp.errors import (
-    DeviceError,
-    DeviceProtocolError,
-    DeviceTimeout,
-    UnsupportedControl,
-    WrongDevice,
-)
+from drivers.zaber_axis import INTERRUPTED, WHOLE, ZaberAxis
+from drivers.zaber_line import ZaberLine
+from navapp.errors import DeviceError, DeviceProtocolError, UnsupportedControl, WrongDevice
 
-_WHOLE, _REAL = re.compile(r"-?\d{1,12}"), re.compile(r"-?\d{1,12}(\.\d{1,9})?")
-_FLAGS = re.compile(r"(\d{2}|--)( [A-Z][A-Z0-9])*")
-_POLL_NS, _RETRY_NS = 50_000_000, 50_000_000
-_RETRY_S = 2.0
-_LATER = ("AGAIN", "STATUSBUSY", "FULL")
+_REAL = re.compile(r"\d{1,12}(\.\d{1,9})?")
 # Microsteps/s = the setting `maxspeed` / this (protocol manual, units of speed).
 _SPEED_UNIT = 1.6384
 # A stage that ramps is slower than its speed; beyond this it is stuck.
@@ -34,7 +21,7 @@ _PATIENCE, _PATIENCE_S = 1.5, 2.0
 
 @dataclass(frozen=True, slots=True)
 class _Travel:
-    """What the stage says of its axis: whole microsteps, and steps a second."""
+    """What the stage says of its range, in microsteps and microsteps/s."""
 
     steps_per_turn: int
     lowest: int
@@ -47,9 +34,12 @@ class _Travel:
     def angle_deg(self, steps: int) -> float:
         return steps / self.steps_per_turn * 360.0
 
+    def longest_s(self, steps: int) -> float:
+        return abs(steps) / self.steps_per_s * _PATIENCE + _PATIENCE_S
+
 
 class ZaberMirror:
-    """One axis of a Zaber device as the mirror's mount; angles from its home position.
+    """The mirror's mount, bound to a serial number when one is given.
 
     `stop` may be called by any thread; the motion that it ends then raises.
     """
@@ -61,15 +51,13 @@ class ZaberMirror:
         serial: str = "",
         axis: tuple[int, int] = (1, 1),
     ) -> None:
-        self._talk = ZaberLine(address, clock, axis, self._note)
+        """`axis` is the device's number on the line and the axis' number in the device."""
+        self._talk = ZaberLine(address, clock, axis, self._hear)
+        self._axis = ZaberAxis(self._talk, clock)
         self._address = address
-        self._clock = clock
         self._bound_serial = serial
         self._serial = ""
         self._travel: _Travel | None = None
-        self._is_homed = False
-        self._is_placed = False
-        self._is_stop_asked = False
 
     @property
     def info(self) -> MirrorInfo:
@@ -101,8 +89,8 @@ class ZaberMirror:
                 self._talk.ask(f"set {setting} 1", of_device=True)
             self._require_serial()
             self._travel = self._read_travel()
-            self._is_homed = self._is_placed = True
-            self._look()
+            self._axis.trust()
+            self._axis.look()
         except BaseException:
             self._talk.close()
             raise
@@ -114,33 +102,27 @@ class ZaberMirror:
             DeviceError: it stalled or has another fault; the flags are named.
             DeviceTimeout: it does not get there; it was stopped.
         """
-        self._is_stop_asked = False
         self._require_serial()
-        self._is_homed = False
-        self._tell("home")
-        self._wait_until_idle(timeout_s, "finding its home position")
-        # What the flags said on the way there does not count any more.
-        self._is_homed = self._is_placed = True
-        self._require_clear("homing")
+        self._axis.home(timeout_s)
 
     def move_to(self, angle_deg: float, timeout_s: float) -> None:
         """Move and wait until it stands there, read twice.
 
         Raises:
-            UnsupportedControl: not homed, out of range, or rejected.
+            UnsupportedControl: not homed, out of range, moving already, or rejected.
             DeviceError: it stalled, was stopped or turned by hand; the flags are named.
             DeviceTimeout: it does not get there in the time, or in that of its speed.
         """
         travel, steps = self._target(angle_deg)
-        self._look()
-        if not self._is_homed:
+        self._require_rest()
+        if not self._axis.is_homed:
             raise UnsupportedControl(
                 "the mirror has no reference position", subject="mirror", remedy="home it first"
             )
-        distance = abs(steps - self._steps())
-        self._move(f"move abs {steps}", travel, distance, timeout_s)
-        if (found := self._steps()) != steps:
-            self._is_placed = False
+        limit_s = min(timeout_s, travel.longest_s(steps - self._axis.steps()))
+        self._axis.move(f"move abs {steps}", limit_s, is_repeatable=True)
+        if (found := self._axis.steps()) != steps:
+            self._axis.against = INTERRUPTED
             raise DeviceProtocolError(
                 f"the mirror stands at {travel.angle_deg(found):.3f} deg, "
                 f"sent to {angle_deg:.3f} deg",
@@ -150,10 +132,12 @@ class ZaberMirror:
 
     def move_by(self, change_deg: float, timeout_s: float) -> None:
         """Move by that much from where it stands, homed or not; errors as of `move_to`."""
-        travel, change = self._target(change_deg, is_relative=True)
-        if self._is_homed:
-            self._target(travel.angle_deg(self._steps() + change))
-        self._move(f"move rel {change}", travel, abs(change), timeout_s)
+        travel, change = self._target(change_deg, is_change=True)
+        self._require_rest()
+        if self._axis.is_homed:
+            self._target(travel.angle_deg(self._axis.steps() + change))
+        limit_s = min(timeout_s, travel.longest_s(change))
+        self._axis.move(f"move rel {change}", limit_s, is_repeatable=False)
 
     def position_deg(self) -> float | None:
         """Where it stands.
@@ -161,29 +145,29 @@ class ZaberMirror:
         None while it moves, without reference, and when it was displaced, turned by hand or
         interrupted since it was last sent somewhere.
         """
-        is_busy = self._look()
-        travel = self._travel
-        if is_busy or travel is None or not (self._is_homed and self._is_placed):
+        is_moving = self._axis.look()
+        if is_moving or not self._axis.is_placed or self._travel is None:
             return None
-        steps = self._steps()
-        return travel.angle_deg(steps) if self._is_homed and self._is_placed else None
+        steps = self._axis.steps()
+        # An alert may have come with the position.
+        return self._travel.angle_deg(steps) if self._axis.is_placed else None
 
     def stop(self) -> None:
         """Stop moving, now."""
-        self._is_stop_asked = True
-        self._talk.ask("stop")
+        self._axis.stop()
 
     def close(self) -> None:
         """Stop and disconnect; never fails."""
         if self._talk.line.is_open:
-            try:
+            with suppress(DeviceError):
                 self._talk.give("stop")
-            except DeviceError:
-                pass
         self._talk.close()
 
+    def _hear(self, flag: str) -> None:
+        self._axis.note(flag)
+
     def _require_serial(self) -> None:
-        serial = self._talk.value("system.serial", _WHOLE, of_device=True)
+        serial = self._talk.value("system.serial", WHOLE, of_device=True)
         if self._bound_serial and serial != self._bound_serial:
             self._talk.close()
             raise WrongDevice(
@@ -195,9 +179,9 @@ class ZaberMirror:
 
     def _read_travel(self) -> _Travel:
         names = ("limit.cycle.dist", "limit.min", "limit.max")
-        turn, lowest, highest = (int(self._talk.value(name, _WHOLE)) for name in names)
+        turn, lowest, highest = (int(self._talk.value(name, WHOLE)) for name in names)
         speed = float(self._talk.value("maxspeed", _REAL)) / _SPEED_UNIT
-        if turn <= 0 or lowest >= highest or not speed > 0.0:
+        if turn <= 0 or lowest >= highest or speed <= 0.0:
             raise DeviceProtocolError(
                 f"the mirror's stage says {turn} steps a turn, {lowest} to {highest}, {speed:g}/s",
                 subject="mirror",
@@ -205,112 +189,28 @@ class ZaberMirror:
             )
         return _Travel(turn, lowest, highest, speed)
 
-    def _target(self, angle_deg: float, *, is_relative: bool = False) -> tuple[_Travel, int]:
-        """The axis and the steps to or by that angle.
+    def _require_rest(self) -> None:
+        if self._axis.look():
+            raise UnsupportedControl(
+                "the mirror is moving", subject="mirror", remedy="wait, or stop it first"
+            )
+
+    def _target(self, angle_deg: float, *, is_change: bool = False) -> tuple[_Travel, int]:
+        """The range, and the steps to or by that angle.
 
         Raises:
             DeviceLost: not open. UnsupportedControl: out of range, or no number.
         """
-        if not self._talk.line.is_open or self._travel is None:
-            self._talk.give("")
-            raise AssertionError("a closed line must have raised")
         travel = self._travel
-        is_inside = math.isfinite(angle_deg) and (
-            is_relative or travel.lowest <= travel.steps(angle_deg) <= travel.highest
-        )
-        if not is_inside:
-            low_deg, high_deg = travel.angle_deg(travel.lowest), travel.angle_deg(travel.highest)
+        if not self._talk.line.is_open or travel is None:
+            raise self._talk.line.absence()
+        span = travel.highest - travel.lowest
+        lowest, highest = (-span, span) if is_change else (travel.lowest, travel.highest)
+        if not math.isfinite(angle_deg) or not lowest <= travel.steps(angle_deg) <= highest:
+            low_deg, high_deg = travel.angle_deg(lowest), travel.angle_deg(highest)
             raise UnsupportedControl(
-                f"the mirror cannot be moved to {angle_deg:g} deg",
+                f"the mirror cannot be moved {'by' if is_change else 'to'} {angle_deg:g} deg",
                 subject="mirror",
-                remedy=f"it reaches {low_deg:.1f} to {high_deg:.1f} deg",
+                remedy=f"give {low_deg:.1f} to {high_deg:.1f} deg",
             )
         return travel, travel.steps(angle_deg)
-
-    def _move(self, command: str, travel: _Travel, distance: int, timeout_s: float) -> None:
-        self._is_stop_asked = False
-        self._is_placed = False
-        self._tell(command)
-        limit_s = distance / travel.steps_per_s * _PATIENCE + _PATIENCE_S
-        self._wait_until_idle(min(limit_s, timeout_s), "moving")
-        # What the flags said on the way there does not count any more.
-        self._is_placed = True
-        self._require_clear("moving")
-
-    def _tell(self, command: str) -> None:
-        """Give a motion command; what the flags said of the last one is cleared first."""
-        self._talk.ask("warnings clear")
-        deadline_ns = self._talk.line.deadline_ns(_RETRY_S)
-        reply = self._talk.give(command)
-        while reply.data in _LATER and not reply.is_accepted:
-            if self._clock.now_ns() >= deadline_ns:
-                break
-            self._clock.wait_until_ns(self._clock.now_ns() + _RETRY_NS)
-            reply = self._talk.give(command)
-        if not reply.is_accepted:
-            raise rejection(command, reply.data)
-
-    def _wait_until_idle(self, timeout_s: float, what: str) -> None:
-        deadline_ns = self._talk.line.deadline_ns(timeout_s)
-        while self._talk.ask("").is_busy:
-            if self._clock.now_ns() >= deadline_ns:
-                self._is_placed = False
-                self.stop()
-                raise DeviceTimeout(
-                    f"the mirror was still {what} after {timeout_s:.1f} s and was stopped",
-                    subject="mirror",
-                    remedy="see whether something is in its way, then home it",
-                )
-            self._clock.wait_until_ns(self._clock.now_ns() + _POLL_NS)
-        if self._is_stop_asked:
-            self._is_placed = False
-            raise DeviceError(f"the mirror was stopped while {what}", subject="mirror")
-
-    def _require_clear(self, what: str) -> None:
-        """Raise unless a motion ended without a flag that says otherwise."""
-        self._look()
-        if self._is_homed and self._is_placed:
-            return
-        raise DeviceError(
-            f"{what} the mirror failed: {named(self._flags)}",
-            subject="mirror",
-            remedy="see what is in its way, then home it",
-        )
-
-    def _look(self) -> bool:
-        """Note all flags; whether it moves."""
-        reply = self._talk.ask("")
-        self._flags: tuple[str, ...] = ()
-        if reply.warning:
-            self._flags = self._all_flags(reply)
-        for flag in self._flags:
-            self._note(flag)
-        return reply.is_busy
-
-    def _all_flags(self, reply: Reply) -> tuple[str, ...]:
-        """A reply shows the most urgent flag only."""
-        every = self._talk.ask("warnings")
-        if not every.is_accepted or _FLAGS.fullmatch(every.data) is None:
-            return (reply.warning,)
-        others = every.data.split()[1:]
-        return tuple(dict.fromkeys((reply.warning, every.warning, *others)))
-
-    def _note(self, flag: str) -> None:
-        if not flag or is_harmless(flag):
-            return
-        self._is_placed = False
-        if costs_reference(flag):
-            self._is_homed = False
-
-    def _steps(self) -> int:
-        """Position, the same in two readings one after the other."""
-        readings = [int(self._talk.value("pos", _WHOLE)) for _ in range(2)]
-        if readings[0] != readings[1]:
-            readings.append(int(self._talk.value("pos", _WHOLE)))
-        if readings[-1] != readings[-2]:
-            raise DeviceProtocolError(
-                f"the mirror tells {readings[0]}, {readings[1]} and {readings[2]} steps at rest",
-                subject="mirror",
-                remedy="check its cable",
-            )
-        return readings[-1]
