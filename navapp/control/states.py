@@ -215,6 +215,7 @@ class Snapshot:
         preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
             the first frame.
         is_bone_planned: the plan has a model of the stage's bone.
+        device_reasons: what projector and mirror have against guides; nothing at all is shown then.
         is_camera_silent: no picture has come for longer than the camera's period explains.
         rig_alarm: why the rig is not believed any more; empty while it is.
         length_check: the newest look at a known length, None before one.
@@ -246,6 +247,7 @@ class Snapshot:
     is_camera_silent: bool = False
     rig_alarm: str = ""
     length_check: LengthCheck | None = None
+    device_reasons: tuple[Reason, ...] = ()
     is_simulated: bool = False
     is_recording: bool = False
     is_over: bool = False
