@@ -165,10 +165,12 @@ def _opened(name: str, baud_rate: int) -> "Serial":
         port.open()
         return port
     except _failures() as error:
+        number = getattr(error, "errno", None)
+        why = os.strerror(number) if number else str(error)
         raise DeviceNotFound(
-            f"the line {name} cannot be opened ({error})",
+            f"the line {name} cannot be opened ({why})",
             subject=name,
-            remedy=_REMEDIES.get(getattr(error, "errno", None), "check the port in the settings"),
+            remedy=_REMEDIES.get(number, "check the port in the settings"),
         ) from error
 
 

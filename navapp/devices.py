@@ -1,6 +1,7 @@
 """Composition root: the only place that turns a configuration into opened devices."""
 
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,11 +10,22 @@ import numpy as np
 from calibration.targets.boards import Board
 from calibration.targets.drawing import drawn, rastered
 from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.escvp21_projector import BAUD_RATE as ESCVP21_BAUD_RATE
+from drivers.escvp21_projector import EscVp21Projector
 from drivers.fixed_mirror import FixedMirror
-from drivers.interfaces import DeviceSet, StereoCamera
+from drivers.interfaces import DeviceSet, MirrorMount, ProjectorControl, StereoCamera
 from drivers.no_projector import NoProjector
 from drivers.replay_camera import ReplayCamera, ReplaySettings
-from navapp.config import Configuration, FaultSection, SimulationSection
+from drivers.serial_port import SerialAddress
+from drivers.zaber_line import BAUD_RATE as ZABER_BAUD_RATE
+from drivers.zaber_mirror import ZaberMirror
+from navapp.config import (
+    Configuration,
+    FaultSection,
+    MirrorSection,
+    ProjectorSection,
+    SimulationSection,
+)
 from navapp.errors import ConfigurationError, DeviceError, RigError, WrongDevice
 from navapp.geometry import Rectifier, RigidTransform, StereoRig, TriangleMesh, read_rig
 from navapp.geometry.transform import FloatArray
@@ -168,7 +180,8 @@ def open_recording(
     clock = ManualClock()
     camera = ReplayCamera(source, clock, settings, rig_id=rig.rig_id)
     _open_fitting(camera, rig)
-    return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, _no_reopening)
+    devices = _device_set(configuration, camera, clock, rig, is_live=False)
+    return OpenedDevices(devices, rig, _no_reopening)
 
 
 def _configured_rig(configuration: Configuration) -> StereoRig:
@@ -291,14 +304,44 @@ def _third_party_camera(configuration: Configuration, clock: Clock) -> StereoCam
 
 
 def _device_set(
-    configuration: Configuration, camera: StereoCamera, clock: Clock, rig: StereoRig
+    configuration: Configuration,
+    camera: StereoCamera,
+    clock: Clock,
+    rig: StereoRig,
+    *,
+    is_live: bool = True,
 ) -> DeviceSet:
+    """The camera as it is, the others opened; when one cannot be opened, all are closed.
+
+    A recording moves no mirror and asks no projector.
+    """
+    projector: ProjectorControl = NoProjector()
+    mirror: MirrorMount = FixedMirror(configuration.mirror.calibrated_deg)
+    if is_live:
+        projector, mirror = _projector(configuration.projector), _mirror(configuration.mirror)
     display = SimulatedDisplay(clock, rig.width, rig.height)
-    mirror = FixedMirror(configuration.mirror.calibrated_deg)
-    projector = NoProjector()
-    for device in (display, mirror, projector):
-        device.open()
-    return DeviceSet(camera, display, projector, mirror, clock)
+    devices = DeviceSet(camera, display, projector, mirror, clock)
+    with ExitStack() as undo:
+        undo.callback(devices.close)
+        for device in (display, mirror, projector):
+            device.open()
+        undo.pop_all()
+    return devices
+
+
+def _projector(settings: ProjectorSection) -> ProjectorControl:
+    if settings.backend == "escvp21":
+        address = SerialAddress(settings.port, ESCVP21_BAUD_RATE)
+        return EscVp21Projector(address, SystemClock(), settings.serial)
+    return NoProjector()
+
+
+def _mirror(settings: MirrorSection) -> MirrorMount:
+    if settings.backend == "zaber":
+        address = SerialAddress(settings.port, ZABER_BAUD_RATE)
+        axis = (settings.device, settings.axis)
+        return ZaberMirror(address, SystemClock(), settings.serial, axis)
+    return FixedMirror(settings.calibrated_deg)
 
 
 def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:

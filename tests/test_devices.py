@@ -3,17 +3,20 @@
 import importlib.metadata
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from drivers.clock import Clock, ManualClock
+from drivers.interfaces import PowerState
 from drivers.replay_camera import ReplaySettings
 from navapp.config import Configuration, parse
 from navapp.devices import open_live, open_recording
-from navapp.errors import ConfigurationError, DeviceLost, RigError, WrongDevice
+from navapp.errors import ConfigurationError, DeviceLost, DeviceNotFound, RigError, WrongDevice
 from navapp.geometry import write_rig
 from sim_devices.camera import SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
+from tests.drivers.firmware_rigs import SERIAL, STAGE_SERIAL, projector_terminal, stage_terminal
 from tests.drivers.recordings import write_pairs
 from tests.sim_devices.plain_world import PlainWorld, plain_rig
 
@@ -129,3 +132,47 @@ def test_an_unknown_backend_is_refused(tmp_path, monkeypatch) -> None:
     announce(monkeypatch, [])
     with pytest.raises(ConfigurationError, match="no camera backend 'acme'"):
         open_live(acme(tmp_path), is_headless=True)
+
+
+def with_ports(folder: Path, projector: str = "", mirror: str = "") -> Configuration:
+    ports = {
+        "projector": {"backend": "escvp21", "port": f"{folder}/projector", "serial": projector},
+        "mirror": {"backend": "zaber", "port": f"{folder}/stage", "serial": mirror},
+    }
+    return parse({**SMALL, **ports}, "x")
+
+
+def test_projector_and_mirror_are_opened_on_their_ports(tmp_path) -> None:
+    with projector_terminal(tmp_path), stage_terminal(tmp_path):
+        opened = open_live(with_ports(tmp_path, SERIAL, STAGE_SERIAL), is_headless=True)
+        assert opened.devices.projector.name == f"sim:ESC/VP21 projector {SERIAL}"
+        assert opened.devices.mirror.info.name == f"sim:Zaber mount {STAGE_SERIAL}"
+        assert opened.devices.projector.status().power is PowerState.STANDBY
+        assert opened.devices.mirror.position_deg() is None
+        opened.devices.close()
+
+
+def test_another_mount_is_refused_and_everything_is_closed(tmp_path) -> None:
+    with projector_terminal(tmp_path), stage_terminal(tmp_path):
+        with pytest.raises(WrongDevice, match="has serial number 990123, the rig's is 1"):
+            open_live(with_ports(tmp_path, SERIAL, "1"), is_headless=True)
+        # A line that was left open would be refused to the second one.
+        open_live(with_ports(tmp_path, SERIAL), is_headless=True).devices.close()
+
+
+def test_a_port_that_is_not_there_says_what_to_do(tmp_path) -> None:
+    with pytest.raises(
+        DeviceNotFound, match=r"cannot be opened \(No such file.*: connect the device"
+    ):
+        open_live(with_ports(tmp_path), is_headless=True)
+
+
+def test_a_recording_asks_no_projector_and_moves_no_mirror(tmp_path) -> None:
+    write_pairs(tmp_path / "pairs", range(1))
+    rig = plain_rig(48, 32)
+    opened = open_recording(
+        str(tmp_path / "pairs"), ReplaySettings(), rig, with_ports(tmp_path / "nowhere")
+    )
+    assert opened.devices.projector.status().power is PowerState.ABSENT
+    assert not opened.devices.mirror.info.is_movable
+    opened.devices.close()

@@ -6,6 +6,8 @@ from navapp.config.sections import (
     CalibrationSection,
     Configuration,
     FaultSection,
+    MirrorSection,
+    ProjectorSection,
     Section,
     SimulationSection,
 )
@@ -16,6 +18,8 @@ __all__ = [
     "CalibrationSection",
     "Configuration",
     "FaultSection",
+    "MirrorSection",
+    "ProjectorSection",
     "Section",
     "SimulationSection",
     "as_toml",

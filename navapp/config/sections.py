@@ -1,6 +1,6 @@
 """The tables of the configuration: frozen models that refuse unknown keys."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -24,6 +24,15 @@ class Section(BaseModel):
         allow_inf_nan=False,
         use_attribute_docstrings=True,
     )
+
+
+S = TypeVar("S", bound="Section")
+
+
+def _with_port(section: S, needs_port: bool, port: str) -> S:
+    if needs_port and not port:
+        raise ValueError("this backend needs a port")
+    return section
 
 
 class FaultSection(Section):
@@ -119,17 +128,37 @@ class DisplaySection(Section):
 class ProjectorSection(Section):
     """The projector's control line."""
 
-    backend: Literal["none"] = "none"
-    """none."""
+    backend: Literal["none", "escvp21"] = "none"
+    """none, or escvp21: Epson's protocol on a serial line."""
+    port: str = ""
+    """Serial port (/dev/serial/by-id/...) or socket://host:port."""
+    serial: str = ""
+    """Serial number of the rig's projector; another one is refused. Empty: any."""
+
+    @model_validator(mode="after")
+    def _has_a_port(self) -> Self:
+        return _with_port(self, self.backend == "escvp21", self.port)
 
 
 class MirrorSection(Section):
     """The mount of the half-silvered mirror."""
 
-    backend: Literal["fixed"] = "fixed"
-    """fixed."""
+    backend: Literal["fixed", "zaber"] = "fixed"
+    """fixed, or zaber: a rotary stage that speaks Zaber's ASCII protocol."""
     calibrated_deg: float = 45.0
-    """Angle at which the display was calibrated."""
+    """Angle at which the display was calibrated; of a stage from its home position."""
+    port: str = ""
+    """Serial port (/dev/serial/by-id/...) or socket://host:port."""
+    serial: str = ""
+    """Serial number of the rig's mount; another one is refused. Empty: any."""
+    device: Annotated[int, Field(ge=1, le=99)] = 1
+    """Its number on the line."""
+    axis: Annotated[int, Field(ge=1, le=9)] = 1
+    """The axis' number in the device."""
+
+    @model_validator(mode="after")
+    def _has_a_port(self) -> Self:
+        return _with_port(self, self.backend == "zaber", self.port)
 
 
 class PlanSection(Section):

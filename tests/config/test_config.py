@@ -38,8 +38,15 @@ CHANGED: dict[str, Any] = {
         },
     },
     "display": {"backend": "simulated", "valid_ms": 100.0},
-    "projector": {"backend": "none"},
-    "mirror": {"backend": "fixed", "calibrated_deg": 44.5},
+    "projector": {"backend": "escvp21", "port": "/dev/ttyUSB0", "serial": "X4YZ"},
+    "mirror": {
+        "backend": "zaber",
+        "calibrated_deg": 44.5,
+        "port": "socket://stage:55550",
+        "serial": "990123",
+        "device": 2,
+        "axis": 3,
+    },
     "plan": {"path": 'plans\\p "1"', "prior": "prior.json"},
     "stereo": {},
     "registration": {},
@@ -57,7 +64,7 @@ CHANGED: dict[str, Any] = {
     "link": {},
     "ui": {},
 }
-ONLY_ONE_VALUE = {"display.backend", "projector.backend", "mirror.backend"}
+ONLY_ONE_VALUE = {"display.backend"}
 
 
 def keys_of(model: type[BaseModel], prefix: str = "") -> list[str]:
@@ -250,12 +257,22 @@ def test_a_wrong_type_names_the_key(key, value):
         ("camera.simulated.skew_ms", float("nan")),
         ("display.valid_ms", 0.0),
         ("mirror.calibrated_deg", float("inf")),
+        ("mirror.device", 0),
+        ("mirror.device", 100),
+        ("mirror.axis", 0),
     ],
 )
 def test_a_value_out_of_bounds_names_the_key(key, value):
     with pytest.raises(ConfigurationError) as caught:
         parse(nested(key, value), "x")
     assert caught.value.subject.startswith(key)
+
+
+@pytest.mark.parametrize(("table", "backend"), [("projector", "escvp21"), ("mirror", "zaber")])
+def test_a_serial_device_needs_a_port(table, backend):
+    with pytest.raises(ConfigurationError, match="needs a port"):
+        parse({table: {"backend": backend}}, "x")
+    assert parse({table: {"backend": backend, "port": "/dev/ttyS0"}}, "x")
 
 
 @pytest.mark.parametrize("key", ["camera.simulated.cartilage_mm", "camera.simulated.scale"])
