@@ -7,6 +7,7 @@ afterwards. A port is closed by the thread that reads it.
 
 import errno
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -126,10 +127,12 @@ class SerialPort:
 
     def close(self) -> None:
         """Release; a line that is gone cannot be flushed, which does not matter any more."""
-        try:
+        # Of a socket that was reset pyserial only forgets the handle.
+        handle = getattr(self._serial, "_socket", None)
+        with suppress(*_failures()):
+            if handle is not None:
+                handle.close()
             self._serial.close()
-        except _failures():
-            return
 
     def _lost(self, error: Exception) -> DeviceLost:
         return DeviceLost(
