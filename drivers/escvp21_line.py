@@ -70,6 +70,8 @@ class EscVp21Line:
             try:
                 return self._ask_once(name, form)
             except (DeviceTimeout, DeviceProtocolError):
+                if self.is_silent:
+                    raise
                 return self._ask_once(name, form)
 
     def tell(self, command: str, timeout_s: float = _ANSWER_S) -> None:
@@ -116,22 +118,26 @@ class EscVp21Line:
         self.line.send(f"{command}\r".encode("ascii"))
 
     def _answer(self, deadline_ns: int) -> str:
-        """The next answer: empty for a bare colon, `ERR`, or `NAME=value`; events are skipped."""
+        """The next answer: empty for a bare colon, `ERR`, or `NAME=value`.
+
+        Events are skipped, and so is what cannot be understood, unless nothing better comes.
+        """
+        damaged = ""
         for _ in range(_MOST_UNASKED):
             packet = self.line.next(deadline_ns)
             if packet is None:
-                raise self.line.silence()
+                break
             self._free_at_ns = self._clock.now_ns() + _PAUSE_NS
             lines = [part for part in re.split("[\r\n]+", packet.decode("latin-1")) if part]
             answers = [part for part in lines if not part.startswith(_EVENT)]
+            answer = "\r".join(answers)
             if lines and not answers:
                 continue
-            answer = "\r".join(answers)
-            if answer and answer != _REFUSED and _NAMED.fullmatch(answer) is None:
-                raise self._misunderstood(answer)
-            self._is_in_step = True
-            return answer
-        raise self._misunderstood("one line after the other")
+            if answer in ("", _REFUSED) or _NAMED.fullmatch(answer):
+                self._is_in_step = True
+                return answer
+            damaged = answer
+        raise self._misunderstood(damaged) if damaged else self.line.silence()
 
     def _get_in_step(self) -> None:
         """Send bare CRs until one is answered; once is enough for one known to be silent."""
