@@ -118,8 +118,9 @@ class ProjectorFirmware:
         self._out.clear()
 
     def restore_mains(self) -> None:
-        """Standby."""
+        """Standby; what was wrong is forgotten."""
         self.has_mains = True
+        self.model.fault = 0
 
     def _advance(self) -> None:
         """What the lamp has done by now."""

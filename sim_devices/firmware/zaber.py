@@ -75,7 +75,8 @@ class StageFirmware:
     @property
     def is_busy(self) -> bool:
         """It moves."""
-        return self._travel is not None
+        travel = self._travel
+        return travel is not None and self._clock.now_ns() < travel.end_ns
 
     def receive(self, data: bytes) -> None:
         """Bytes of commands."""
