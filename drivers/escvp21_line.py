@@ -1,5 +1,7 @@
 """ESC/VP21 on a line: commands that end with CR, answers that end with a colon, events between.
 
+On port 3629 of a network the line begins with a greeting (ESC/VP.net); then it is the same.
+
 The colon ends every answer and every event, and nothing says which answer belongs to which command
 but its name: so the line is brought into step again after every answer that did not come or could
 not be understood, and what came unasked is thrown away before a command is sent.
@@ -11,6 +13,11 @@ from drivers.clock import Clock
 from drivers.serial_line import SerialLine
 from drivers.serial_port import Address
 from navapp.errors import DeviceProtocolError, DeviceTimeout, UnsupportedControl
+
+# Projectors on a network are greeted first: name, version, type of message, status.
+_NETWORK_PORT = ":3629"
+_GREETING = b"ESC/VP.net\x10\x03\x00\x00\x00\x00"
+_STATUS_BYTE, _WELCOME = 14, 0x20
 
 _ANSWER_S = 3.0
 _PAUSE_NS = 100_000_000
@@ -49,6 +56,8 @@ class EscVp21Line:
             self.line.open()
             self._is_in_step = self.is_silent = False
             try:
+                if self.line.address.name.endswith(_NETWORK_PORT):
+                    self._greet()
                 self._get_in_step()
             except BaseException:
                 self.line.close()
@@ -150,6 +159,19 @@ class EscVp21Line:
                 return
         self.is_silent = True
         raise self.line.silence()
+
+    def _greet(self) -> None:
+        """Ask for the connection, as a projector on a network wants it."""
+        self.line.send(_GREETING)
+        answer = self.line.take(len(_GREETING), self.line.deadline_ns(_ANSWER_S))
+        if answer is None:
+            raise self.line.silence()
+        if not answer.startswith(_GREETING[:10]) or answer[_STATUS_BYTE] != _WELCOME:
+            raise DeviceProtocolError(
+                f"the projector at {self.line.address.name} refuses the connection",
+                subject="projector",
+                remedy="allow control over the network without a password in its menu",
+            )
 
     def _is_probe_answered(self, deadline_ns: int) -> bool:
         """What an earlier command left, or noise, may come before the colon."""

@@ -92,6 +92,19 @@ class SerialLine:
             if not self._receive(self.remaining_s(deadline_ns)):
                 return None
 
+    def take(self, n_bytes: int, deadline_ns: int) -> bytes | None:
+        """So many bytes, whatever they are; None when they have not come by then.
+
+        Raises:
+            DeviceLost: not open, or gone; it is closed then.
+        """
+        while len(self._received) < n_bytes:
+            if not self._receive(self.remaining_s(deadline_ns)):
+                return None
+        data = bytes(self._received[:n_bytes])
+        del self._received[:n_bytes]
+        return data
+
     def discard(self) -> None:
         """Forget what has come, and what comes until the line is quiet.
 

@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from drivers.escvp21_projector import SILENT
+from drivers.clock import ManualClock
+from drivers.escvp21_projector import SILENT, EscVp21Projector
 from drivers.interfaces import CommandResult, PowerState
 from navapp.errors import (
     DeviceLost,
@@ -16,7 +17,14 @@ from navapp.errors import (
     WrongDevice,
 )
 from sim_devices.firmware import wire
-from sim_devices.firmware.escvp21 import Power, ProjectorModel
+from sim_devices.firmware.escvp21 import (
+    NetworkedProjectorFirmware,
+    Power,
+    ProjectorFirmware,
+    ProjectorModel,
+)
+from sim_devices.firmware.memory_port import MemoryAddress
+from sim_devices.firmware.wire import Wire
 from tests.drivers.firmware_rigs import SERIAL, ProjectorRig
 
 VERIFIED, FINISHED, ACCEPTED = (
@@ -323,6 +331,33 @@ def test_a_tenth_of_a_second_passes_between_colon_and_command() -> None:
     gaps_s = [after - before for before, after in pairwise(moments_s)]
     assert len(gaps_s) > 8
     assert min(gaps_s) >= 0.1
+
+
+def networked(*, wants_password: bool) -> tuple[EscVp21Projector, Wire]:
+    clock = ManualClock(10**9)
+    firmware = NetworkedProjectorFirmware(ProjectorFirmware(clock), wants_password=wants_password)
+    line = Wire(firmware, clock)
+    return EscVp21Projector(MemoryAddress(line, "socket://projector:3629"), clock, SERIAL), line
+
+
+def test_a_projector_on_a_network_is_greeted_first() -> None:
+    projector, line = networked(wants_password=False)
+    line.spoiler = wire.split(0.001)
+    projector.open()
+    assert projector.set_power(True, 150.0) is VERIFIED
+
+
+def test_a_projector_that_wants_a_password_is_not_opened() -> None:
+    projector, _ = networked(wants_password=True)
+    with pytest.raises(DeviceProtocolError, match="refuses the connection: allow control"):
+        projector.open()
+
+
+def test_a_port_of_a_network_that_does_not_greet_is_silence() -> None:
+    projector, line = networked(wants_password=False)
+    line.spoiler = wire.lost
+    with pytest.raises(DeviceTimeout, match="does not answer"):
+        projector.open()
 
 
 def test_its_name_says_that_it_is_simulated() -> None:

@@ -25,7 +25,8 @@ class Fuzz:
         self.random = random.Random(seed)
         self.n_replies = 0
         self.share = 0.0
-        self._ways = (
+        self.heard: list[bytes] = []
+        self.ways: list[wire.Spoiler] = [
             wire.lost,
             wire.doubled,
             wire.corrupted(self.random),
@@ -36,13 +37,13 @@ class Fuzz:
             self.noise_before,
             self.cut,
             self.torn,
-        )
+        ]
 
     def __call__(self, message: bytes) -> Pieces:
         self.n_replies += 1
         if self.random.random() >= self.share:
             return wire.whole(message)
-        return self.random.choice(self._ways)(message)
+        return self.random.choice(self.ways)(message)
 
     def noise(self, message: bytes) -> Pieces:
         return [(0, self.random.randbytes(self.random.randint(1, 60)))]
@@ -58,6 +59,16 @@ class Fuzz:
         place = self.random.randint(0, len(message))
         gap_ns = self.random.randint(0, 4_000_000_000)
         return [(0, message[:place]), (gap_ns, message[place:])]
+
+    def misread(self, message: bytes) -> Pieces:
+        """Other digits in the same places: it reads well and is wrong."""
+        digits = bytes(self.random.choice(b"0123456789") if 48 <= b <= 57 else b for b in message)
+        return wire.whole(digits)
+
+    def replayed(self, message: bytes) -> Pieces:
+        """An older message instead, as it was."""
+        self.heard.append(message)
+        return wire.whole(self.random.choice(self.heard[-200:]))
 
     def command(self, data: bytes) -> bytes:
         """Commands suffer too, more rarely."""
@@ -134,6 +145,8 @@ def test_a_projector_never_believes_a_spoilt_line() -> None:
 def test_a_mirror_never_believes_a_spoilt_line() -> None:
     rig = StageRig()
     fuzz, firmware = Fuzz(2), rig.firmware
+    # A protocol with numbers and checksums must bear these as well.
+    fuzz.ways += [fuzz.misread, fuzz.replayed] * 2
     n_known = dict.fromkeys(("position", "arrived"), 0)
 
     def home() -> None:
