@@ -89,13 +89,20 @@ class ZaberAxis:
         return readings[-1]
 
     def home(self, timeout_s: float) -> None:
-        """Find the reference position; errors as of `move`."""
+        """Find the reference position, from which it counts; errors as of `move`."""
         self.is_homed = False
         self._tell("home", self.talk.ask)
         self._wait_until_idle(timeout_s, "finding its home position")
         # What the flags said on the way there does not count any more.
         self.trust()
         self._require_clear("homing")
+        if (found := self.steps()) != 0:
+            self.is_homed = False
+            raise DeviceProtocolError(
+                f"the mirror counts {found} steps at its home position",
+                subject="mirror",
+                remedy="home it again; a stage that does not count from 0 cannot be used",
+            )
 
     def move(self, command: str, limit_s: float, *, is_repeatable: bool) -> None:
         """Give a motion command and follow it to its end.

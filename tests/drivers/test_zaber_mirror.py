@@ -101,6 +101,14 @@ def test_a_stall_is_named_and_costs_the_reference() -> None:
     assert rig.driver.position_deg() == pytest.approx(45.0, abs=0.001)
 
 
+def test_a_home_that_is_not_at_zero_is_not_believed() -> None:
+    rig = at_45()
+    rig.firmware._set_off = lambda end, at_end=None: None
+    with pytest.raises(DeviceProtocolError, match="counts 48000 steps at its home position"):
+        rig.driver.home(30.0)
+    assert rig.driver.position_deg() is None
+
+
 def test_a_stall_while_homing_is_named() -> None:
     rig = StageRig()
     rig.driver.open()
