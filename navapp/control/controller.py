@@ -19,7 +19,7 @@ from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
 from navapp.control.companions import Companions
 from navapp.control.device_care import MirrorCare, ProjectorCare
-from navapp.control.device_watch import SlowDevices
+from navapp.control.device_watch import SlowDevices, tell_changes
 from navapp.control.display_link import DisplayLink
 from navapp.control.executors import Executor
 from navapp.control.pictures import compose
@@ -29,15 +29,7 @@ from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session, SessionHooks, with_bound
 from navapp.control.snapshots import SnapshotMaker
 from navapp.control.stages import STAGES
-from navapp.control.states import (
-    Blank,
-    Command,
-    DeviceHealth,
-    EventLevel,
-    Interrupt,
-    SessionState,
-    Snapshot,
-)
+from navapp.control.states import Blank, Command, EventLevel, Interrupt, SessionState, Snapshot
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import make_preview
@@ -51,8 +43,6 @@ from navapp.values import (
     StageSpec,
     TrackedFrame,
 )
-
-_FAILED = (DeviceHealth.TROUBLE, DeviceHealth.LOST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +155,7 @@ class SessionController:
             self._display.darken()
         elif not (self._snapshot.is_navigable or self._snapshot.is_candidate):
             self._display.withdraw_guides()
-        self._tell_devices(before)
+        tell_changes(session, before, self._snapshot)
         return self._snapshot
 
     def close(self) -> None:
@@ -260,17 +250,6 @@ class SessionController:
         self._session.preview = make_preview(image)
         age_ns = self._session.clock.now_ns() - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
-
-    def _tell_devices(self, before: Snapshot) -> None:
-        """Say once what projector or mirror has begun, or has ceased, to have against guides."""
-        session, now = self._session, self._snapshot
-        for reason in now.device_reasons:
-            if reason not in before.device_reasons:
-                details = "; ".join(line.detail for line in now.devices if line.health in _FAILED)
-                session.event("device", f"dark: {reason.value} ({details})", EventLevel.ALARM)
-        for reason in before.device_reasons:
-            if reason not in now.device_reasons:
-                session.event("device", f"no longer: {reason.value}")
 
     def _take_over(self, next_sequence: int) -> TrackedFrame | None:
         """Bring a finished registration under review; its best answer, when there is one."""

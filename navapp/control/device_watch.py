@@ -4,7 +4,8 @@ import threading
 
 from drivers.clock import Clock, SystemClock
 from navapp.control.device_care import Care, MirrorCare, ProjectorCare, Report
-from navapp.control.states import DeviceHealth, DeviceLine
+from navapp.control.session import Session
+from navapp.control.states import DeviceHealth, DeviceLine, EventLevel, Snapshot
 from navapp.errors import DeviceError
 
 # Between two questions, and after which an answer that was not renewed counts no more. A mirror
@@ -12,6 +13,9 @@ from navapp.errors import DeviceError
 MIRROR_TIMES_S = (0.2, 1.5)
 PROJECTOR_TIMES_S = (3.0, 20.0)
 _FIRST_RETRY_S, _LAST_RETRY_S = 1.0, 8.0
+
+
+_FAILED = (DeviceHealth.TROUBLE, DeviceHealth.LOST)
 
 
 class DeviceWatch:
@@ -131,3 +135,14 @@ class SlowDevices:
         """End all watching; the devices stay open."""
         for watch in self._watches:
             watch.close()
+
+
+def tell_changes(session: Session, before: Snapshot, after: Snapshot) -> None:
+    """Say once what projector or mirror has begun, or has ceased, to have against guides."""
+    for reason in after.device_reasons:
+        if reason not in before.device_reasons:
+            details = "; ".join(line.detail for line in after.devices if line.health in _FAILED)
+            session.event("device", f"dark: {reason.value} ({details})", EventLevel.ALARM)
+    for reason in before.device_reasons:
+        if reason not in after.device_reasons:
+            session.event("device", f"no longer: {reason.value}")
