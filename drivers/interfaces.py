@@ -254,7 +254,7 @@ class MirrorMount(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop moving, now."""
+        """Stop moving, now; any thread may call it, and the motion that it ends then raises."""
         ...
 
     def close(self) -> None:

@@ -318,6 +318,13 @@ def test_events_without_end_are_no_answer() -> None:
     assert (status.power, status.faults) == (PowerState.FAULT, (SILENT,))
 
 
+def test_a_full_reading_takes_a_second_and_a_half() -> None:
+    rig = lit()
+    begin_s = rig.now_s
+    rig.driver.status()
+    assert 1.3 < rig.now_s - begin_s < 1.6
+
+
 def test_a_tenth_of_a_second_passes_between_colon_and_command() -> None:
     rig = lit()
     moments_s = []
