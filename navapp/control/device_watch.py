@@ -55,7 +55,8 @@ class DeviceWatch:
         made_ns, report = self._made
         if self._is_restoring and self._care.restoring:
             return self._with(report, DeviceHealth.TROUBLE, self._care.restoring)
-        if self._clock.now_ns() - made_ns > self._stale_s * 1e9:
+        is_lost = report.line.health is DeviceHealth.LOST
+        if not is_lost and self._clock.now_ns() - made_ns > self._stale_s * 1e9:
             return self._with(report, DeviceHealth.LOST, "has not answered for a while")
         return report
 

@@ -1,7 +1,28 @@
-"""How a stage travels: phases of constant acceleration, in microsteps and seconds."""
+"""A stage and how it travels: phases of constant acceleration, in microsteps and seconds."""
 
 import math
 from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class StageModel:
+    """What differs between stages.
+
+    Attributes:
+        serial: number.
+        steps_per_turn: microsteps.
+        highest: of the range that begins with 0.
+        speed: microsteps/s.
+        acceleration: microsteps/s^2.
+        unhomed_steps: how far from home it stands when it gets power.
+    """
+
+    serial: int = 990123
+    steps_per_turn: int = 384_000
+    highest: int = 128_000
+    speed: float = 26_000.0
+    acceleration: float = 100_000.0
+    unhomed_steps: float = 21_000.0
 
 
 @dataclass(frozen=True, slots=True)

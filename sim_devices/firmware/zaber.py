@@ -2,10 +2,9 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from drivers.clock import Clock
-from sim_devices.firmware.stage_motion import Travel, to_place, to_rest
+from sim_devices.firmware.stage_motion import StageModel, Travel, to_place, to_rest
 
 # The most urgent first.
 _FAULTS = ("FF", "FN", "FZ", "FH", "FV", "FO", "FC", "FM", "FD", "FQ", "FI", "FA", "FR", "FS", "FB")
@@ -19,27 +18,6 @@ _SPEED_UNIT = 1.6384
 
 def _nothing() -> None:
     """Happens at the end of most motions."""
-
-
-@dataclass(slots=True)
-class StageModel:
-    """What differs between stages.
-
-    Attributes:
-        serial: number.
-        steps_per_turn: microsteps.
-        highest: of the range that begins with 0.
-        speed: microsteps/s.
-        acceleration: microsteps/s^2.
-        unhomed_steps: how far from home it stands when it gets power.
-    """
-
-    serial: int = 990123
-    steps_per_turn: int = 384_000
-    highest: int = 128_000
-    speed: float = 26_000.0
-    acceleration: float = 100_000.0
-    unhomed_steps: float = 21_000.0
 
 
 class StageFirmware:

@@ -96,12 +96,14 @@ def test_an_answer_that_stays_away_makes_the_device_lost(watch, care, clock) -> 
     assert watch.report.reason is None
 
 
-def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, monkeypatch) -> None:
+def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, clock, monkeypatch) -> None:
     monkeypatch.setattr("navapp.control.device_watch._FIRST_RETRY_S", 0.01)
     care.error = DeviceNotFound("not plugged in")
     care.health = DeviceHealth.LOST
     wait_for(lambda: watch.report.line.detail == "not plugged in", "the error")
     assert watch.report.reason is Reason.MIRROR_AWAY
+    clock.advance_ns(10**11)
+    assert watch.report.line.detail == "not plugged in", "however long the pauses become"
     care.error, care.health = None, DeviceHealth.OK
     watch.restore()
     wait_for(lambda: watch.report.line.health is DeviceHealth.OK, "its return")

@@ -13,8 +13,9 @@ from sim_devices.firmware.escvp21 import ProjectorFirmware, ProjectorModel
 from sim_devices.firmware.fast_clock import FastClock
 from sim_devices.firmware.memory_port import MemoryAddress
 from sim_devices.firmware.pseudo_terminal import PseudoTerminal
+from sim_devices.firmware.stage_motion import StageModel
 from sim_devices.firmware.wire import Wire
-from sim_devices.firmware.zaber import StageFirmware, StageModel
+from sim_devices.firmware.zaber import StageFirmware
 
 SERIAL = "SIM1200123"
 STAGE_SERIAL = "990123"

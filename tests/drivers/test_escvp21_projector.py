@@ -17,12 +17,8 @@ from navapp.errors import (
     WrongDevice,
 )
 from sim_devices.firmware import wire
-from sim_devices.firmware.escvp21 import (
-    NetworkedProjectorFirmware,
-    Power,
-    ProjectorFirmware,
-    ProjectorModel,
-)
+from sim_devices.firmware.escvp21 import Power, ProjectorFirmware, ProjectorModel
+from sim_devices.firmware.escvpnet import NetworkedProjectorFirmware
 from sim_devices.firmware.memory_port import MemoryAddress
 from sim_devices.firmware.wire import Wire
 from tests.drivers.firmware_rigs import SERIAL, ProjectorRig

@@ -18,7 +18,7 @@ from navapp.errors import (
     WrongDevice,
 )
 from sim_devices.firmware import wire
-from sim_devices.firmware.zaber import StageModel
+from sim_devices.firmware.stage_motion import StageModel
 from tests.drivers.firmware_rigs import STAGE_SERIAL, StageRig, mirror_at, stage_terminal
 
 # Of the public test-suites of other implementations.

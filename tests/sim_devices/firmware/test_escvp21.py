@@ -6,26 +6,16 @@ import pytest
 
 from drivers.clock import ManualClock
 from sim_devices.firmware.escvp21 import Power, ProjectorFirmware, ProjectorModel
+from tests.sim_devices.firmware.terminals import Terminal
 
 
-class Terminal:
-    """Types commands and reads what comes."""
-
-    def __init__(self, **model) -> None:
-        self.clock = ManualClock()
-        self.firmware = ProjectorFirmware(self.clock, ProjectorModel(**model))
-
-    def type(self, command: bytes) -> bytes:
-        self.firmware.receive(command)
-        return b"".join(self.firmware.messages())
-
-    def after_s(self, duration_s: float) -> bytes:
-        self.clock.advance_ns(round(duration_s * 1e9))
-        return b"".join(self.firmware.messages())
+def terminal_of_a_projector(**model: object) -> Terminal:
+    clock = ManualClock()
+    return Terminal(ProjectorFirmware(clock, ProjectorModel(**model)), clock)
 
 
 def test_the_guides_exchanges() -> None:
-    terminal = Terminal(serial="X4YZ1200123", hours=(1633, 1633))
+    terminal = terminal_of_a_projector(serial="X4YZ1200123", hours=(1633, 1633))
     assert terminal.type(b"\r") == b":"
     assert terminal.type(b"PWR?\r") == b"PWR=04\r:"
     assert terminal.type(b"PWR ON\r") == b""
@@ -41,7 +31,7 @@ def test_the_guides_exchanges() -> None:
 
 
 def test_a_quick_model_answers_while_it_warms_up() -> None:
-    terminal = Terminal(is_quick=True)
+    terminal = terminal_of_a_projector(is_quick=True)
     assert terminal.type(b"PWR ON\r") == b":"
     assert terminal.type(b"PWR?\r") == b"PWR=02\r:"
     assert terminal.type(b"MUTE ON\r") == b"ERR\r:"
@@ -49,20 +39,20 @@ def test_a_quick_model_answers_while_it_warms_up() -> None:
 
 
 def test_what_is_typed_while_the_lamp_burns_up_is_answered_afterwards() -> None:
-    terminal = Terminal()
+    terminal = terminal_of_a_projector()
     assert terminal.type(b"PWR ON\rPWR?\r") == b""
     assert terminal.after_s(40.1) == b":PWR=01\r:"
 
 
 def test_events_tell_of_the_lamp() -> None:
-    terminal = Terminal(has_events=True)
+    terminal = terminal_of_a_projector(has_events=True)
     warming = b"IMEVENT=0001 02 00000000 00000000 T1 F1\r:"
     assert terminal.type(b"PWR ON\r") == warming
     assert terminal.after_s(40.1) == warming.replace(b" 02 ", b" 03 ") + b":"
 
 
 def test_an_abnormal_projector_is_silent_and_takes_the_lamp_after_its_pause() -> None:
-    terminal = Terminal(n_failing=3)
+    terminal = terminal_of_a_projector(n_failing=3)
     assert terminal.type(b"PWR ON\r") == b""
     assert terminal.after_s(100.1) == b""
     assert terminal.firmware.power is Power.ABNORMAL
@@ -78,7 +68,7 @@ def test_an_abnormal_projector_is_silent_and_takes_the_lamp_after_its_pause() ->
     ("given", "kept"), [(0, 0), (126, 126), (127, 126), (128, 130), (255, 251)]
 )
 def test_keystone_has_61_steps(given, kept) -> None:
-    terminal = Terminal(is_quick=True)
+    terminal = terminal_of_a_projector(is_quick=True)
     terminal.type(b"PWR ON\r")
     terminal.after_s(41.0)
     assert terminal.type(f"HKEYSTONE {given}\r".encode()) == b":"
@@ -86,7 +76,7 @@ def test_keystone_has_61_steps(given, kept) -> None:
 
 
 def test_random_bytes_do_it_no_harm() -> None:
-    terminal, bits = Terminal(), random.Random(1)
+    terminal, bits = terminal_of_a_projector(), random.Random(1)
     for _ in range(1000):
         terminal.type(bits.randbytes(100))
     terminal.type(b"\r")

@@ -8,26 +8,16 @@ import pytest
 from drivers.clock import ManualClock
 from sim_devices.firmware.stage_motion import to_place, to_rest
 from sim_devices.firmware.zaber import StageFirmware
+from tests.sim_devices.firmware.terminals import Terminal
 
 
-class Terminal:
-    """Types commands and reads what comes."""
-
-    def __init__(self) -> None:
-        self.clock = ManualClock()
-        self.firmware = StageFirmware(self.clock)
-
-    def type(self, command: bytes) -> bytes:
-        self.firmware.receive(command)
-        return b"".join(self.firmware.messages())
-
-    def after_s(self, duration_s: float) -> bytes:
-        self.clock.advance_ns(round(duration_s * 1e9))
-        return b"".join(self.firmware.messages())
+def terminal_of_a_stage() -> Terminal:
+    clock = ManualClock()
+    return Terminal(StageFirmware(clock), clock)
 
 
 def test_the_manuals_exchanges() -> None:
-    terminal = Terminal()
+    terminal = terminal_of_a_stage()
     assert terminal.type(b"/1 1 get pos\n") == b"@01 1 OK IDLE WR 0\r\n"
     assert terminal.type(b"/1 1 home\n") == b"@01 1 OK BUSY WR 0\r\n"
     assert terminal.type(b"/1 1\n") == b"@01 1 OK BUSY WR 0\r\n"
@@ -44,7 +34,7 @@ def test_the_manuals_exchanges() -> None:
 
 
 def test_checksums_are_checked_and_sent() -> None:
-    terminal = Terminal()
+    terminal = terminal_of_a_stage()
     assert terminal.type(b"/1 get pos:FD\n") == b"@01 0 OK IDLE WR 0\r\n"
     assert terminal.type(b"/1 get pos:FE\n") == b""
     assert terminal.type(b"/1 0 set comm.checksum 1\n").startswith(b"@01 0 OK IDLE WR 0:")
@@ -54,7 +44,7 @@ def test_checksums_are_checked_and_sent() -> None:
 
 def test_an_absolute_move_without_reference_goes_wrong() -> None:
     """So that a driver that does not refuse it is found out."""
-    terminal = Terminal()
+    terminal = terminal_of_a_stage()
     before_deg = terminal.firmware.true_deg
     terminal.type(b"/1 1 move abs 10000\n")
     terminal.after_s(5.0)
@@ -62,7 +52,7 @@ def test_an_absolute_move_without_reference_goes_wrong() -> None:
 
 
 def test_warnings_are_listed_and_cleared() -> None:
-    terminal = Terminal()
+    terminal = terminal_of_a_stage()
     terminal.firmware.flags.add("NC")
     assert terminal.type(b"/1 1 warnings\n") == b"@01 1 OK IDLE WR 02 WR NC\r\n"
     assert terminal.type(b"/1 1 warnings clear\n") == b"@01 1 OK IDLE WR 02 WR NC\r\n"
@@ -70,7 +60,7 @@ def test_warnings_are_listed_and_cleared() -> None:
 
 
 def test_a_knob_alerts() -> None:
-    terminal = Terminal()
+    terminal = terminal_of_a_stage()
     terminal.type(b"/1 1 home\n")
     terminal.after_s(5.0)
     terminal.type(b"/1 0 set comm.alert 1\n")
@@ -79,7 +69,7 @@ def test_a_knob_alerts() -> None:
 
 
 def test_random_bytes_do_it_no_harm() -> None:
-    terminal, bits = Terminal(), random.Random(1)
+    terminal, bits = terminal_of_a_stage(), random.Random(1)
     for _ in range(1000):
         terminal.type(b"/" + bits.randbytes(100))
     terminal.type(b"\n")
