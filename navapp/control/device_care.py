@@ -9,7 +9,7 @@ from navapp.errors import DeviceError
 from navapp.values import Reason
 
 # A mirror turned by an angle turns what is seen in it by twice that: at half a metre this moves a
-# guide by 0.5 mm, the smallest error that a stage is concerned with.
+# guide by 0.5 mm, half of what the strictest stage tolerates.
 MIRROR_TOLERANCE_DEG = 0.028
 _MOTION_S = 60.0
 
