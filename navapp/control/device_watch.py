@@ -79,17 +79,17 @@ class DeviceWatch:
             self._thread.join(20.0)
 
     def _run(self) -> None:
-        pause_s = self._period_s
+        retry_s = 0.0
         while True:
-            self._wake.wait(pause_s)
+            self._wake.wait(retry_s or self._period_s)
             self._wake.clear()
             if self._is_over:
                 return
             report = self._asked()
             self._made = (self._clock.now_ns(), report)
             is_lost = report.line.health is DeviceHealth.LOST
-            longer_s = min(_LAST_RETRY_S, max(_FIRST_RETRY_S, 2.0 * pause_s))
-            pause_s = longer_s if is_lost else self._period_s
+            longer_s = min(_LAST_RETRY_S, max(_FIRST_RETRY_S, 2.0 * retry_s))
+            retry_s = longer_s if is_lost else 0.0
 
     def _asked(self) -> Report:
         n_asked, report = self._n_asked, self._made[1]

@@ -110,6 +110,21 @@ def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, clock, mo
     assert care.n_reopened >= 2
 
 
+def test_the_pauses_between_attempts_double(care, clock, monkeypatch) -> None:
+    pauses_s = []
+    monkeypatch.setattr("navapp.control.device_watch._FIRST_RETRY_S", 0.01)
+    monkeypatch.setattr("navapp.control.device_watch._LAST_RETRY_S", 0.05)
+    care.health, care.error = DeviceHealth.LOST, DeviceLost("gone")
+    watch = DeviceWatch(care, (0.002, 1.0), clock)
+    wait = watch._wake.wait
+    watch._wake.wait = lambda pause_s: pauses_s.append(pause_s) or wait(pause_s)
+    wait_for(lambda: len(pauses_s) > 6, "attempts")
+    watch.close()
+    assert set(pauses_s) <= {0.002, 0.01, 0.02, 0.04, 0.05}
+    assert pauses_s[-3:] == [0.05] * 3
+    assert pauses_s == sorted(pauses_s), "never shorter while it stays away"
+
+
 def test_attempts_become_rarer_and_the_operator_does_not_wait(watch, care, monkeypatch) -> None:
     monkeypatch.setattr("navapp.control.device_watch._FIRST_RETRY_S", 30.0)
     monkeypatch.setattr("navapp.control.device_watch._LAST_RETRY_S", 30.0)
