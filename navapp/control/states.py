@@ -70,7 +70,7 @@ class EnterStage:
 
 @dataclass(frozen=True, slots=True)
 class Reconnect:
-    """Try to open lost devices again, now."""
+    """Open lost devices again and bring the mirror to its place, now."""
 
 
 @dataclass(frozen=True, slots=True)
