@@ -145,10 +145,12 @@ class Keeper:
         return picture if now_ns < self._memory.valid_until_ns(picture) else 0
 
     def _show(self, picture: int) -> bool:
-        """Make it visible; False when it was overwritten or expired meanwhile."""
+        """Make it visible; False when it must not be seen any more, or was replaced meanwhile.
+
+        Its place is written again only after the picture between has been published.
+        """
         self._window.draw(self._memory.pictures[picture % 2] if picture else None)
-        is_whole = self._memory.fields[Field.WRITING] < picture + 2
-        if picture and not (is_whole and self._wanted() == picture):
+        if picture and self._wanted() != picture:
             return False
         self._window.flip()
         self._seen = self._memory.fields[Field.SEEN] = picture
