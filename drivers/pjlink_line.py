@@ -112,7 +112,7 @@ class PjlinkLine:
             raise PasswordRefused(
                 "the projector wants a password",
                 subject="projector",
-                remedy="set [projector] password to the one in the projector's network menu",
+                remedy="write the one of its network menu into [projector] password_file",
             )
         return digest(salt, password) if salt else ""
 

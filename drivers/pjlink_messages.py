@@ -141,7 +141,7 @@ def _check_not_refused(line: str) -> None:
         raise PasswordRefused(
             "the projector refuses the password",
             subject="projector",
-            remedy="set [projector] password to the one in the projector's network menu",
+            remedy="write the one of its network menu into [projector] password_file",
         )
 
 

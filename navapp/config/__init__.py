@@ -5,7 +5,9 @@ from navapp.config.files import FILE_NAME, find_file, load
 from navapp.config.sections import (
     CalibrationSection,
     Configuration,
+    DisplaySection,
     FaultSection,
+    ProjectorSection,
     Section,
     SimulationSection,
 )
@@ -15,7 +17,9 @@ __all__ = [
     "FILE_NAME",
     "CalibrationSection",
     "Configuration",
+    "DisplaySection",
     "FaultSection",
+    "ProjectorSection",
     "Section",
     "SimulationSection",
     "as_toml",

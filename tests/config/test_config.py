@@ -37,8 +37,20 @@ CHANGED: dict[str, Any] = {
             ],
         },
     },
-    "display": {"backend": "simulated", "valid_ms": 100.0},
-    "projector": {"backend": "none"},
+    "display": {
+        "backend": "window",
+        "output": 'DELL 24"',
+        "size_px": [1920, 1080],
+        "flip_horizontally": True,
+        "flip_vertically": True,
+        "valid_ms": 100.0,
+    },
+    "projector": {
+        "backend": "pjlink",
+        "host": "10.0.0.7",
+        "tcp_port": 4353,
+        "password_file": "pjlink.txt",
+    },
     "mirror": {"backend": "fixed", "calibrated_deg": 44.5},
     "plan": {"path": 'plans\\p "1"', "prior": "prior.json"},
     "stereo": {},
@@ -57,7 +69,7 @@ CHANGED: dict[str, Any] = {
     "link": {},
     "ui": {},
 }
-ONLY_ONE_VALUE = {"display.backend", "projector.backend", "mirror.backend"}
+ONLY_ONE_VALUE = {"mirror.backend"}
 
 
 def keys_of(model: type[BaseModel], prefix: str = "") -> list[str]:
@@ -194,7 +206,7 @@ def test_an_unknown_key_names_the_nearest_known_one(content, key, nearest):
 
 
 def test_an_unknown_key_like_no_other_names_what_is_known():
-    with pytest.raises(ConfigurationError, match=r"known here: backend, valid_ms$"):
+    with pytest.raises(ConfigurationError, match=r"known here: backend, output, .*valid_ms$"):
         parse({"display": {"xyzzy": 1}}, "x")
     with pytest.raises(ConfigurationError, match=r"known here: nothing$"):
         parse({"ui": {"xyzzy": 1}}, "x")
@@ -249,6 +261,8 @@ def test_a_wrong_type_names_the_key(key, value):
         ("camera.simulated.scale", 1.01),
         ("camera.simulated.skew_ms", float("nan")),
         ("display.valid_ms", 0.0),
+        ("display.size_px", [0, 720]),
+        ("projector.tcp_port", 65536),
         ("mirror.calibrated_deg", float("inf")),
     ],
 )
@@ -256,6 +270,15 @@ def test_a_value_out_of_bounds_names_the_key(key, value):
     with pytest.raises(ConfigurationError) as caught:
         parse(nested(key, value), "x")
     assert caught.value.subject.startswith(key)
+
+
+@pytest.mark.parametrize(
+    ("table", "backend", "text"),
+    [("display", "window", "a window needs size_px"), ("projector", "pjlink", "needs a host")],
+)
+def test_a_device_needs_to_be_described(table, backend, text):
+    with pytest.raises(ConfigurationError, match=text):
+        parse({table: {"backend": backend}}, "x")
 
 
 @pytest.mark.parametrize("key", ["camera.simulated.cartilage_mm", "camera.simulated.scale"])
