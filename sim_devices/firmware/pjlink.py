@@ -192,7 +192,8 @@ class PjlinkSession:
         self._received += data
         while b"\r" in self._received and not self.is_over:
             line, _, self._received = self._received.partition(b"\r")
-            replies += self._reply(line.decode("latin-1"))
+            # A terminal program ends its lines with a line feed, too.
+            replies += self._reply(line.decode("latin-1").lstrip("\n"))
             self._last_ns = self._projector.clock.now_ns()
         if len(self._received) > _MOST_LINE_BYTES:
             self._received = b""

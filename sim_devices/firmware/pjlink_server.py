@@ -118,7 +118,7 @@ def main(arguments: Sequence[str]) -> None:
     """Run a projector until interrupted."""
     parser = argparse.ArgumentParser(
         prog="python -m sim_devices.firmware.pjlink_server",
-        description="a simulated PJLink projector; end each line with a carriage return",
+        description="a simulated PJLink projector for a terminal program",
     )
     parser.add_argument("--port", type=int, default=4352, help="on 127.0.0.1; 0: any free one")
     parser.add_argument("--password", default="", help="of PJLink; empty: none")

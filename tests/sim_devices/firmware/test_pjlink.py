@@ -66,6 +66,7 @@ def test_it_hangs_up_after_half_a_minute_of_silence(projector) -> None:
         (b"%1POWR 2", b"%1POWR=ERR2"),
         (b"%1INPT 99", b"%1INPT=ERR2"),
         (b"%1powr ?", b"%1POWR=0"),
+        (b"\n%1POWR ?", b"%1POWR=0"),
         (b"%1INST ?", b"%1INST=11 31 32"),
         (b"%2SNUM ?", b""),
         (b"", b""),
