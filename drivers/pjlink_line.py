@@ -40,6 +40,10 @@ class Connection(Protocol):
         ...
 
 
+# Makes a connection within so many seconds; DeviceNotFound when nothing answers.
+Connect = Callable[[float], Connection]
+
+
 class TcpConnection:
     """Over the network.
 
@@ -47,9 +51,9 @@ class TcpConnection:
         DeviceNotFound: nothing answers there.
     """
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, timeout_s: float) -> None:
         try:
-            self._socket = socket.create_connection((host, port), _CONNECT_S)
+            self._socket = socket.create_connection((host, port), timeout_s)
         except (OSError, UnicodeError) as error:
             raise DeviceNotFound(
                 f"no projector answers at {host} port {port} ({error})",
@@ -79,13 +83,14 @@ class PjlinkLine:
         DeviceNotFound, DeviceLost, DeviceTimeout, DeviceProtocolError, PasswordRefused.
     """
 
-    def __init__(
-        self, connect: Callable[[], Connection], password: str, clock: Clock, until_ns: int
-    ) -> None:
+    def __init__(self, connect: Connect, password: str, clock: Clock, until_ns: int) -> None:
         self._clock = clock
         self._until_ns = until_ns
         self._received = b""
-        self._connection = connect()
+        left_s = (until_ns - clock.now_ns()) / 1e9
+        if left_s <= 0.0:
+            raise _silent()
+        self._connection = connect(min(_CONNECT_S, left_s))
         try:
             self._prefix = self._authentication(password)
         except BaseException:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock
 from drivers.interfaces import CommandResult, PowerState, ProjectorStatus
-from drivers.pjlink_line import Connection, PjlinkLine
+from drivers.pjlink_line import Connect, PjlinkLine
 from drivers.pjlink_messages import (
     LIT,
     MUTED,
@@ -58,15 +58,13 @@ class PjlinkProjector:
     come to that in time. PJLink has no answer that would mean FINISHED.
     """
 
-    def __init__(
-        self, address: str, clock: Clock, connect: Callable[[], Connection], password: str = ""
-    ) -> None:
+    def __init__(self, address: str, clock: Clock, connect: Connect, password: str = "") -> None:
         """A projector that is not connected yet.
 
         Args:
             address: for people.
             clock: by which it waits.
-            connect: makes a new connection; DeviceNotFound when nothing answers.
+            connect: makes a new connection.
             password: of PJLink, empty for none; appears in no message.
         """
         self._name = f"projector at {address}"

@@ -67,8 +67,10 @@ class Window:
         self._pygame.display.flip()
 
     def was_disturbed(self) -> bool:
-        """Whether anything has happened to the window, so that it must be shown again."""
-        return bool(self._pygame.event.get())
+        """Whether a part of the window was lost, so that it must be shown again."""
+        game = self._pygame
+        losses = (game.VIDEOEXPOSE, game.WINDOWEXPOSED, game.WINDOWSHOWN, game.WINDOWRESTORED)
+        return any(event.type in losses for event in game.event.get())
 
     def is_in_place(self) -> bool:
         """Whether it covers its output."""

@@ -67,6 +67,7 @@ class WindowProcess:
             self.memory = WindowMemory(descriptor, settings.width, settings.height)
             os.close(descriptor)
             undo.pop_all()
+        self._wake_lock, self._is_closed = threading.Lock(), False
         self._stopping = threading.Event()
         self._guard = threading.Thread(target=self._watch, name="window-guard", daemon=True)
         self._guard.start()
@@ -83,8 +84,9 @@ class WindowProcess:
 
     def wake(self) -> None:
         """Make it look at the memory now; a pipe that is full does so already."""
-        with contextlib.suppress(OSError):
-            os.write(self._wake, b"!")
+        with self._wake_lock, contextlib.suppress(OSError):
+            if not self._is_closed:
+                os.write(self._wake, b"!")
 
     def close(self) -> None:
         """Black, then end it, by force when it does not obey."""
@@ -93,7 +95,10 @@ class WindowProcess:
         self.memory.fields[Field.QUIT] = 1
         self.wake()
         _end(self._process)
-        os.close(self._wake)
+        # The number of a closed descriptor soon belongs to another file.
+        with self._wake_lock:
+            self._is_closed = True
+            os.close(self._wake)
         self.memory.close()
 
     def _watch(self) -> None:

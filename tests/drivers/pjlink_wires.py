@@ -41,4 +41,4 @@ def driver(
     """A driver that is not open, on the firmware's clock."""
     clock = firmware.clock
     assert isinstance(clock, ManualClock)
-    return PjlinkProjector("test", clock, lambda: Wire(firmware, spoil), password)
+    return PjlinkProjector("test", clock, lambda _: Wire(firmware, spoil), password)

@@ -53,7 +53,7 @@ def test_a_projector_that_serves_someone_else_says_so_in_time(monkeypatch) -> No
     monkeypatch.setattr("drivers.pjlink_line._REPLY_S", 0.3)
     with served() as server:
         projector = driver(server.port)
-        other = TcpConnection("127.0.0.1", server.port)
+        other = TcpConnection("127.0.0.1", server.port, 5.0)
         try:
             assert other.receive(5.0) == b"PJLINK 0\r"
             with pytest.raises(DeviceTimeout, match="most projectors serve one at a time"):
@@ -65,7 +65,7 @@ def test_a_projector_that_serves_someone_else_says_so_in_time(monkeypatch) -> No
 
 def test_a_client_that_is_idle_is_hung_up_on_and_a_later_call_connects_again() -> None:
     with served() as server:
-        idle = TcpConnection("127.0.0.1", server.port)
+        idle = TcpConnection("127.0.0.1", server.port, 5.0)
         try:
             assert idle.receive(5.0) == b"PJLINK 0\r"
             server.projector.clock.wait_until_ns(30 * 10**9)
