@@ -13,6 +13,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 
 from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, memory_bytes
 from drivers.window_outputs import Output, chosen, outputs
@@ -179,7 +180,7 @@ def main(arguments: Sequence[str]) -> None:
         _tell({"error": type(error).__name__, "problem": error.problem, "remedy": error.remedy})
         return
     os.ftruncate(memory_descriptor, memory_bytes(width, height))
-    with WindowMemory(memory_descriptor, width, height) as memory:
+    with closing(WindowMemory(memory_descriptor, width, height)) as memory:
         memory.fields[Field.WINDOW_BEAT_NS] = time.monotonic_ns()
         memory.fields[Field.APPLICATION_BEAT_NS] = time.monotonic_ns()
         _tell({"output": window.output.name})

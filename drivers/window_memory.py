@@ -6,8 +6,6 @@ is one aligned 64-bit word that only one side writes; a woken reader looks at al
 
 import mmap
 from enum import IntEnum
-from types import TracebackType
-from typing import Self
 
 # A side that was silent for longer hangs: pictures are forfeited, or the window's process killed.
 HANG_LIMIT_NS = 1_000_000_000
@@ -53,17 +51,6 @@ class WindowMemory:
             self._view[start : start + n_bytes]
             for start in (_HEADER_BYTES, _HEADER_BYTES + n_bytes)
         )
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def valid_until_ns(self, picture: int) -> int:
         """When that picture, one of the two last ones, must be gone."""
