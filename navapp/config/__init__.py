@@ -5,6 +5,7 @@ from navapp.config.files import FILE_NAME, find_file, load
 from navapp.config.sections import (
     CalibrationSection,
     Configuration,
+    DisplaySection,
     FaultSection,
     MirrorSection,
     ProjectorSection,
@@ -17,6 +18,7 @@ __all__ = [
     "FILE_NAME",
     "CalibrationSection",
     "Configuration",
+    "DisplaySection",
     "FaultSection",
     "MirrorSection",
     "ProjectorSection",

@@ -6,6 +6,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+Pixels = Annotated[int, Field(gt=0)]
 
 
 def _rising(values: tuple[float, float]) -> tuple[float, float]:
@@ -119,24 +120,46 @@ class CameraSection(BaseModel):
 class DisplaySection(Section):
     """Where the overlay is shown."""
 
-    backend: Literal["simulated"] = "simulated"
-    """simulated."""
+    backend: Literal["simulated", "window"] = "simulated"
+    """simulated, or window: a monitor or projector of this computer, covered from edge to edge."""
+    output: str = ""
+    """Name of the window's monitor or projector; empty: the only one."""
+    size_px: tuple[Pixels, Pixels] | None = None
+    """Width and height of that output; a window needs it."""
+    flip_horizontally: bool = False
+    """The window shows every picture with left and right exchanged."""
+    flip_vertically: bool = False
+    """The window shows every picture upside down."""
     valid_ms: Positive = 500.0
     """A picture without a newer one turns black after this."""
+
+    @model_validator(mode="after")
+    def _has_a_size(self) -> Self:
+        if self.backend == "window" and self.size_px is None:
+            raise ValueError("a window needs size_px")
+        return self
 
 
 class ProjectorSection(Section):
     """The projector's control line."""
 
-    backend: Literal["none", "escvp21"] = "none"
-    """none, or escvp21: Epson's protocol on a serial line."""
+    backend: Literal["none", "pjlink", "escvp21"] = "none"
+    """none; pjlink: PJLink class 1 over the network; escvp21: Epson's protocol on a serial line."""
+    host: str = ""
+    """Address of a PJLink projector."""
+    tcp_port: Annotated[int, Field(gt=0, lt=65536)] = 4352
+    """Port of a PJLink projector."""
+    password_file: str | None = None
+    """File that holds the password of a PJLink projector, and nothing else."""
     port: str = ""
-    """Serial port (/dev/serial/by-id/...) or socket://host:port."""
+    """Of an ESC/VP21 projector: serial port (/dev/serial/by-id/...) or socket://host:port."""
     serial: str = ""
-    """Serial number of the rig's projector; another one is refused. Empty: any."""
+    """Serial number of the rig's ESC/VP21 projector; another one is refused. Empty: any."""
 
     @model_validator(mode="after")
-    def _has_a_port(self) -> Self:
+    def _has_a_host(self) -> Self:
+        if self.backend == "pjlink" and not self.host:
+            raise ValueError("pjlink needs a host")
         return _with_port(self, self.backend == "escvp21", self.port)
 
 

@@ -160,7 +160,7 @@ class SessionController:
 
     def close(self) -> None:
         """End everything, the display first; safe to call twice."""
-        self._display.darken()
+        self._display.close()
         self._session.is_over = True
         self._pursuit.drop()
         self._executor.close()
