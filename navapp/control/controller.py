@@ -202,7 +202,7 @@ class SessionController:
         snapshot = self._maker.make()
         picture, overlay_ms = self._show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
-        others = session.companions.follow(session.stage, frame, session.tracked)
+        others = session.follow_others(frame)
         timings = LineTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,

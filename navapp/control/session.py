@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.clock import Clock
+from drivers.frames import StereoFrame
 from navapp.control.camera_link import Reopen
 from navapp.control.companions import Companions
 from navapp.control.pictures import Image
@@ -106,6 +107,12 @@ class Session:
             self.change(SessionState.SUSPENDED, f"bone lost{why}", EventLevel.ALARM)
         elif self.state is SessionState.SUSPENDED and not is_lost:
             self.change(SessionState.NAVIGATING, "bone found again")
+
+    def follow_others(self, frame: StereoFrame) -> dict[str, TrackedFrame]:
+        """Follow another bone into a frame; in a fault none: nothing that is measured counts."""
+        if self.state is SessionState.FAULT:
+            return {}
+        return self.companions.follow(self.stage, frame, self.tracked)
 
     def lose_sight(self) -> None:
         """What the loss of the camera or of the rig does to what is known of the bones."""

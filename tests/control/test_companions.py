@@ -6,7 +6,14 @@ import pytest
 
 from navapp.control.controller import SessionOptions
 from navapp.control.interlocks import is_current
-from navapp.control.states import Accept, EnterStage, OtherBone, Register, Reject
+from navapp.control.states import (
+    Accept,
+    DistrustRig,
+    EnterStage,
+    OtherBone,
+    Register,
+    Reject,
+)
 from navapp.errors import DeviceLost
 from navapp.values import Reason, Status
 from tests.control.fakes import LOST, PERIOD_NS, Bench, a_plan, a_pose, answer, navigating
@@ -247,6 +254,25 @@ def test_the_loss_of_the_camera_is_the_end_of_what_was_said(bench: Bench) -> Non
     bench.camera.error = None
     bench.frames(12)
     assert is_current(other(bench))
+
+
+def test_with_a_rig_that_moved_nothing_is_said_of_any_bone(bench: Bench) -> None:
+    accepted(bench, "femur", "tibia")
+    bench.frames(2)
+    assert is_current(other(bench))
+    bench.do(DistrustRig("a test"))
+    asked = len(bench.script.calls)
+    assert turns(bench, 4) == [""] * 4
+    assert bench.state == "fault"
+    assert bench.script.calls[asked:] == []
+    assert other(bench) == OtherBone("femur")
+
+
+def test_a_bone_asked_for_is_not_registered_with_a_rig_that_moved(monkeypatch) -> None:
+    bench = replayed(monkeypatch, [FOUND["tibia"]])
+    bench.do(DistrustRig("a test"))
+    assert turns(bench, 4) == [""] * 4
+    assert bench.script.calls == []
 
 
 # -- bones that a replay asks for ------------------------------------------------------------------
