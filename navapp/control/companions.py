@@ -4,19 +4,14 @@ Once accepted, a bone is followed while another stage is in force, too: one such
 second frame, after the picture was shown. With three bones the two others take turns.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from drivers.frames import StereoFrame
 from navapp.control.pursuit import Pursuit
 from navapp.control.stages import stage_of
 from navapp.control.states import OtherBone
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import is_place_doubted
 from navapp.values import StageSpec, Status, TrackedFrame, Verdict
-
-# A bone whose place stays in doubt is searched for, which takes as long as many frames: from the
-# second such answer on it rests for 1, 3 and 7 turns, so that the active bone is not starved.
-_MOST_RESTS = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,16 +21,12 @@ class _Sight:
     Attributes:
         verdict: that.
         ok_ns: when the newest frame in which it was OK was captured; None when there was none.
-        n_rests: so many turns it lets pass now.
-        next_rests: so many after the next answer, if that leaves its place in doubt, too.
         beside: where the stage's bone was in the same frame; None when that was not OK.
         lineage: of that pose.
     """
 
     verdict: Verdict
     ok_ns: int | None = None
-    n_rests: int = 0
-    next_rests: int = 0
     beside: RigidTransform | None = None
     lineage: int = 0
 
@@ -69,18 +60,16 @@ class Companions:
             frame: the next one.
             active: what was said of the stage's bone in that frame.
         """
-        turn, is_rest = divmod(self._n_frames, 2)
+        turn, is_odd = divmod(self._n_frames, 2)
         self._n_frames += 1
         names = self._names(stage)
         self._sights.pop(stage.bone, None)
-        if is_rest or not names:
+        if is_odd or not names:
             return {}
         name = names[turn % len(names)]
-        if self._is_resting(name):
-            return {}
         own, beside = stage_of(name), _well_known(active)
         if self._pursuit.is_accepted(own):
-            tracked = self._pursuit.follow(own, frame, self._moved(name, beside))
+            tracked = self._pursuit.glance(own, frame, self._moved(name, beside))
         else:
             tracked = self._pursuit.register_now(own, frame)
         self._remember(name, tracked.verdict, frame.captured_ns, beside)
@@ -105,14 +94,6 @@ class Companions:
         known = dict.fromkeys((*self._unasked, *self._pursuit.accepted))
         return [name for name in known if name != stage.bone]
 
-    def _is_resting(self, name: str) -> bool:
-        """Whether it lets this turn pass."""
-        sight = self._sights.get(name)
-        if sight is None or sight.n_rests == 0:
-            return False
-        self._sights[name] = replace(sight, n_rests=sight.n_rests - 1)
-        return True
-
     def _moved(self, name: str, beside: RigidTransform | None) -> RigidTransform | None:
         """How the stage's bone has moved since a bone's last turn, if that is known."""
         sight = self._sights.get(name)
@@ -127,12 +108,7 @@ class Companions:
     ) -> None:
         before = self._sights.get(name, _Sight(verdict))
         ok_ns = captured_ns if verdict.status is Status.OK else before.ok_ns
-        n_rests = next_rests = 0
-        if is_place_doubted(verdict):
-            n_rests = before.next_rests
-            next_rests = min(2 * n_rests + 1, _MOST_RESTS)
-        lineage = self._pursuit.lineage
-        self._sights[name] = _Sight(verdict, ok_ns, n_rests, next_rests, beside, lineage)
+        self._sights[name] = _Sight(verdict, ok_ns, beside, self._pursuit.lineage)
 
 
 def _well_known(active: TrackedFrame | None) -> RigidTransform | None:

@@ -198,24 +198,28 @@ class Pursuit:
         self._candidates[0] = replace(candidate, tracked=tracked, track=track)
         return tracked
 
-    def follow(
-        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None = None
+    def follow(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Follow the accepted bone into a frame."""
+        line, track, goal = self._line(stage), self._tracks[stage.bone], self._goal(stage)
+        tracked, track = line.track(frame.left, frame.right, frame.captured_ns, track, goal)
+        self._tracks[stage.bone] = track
+        return tracked
+
+    def glance(
+        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None
     ) -> TrackedFrame:
-        """Follow the accepted bone into a frame.
+        """Follow an accepted bone into a frame if it is near where it is expected.
 
         Args:
             stage: whose bone, and by whose goal.
             frame: the next one.
             moved: in the left camera, how something that the bone goes with has moved meanwhile.
         """
-        track = self._tracks[stage.bone]
-        tracked, self._tracks[stage.bone] = self._line(stage).track(
-            frame.left,
-            frame.right,
-            frame.captured_ns,
-            track if moved is None else track.carried(moved),
-            self._goal(stage),
-        )
+        line, track, goal = self._line(stage), self._tracks[stage.bone], self._goal(stage)
+        if moved is not None:
+            track = track.carried(moved)
+        tracked, track = line.glance(frame.left, frame.right, frame.captured_ns, track, goal)
+        self._tracks[stage.bone] = track
         return tracked
 
     def register_now(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:

@@ -3,7 +3,7 @@
 from navapp.tracking.judge import Goal
 from navapp.tracking.line import Line, LineSettings
 from navapp.tracking.locator import LocatorSettings, Method
-from navapp.tracking.motion import TrackState, is_place_doubted
+from navapp.tracking.motion import TrackState
 
 __all__ = [
     "Goal",
@@ -12,5 +12,4 @@ __all__ = [
     "LocatorSettings",
     "Method",
     "TrackState",
-    "is_place_doubted",
 ]

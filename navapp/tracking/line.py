@@ -129,6 +129,29 @@ class Line:
         boxes = self._boxes.placed(boxes, left, tracked) if after.n_lost == 0 else boxes
         return tracked, replace(after, box=boxes)
 
+    def glance(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame, lost or not, if it is near where it is expected.
+
+        Only the model itself is matched: that is soon done, and sees no more than some millimetres.
+        """
+        expected = self._rectified(state.predicted(captured_ns, self.centre_mm))
+        pair, timings = self._rectified_pair(left, right, expected, NEAR_VIEW)
+        coarse = self._meter.coarsely(pair, expected)
+        answers = [self._fit_judge.lost(Reason.BONE_LOST, timings)]
+        for fit in self.locator.rests(pair, expected):
+            timings = answers[-1].timings
+            answers.append(self._fit_judge.judged(pair, fit, goal, timings, expected, coarse))
+            if not is_place_doubted(answers[-1].verdict):
+                break
+        best = min(reversed(answers), key=lambda one: one.verdict.order)
+        tracked = replace(best, timings=answers[-1].timings).because(state.cause)
+        after = state.updated(tracked, captured_ns, self.centre_mm)
+        box = self._boxes.placed(state.box, left, tracked) if after.n_lost == 0 else state.box
+        # A doubt that nothing was searched for puts off no search.
+        return tracked, replace(after, box=box, n_doubted=0)
+
     def _near(
         self,
         pair: RectifiedPair,

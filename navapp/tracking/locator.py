@@ -1,7 +1,7 @@
 """Matching and fitting in turns: from an expected pose to the pose that the pictures show."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -101,6 +101,19 @@ class Locator:
         fits = [fit for fit in (stayed, found) if fit is not None]
         best = max(fits, key=self._score) if len(fits) > 1 else next(iter(fits), None)
         return None if best is None else replace(best, timings=timings)
+
+    def rests(self, pair: RectifiedPair, pose: RigidTransform) -> Iterator[Fit]:
+        """Where the model rests next to an expected pose, from samples of it and from all of it."""
+        if self.is_baseline:
+            fits = [self.search(pair, pose, self.settings.tracking)]
+            yield from (fit for fit in fits if fit is not None)
+            return
+        for is_near in (False, True):
+            fit, timings = self._follower.follow(
+                pair, pose, self.settings.hidden_share, is_near=is_near
+            )
+            if fit is not None:
+                yield replace(fit, timings=timings)
 
     def _is_here(self, fit: Fit, expected: RigidTransform) -> bool:
         """Enough of the model answers, or what answers is where it was expected."""

@@ -38,7 +38,8 @@ class TrackState:
         captured_ns: when that was.
         velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
         n_lost: frames lost since then.
-        n_doubted: frames in a row, up to now, whose answer's place was in doubt.
+        n_doubted: answers in a row whose place was in doubt. A lost frame neither counts nor ends
+            the row; a glance, which searches nothing, ends it.
         box: of the bone in the newest picture, and what it looks like; None before the first.
         cause: what was found to be wrong for good, until a frame is OK.
     """

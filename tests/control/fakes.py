@@ -111,6 +111,13 @@ class FakeLine:
 
     def track(self, left, right, captured_ns, state: TrackState, goal):
         self.script.calls.append(f"track {self.bone.name}")
+        return self._followed(captured_ns, state, goal)
+
+    def glance(self, left, right, captured_ns, state: TrackState, goal):
+        self.script.calls.append(f"glance at {self.bone.name}")
+        return self._followed(captured_ns, state, goal)
+
+    def _followed(self, captured_ns, state: TrackState, goal):
         self.script.tracks.append((self.bone.name, state, goal))
         self.script.on_track(self.bone.name)
         tracked = self.script.tracked_of.get(self.bone.name, self.script.tracked)

@@ -153,8 +153,7 @@ def test_a_lost_other_goes_along_until_it_is_found(bench: Bench) -> None:
     accepted(bench, "femur", "tibia")
     bench.frames(2)
     bench.script.tracked_of["femur"] = LOST_OF["femur"]
-    # From the second loss on every other turn is a rest.
-    assert expected_x_mm(bench, 3.0, 5.0, 6.0, 9.0) == pytest.approx([3.0, 5.0, 9.0])
+    assert expected_x_mm(bench, 3.0, 5.0, 9.0) == pytest.approx([3.0, 5.0, 9.0])
 
 
 def test_with_an_active_bone_in_doubt_nothing_is_said_to_have_moved(bench: Bench) -> None:
@@ -223,18 +222,24 @@ def test_a_found_other_does_not_make_a_lost_bone_navigable(bench: Bench) -> None
     assert bench.snapshot.left_from_bone.source == "tibia"
 
 
-def test_who_stays_lost_rests_longer_and_longer_until_it_is_found(bench: Bench) -> None:
+@pytest.mark.parametrize("active", ["OK", "DEGRADED", "LOST"])
+def test_the_active_bone_is_never_kept_waiting_by_a_search_for_another(bench, active) -> None:
     accepted(bench, "femur", "tibia")
-    while turns(bench, 1) != ["femur"]:
-        pass
     bench.script.tracked_of["femur"] = LOST_OF["femur"]
-    seen = turns(bench, 64)
-    # In turns: at once, then after 1, 3, 7 and again 7 that pass.
-    places = [number for number, said in enumerate(seen) if said]
-    assert [b - a for a, b in pairwise(places)] == [2, 4, 8, 16, 16, 16]
-    bench.script.tracked_of["femur"] = FOUND["femur"]
-    found = turns(bench, 20)
-    assert found[found.index("femur") :].count("femur") >= len(found[found.index("femur") :]) // 2
+    bench.script.tracked_of["tibia"] = answer(Status[active], pose=a_pose("tibia"))
+    first = len(bench.script.calls)
+    bench.frames(6)
+    said = bench.script.calls[first:]
+    assert sorted(said) == ["glance at femur"] * 3 + ["track tibia"] * 6
+
+
+def test_who_stays_lost_keeps_its_turns_and_is_searched_in_its_stage(bench: Bench) -> None:
+    accepted(bench, "femur", "tibia")
+    bench.script.tracked_of["femur"] = LOST_OF["femur"]
+    assert turns(bench, 40).count("femur") == 20
+    bench.do(EnterStage(1))
+    bench.frames(1)
+    assert "track femur" in bench.script.calls[-2:]
 
 
 def test_a_bone_that_is_only_loosely_fixed_keeps_its_turns(bench: Bench) -> None:
@@ -290,18 +295,18 @@ def test_a_bone_asked_for_is_registered_in_its_turn_and_followed_without_a_word(
 ) -> None:
     bench = replayed(monkeypatch, [FOUND["tibia"], LOST])
     assert turns(bench, 6) == ["tibia", "", "tibia", "", "tibia", ""]
-    assert bench.script.calls == ["register tibia", "track tibia", "track tibia"]
+    assert bench.script.calls == ["register tibia", "glance at tibia", "glance at tibia"]
     assert bench.state == "ready"
 
 
-def test_a_bone_asked_for_that_is_not_found_is_looked_for_again_after_rests(monkeypatch) -> None:
+def test_a_bone_asked_for_that_is_not_found_is_looked_for_in_its_next_turn(monkeypatch) -> None:
     bench = replayed(monkeypatch, [LOST_OF["tibia"]])
-    assert turns(bench, 8) == ["tibia", "", "tibia", "", "", "", "tibia", ""]
-    assert bench.script.calls == ["register tibia"] * 3
+    assert turns(bench, 4) == ["tibia", "", "tibia", ""]
+    assert bench.script.calls == ["register tibia"] * 2
     assert other(bench).verdict.status is Status.LOST
     bench.script.found = []
-    assert "tibia" in turns(bench, 8)
+    assert turns(bench, 2) == ["tibia", ""]
     bench.script.found = [FOUND["tibia"]]
-    bench.frames(20)
-    assert bench.script.calls[-1] == "track tibia"
+    bench.frames(4)
+    assert bench.script.calls[-2:] == ["register tibia", "glance at tibia"]
     assert is_current(other(bench))

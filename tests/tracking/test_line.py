@@ -5,6 +5,11 @@ import pytest
 
 from navapp.geometry.rig import RigQuality
 from navapp.tracking import Line, LineSettings, LocatorSettings, TrackState
+from navapp.tracking.box_guide import BoxGuide
+from navapp.tracking.buried import BuriedBone
+from navapp.tracking.causes import Causes
+from navapp.tracking.recovery import Recovery
+from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import Prior, Reason, Status
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -141,6 +146,52 @@ def test_the_box_leads_back_to_a_lost_bone() -> None:
     boxless = replace(state, box=None)
     found, _ = a.line.track(frame.left, frame.right, frame.captured_ns, boxless, GOAL)
     assert found.verdict.status is not Status.OK
+
+
+LONG = (
+    (Recovery, "found_again"),
+    (Causes, "of_loss"),
+    (BoxGuide, "followed"),
+    (BuriedBone, "followed"),
+    (SurfaceMeter, "freely"),
+)
+
+
+def glance(a: Room, state: TrackState):
+    frame = a.frames[2]
+    return a.line.glance(frame.left, frame.right, frame.captured_ns, state, GOAL)
+
+
+@pytest.mark.parametrize("n_lost", [0, 1, 5, 10])
+def test_a_glance_does_not_look_further_off(monkeypatch, n_lost: int) -> None:
+    a = room()
+    state = replace(lost_far_away(a), n_lost=n_lost, cause=Reason.OTHER_SIDE)
+    for owner, name in LONG:
+        monkeypatch.setattr(owner, name, lambda *given, name=name, **more: pytest.fail(name))
+    found, after = glance(a, state)
+    assert found.verdict.status is Status.LOST
+    assert found.verdict.reasons[0] is Reason.OTHER_SIDE
+    assert (after.n_lost, after.cause) == (n_lost + 1, Reason.OTHER_SIDE)
+    assert after.left_from_bone is state.left_from_bone
+
+
+@pytest.mark.parametrize("n_lost", [0, 5])
+def test_a_glance_finds_a_bone_near_where_it_is_expected(n_lost: int) -> None:
+    a = room()
+    truth = a.truth(a.frames[2])
+    expected = truth.moved((2.0, -1.5, 2.0, 0.01, -0.01, 0.01), truth.apply(a.line.centre_mm))
+    found, after = glance(a, replace(TrackState.at_rest(expected, 0), n_lost=n_lost))
+    assert found.verdict.status is Status.OK
+    assert a.error_mm(found.left_from_bone, a.frames[2]) < 0.4
+    assert after.n_lost == 0
+    assert after.box is not None
+
+
+def test_a_doubt_at_a_glance_puts_off_no_search(monkeypatch) -> None:
+    a = room()
+    monkeypatch.setattr("navapp.tracking.motion.is_place_doubted", lambda verdict: True)
+    state = replace(TrackState.at_rest(a.truth(a.frames[2]), 0), n_doubted=4)
+    assert glance(a, state)[1].is_search_due
 
 
 def test_the_box_of_a_pose_is_its_projection() -> None:

@@ -168,3 +168,12 @@ def test_after_a_sure_frame_the_next_doubt_is_searched_at_once() -> None:
         state = state.updated(doubtful(START), PERIOD_NS, CENTRE)
     assert not state.is_search_due
     assert state.updated(frame(START), PERIOD_NS, CENTRE).is_search_due
+
+
+def test_a_lost_frame_neither_counts_as_a_doubt_nor_ends_a_row_of_them() -> None:
+    state = TrackState.at_rest(START, 0)
+    for number in range(3):
+        state = state.updated(doubtful(START), number * PERIOD_NS, CENTRE)
+    lost = state.updated(frame(START, Status.LOST), 3 * PERIOD_NS, CENTRE)
+    assert (lost.n_doubted, lost.n_lost) == (3, 1)
+    assert lost.updated(doubtful(START), 4 * PERIOD_NS, CENTRE).n_doubted == 4
