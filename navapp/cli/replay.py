@@ -51,7 +51,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="one more bone, registered from the prior and followed at half rate; repeatable",
+        help="another bone, registered from the prior and followed in turns; repeatable",
     )
     parser.add_argument(
         "--order",
@@ -81,7 +81,7 @@ class _Replay:
     method: "Method"
     operator: "Operator"
     executor: "Executor"
-    also: "tuple[StageSpec, ...]" = ()
+    others: "tuple[StageSpec, ...]" = ()
     is_as_recorded: bool = False
     warnings: tuple[str, ...] = ()
 
@@ -102,7 +102,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         diagnostics.warn(warning)
     check_accepted(replay.rig, options.allow_unaccepted, diagnostics)
     if not replay.is_as_recorded:
-        for stage in (replay.stage, *replay.also):
+        for stage in (replay.stage, *replay.others):
             check_start(replay.prior, stage)
     opened = open_recording(options.sequence, settings, replay.rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
@@ -165,8 +165,8 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
     plan = read_plan(plan_path)
     first = stage_by_name(stage) if options.bone is None else _stage_of(options.bone, plan)
-    also = tuple(_stage_of(name, plan) for name in dict.fromkeys(options.also))
-    if first.bone in {other.bone for other in also}:
+    others = tuple(_stage_of(name, plan) for name in dict.fromkeys(options.also))
+    if first.bone in {other.bone for other in others}:
         raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
     operator, executor = _operation(session, options)
     return _Replay(
@@ -177,7 +177,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         method,
         operator,
         executor,
-        also,
+        others,
         isinstance(operator, RecordedOperator),
         _warnings(session),
     )
@@ -243,7 +243,7 @@ def _controller(
             ),
             first_stage=replay.stage,
             overlay_valid_ms=configuration.display.valid_ms,
-            also=tuple(stage.bone for stage in replay.also),
+            others=tuple(stage.bone for stage in replay.others),
             mirror_deg=configuration.mirror.calibrated_deg,
         ),
         hooks=SessionHooks(on_frame=tuple(listeners)),

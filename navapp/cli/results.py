@@ -104,7 +104,7 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
     ]
     return {
         **_counted(frames),
-        "bodies": _bodies(frames),
+        "bodies": _others(frames),
         "fps": len(frames) / seconds if seconds > 0 and frames else None,
         "latency_ms": (
             {f"p{q}": float(np.percentile(totals, q)) for q in (50, 95, 99)}
@@ -123,7 +123,7 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
     }
 
 
-def _bodies(frames: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
+def _others(frames: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
     """The other bones' answers, counted for each."""
     turns: dict[str, list[dict[str, Any]]] = {}
     for frame in frames:
@@ -148,7 +148,7 @@ def _counted_text(counts: dict[str, int]) -> str:
 def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
     lines = [_counted_text(summary)]
-    lines += [f"beside it {name}: {_counted_text(n)}" for name, n in summary["bodies"].items()]
+    lines += [f"other bone, {name}: {_counted_text(n)}" for name, n in summary["bodies"].items()]
     latency, tre = summary["latency_ms"], summary["tre_mm"]
     if summary["fps"] is not None and latency["p50"] is not None:
         lines.append(

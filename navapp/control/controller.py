@@ -17,11 +17,11 @@ from drivers.interfaces import DeviceSet
 from navapp.control.board_watch import BoardWatch
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
-from navapp.control.companions import Companions
 from navapp.control.device_care import MirrorCare, ProjectorCare
 from navapp.control.device_watch import SlowDevices, tell_changes
 from navapp.control.display_link import DisplayLink
 from navapp.control.executors import Executor
+from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import compose
 from navapp.control.pursuit import Pursuit
 from navapp.control.results import FrameResult
@@ -54,7 +54,7 @@ class SessionOptions:
         first_stage: stage in force at the start.
         overlay_valid_ms: how long a picture may stay on the display without a newer one.
         is_recording: the session is kept in a folder.
-        also: bones that are registered from the prior and followed beside the stage's, unasked.
+        others: bones that are registered from the prior and followed, too, unasked.
         mirror_deg: where the mirror stood when the display was calibrated.
     """
 
@@ -62,7 +62,7 @@ class SessionOptions:
     first_stage: StageSpec = STAGES[0]
     overlay_valid_ms: float = 500.0
     is_recording: bool = False
-    also: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
     mirror_deg: float = 45.0
 
 
@@ -97,10 +97,8 @@ class SessionController:
         self.lost_device: DeviceError | None = None
         self._queue: deque[Command] = deque()
         self._lock = threading.Lock()
-        companions = Companions(self._pursuit, options.also)
-        self._session = Session(
-            devices.clock, hooks, self._pursuit, companions, options.first_stage
-        )
+        others = OtherBones(self._pursuit, options.others)
+        self._session = Session(devices.clock, hooks, self._pursuit, others, options.first_stage)
         self._watch = RigWatch(self._session, self._display, board_watch)
         self._slow = SlowDevices(
             ProjectorCare(devices.projector), MirrorCare(devices.mirror, options.mirror_deg)

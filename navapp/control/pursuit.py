@@ -63,8 +63,8 @@ class Pursuit:
     """What is known of the bones of one session; one of them, the stage's, is looked for.
 
     Attributes:
-        lineage: another number when what is said of the stage's bone is of another candidate or
-            track than before, and not of the same one a frame later.
+        track_number: of the candidate or track by which the stage's bone is followed: the same from
+            frame to frame, another after a new search or with another candidate.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Pursuit:
         self._tracks: dict[str, TrackState] = {}
         self._candidates: list[Candidate] = []
         self._search: _Search | None = None
-        self.lineage = 0
+        self.track_number = 0
 
     @property
     def candidate(self) -> Candidate | None:
@@ -130,7 +130,7 @@ class Pursuit:
         if search is None or not self._executor.take_due(search.job, next_sequence):
             return None
         self._search = None
-        self.lineage += 1
+        self.track_number += 1
         if isinstance(search.job.error, JobCancelled):
             return None
         if search.job.error is not None:
@@ -162,7 +162,7 @@ class Pursuit:
             self._search.job.cancel()
             self._search = None
         self._candidates = []
-        self.lineage += 1
+        self.track_number += 1
 
     def propose(self, stage: StageSpec, pose: RigidTransform, now_ns: int) -> None:
         """Put a pose under review that will be judged as it stands."""
@@ -184,7 +184,7 @@ class Pursuit:
 
     def reject(self) -> Candidate:
         """Take the candidate out; the next one, if any, comes under review."""
-        self.lineage += 1
+        self.track_number += 1
         return self._candidates.pop(0)
 
     def review(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:

@@ -20,7 +20,7 @@ class FrameResult:
         picture: what was made for the display.
         timings: of the line and the overlay.
         is_navigable: guides are in the picture.
-        others: bones beside the active one whose turn it was in this very frame.
+        others: other bones than the active one, whose turn it was in this very frame.
     """
 
     frame: StereoFrame

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from navapp.control.camera_link import Reopen
-from navapp.control.companions import Companions
+from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import Image
 from navapp.control.pursuit import Pursuit
 from navapp.control.rates import RateMeter
@@ -39,7 +39,7 @@ class Session:
         clock: of the session.
         hooks: who is told.
         pursuit: of the stage's bone.
-        companions: the other bones that are followed beside it.
+        others: the other bones that are followed.
         state: where the session stands.
         stage: in force.
         tracked: the newest answer on the stage's bone, None when there is none that counts.
@@ -56,13 +56,13 @@ class Session:
         clock: Clock,
         hooks: SessionHooks,
         pursuit: Pursuit,
-        companions: Companions,
+        others: OtherBones,
         stage: StageSpec,
     ) -> None:
         self.clock = clock
         self.hooks = hooks
         self.pursuit = pursuit
-        self.companions = companions
+        self.others = others
         self.state = SessionState.STARTING
         self.tracked: TrackedFrame | None = None
         self.tracked_at_ns = 0
@@ -112,12 +112,12 @@ class Session:
         """Follow another bone into a frame; in a fault none: nothing that is measured counts."""
         if self.state is SessionState.FAULT:
             return {}
-        return self.companions.follow(self.stage, frame, self.tracked)
+        return self.others.follow(self.stage, frame, self.tracked)
 
     def lose_sight(self) -> None:
         """What the loss of the camera or of the rig does to what is known of the bones."""
         self.pursuit.drop()
-        self.companions.forget()
+        self.others.forget()
         self.tracked = None
 
     def distrust_rig(self, why: str) -> None:

@@ -58,7 +58,7 @@ class SnapshotMaker:
             left_from_bone=None if tracked is None else tracked.left_from_bone,
             is_candidate=session.state is SessionState.REVIEW and tracked is not None,
             pose_age_ms=None if tracked is None else (now_ns - session.tracked_at_ns) / 1e6,
-            others=session.companions.seen(session.stage, now_ns),
+            others=session.others.seen(session.stage, now_ns),
             preview=session.preview,
             rates=session.meter.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),

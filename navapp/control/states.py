@@ -183,7 +183,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class OtherBone:
-    """A bone that is followed beside the stage's; never drawn.
+    """Another bone than the stage's that is followed; never drawn.
 
     Attributes:
         name: of the bone.
@@ -211,7 +211,7 @@ class Snapshot:
         is_simulated: the pictures are not of this world.
         is_recording: the session is kept in a folder.
         pose_age_ms: of that pose, now.
-        others: the bones that are followed beside the stage's.
+        others: the other bones that are followed.
         preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
             the first frame.
         is_bone_planned: the plan has a model of the stage's bone.

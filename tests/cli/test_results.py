@@ -51,7 +51,7 @@ def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
     }
     lines = summary_text(summary).splitlines()
     assert lines[0] == "4 frames: 4 OK, 0 degraded, 0 lost"
-    assert "beside it tibia: 2 frames: 0 OK, 1 degraded, 1 lost" in lines
+    assert "other bone, tibia: 2 frames: 0 OK, 1 degraded, 1 lost" in lines
 
 
 def test_a_line_a_frame_names_the_other_bones(monkeypatch) -> None:

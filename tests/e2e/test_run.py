@@ -89,11 +89,11 @@ def test_two_bones_are_followed_at_once_and_replay_to_the_same_poses(
     assert run([*options, "--json", str(first)]) == 0
     frames = result(first)["frames"]
     for bone, other in (("tibia", "femur"), ("femur", "tibia")):
-        beside = [f for f in frames if f["bone"] == bone and f["bodies"]]
-        assert len(beside) >= 4
-        assert all(set(frame["bodies"]) == {other} for frame in beside)
-        assert all(b["index"] - a["index"] == 2 for a, b in itertools.pairwise(beside))
-        said = [frame["bodies"][other] for frame in beside]
+        its_turns = [f for f in frames if f["bone"] == bone and f["bodies"]]
+        assert len(its_turns) >= 4
+        assert all(set(frame["bodies"]) == {other} for frame in its_turns)
+        assert all(b["index"] - a["index"] == 2 for a, b in itertools.pairwise(its_turns))
+        said = [frame["bodies"][other] for frame in its_turns]
         assert all(one["status"] == "OK" and one["tre_mm"] < 0.4 for one in said)
     # The femur's stage goes on from where the femur is by then, without being looked for.
     back = frames[[f["bone"] for f in frames].index("tibia") :]

@@ -1,4 +1,4 @@
-"""The bones beside the stage's: whose turn it is, and what is said of them."""
+"""The other bones than the stage's: whose turn it is, and what is said of them."""
 
 from itertools import pairwise
 
@@ -40,7 +40,7 @@ def accepted(bench: Bench, *bones: str) -> Bench:
 
 
 def turns(bench: Bench, n_frames: int) -> list[str]:
-    """Who was followed beside the stage's bone in each of the next frames."""
+    """Which other bone was followed in each of the next frames."""
     before = len(bench.results)
     bench.frames(n_frames)
     return [" ".join(result.others) for result in bench.results[before:]]
@@ -284,7 +284,7 @@ def test_a_bone_asked_for_is_not_registered_with_a_rig_that_moved(monkeypatch) -
 
 
 def replayed(monkeypatch, found) -> Bench:
-    bench = Bench(monkeypatch, options=SessionOptions(also=("tibia",)))
+    bench = Bench(monkeypatch, options=SessionOptions(others=("tibia",)))
     bench.script.found = found
     bench.script.tracked_of = {**FOUND}
     return bench

@@ -1,4 +1,4 @@
-"""The bones beside the stage's: followed at half rate, so that none is forgotten.
+"""The other bones, which are not the stage's: followed at a lower rate, so that none is forgotten.
 
 Once accepted, a bone is followed while another stage is in force, too: one such bone in every
 second frame, after the picture was shown. With three bones the two others take turns.
@@ -21,17 +21,17 @@ class _Sight:
     Attributes:
         verdict: that.
         ok_ns: when the newest frame in which it was OK was captured; None when there was none.
-        beside: where the stage's bone was in the same frame; None when that was not OK.
-        lineage: of that pose.
+        active: where the stage's bone was in the same frame; None when that was not OK.
+        track_number: of that pose.
     """
 
     verdict: Verdict
     ok_ns: int | None = None
-    beside: RigidTransform | None = None
-    lineage: int = 0
+    active: RigidTransform | None = None
+    track_number: int = 0
 
 
-class Companions:
+class OtherBones:
     """Whose turn it is, and what was last said of each.
 
     Turns go by the count of handled frames, never by the time: a recorded session replays to them.
@@ -56,7 +56,7 @@ class Companions:
         gone since, the other one is expected to have gone, too.
 
         Args:
-            stage: in force; its bone is no companion.
+            stage: in force; its bone is none of the others.
             frame: the next one.
             active: what was said of the stage's bone in that frame.
         """
@@ -67,12 +67,12 @@ class Companions:
         if is_odd or not names:
             return {}
         name = names[turn % len(names)]
-        own, beside = stage_of(name), _well_known(active)
+        own, known = stage_of(name), _well_known(active)
         if self._pursuit.is_accepted(own):
-            tracked = self._pursuit.glance(own, frame, self._moved(name, beside))
+            tracked = self._pursuit.glance(own, frame, self._moved(name, known))
         else:
             tracked = self._pursuit.register_now(own, frame)
-        self._remember(name, tracked.verdict, frame.captured_ns, beside)
+        self._remember(name, tracked.verdict, frame.captured_ns, known)
         return {name: tracked}
 
     def forget(self) -> None:
@@ -94,21 +94,22 @@ class Companions:
         known = dict.fromkeys((*self._unasked, *self._pursuit.accepted))
         return [name for name in known if name != stage.bone]
 
-    def _moved(self, name: str, beside: RigidTransform | None) -> RigidTransform | None:
+    def _moved(self, name: str, active: RigidTransform | None) -> RigidTransform | None:
         """How the stage's bone has moved since a bone's last turn, if that is known."""
         sight = self._sights.get(name)
-        if sight is None or sight.beside is None or beside is None:
+        if sight is None or sight.active is None or active is None:
             return None
         # From one candidate to another nothing has moved.
-        is_same = (sight.lineage, sight.beside.source) == (self._pursuit.lineage, beside.source)
-        return beside @ sight.beside.inverse() if is_same else None
+        now = self._pursuit.track_number, active.source
+        is_same = (sight.track_number, sight.active.source) == now
+        return active @ sight.active.inverse() if is_same else None
 
     def _remember(
-        self, name: str, verdict: Verdict, captured_ns: int, beside: RigidTransform | None
+        self, name: str, verdict: Verdict, captured_ns: int, active: RigidTransform | None
     ) -> None:
         before = self._sights.get(name, _Sight(verdict))
         ok_ns = captured_ns if verdict.status is Status.OK else before.ok_ns
-        self._sights[name] = _Sight(verdict, ok_ns, beside, self._pursuit.lineage)
+        self._sights[name] = _Sight(verdict, ok_ns, active, self._pursuit.track_number)
 
 
 def _well_known(active: TrackedFrame | None) -> RigidTransform | None:
