@@ -261,6 +261,24 @@ def test_a_bone_lost_during_the_search_leaves_what_stayed() -> None:
     assert error_mm(fit.pose) < 0.05
 
 
+def test_a_rest_is_looked_for_on_the_model_and_never_freely() -> None:
+    meter = FakeMeter()
+    sampled, whole = locator_of(meter).rests(PAIR, moved((0.5, -0.5, 0.8), (0.0,) * 3))
+    assert error_mm(sampled.pose) < 0.05
+    assert error_mm(whole.pose) < 0.05
+    assert "freely" not in meter.asked
+    meter.share = LocatorSettings().hidden_share - 0.01
+    assert len(list(locator_of(meter).rests(PAIR, TRUE))) == 1
+    meter.is_in_view = False
+    assert list(locator_of(meter).rests(PAIR, TRUE)) == []
+
+
+def test_the_baseline_rests_where_its_one_fit_does() -> None:
+    meter = FakeMeter()
+    (fit,) = locator_of(meter, LocatorSettings(method="icp")).rests(PAIR, TRUE)
+    assert (meter.asked, fit.n_rounds) == (["freely"], 1)
+
+
 def spent_ms(meter: FakeMeter) -> float:
     """What all that it was asked for took."""
     cost = {"freely": FREELY_MS, "on_model": ON_MODEL_MS, "sampled": SAMPLED_MS}
