@@ -70,7 +70,7 @@ def rig_to_json(snapshot: Snapshot) -> dict[str, Any]:
         else {
             "length_100_mm": {"mean": 100.0 * check.ratio, "bound_95": 100.0 * check.bound},
             "looks": check.n_looks,
-            "within": check.is_within,
+            "finding": check.finding.value,
             "age_s": (snapshot.time_ns - check.captured_ns) / 1e9,
         },
     }

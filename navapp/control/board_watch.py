@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 from drivers.frames import Image, StereoFrame
 from navapp.control.executors import Executor, Job
-from navapp.control.length_check import Length, LengthCheck, pooled
+from navapp.control.length_check import MOST_LOOKS, Finding, Length, LengthCheck, pooled
 
 # Often enough for a board that is shown for some seconds; a slow look takes at most a tenth of the
 # time, so that the line keeps its cores.
 _PERIOD_NS, _LEAST_PERIODS_OF_A_LOOK = 2_000_000_000, 10
-# Looks of one showing belong together; of a long one the newest, so that a move is soon seen.
-_SHOWING_NS, _MOST_LOOKS = 10_000_000_000, 5
+# Looks of one showing belong together.
+_SHOWING_NS = 10_000_000_000
 
 # Of the left and the right picture; None where not both of them show the board.
 MeasureLength = Callable[[Image, Image], Length | None]
@@ -33,7 +33,7 @@ class BoardWatch:
         self._measure, self._worst, self._executor = measure, worst_share, executor
         self._job: Job[Length | None] | None = None
         self._began_ns, self._due_ns = 0, 0
-        self._lengths: deque[Length] = deque(maxlen=_MOST_LOOKS)
+        self._lengths: deque[Length] = deque(maxlen=2 * MOST_LOOKS)
         self._is_told = False
         self.newest: LengthCheck | None = None
 
@@ -70,7 +70,7 @@ class BoardWatch:
             self._lengths.clear()
             self._is_told = False
         self._lengths.append(length)
-        self.newest = pooled(self._lengths, self._began_ns, self._worst)
+        self.newest = pooled(tuple(self._lengths), self._began_ns, self._worst)
         is_news = self.newest.is_judged and not self._is_told
         self._is_told = self._is_told or is_news
-        return self.newest if is_news or self.newest.is_off else None
+        return self.newest if is_news or self.newest.finding is Finding.OFF else None

@@ -1,7 +1,7 @@
 """What the devices panel says."""
 
 from drivers.interfaces import CameraInfo, DisplayInfo, MirrorMount, PowerState, ProjectorControl
-from navapp.control.length_check import LengthCheck
+from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.states import DeviceHealth, DeviceLine
 from navapp.errors import DeviceError
 
@@ -53,7 +53,7 @@ def rig_line(name: str, problem: str, check: LengthCheck | None, now_ns: int) ->
         return DeviceLine("rig", name, DeviceHealth.TROUBLE, problem)
     if check is None:
         return DeviceLine("rig", name, DeviceHealth.OK, "not checked: show the board")
-    is_doubted = check.is_judged and not check.is_within
+    is_doubted = check.is_judged and check.finding is not Finding.WITHIN
     health = DeviceHealth.TROUBLE if is_doubted else DeviceHealth.OK
     age_s = max(now_ns - check.captured_ns, 0) // 1_000_000_000
     return DeviceLine("rig", name, health, f"{check}, {age_s} s ago")

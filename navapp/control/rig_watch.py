@@ -10,7 +10,7 @@ import numpy as np
 from drivers.frames import StereoFrame
 from navapp.control.board_watch import BoardWatch
 from navapp.control.display_link import DisplayLink
-from navapp.control.length_check import LengthCheck
+from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.session import Session
 from navapp.control.states import DistrustRig, EventLevel
 from navapp.values import RowCheck
@@ -76,12 +76,12 @@ class RigWatch:
         found = None if self._board is None else self._board.take_over(session.clock.now_ns())
         if found is None or session.rig_error is not None:
             return
-        if found.is_off:
+        if found.finding is Finding.OFF:
             # A replay cannot look again as fast as the session did: it is told.
             command = DistrustRig(str(found))
             session.tell(session.hooks.on_command, command, session.sequence)
             self.distrust(command)
-        elif found.is_within:
+        elif found.finding is Finding.WITHIN:
             session.event("rig", f"rig checked: {found}")
         else:
             session.event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)

@@ -8,6 +8,7 @@ import pytest
 from drivers.frames import StereoFrame
 from navapp.control.board_watch import BoardWatch
 from navapp.control.executors import InlineExecutor, ThreadExecutor
+from navapp.control.length_check import Finding
 from tests.control.fakes import wait_for
 from tests.control.test_length_check import Look
 
@@ -68,7 +69,7 @@ def test_a_showing_is_told_once_and_the_next_one_again() -> None:
     looker = Looker()
     (first,) = looker.run(0.0, 20.0)
     assert first.n_looks == 3
-    assert first.is_within
+    assert first.finding is Finding.WITHIN
     looker.length = None
     assert looker.run(20.0, 40.0) == []
     assert looker.watch.newest.captured_ns < 20 * S
@@ -78,21 +79,24 @@ def test_a_showing_is_told_once_and_the_next_one_again() -> None:
     assert second.ratio == pytest.approx(1.0001)
 
 
-def test_a_length_that_is_off_is_told_once_three_looks_agree() -> None:
+def test_a_length_that_is_off_is_a_doubt_after_three_looks_and_told_after_six() -> None:
     looker = Looker()
     looker.length = Look(1.0012)
     told = looker.run(0.0, 20.0)
-    assert [one.n_looks for one in told[:2]] == [3, 4]
-    assert all(one.is_off for one in told)
+    assert [(one.n_looks, one.finding) for one in told[:2]] == [
+        (3, Finding.DOUBTFUL),
+        (5, Finding.OFF),
+    ]
+    assert looker.asked_s[5] < 16.0
 
 
 def test_one_wrong_look_among_good_ones_is_no_alarm() -> None:
     looker = Looker()
     looker.run(0.0, 9.0)
     looker.length = Look(1.004)
-    assert not any(one.is_off for one in looker.run(9.0, 11.6))
+    assert not any(one.finding is Finding.OFF for one in looker.run(9.0, 11.6))
     looker.length = Look(1.0)
-    assert not any(one.is_off for one in looker.run(11.6, 60.0))
+    assert not any(one.finding is Finding.OFF for one in looker.run(11.6, 60.0))
     assert len(looker.asked_s) > 15
 
 

@@ -271,7 +271,7 @@ def test_a_board_in_view_checks_the_rig(tmp_path: Path) -> None:
     rig = result(out)["rig"]
     assert rig["alarm"] is None
     check = rig["length_check"]
-    assert check["within"]
+    assert check["finding"] == "within"
     assert check["looks"] >= 3
     assert check["length_100_mm"]["mean"] == pytest.approx(100.0, abs=0.02)
     assert 0.0 <= check["age_s"] <= 3.0
