@@ -67,13 +67,19 @@ class RigWatch:
 
     @property
     def length_check(self) -> LengthCheck | None:
-        """The newest, None before the first."""
-        return None if self._board is None else self._board.newest
+        """The newest that says something of the rig, else the newest; None before the first."""
+        return None if self._board is None else self._board.judged or self._board.newest
+
+    @property
+    def unjudged(self) -> LengthCheck | None:
+        """The newest, as long as it says nothing yet; None when it does."""
+        newest = None if self._board is None else self._board.newest
+        return None if newest is None or newest.is_judged else newest
 
     def take_over(self) -> None:
         """Before a frame: what a look at an earlier one has found."""
         session = self._session
-        found = None if self._board is None else self._board.take_over(session.clock.now_ns())
+        found = None if self._board is None else self._board.take_over()
         if found is None or session.rig_error is not None:
             return
         if found.finding is Finding.OFF:

@@ -217,7 +217,8 @@ class Snapshot:
         is_bone_planned: the plan has a model of the stage's bone.
         is_camera_silent: no picture has come for longer than the camera's period explains.
         rig_alarm: why the rig is not believed any more; empty while it is.
-        length_check: the newest look at a known length, None before one.
+        length_check: the newest look at a known length that says something of the rig, else the
+            newest; None before one.
         events: the newest, oldest first.
     """
 

@@ -140,7 +140,7 @@ def test_rows_that_are_off_for_a_moment_only_hide_the_guides(bench: Bench) -> No
 def board_bench(monkeypatch, looks: Callable[[], Look | None], **options) -> Bench:
     return Bench(
         monkeypatch,
-        board_watch=BoardWatch(lambda left, right: looks(), WORST, InlineExecutor()),
+        board_watch=BoardWatch(lambda left, right: looks(), WORST, InlineExecutor(), lambda: 0),
         **options,
     )
 
@@ -150,6 +150,7 @@ def test_a_board_that_is_measured_right_is_an_event_and_a_line_with_its_age(monk
     bench.frames(1)
     (line,) = [line for line in bench.snapshot.devices if line.kind == "rig"]
     assert line.detail == "not checked: show the board"
+    assert line.health is DeviceHealth.ABSENT
     after_rows(navigating(bench), GOOD, 8.0)
     told = [event for event in bench.events if event.kind == "rig"]
     assert [event.level for event in told] == [EventLevel.INFO]

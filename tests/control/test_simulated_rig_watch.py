@@ -90,7 +90,7 @@ def with_board(undo: ExitStack, faults: FaultScript) -> SimulatedRoom:
     place_mm = np.array([-110.0, -60.0, 420.0]) - rotation @ BOARD.points_mm.mean(axis=0)
     pose = RigidTransform.from_parts("left", "board", rotation, place_mm)
     sheet = sheet_of(BOARD)
-    watch = BoardWatch(LengthMeter(BOARD, default_rig()), WORST, InlineExecutor())
+    watch = BoardWatch(LengthMeter(BOARD, default_rig()), WORST, InlineExecutor(), lambda: 0)
     return SimulatedRoom(
         undo, faults=faults, rate_hz=2.0, board_watch=watch,
         seen=lambda world: SheetInView(world, sheet, lambda time_ns: pose, (0, 60 * S)),
