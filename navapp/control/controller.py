@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from drivers.frames import StereoFrame
 from drivers.interfaces import DeviceSet
 from navapp.control.board_watch import BoardWatch
+from navapp.control.bone_motion import BoneMotion
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
 from navapp.control.companions import Companions
@@ -97,7 +98,7 @@ class SessionController:
         self._session = Session(
             devices.clock, hooks, self._pursuit, companions, options.first_stage
         )
-        self._watch = RigWatch(self._session, self._display, board_watch)
+        self._watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._commands = Commands(self._session, self._camera, self._display, self._watch)
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, devices, rig, self._watch, plan,

@@ -1,8 +1,10 @@
 """A rig that moved ends all trust; what passes does not."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from navapp.control.board_watch import BoardWatch
@@ -22,6 +24,7 @@ from navapp.control.states import (
     Show,
 )
 from navapp.errors import DeviceLost, RigError
+from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, RowCheck
 from tests.control.fakes import DOUBTED, PERIOD_NS, Bench, a_pose, answer, navigating
 from tests.control.test_length_check import Look
@@ -31,11 +34,16 @@ GOOD, LOW, HIGH = RowCheck(0.02, False), RowCheck(0.6, True), RowCheck(-0.6, Tru
 WORST = 0.0009
 
 
-def said(rows: Callable[[float], RowCheck | None], seconds: float, rate_hz: float = 15.0) -> str:
+def said(
+    rows: Callable[[float], RowCheck | None],
+    seconds: float,
+    rate_hz: float = 15.0,
+    motion_px: float = 0.0,
+) -> str:
     """What is wrong, after so long; empty: nothing."""
     watch = RowWatch()
     for k in range(round(seconds * rate_hz)):
-        if why := watch.add(rows(k / rate_hz), round(k / rate_hz * S)):
+        if why := watch.add(rows(k / rate_hz), round(k / rate_hz * S), motion_px):
             return why
     return ""
 
@@ -67,6 +75,31 @@ def test_a_good_pair_in_between_does_not_hide_it() -> None:
 )
 def test_what_passes_is_no_alarm(rows: Callable[[float], RowCheck | None]) -> None:
     assert said(rows, 60.0) == ""
+
+
+@pytest.mark.parametrize("motion_px", [0.31, 0.6, 5.0, math.inf])
+def test_rows_that_a_moving_leg_explains_are_no_alarm(motion_px: float) -> None:
+    for rows in (LOW, HIGH):
+        assert said(lambda s, rows=rows: rows, 60.0, motion_px=motion_px) == ""
+
+
+def test_rows_that_it_does_not_explain_are_one_all_the_same() -> None:
+    assert "0.60 px too low" in said(lambda s: LOW, 8.0, motion_px=0.2)
+
+
+def test_a_leg_that_is_carried_steadily_never_alarms_and_once_it_rests_does(bench: Bench) -> None:
+    """10 mm/s, paired with pictures of unknown times."""
+    navigating(bench)
+    y_mm = 0.0
+    for k in range(300):
+        y_mm += 0.66 if k < 200 else 0.0
+        pose = RigidTransform.from_parts("left", "femur", np.eye(3), (0.0, y_mm % 100, 300.0))
+        offset_px = 0.22 if k < 200 else 0.6
+        bench.script.tracked = replace(answer(pose=pose), rows=RowCheck(offset_px, True))
+        bench.frames(1)
+        if k < 200:
+            assert bench.state == "navigating"
+    assert bench.state == "fault"
 
 
 def with_rows(rows: RowCheck | None):
