@@ -113,7 +113,7 @@ class _Pool:
 
         known = float(ndtri(tail)) * self.sigma
         found = float(stdtrit(freedom, tail)) * scatter if freedom > 0 else 0.0
-        return max(known, found) / self.n**0.5
+        return max(known, found) / float(np.sqrt(self.n))
 
     def is_still(self, worst_share: float) -> bool:
         """The looks scatter as those at a board held still do."""

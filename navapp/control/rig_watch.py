@@ -97,10 +97,7 @@ class RigWatch:
         if found is None or session.rig_error is not None:
             return
         if found.finding is Finding.OFF:
-            # A replay cannot look again as fast as the session did: it is told.
-            command = DistrustRig(str(found))
-            session.tell(session.hooks.on_command, command, session.sequence)
-            self.distrust(command)
+            self._found(str(found))
         elif found.finding is Finding.WITHIN:
             session.event("rig", f"rig checked: {found}")
         else:
@@ -115,7 +112,7 @@ class RigWatch:
         rows = None if tracked is None else tracked.rows
         why = self._rows.add(rows, frame.captured_ns, motion_px)
         if why:
-            self.distrust(DistrustRig(why))
+            self._found(why)
         elif self._board is not None:
             self._board.look(frame)
 
@@ -123,6 +120,12 @@ class RigWatch:
         """Dark, and for good."""
         self._display.darken()
         self._session.distrust_rig(command.why)
+
+    def _found(self, why: str) -> None:
+        # A replay cannot look again as fast as the session did, or follows otherwise: it is told.
+        command = DistrustRig(why)
+        self._session.tell(self._session.hooks.on_command, command, self._session.sequence)
+        self.distrust(command)
 
     def close(self) -> None:
         """Wait for a look that still runs."""

@@ -82,7 +82,7 @@ _REMEDIES = {
     Reason.BLANKED: "press the show key to leave blank",
     Reason.CAMERA_SILENT: "check the camera's cable",
     Reason.DEVICE_FAULT: "see the events, then check the device",
-    Reason.RIG_MOVED: "end the session and calibrate the rig; the events say how it was found",
+    Reason.RIG_MOVED: "end the session; check the rig on the board, or calibrate it",
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }

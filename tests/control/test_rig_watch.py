@@ -130,6 +130,19 @@ def test_a_moved_rig_is_said_in_words_rings_and_is_dark(moved: Bench) -> None:
     assert line.health is DeviceHealth.TROUBLE
     assert "rig moved, recalibrate" in line.detail
     assert isinstance(moved.controller.failure, RigError)
+    assert moved.controller.failure.remedy == Reason.RIG_MOVED.remedy
+
+
+def test_what_the_rows_have_found_is_told_to_a_recording(monkeypatch) -> None:
+    told = []
+    hooks = SessionHooks(on_command=(lambda command, sequence: told.append((command, sequence)),))
+    bench = after_rows(navigating(Bench(monkeypatch, hooks=hooks)), LOW, 6.0)
+    (found,) = [one for one in told if isinstance(one[0], DistrustRig)]
+    first = next(result for result in bench.results if result.state.value == "fault")
+    assert found == (
+        DistrustRig("the right picture shows everything 0.60 px too low"),
+        first.frame.sequence,
+    )
 
 
 def test_no_good_frame_and_no_command_brings_it_back(moved: Bench) -> None:

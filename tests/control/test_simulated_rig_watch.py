@@ -107,7 +107,7 @@ def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack, sign
     told = [event for event in room.controller.snapshot.events if event.kind == "rig"]
     assert [event.level for event in told] == [EventLevel.INFO]
     assert room.controller.snapshot.length_check.ratio == pytest.approx(1.0, abs=2e-4)
-    until_s(room, 45.0)
+    until_s(room, 25.0)
     assert room.state == "fault"
     assert not room.display.visible_image().any()
     assert "100 mm on the board are measured as" in room.controller.snapshot.rig_alarm

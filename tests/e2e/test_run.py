@@ -298,6 +298,15 @@ def test_a_board_in_view_finds_a_camera_that_turned_sideways_and_so_does_the_rep
     assert states[-1] == "fault"
     assert run(["--quiet", "replay", str(session), "--json", str(again)]) == 3
     assert [frame["state"] for frame in result(again)["frames"]] == states
+    after = states.index("fault") - 1
+    for changed in (["--method", "icp"], ["--order", "each"], ["--start", str(after + 3)]):
+        assert run(["--quiet", "replay", str(session), *changed, "--json", str(again)]) == 3
+        content = result(again)
+        assert content["rig"]["moved_after_frame"] == after
+        late = [frame for frame in content["frames"] if frame["index"] > after]
+        assert late
+        assert {frame["state"] for frame in late} == {"fault"}
+        assert {tuple(frame["reasons"]) for frame in late} == {("rig moved, recalibrate",)}
 
 
 def test_a_board_to_be_shown_must_be_named(
