@@ -10,7 +10,7 @@ _FINDINGS = {
     Finding.OFF: DeviceHealth.TROUBLE,
     Finding.DOUBTFUL: DeviceHealth.TROUBLE,
     Finding.WITHIN: DeviceHealth.OK,
-    Finding.NOT_JUDGED: DeviceHealth.ABSENT,
+    Finding.NOT_JUDGED: DeviceHealth.UNKNOWN,
 }
 
 
@@ -74,7 +74,7 @@ def rig_line(
     if problem:
         return DeviceLine("rig", name, DeviceHealth.TROUBLE, problem)
     if check is None:
-        return DeviceLine("rig", name, DeviceHealth.ABSENT, "not checked: show the board")
+        return DeviceLine("rig", name, DeviceHealth.UNKNOWN, "not checked: show the board")
     told = f"{check}, {max(now_ns - check.captured_ns, 0) // 1_000_000_000} s ago"
     if unjudged is not None and unjudged is not check:
         told = f"{told}; now {unjudged}"

@@ -137,6 +137,7 @@ class DeviceHealth(Enum):
 
     OK = "ok"
     ABSENT = "absent"
+    UNKNOWN = "unknown"
     TROUBLE = "trouble"
     LOST = "lost"
 

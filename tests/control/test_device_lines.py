@@ -19,7 +19,7 @@ def check(finding: Finding, n_looks: int = 4) -> LengthCheck:
         (Finding.WITHIN, DeviceHealth.OK),
         (Finding.DOUBTFUL, DeviceHealth.TROUBLE),
         (Finding.OFF, DeviceHealth.TROUBLE),
-        (Finding.NOT_JUDGED, DeviceHealth.ABSENT),
+        (Finding.NOT_JUDGED, DeviceHealth.UNKNOWN),
     ],
 )
 def test_only_a_length_that_is_right_is_good_news(finding: Finding, health: DeviceHealth) -> None:
@@ -28,11 +28,11 @@ def test_only_a_length_that_is_right_is_good_news(finding: Finding, health: Devi
 
 def test_a_rig_that_was_never_measured_is_no_good_news() -> None:
     line = rig_line("rig", "", None, 9 * S)
-    assert (line.health, line.detail) == (DeviceHealth.ABSENT, "not checked: show the board")
+    assert (line.health, line.detail) == (DeviceHealth.UNKNOWN, "not checked: show the board")
     few = check(Finding.NOT_JUDGED, 2)
     line = rig_line("rig", "", few, 9 * S, few)
     assert (line.health, line.detail) == (
-        DeviceHealth.ABSENT,
+        DeviceHealth.UNKNOWN,
         "2 of 3 looks at the board, 7 s ago",
     )
 

@@ -196,7 +196,7 @@ def test_a_board_that_is_measured_right_is_an_event_and_a_line_with_its_age(monk
     bench.frames(1)
     (line,) = [line for line in bench.snapshot.devices if line.kind == "rig"]
     assert line.detail == "not checked: show the board"
-    assert line.health is DeviceHealth.ABSENT
+    assert line.health is DeviceHealth.UNKNOWN
     after_rows(navigating(bench), GOOD, 8.0)
     told = [event for event in bench.events if event.kind == "rig"]
     assert [event.level for event in told] == [EventLevel.INFO]
