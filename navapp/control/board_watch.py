@@ -52,7 +52,7 @@ class BoardWatch:
         self._now_ns = now_ns
         self._job: Job[_Look] | None = None
         self._began_ns, self._due_ns = 0, 0
-        self._lengths: deque[Length] = deque(maxlen=2 * MOST_LOOKS)
+        self._lengths: deque[Length] = deque(maxlen=MOST_LOOKS)
         self._is_told = False
         self.newest: LengthCheck | None = None
         self.judged: LengthCheck | None = None

@@ -8,7 +8,10 @@ from typing import Protocol
 import numpy as np
 
 # Fewer do not say how far they scatter; of more the newest count, so that a move is soon seen.
-FEWEST_LOOKS, MOST_LOOKS = 3, 5
+FEWEST_LOOKS, _MOST_LOOKS = 3, 5
+# An alarm has two pools as large as it needs: so many looks of a showing are of use.
+_LARGEST_POOL = 10
+MOST_LOOKS = 2 * _LARGEST_POOL
 _TAIL = 0.975
 # An alarm cannot be taken back, and a long session asks a thousand times: two-sided 99.99 %.
 _SURE_TAIL = 0.99995
@@ -131,7 +134,7 @@ def pooled(lengths: Sequence[Length], captured_ns: int, worst_share: float) -> L
         captured_ns: of the last one.
         worst_share: of a length that may be wrong.
     """
-    pool = _Pool.of(lengths[-MOST_LOOKS:])
+    pool = _Pool.of(lengths[-_MOST_LOOKS:])
     bound = pool.bound(_TAIL, pool.scatter, pool.n - 1 if pool.n >= FEWEST_LOOKS else 0)
     finding = Finding.DOUBTFUL
     if _are_off(lengths, worst_share):
@@ -145,7 +148,7 @@ def pooled(lengths: Sequence[Length], captured_ns: int, worst_share: float) -> L
 
 def _are_off(lengths: Sequence[Length], worst_share: float) -> bool:
     """Two pools that share no look are both surely off, and to the same side."""
-    sizes = range(FEWEST_LOOKS, min(MOST_LOOKS, len(lengths) // 2) + 1)
+    sizes = range(FEWEST_LOOKS, min(_LARGEST_POOL, len(lengths) // 2) + 1)
     return any(
         _agree(_Pool.of(lengths[-2 * n : -n]), _Pool.of(lengths[-n:]), worst_share) for n in sizes
     )

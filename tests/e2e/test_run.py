@@ -281,17 +281,17 @@ def test_a_board_in_view_checks_the_rig(tmp_path: Path) -> None:
 def test_a_board_in_view_finds_a_camera_that_turned_sideways_and_so_does_the_replay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # A third of a pixel.
+    # Two thirds of a pixel.
     faults = (
-        'faults = [{kind = "turn", start_s = 3.0, duration_s = inf, turn_deg = [0, 0.0123, 0]}]'
+        'faults = [{kind = "turn", start_s = 3.0, duration_s = inf, turn_deg = [0, 0.0246, 0]}]'
     )
     out, again, session = tmp_path / "a.json", tmp_path / "b.json", tmp_path / "session"
-    options = [*boarded(tmp_path, faults), "--frames", "30"]
+    options = [*boarded(tmp_path, faults), "--frames", "36"]
     assert run([*options, "--record", str(session), "--json", str(out)]) == 3
     assert "rig moved, recalibrate (100 mm on the board" in capsys.readouterr().err
     content = result(out)
     assert content["rig"]["length_check"]["length_100_mm"]["mean"] == pytest.approx(
-        100.12, abs=0.02
+        100.24, abs=0.03
     )
     states = [frame["state"] for frame in content["frames"]]
     assert states[0] != "fault"
@@ -299,14 +299,13 @@ def test_a_board_in_view_finds_a_camera_that_turned_sideways_and_so_does_the_rep
     assert run(["--quiet", "replay", str(session), "--json", str(again)]) == 3
     assert [frame["state"] for frame in result(again)["frames"]] == states
     after = states.index("fault") - 1
-    for changed in (["--method", "icp"], ["--order", "each"], ["--start", str(after + 3)]):
-        assert run(["--quiet", "replay", str(session), *changed, "--json", str(again)]) == 3
-        content = result(again)
-        assert content["rig"]["moved_after_frame"] == after
-        late = [frame for frame in content["frames"] if frame["index"] > after]
-        assert late
-        assert {frame["state"] for frame in late} == {"fault"}
-        assert {tuple(frame["reasons"]) for frame in late} == {("rig moved, recalibrate",)}
+    changed = ["--method", "icp", "--start", str(after + 1)]
+    assert run(["--quiet", "replay", str(session), *changed, "--json", str(again)]) == 3
+    content = result(again)
+    assert content["rig"]["moved_after_frame"] == after
+    assert content["frames"]
+    assert {frame["state"] for frame in content["frames"]} == {"fault"}
+    assert {tuple(one["reasons"]) for one in content["frames"]} == {("rig moved, recalibrate",)}
 
 
 def test_a_board_to_be_shown_must_be_named(
