@@ -12,7 +12,11 @@ KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration \
     tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \
     tests/stereo tests/tracking/test_agreement.py tests/calibration/targets
 
-SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 libx11-6 tmux
+# The window's libraries: SDL draws into nothing without them. Then screens for the tests.
+SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
+    libx11-6 libxext6 libxrandr2 libxcursor1 libxi6 libxss1 libxfixes3 \
+    xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils \
+    libxcb-randr0 libxcb-render0 libxcb-shm0 libxcb-xfixes0
 
 .PHONY: run test check setup bench bench-peers system-deps clean help
 

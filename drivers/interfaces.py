@@ -150,7 +150,11 @@ class PowerState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ProjectorStatus:
-    """What was read back; None means that this projector cannot say."""
+    """What was read back; None means that this projector cannot say.
+
+    `keystone` is its horizontal and vertical correction in the projector's own steps: they tell
+    that it was changed, not by how much.
+    """
 
     power: PowerState
     source: str | None = None
@@ -160,6 +164,8 @@ class ProjectorStatus:
     lamp_hours: tuple[int, ...] = ()
     faults: tuple[str, ...] = ()
     serial: str = ""
+    keystone: tuple[int, int] | None = None
+    is_frozen: bool | None = None
 
 
 class ProjectorControl(Protocol):
@@ -248,7 +254,7 @@ class MirrorMount(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop moving, now."""
+        """Stop moving, now; any thread may call it, and the motion that it ends then raises."""
         ...
 
     def close(self) -> None:

@@ -1,7 +1,10 @@
 """Composition root: the only place that turns a configuration into opened devices."""
 
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -9,11 +12,27 @@ import numpy as np
 from calibration.targets.boards import Board
 from calibration.targets.drawing import drawn, rastered
 from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.escvp21_projector import BAUD_RATE as ESCVP21_BAUD_RATE
+from drivers.escvp21_projector import EscVp21Projector
 from drivers.fixed_mirror import FixedMirror
-from drivers.interfaces import DeviceSet, StereoCamera
+from drivers.interfaces import DeviceSet, Display, MirrorMount, ProjectorControl, StereoCamera
 from drivers.no_projector import NoProjector
+from drivers.pjlink_line import TcpConnection
+from drivers.pjlink_projector import PjlinkProjector
 from drivers.replay_camera import ReplayCamera, ReplaySettings
-from navapp.config import Configuration, FaultSection, SimulationSection
+from drivers.serial_port import SerialAddress
+from drivers.window_display import WindowDisplay
+from drivers.window_process import WindowSettings
+from drivers.zaber_line import BAUD_RATE as ZABER_BAUD_RATE
+from drivers.zaber_mirror import ZaberMirror
+from navapp.config import (
+    Configuration,
+    DisplaySection,
+    FaultSection,
+    MirrorSection,
+    ProjectorSection,
+    SimulationSection,
+)
 from navapp.errors import ConfigurationError, DeviceError, RigError, WrongDevice
 from navapp.geometry import Rectifier, RigidTransform, StereoRig, TriangleMesh, read_rig
 from navapp.geometry.transform import FloatArray
@@ -168,7 +187,8 @@ def open_recording(
     clock = ManualClock()
     camera = ReplayCamera(source, clock, settings, rig_id=rig.rig_id)
     _open_fitting(camera, rig)
-    return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, _no_reopening)
+    devices = _device_set(configuration, camera, clock, rig, is_live=False)
+    return OpenedDevices(devices, rig, _no_reopening)
 
 
 def _configured_rig(configuration: Configuration) -> StereoRig:
@@ -291,14 +311,47 @@ def _third_party_camera(configuration: Configuration, clock: Clock) -> StereoCam
 
 
 def _device_set(
-    configuration: Configuration, camera: StereoCamera, clock: Clock, rig: StereoRig
+    configuration: Configuration,
+    camera: StereoCamera,
+    clock: Clock,
+    rig: StereoRig,
+    *,
+    is_live: bool = True,
 ) -> DeviceSet:
-    display = SimulatedDisplay(clock, rig.width, rig.height)
-    mirror = FixedMirror(configuration.mirror.calibrated_deg)
-    projector = NoProjector()
-    for device in (display, mirror, projector):
-        device.open()
-    return DeviceSet(camera, display, projector, mirror, clock)
+    """The camera as it is, the others opened; when one cannot be opened, all are closed.
+
+    A recording lights no display, moves no mirror and asks no projector.
+    """
+    projector: ProjectorControl = NoProjector()
+    mirror: MirrorMount = FixedMirror(configuration.mirror.calibrated_deg)
+    display: Display = SimulatedDisplay(clock, rig.width, rig.height)
+    if is_live:
+        projector, mirror = _projector(configuration.projector), _mirror(configuration.mirror)
+        display = _display(configuration.display, clock, rig)
+    devices = DeviceSet(camera, display, projector, mirror, clock)
+    with ExitStack() as undo:
+        undo.callback(devices.close)
+        for device in (display, mirror, projector):
+            device.open()
+        undo.pop_all()
+    return devices
+
+
+def _projector(settings: ProjectorSection) -> ProjectorControl:
+    if settings.backend == "pjlink":
+        return _pjlink_projector(settings)
+    if settings.backend == "escvp21":
+        address = SerialAddress(settings.port, ESCVP21_BAUD_RATE)
+        return EscVp21Projector(address, SystemClock(), settings.serial)
+    return NoProjector()
+
+
+def _mirror(settings: MirrorSection) -> MirrorMount:
+    if settings.backend == "zaber":
+        address = SerialAddress(settings.port, ZABER_BAUD_RATE)
+        axis = (settings.device, settings.axis)
+        return ZaberMirror(address, SystemClock(), settings.serial, axis)
+    return FixedMirror(settings.calibrated_deg)
 
 
 def _open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
@@ -345,3 +398,27 @@ def _reopener(camera: StereoCamera, open_again: Callable[[], None]) -> Callable[
 
 def _no_reopening() -> StereoCamera:
     raise DeviceError("a recording cannot be reopened")
+
+
+def _display(settings: DisplaySection, clock: Clock, rig: StereoRig) -> Display:
+    if settings.backend == "window" and settings.size_px is not None:
+        flips = (settings.flip_horizontally, settings.flip_vertically)
+        return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
+    return SimulatedDisplay(clock, rig.width, rig.height)
+
+
+def _pjlink_projector(settings: ProjectorSection) -> PjlinkProjector:
+    connect = partial(TcpConnection, settings.host, settings.tcp_port)
+    password = "" if settings.password_file is None else _password(Path(settings.password_file))
+    return PjlinkProjector(settings.host, SystemClock(), connect, password)
+
+
+def _password(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8").rstrip("\r\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            f"the password file {path} cannot be read",
+            subject="projector.password_file",
+            remedy="write the projector's PJLink password into it, readable by you alone",
+        ) from error

@@ -1,21 +1,29 @@
 """The composition root: what it opens, refuses and closes again."""
 
 import importlib.metadata
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from drivers.clock import Clock, ManualClock
+from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.interfaces import PowerState
 from drivers.replay_camera import ReplaySettings
-from navapp.config import Configuration, parse
+from navapp.config import Configuration, as_toml, parse
 from navapp.devices import open_live, open_recording
-from navapp.errors import ConfigurationError, DeviceLost, RigError, WrongDevice
+from navapp.errors import ConfigurationError, DeviceLost, DeviceNotFound, RigError, WrongDevice
 from navapp.geometry import write_rig
 from sim_devices.camera import SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
+from sim_devices.firmware import pjlink
+from sim_devices.firmware.pjlink_server import PjlinkServer
+from tests.drivers.firmware_rigs import SERIAL, STAGE_SERIAL, projector_terminal, stage_terminal
 from tests.drivers.recordings import write_pairs
 from tests.sim_devices.plain_world import PlainWorld, plain_rig
+from tests.x_servers import seen, xvfb
 
 SMALL = {"camera": {"simulated": {"scale": 0.2}}}
 
@@ -129,3 +137,110 @@ def test_an_unknown_backend_is_refused(tmp_path, monkeypatch) -> None:
     announce(monkeypatch, [])
     with pytest.raises(ConfigurationError, match="no camera backend 'acme'"):
         open_live(acme(tmp_path), is_headless=True)
+
+
+def with_ports(folder: Path, projector: str = "", mirror: str = "") -> Configuration:
+    ports = {
+        "projector": {"backend": "escvp21", "port": f"{folder}/projector", "serial": projector},
+        "mirror": {"backend": "zaber", "port": f"{folder}/stage", "serial": mirror},
+    }
+    return parse({**SMALL, **ports}, "x")
+
+
+def test_projector_and_mirror_are_opened_on_their_ports(tmp_path) -> None:
+    with projector_terminal(tmp_path), stage_terminal(tmp_path):
+        opened = open_live(with_ports(tmp_path, SERIAL, STAGE_SERIAL), is_headless=True)
+        assert opened.devices.projector.name == f"sim:ESC/VP21 projector {SERIAL}"
+        assert opened.devices.mirror.info.name == f"sim:Zaber mount {STAGE_SERIAL}"
+        assert opened.devices.projector.status().power is PowerState.STANDBY
+        assert opened.devices.mirror.position_deg() is None
+        opened.devices.close()
+
+
+def test_another_mount_is_refused_and_everything_is_closed(tmp_path) -> None:
+    with projector_terminal(tmp_path), stage_terminal(tmp_path):
+        with pytest.raises(WrongDevice, match="has serial number 990123, the rig's is 1"):
+            open_live(with_ports(tmp_path, SERIAL, "1"), is_headless=True)
+        # A line that was left open would be refused to the second one.
+        open_live(with_ports(tmp_path, SERIAL), is_headless=True).devices.close()
+
+
+def test_a_port_that_is_not_there_says_what_to_do(tmp_path) -> None:
+    with pytest.raises(
+        DeviceNotFound, match=r"cannot be opened \(No such file.*: connect the device"
+    ):
+        open_live(with_ports(tmp_path), is_headless=True)
+
+
+def test_a_recording_asks_no_projector_and_moves_no_mirror(tmp_path) -> None:
+    write_pairs(tmp_path / "pairs", range(1))
+    rig = plain_rig(48, 32)
+    opened = open_recording(
+        str(tmp_path / "pairs"), ReplaySettings(), rig, with_ports(tmp_path / "nowhere")
+    )
+    assert opened.devices.projector.status().power is PowerState.ABSENT
+    assert not opened.devices.mirror.info.is_movable
+    opened.devices.close()
+
+
+WINDOW = {"backend": "window", "size_px": [320, 200]}
+
+
+def test_a_window_is_opened_on_the_only_output(monkeypatch) -> None:
+    with xvfb(320, 200) as server:
+        monkeypatch.setenv("DISPLAY", server)
+        content = {**SMALL, "display": {**WINDOW, "flip_vertically": True}}
+        devices = open_live(parse(content, "x"), is_headless=True).devices
+        info = devices.display.info
+        assert (info.backend, info.width, info.height) == ("window", 320, 200)
+        assert (info.flips_horizontally, info.flips_vertically) == (False, True)
+        white = np.full((200, 320, 3), 255, np.uint8)
+        devices.display.show(white, devices.clock.now_ns() + 60 * 10**9)
+        end_s = time.monotonic() + 5.0
+        while not seen(server, 0, 0, 320, 200).all():
+            assert time.monotonic() < end_s
+        devices.close()
+        assert not seen(server, 0, 0, 320, 200).any()
+
+
+def test_a_window_that_cannot_be_opened_closes_the_camera(camera, tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("DISPLAY", ":31999")
+    settings = acme(tmp_path).model_copy(
+        update={"display": parse({"display": WINDOW}, "x").display}
+    )
+    with pytest.raises(DeviceNotFound, match="no X11 screen"):
+        open_live(settings, is_headless=True)
+    assert is_closed(camera)
+
+
+def test_a_recording_lights_no_display_and_asks_no_projector(tmp_path) -> None:
+    pairs = write_pairs(tmp_path / "pairs", range(2))
+    content = {"display": WINDOW, "projector": {"backend": "pjlink", "host": "192.0.2.1"}}
+    opened = open_recording(str(pairs), ReplaySettings(), plain_rig(48, 32), parse(content, "x"))
+    assert opened.devices.display.info.is_simulated
+    assert opened.devices.projector.status().power is PowerState.ABSENT
+    opened.devices.close()
+
+
+def test_a_pjlink_projector_is_opened_with_the_password_of_a_file(tmp_path) -> None:
+    server = PjlinkServer(pjlink.PjlinkProjector(SystemClock(), password="open sesame"))
+    server.start()
+    (tmp_path / "password").write_text("open sesame\n")
+    settings = {
+        "backend": "pjlink",
+        "host": "127.0.0.1",
+        "tcp_port": server.port,
+        "password_file": str(tmp_path / "password"),
+    }
+    try:
+        configuration = parse({**SMALL, "projector": settings}, "x")
+        devices = open_live(configuration, is_headless=True).devices
+        assert devices.projector.name == "sim:projector"
+        assert devices.projector.status().power is PowerState.STANDBY
+        devices.close()
+        assert "sesame" not in as_toml(configuration, True) + repr(configuration)
+        (tmp_path / "password").unlink()
+        with pytest.raises(ConfigurationError, match=r"password file .* cannot be read"):
+            open_live(configuration, is_headless=True)
+    finally:
+        server.close()

@@ -136,6 +136,7 @@ _CHECKS: tuple[Callable[[], Finding], ...] = (
     _package("open3d-cpu", "open3d", False, "referee in tests; needs system libraries"),
     _package("depthai", "depthai", False, "OAK cameras"),
     _package("pyserial", "serial", False, "projector and mirror lines"),
+    _package("pygame-ce", "pygame", False, "window on a monitor or projector"),
     _kernel_cache,
     _terminal,
     _configuration,

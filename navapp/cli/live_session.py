@@ -129,6 +129,7 @@ def controller_of(
             first_stage=session.stage,
             overlay_valid_ms=configuration.display.valid_ms,
             is_recording=configuration.recording.folder is not None,
+            mirror_deg=configuration.mirror.calibrated_deg,
         ),
         hooks=_listening(session, on_frame, undo),
         board_watch=_board_watch(session, is_inline=is_inline),

@@ -226,6 +226,7 @@ def _controller(
             first_stage=replay.stage,
             overlay_valid_ms=configuration.display.valid_ms,
             also=tuple(stage.bone for stage in replay.also),
+            mirror_deg=configuration.mirror.calibrated_deg,
         ),
         hooks=SessionHooks(on_frame=tuple(listeners)),
     )

@@ -5,7 +5,10 @@ from navapp.config.files import FILE_NAME, find_file, load
 from navapp.config.sections import (
     CalibrationSection,
     Configuration,
+    DisplaySection,
     FaultSection,
+    MirrorSection,
+    ProjectorSection,
     Section,
     SimulationSection,
 )
@@ -15,7 +18,10 @@ __all__ = [
     "FILE_NAME",
     "CalibrationSection",
     "Configuration",
+    "DisplaySection",
     "FaultSection",
+    "MirrorSection",
+    "ProjectorSection",
     "Section",
     "SimulationSection",
     "as_toml",

@@ -1,11 +1,12 @@
 """The tables of the configuration: frozen models that refuse unknown keys."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
+Pixels = Annotated[int, Field(gt=0)]
 
 
 def _rising(values: tuple[float, float]) -> tuple[float, float]:
@@ -24,6 +25,15 @@ class Section(BaseModel):
         allow_inf_nan=False,
         use_attribute_docstrings=True,
     )
+
+
+S = TypeVar("S", bound="Section")
+
+
+def _with_port(section: S, needs_port: bool, port: str) -> S:
+    if needs_port and not port:
+        raise ValueError("this backend needs a port")
+    return section
 
 
 class FaultSection(Section):
@@ -110,26 +120,68 @@ class CameraSection(BaseModel):
 class DisplaySection(Section):
     """Where the overlay is shown."""
 
-    backend: Literal["simulated"] = "simulated"
-    """simulated."""
+    backend: Literal["simulated", "window"] = "simulated"
+    """simulated, or window: a monitor or projector of this computer, covered from edge to edge."""
+    output: str = ""
+    """Name of the window's monitor or projector; empty: the only one."""
+    size_px: tuple[Pixels, Pixels] | None = None
+    """Width and height of that output; a window needs it."""
+    flip_horizontally: bool = False
+    """The window shows every picture with left and right exchanged."""
+    flip_vertically: bool = False
+    """The window shows every picture upside down."""
     valid_ms: Positive = 500.0
     """A picture without a newer one turns black after this."""
+
+    @model_validator(mode="after")
+    def _has_a_size(self) -> Self:
+        if self.backend == "window" and self.size_px is None:
+            raise ValueError("a window needs size_px")
+        return self
 
 
 class ProjectorSection(Section):
     """The projector's control line."""
 
-    backend: Literal["none"] = "none"
-    """none."""
+    backend: Literal["none", "pjlink", "escvp21"] = "none"
+    """none; pjlink: PJLink class 1 over the network; escvp21: Epson's protocol on a serial line."""
+    host: str = ""
+    """Address of a PJLink projector."""
+    tcp_port: Annotated[int, Field(gt=0, lt=65536)] = 4352
+    """Port of a PJLink projector."""
+    password_file: str | None = None
+    """File that holds the password of a PJLink projector, and nothing else."""
+    port: str = ""
+    """Of an ESC/VP21 projector: serial port (/dev/serial/by-id/...) or socket://host:port."""
+    serial: str = ""
+    """Serial number of the rig's ESC/VP21 projector; another one is refused. Empty: any."""
+
+    @model_validator(mode="after")
+    def _has_a_host(self) -> Self:
+        if self.backend == "pjlink" and not self.host:
+            raise ValueError("pjlink needs a host")
+        return _with_port(self, self.backend == "escvp21", self.port)
 
 
 class MirrorSection(Section):
     """The mount of the half-silvered mirror."""
 
-    backend: Literal["fixed"] = "fixed"
-    """fixed."""
+    backend: Literal["fixed", "zaber"] = "fixed"
+    """fixed, or zaber: a rotary stage that speaks Zaber's ASCII protocol."""
     calibrated_deg: float = 45.0
-    """Angle at which the display was calibrated."""
+    """Angle at which the display was calibrated; of a stage from its home position."""
+    port: str = ""
+    """Serial port (/dev/serial/by-id/...) or socket://host:port."""
+    serial: str = ""
+    """Serial number of the rig's mount; another one is refused. Empty: any."""
+    device: Annotated[int, Field(ge=1, le=99)] = 1
+    """Its number on the line."""
+    axis: Annotated[int, Field(ge=1, le=9)] = 1
+    """The axis' number in the device."""
+
+    @model_validator(mode="after")
+    def _has_a_port(self) -> Self:
+        return _with_port(self, self.backend == "zaber", self.port)
 
 
 class PlanSection(Section):

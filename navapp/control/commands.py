@@ -1,6 +1,7 @@
 """What each of the operator's commands does to the session, its camera and its display."""
 
 from navapp.control.camera_link import CameraLink
+from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session, with_bound
@@ -30,12 +31,18 @@ class Commands:
     """Obeys, or refuses with a reason that the operator reads."""
 
     def __init__(
-        self, session: Session, camera: CameraLink, display: DisplayLink, rig: RigWatch
+        self,
+        session: Session,
+        camera: CameraLink,
+        display: DisplayLink,
+        rig: RigWatch,
+        slow: SlowDevices,
     ) -> None:
         self._session = session
         self._camera = camera
         self._display = display
         self._rig = rig
+        self._slow = slow
 
     def handle(self, command: Command) -> None:
         """Do what is asked."""
@@ -58,6 +65,7 @@ class Commands:
                 self._on_enter_stage(command)
             case Reconnect():
                 self._camera.retry_now()
+                self._slow.restore()
             case Interrupt():
                 self._session.lose_sight()
                 self._session.fall_back("the camera was lost here when this was recorded")

@@ -19,6 +19,8 @@ from navapp.control.bone_motion import BoneMotion
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
 from navapp.control.companions import Companions
+from navapp.control.device_care import MirrorCare, ProjectorCare
+from navapp.control.device_watch import SlowDevices, tell_changes
 from navapp.control.display_link import DisplayLink
 from navapp.control.executors import Executor
 from navapp.control.pictures import compose
@@ -54,6 +56,7 @@ class SessionOptions:
         overlay_valid_ms: how long a picture may stay on the display without a newer one.
         is_recording: the session is kept in a folder.
         also: bones that are registered from the prior and followed beside the stage's, unasked.
+        mirror_deg: where the mirror stood when the display was calibrated.
     """
 
     line: LineSettings = field(default_factory=LineSettings)
@@ -61,6 +64,7 @@ class SessionOptions:
     overlay_valid_ms: float = 500.0
     is_recording: bool = False
     also: tuple[str, ...] = ()
+    mirror_deg: float = 45.0
 
 
 class SessionController:
@@ -99,9 +103,14 @@ class SessionController:
             devices.clock, hooks, self._pursuit, companions, options.first_stage
         )
         self._watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
-        self._commands = Commands(self._session, self._camera, self._display, self._watch)
+        self._slow = SlowDevices(
+            ProjectorCare(devices.projector), MirrorCare(devices.mirror, options.mirror_deg)
+        )
+        self._commands = Commands(
+            self._session, self._camera, self._display, self._watch, self._slow
+        )
         self._maker = SnapshotMaker(
-            self._session, self._camera, self._display, devices, rig, self._watch, plan,
+            self._session, self._camera, self._display, self._slow, rig, self._watch, plan,
             options.is_recording,
         )  # fmt: skip
         self._snapshot = self._maker.make()
@@ -142,19 +151,23 @@ class SessionController:
             frame = self._next_frame(timeout_s)
             if frame is not None:
                 self._handle_frame(frame)
-        self._snapshot = self._maker.make()
-        if not (self._snapshot.is_navigable or self._snapshot.is_candidate):
+        before, self._snapshot = self._snapshot, self._maker.make()
+        if self._snapshot.device_reasons:
+            self._display.darken()
+        elif not (self._snapshot.is_navigable or self._snapshot.is_candidate):
             self._display.withdraw_guides()
+        tell_changes(session, before, self._snapshot)
         return self._snapshot
 
     def close(self) -> None:
         """End everything, the display first; safe to call twice."""
-        self._display.darken()
+        self._display.close()
         self._session.is_over = True
         self._pursuit.drop()
         self._executor.close()
         self._watch.close()
         self._camera.close()
+        self._slow.close()
         self._devices.close()
         self._session.state = SessionState.OFFLINE
         self._snapshot = self._maker.make()
@@ -230,8 +243,9 @@ class SessionController:
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
-        # The screen shows the live picture in a fault as well, the display shows nothing.
-        is_shown = snapshot.state is not SessionState.FAULT
+        # The screen shows the live picture in a fault as well, the display shows nothing; nor does
+        # it when what would be seen on it is not what is shown.
+        is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
         if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
             self._session.event("device", self._display.trouble, EventLevel.ALARM)
         self._session.preview = make_preview(image)

@@ -1,9 +1,8 @@
-"""What the devices panel says."""
+"""What the devices panel says of camera, display and rig."""
 
-from drivers.interfaces import CameraInfo, DisplayInfo, MirrorMount, PowerState, ProjectorControl
+from drivers.interfaces import CameraInfo, DisplayInfo
 from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.states import DeviceHealth, DeviceLine
-from navapp.errors import DeviceError
 
 # What is not known is no good news.
 _FINDINGS = {
@@ -25,34 +24,6 @@ def display_line(info: DisplayInfo, trouble: str) -> DeviceLine:
     """The display."""
     health = DeviceHealth.TROUBLE if trouble else DeviceHealth.OK
     return DeviceLine("display", info.name, health, trouble or f"{info.width}x{info.height}")
-
-
-def projector_line(projector: ProjectorControl) -> DeviceLine:
-    """The projector's control line; one that does not answer is told, not raised."""
-    try:
-        status = projector.status()
-    except DeviceError as error:
-        return DeviceLine("projector", projector.name, DeviceHealth.LOST, str(error))
-    if status.power is PowerState.ABSENT:
-        return DeviceLine("projector", projector.name, DeviceHealth.ABSENT, "not used")
-    if status.faults or status.power is PowerState.FAULT:
-        faults = ", ".join(status.faults)
-        return DeviceLine("projector", projector.name, DeviceHealth.TROUBLE, faults)
-    return DeviceLine("projector", projector.name, DeviceHealth.OK, status.power.value)
-
-
-def mirror_line(mirror: MirrorMount) -> DeviceLine:
-    """The mirror's mount; one that does not answer is told, not raised."""
-    info = mirror.info
-    try:
-        angle_deg = mirror.position_deg()
-    except DeviceError as error:
-        return DeviceLine("mirror", info.name, DeviceHealth.LOST, str(error))
-    angle = "position unknown" if angle_deg is None else f"{angle_deg:.1f} deg"
-    if not info.is_movable:
-        return DeviceLine("mirror", info.name, DeviceHealth.ABSENT, f"fixed, {angle}")
-    health = DeviceHealth.TROUBLE if angle_deg is None else DeviceHealth.OK
-    return DeviceLine("mirror", info.name, health, angle)
 
 
 def rig_line(

@@ -1,12 +1,16 @@
 """The controller's line to its display: blank, withdrawn guides, trouble."""
 
+import threading
+
 from drivers.interfaces import Display
 from navapp.control.pictures import Image, fitted
-from navapp.errors import DeviceError
+from navapp.errors import DeviceError, DeviceLost
+
+_FIRST_PAUSE_S, _LAST_PAUSE_S = 0.5, 8.0
 
 
 class DisplayLink:
-    """Shows pictures unless the operator has blanked the display.
+    """Shows pictures unless the operator has blanked the display; one that is lost is opened again.
 
     Attributes:
         is_blanked: by the operator; nothing is shown until `show_again`.
@@ -16,6 +20,7 @@ class DisplayLink:
     def __init__(self, display: Display) -> None:
         self._display = display
         self._has_guides = False
+        self._reopening = _Reopening(display)
         self.is_blanked = False
         self.trouble = ""
 
@@ -40,7 +45,7 @@ class DisplayLink:
 
     def show(self, image: Image, valid_until_ns: int, *, has_guides: bool) -> bool:
         """Show a picture, fitted to the display; whether the display has just begun to fail."""
-        if self.is_blanked:
+        if self.is_blanked or self._reopening.is_under_way:
             return False
         has_begun_to_fail = False
         self._has_guides = has_guides
@@ -48,9 +53,12 @@ class DisplayLink:
             info = self._display.info
             self._display.show(fitted(image, info.width, info.height), valid_until_ns)
             self.trouble = ""
+            self._reopening.succeeded()
         except DeviceError as error:
             has_begun_to_fail = not self.trouble
             self.trouble = str(error)
+            if isinstance(error, DeviceLost):
+                self._reopening.begin()
         self._keep_dark()
         return has_begun_to_fail
 
@@ -63,3 +71,50 @@ class DisplayLink:
         """Turn a picture dark whose guides a command or the passing time has made wrong."""
         if self._has_guides:
             self.darken()
+
+    def close(self) -> None:
+        """Dark, and not opened any more."""
+        self.darken()
+        self._reopening.close()
+
+
+class _Reopening:
+    """Opens a lost display in a thread, which no frame waits for, with growing pauses."""
+
+    def __init__(self, display: Display) -> None:
+        self._display = display
+        self._thread: threading.Thread | None = None
+        self._pause_s = _FIRST_PAUSE_S
+        self._is_over = threading.Event()
+
+    @property
+    def is_under_way(self) -> bool:
+        """Nothing else may be asked of the display, but to be blank."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def begin(self) -> None:
+        """One attempt, after the pause."""
+        if not self._is_over.is_set():
+            self._thread = threading.Thread(target=self._run, name="display", daemon=True)
+            self._thread.start()
+
+    def succeeded(self) -> None:
+        """A picture was shown: the next loss is a new one."""
+        self._pause_s = _FIRST_PAUSE_S
+
+    def close(self) -> None:
+        """Wait for the attempt that is under way."""
+        self._is_over.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        is_over = self._is_over.wait(self._pause_s)
+        self._pause_s = min(2.0 * self._pause_s, _LAST_PAUSE_S)
+        if is_over:
+            return
+        try:
+            self._display.open()
+        except DeviceError:
+            # The next picture finds it lost and says why.
+            return

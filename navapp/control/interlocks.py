@@ -21,6 +21,7 @@ def navigable(snapshot: Snapshot) -> tuple[Reason, ...]:
         reasons.append(Reason.DEVICE_FAULT)
     if snapshot.is_camera_silent:
         reasons.append(Reason.CAMERA_SILENT)
+    reasons += snapshot.device_reasons
     if not snapshot.is_bone_planned:
         reasons.append(Reason.STAGE_WITHOUT_BONE)
     if snapshot.state is SessionState.SUSPENDED:

@@ -2,15 +2,10 @@
 
 from dataclasses import dataclass, replace
 
-from drivers.interfaces import DeviceSet
 from navapp.control.camera_link import CameraLink
-from navapp.control.device_lines import (
-    camera_line,
-    display_line,
-    mirror_line,
-    projector_line,
-    rig_line,
-)
+from navapp.control.device_care import Report
+from navapp.control.device_lines import camera_line, display_line, rig_line
+from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.interlocks import navigable
 from navapp.control.rig_watch import RigWatch
@@ -29,7 +24,7 @@ class SnapshotMaker:
         session: what is known.
         camera: in use.
         display: in use.
-        devices: the others.
+        slow: projector and mirror.
         rig: of the camera.
         rig_watch: that watches it.
         plan: of the operation.
@@ -39,7 +34,7 @@ class SnapshotMaker:
     session: Session
     camera: CameraLink
     display: DisplayLink
-    devices: DeviceSet
+    slow: SlowDevices
     rig: StereoRig
     rig_watch: RigWatch
     plan: Plan
@@ -50,6 +45,7 @@ class SnapshotMaker:
         session = self.session
         now_ns = session.clock.now_ns()
         tracked = session.tracked
+        reports = self.slow.reports
         bone = self.plan.bones.get(session.stage.bone)
         draft = Snapshot(
             time_ns=now_ns,
@@ -65,7 +61,7 @@ class SnapshotMaker:
             others=session.companions.seen(session.stage, now_ns),
             preview=session.preview,
             rates=session.meter.rates(self.camera.n_dropped),
-            devices=self._device_lines(),
+            devices=self._device_lines(reports),
             events=session.events,
             progress=self._progress(),
             rig_name=self.rig.name,
@@ -76,6 +72,7 @@ class SnapshotMaker:
             side="" if bone is None or bone.side is None else bone.side,
             sequence=session.sequence,
             is_bone_planned=bone is not None,
+            device_reasons=tuple(report.reason for report in reports if report.reason is not None),
             is_camera_silent=self.camera.is_silent,
             rig_alarm="" if session.rig_error is None else session.rig_error.problem,
             length_check=self.rig_watch.length_check,
@@ -88,12 +85,11 @@ class SnapshotMaker:
         """The pictures are not of this world; a replayed rig still says so by its name."""
         return self.camera.camera.info.is_simulated or self.rig.name.startswith("sim:")
 
-    def _device_lines(self) -> tuple[DeviceLine, ...]:
+    def _device_lines(self, reports: tuple[Report, ...]) -> tuple[DeviceLine, ...]:
         lines = (
             camera_line(self.camera.camera.info, self.camera.trouble),
             display_line(self.display.display.info, self.display.trouble),
-            projector_line(self.devices.projector),
-            mirror_line(self.devices.mirror),
+            *(report.line for report in reports),
         )
         if self.session.rig_error is None and not self.rig_watch.has_board:
             return lines

@@ -70,7 +70,7 @@ class EnterStage:
 
 @dataclass(frozen=True, slots=True)
 class Reconnect:
-    """Try to open lost devices again, now."""
+    """Open lost devices again and bring the mirror to its place, now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,6 +216,7 @@ class Snapshot:
         preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
             the first frame.
         is_bone_planned: the plan has a model of the stage's bone.
+        device_reasons: what projector and mirror have against guides; nothing at all is shown then.
         is_camera_silent: no picture has come for longer than the camera's period explains.
         rig_alarm: why the rig is not believed any more; empty while it is.
         length_check: the newest look at a known length that says something of the rig, else the
@@ -248,6 +249,7 @@ class Snapshot:
     is_camera_silent: bool = False
     rig_alarm: str = ""
     length_check: LengthCheck | None = None
+    device_reasons: tuple[Reason, ...] = ()
     is_simulated: bool = False
     is_recording: bool = False
     is_over: bool = False

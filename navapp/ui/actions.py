@@ -198,7 +198,7 @@ ACTIONS: tuple[Action, ...] = (
         "reconnect",
         "o",
         "reopen",
-        "open lost devices again, now",
+        "open lost devices, turn the mirror back",
         _has_failed_device,
         lambda _: Reconnect(),
     ),

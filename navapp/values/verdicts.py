@@ -44,6 +44,9 @@ class Reason(Enum):
     CAMERA_SILENT = "the camera sends no picture"
     DEVICE_FAULT = "a device has failed"
     RIG_MOVED = "rig moved, recalibrate"
+    MIRROR_AWAY = "the mirror does not stand where the display was calibrated"
+    PROJECTOR_ALTERS = "the projector alters the picture"
+    PROJECTOR_LOST = "the projector does not answer"
     POSE_TOO_OLD = "the pose is too old"
     STAGE_WITHOUT_BONE = "the plan has no model of this stage's bone"
 
@@ -83,6 +86,9 @@ _REMEDIES = {
     Reason.CAMERA_SILENT: "check the camera's cable",
     Reason.DEVICE_FAULT: "see the events, then check the device",
     Reason.RIG_MOVED: "end the session; check the rig on the board, or calibrate it",
+    Reason.MIRROR_AWAY: "reopen brings it back; keep hands off, see the devices",
+    Reason.PROJECTOR_ALTERS: "set flips, keystone and freeze back on the projector",
+    Reason.PROJECTOR_LOST: "check its mains, its lamp and its control cable",
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }

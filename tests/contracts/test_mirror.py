@@ -6,6 +6,7 @@ from drivers.contracts import MIRROR_CHECKS, ContractViolation, MirrorUnderTest
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import MirrorInfo
 from navapp.errors import DeviceLost, UnsupportedControl
+from tests.drivers.firmware_rigs import StageRig, mirror_at, stage_terminal
 
 
 class Stage:
@@ -49,6 +50,24 @@ class Stage:
 @pytest.mark.parametrize("kind", [FixedMirror, Stage])
 def test_mirror_keeps_its_contract(kind, check):
     check(lambda: MirrorUnderTest(kind(45.0), 45.0, timeout_s=1.0))
+
+
+@pytest.mark.parametrize("check", MIRROR_CHECKS, ids=lambda check: check.__name__)
+def test_a_zaber_mount_keeps_its_contract_in_memory(check):
+    check(lambda: MirrorUnderTest(StageRig().driver, 45.0))
+
+
+@pytest.mark.parametrize("check", MIRROR_CHECKS, ids=lambda check: check.__name__)
+def test_a_zaber_mount_keeps_its_contract_on_a_terminal(check, tmp_path):
+    with stage_terminal(tmp_path) as terminal:
+
+        def make() -> MirrorUnderTest:
+            # Every mount is new: it has just got power.
+            with terminal.held:
+                terminal.wire.firmware.restore_power()
+            return MirrorUnderTest(mirror_at(terminal), 45.0, timeout_s=5.0)
+
+        check(make)
 
 
 class MovesUnhomed(Stage):

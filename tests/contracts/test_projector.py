@@ -6,6 +6,8 @@ from drivers.contracts import PROJECTOR_CHECKS, ContractViolation, ProjectorUnde
 from drivers.interfaces import CommandResult, PowerState, ProjectorStatus
 from drivers.no_projector import NoProjector
 from navapp.errors import DeviceLost, UnsupportedControl
+from sim_devices.firmware.escvp21 import ProjectorModel
+from tests.drivers.firmware_rigs import ProjectorRig, projector_at, projector_terminal
 
 
 class Lamp:
@@ -53,6 +55,22 @@ class Lamp:
 @pytest.mark.parametrize("kind", [NoProjector, Lamp])
 def test_projector_keeps_its_contract(kind, check):
     check(lambda: ProjectorUnderTest(kind(), source="A0", timeout_s=1.0))
+
+
+@pytest.mark.parametrize("check", PROJECTOR_CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize("is_quick", [False, True])
+def test_an_escvp21_projector_keeps_its_contract_in_memory(is_quick, check):
+    def make() -> ProjectorUnderTest:
+        rig = ProjectorRig(ProjectorModel(is_quick=is_quick, has_events=is_quick))
+        return ProjectorUnderTest(rig.driver, source="A0")
+
+    check(make)
+
+
+@pytest.mark.parametrize("check", PROJECTOR_CHECKS, ids=lambda check: check.__name__)
+def test_an_escvp21_projector_keeps_its_contract_on_a_terminal(check, tmp_path):
+    with projector_terminal(tmp_path) as terminal:
+        check(lambda: ProjectorUnderTest(projector_at(terminal), source="A0", timeout_s=10.0))
 
 
 class LiesAboutPower(Lamp):

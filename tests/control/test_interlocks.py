@@ -35,6 +35,7 @@ def test_no_other_state_is_navigable(state: SessionState) -> None:
     [
         ({"is_blanked": True}, Reason.BLANKED),
         ({"is_camera_silent": True}, Reason.CAMERA_SILENT),
+        ({"device_reasons": (Reason.MIRROR_AWAY,)}, Reason.MIRROR_AWAY),
         ({"is_bone_planned": False}, Reason.STAGE_WITHOUT_BONE),
         ({"state": SessionState.FAULT}, Reason.DEVICE_FAULT),
         ({"state": SessionState.SUSPENDED}, Reason.BONE_LOST),

@@ -2,11 +2,15 @@
 
 import numpy as np
 
+from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState
 from drivers.no_projector import NoProjector
 from navapp.control.controller import SessionOptions
+from navapp.control.device_care import MIRROR_TOLERANCE_DEG
 from navapp.control.states import (
     DeviceHealth,
+    DeviceLine,
+    EventLevel,
     Reconnect,
     Register,
 )
@@ -125,13 +129,13 @@ def test_a_failing_display_does_not_stop_the_line(bench: Bench) -> None:
     show = bench.display.show
 
     def fail(image, valid_until_ns):
-        raise DeviceLost("the display is gone")
+        raise DeviceTimeout("the display is silent")
 
     bench.display.show = fail
     bench.frames(3)
     assert bench.results[-1].frame.sequence == bench.snapshot.sequence
     assert bench.snapshot.devices[1].health is DeviceHealth.TROUBLE
-    assert sum("display is gone" in event.text for event in bench.events) == 1
+    assert sum("display is silent" in event.text for event in bench.events) == 1
     bench.display.show = show
     bench.frames(1)
     assert bench.snapshot.devices[1].health is DeviceHealth.OK
@@ -145,24 +149,66 @@ class BrokenProjector(NoProjector):
         raise DeviceTimeout("the projector does not answer")
 
 
-def test_a_projector_that_does_not_answer_is_told_and_stops_nothing(monkeypatch) -> None:
+def device_line(bench: Bench, kind: str) -> DeviceLine:
+    return next(line for line in bench.snapshot.devices if line.kind == kind)
+
+
+def test_a_projector_that_does_not_answer_is_told_and_everything_is_dark(monkeypatch) -> None:
     bench = Bench(monkeypatch, projector=BrokenProjector())
-    navigating(bench)
-    line = next(line for line in bench.snapshot.devices if line.kind == "projector")
-    assert line.health is DeviceHealth.LOST
-    assert "does not answer" in line.detail
+    try:
+        navigating(bench)
+        line = device_line(bench, "projector")
+        assert line.health is DeviceHealth.LOST
+        assert "does not answer" in line.detail
+        assert Reason.PROJECTOR_LOST in bench.snapshot.reasons
+        assert bench.is_dark
+    finally:
+        bench.controller.close()
     assert NoProjector().status().power is PowerState.ABSENT
 
 
-def test_a_mirror_that_does_not_answer_is_told_and_stops_nothing(monkeypatch) -> None:
-    from drivers.fixed_mirror import FixedMirror
-
+def test_a_mirror_that_does_not_answer_is_told_and_everything_is_dark(monkeypatch) -> None:
     class Broken(FixedMirror):
         def position_deg(self) -> float:
             raise DeviceLost("the mirror's cable is out")
 
     bench = Bench(monkeypatch, mirror=Broken(45.0))
     navigating(bench)
-    line = next(line for line in bench.snapshot.devices if line.kind == "mirror")
+    line = device_line(bench, "mirror")
     assert line.health is DeviceHealth.LOST
     assert "cable is out" in line.detail
+    assert Reason.MIRROR_AWAY in bench.snapshot.reasons
+    assert bench.is_dark
+
+
+def test_a_mirror_away_from_its_calibrated_angle_makes_everything_dark(monkeypatch) -> None:
+    class Turnable(FixedMirror):
+        angle_deg = 45.0
+
+        def position_deg(self) -> float:
+            return self.angle_deg
+
+    mirror = Turnable(45.0)
+    bench = navigating(Bench(monkeypatch, mirror=mirror))
+    assert bench.shows_guides
+    mirror.angle_deg = 45.0 + 2.0 * MIRROR_TOLERANCE_DEG
+    snapshot = bench.frames(1)
+    assert bench.is_dark
+    assert snapshot.reasons == (Reason.MIRROR_AWAY,)
+    assert snapshot.state.value == "navigating"
+    assert bench.events[-1].level is EventLevel.ALARM
+    assert "does not stand where the display was calibrated (45.1 deg" in bench.events[-1].text
+    mirror.angle_deg = 45.0 - 0.5 * MIRROR_TOLERANCE_DEG
+    assert bench.frames(1).is_navigable
+    assert bench.shows_guides
+    assert "no longer" in bench.events[-1].text
+
+
+def test_no_frame_is_shown_between_a_turned_mirror_and_the_dark(monkeypatch) -> None:
+    """What was shown before is darkened also when no new frame comes."""
+    mirror = FixedMirror(45.0)
+    bench = navigating(Bench(monkeypatch, mirror=mirror))
+    mirror._angle_deg = 46.0
+    bench.camera.is_silent = True
+    bench.controller.step(0.01)
+    assert bench.is_dark

@@ -188,6 +188,21 @@ def test_a_picture_that_stands_still_is_called_old(changes: dict[str, Any]) -> N
     assert "OLD PICTURE" not in view.picture_title
 
 
+def test_a_mirror_away_from_its_place_is_named_with_what_to_do() -> None:
+    mirror = DeviceLine("mirror", "m", DeviceHealth.TROUBLE, "46.0 deg, calibrated at 45.0 deg")
+    snapshot = snapshots.navigating(
+        reasons=(Reason.MIRROR_AWAY,),
+        device_reasons=(Reason.MIRROR_AWAY,),
+        devices=(*snapshots.DEVICES[:3], mirror),
+    )
+    view = view_of(snapshot)
+    assert "mirror does not stand where" in view.reason[0]
+    assert "reopen" in view.reason[1]
+    lines = lines_of(DevicesPanel(), view, WIDTH, DEVICE_LINES)
+    assert "mirror" in lines[0]
+    assert "TROUBLE" in lines[0]
+
+
 def test_devices_stand_in_pairs_while_all_is_well() -> None:
     lines = lines_of(DevicesPanel(), view_of(snapshots.navigating()), WIDTH, DEVICE_LINES)
     assert "camera" in lines[0]

@@ -146,7 +146,9 @@ class Capture:
             if not self._camera.can_return:
                 raise
             # What was seen before says nothing of what is held there afterwards.
-            self._frame = self._look = self._way = None
+            if self._looking is not None:
+                self._looking.cancel()
+            self._looking = self._frame = self._look = self._way = None
             self._checks, self._is_told_to_take = (), False
             self._shutter.forget_last()
             self._tell(str(error))
@@ -192,8 +194,6 @@ class Capture:
         self._looking = None
         if job.error is not None:
             raise job.error
-        if self._camera.is_down:
-            return
         look = self._look = job.result
         if look is None or self._phase is not CapturePhase.CAPTURING:
             return

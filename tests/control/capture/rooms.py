@@ -76,12 +76,12 @@ class Room:
         del self.kept[index]
 
 
-def capture_in(room: Room, monkeypatch, solve=None, reopen=None, **asked) -> Capture:
+def capture_in(room: Room, monkeypatch, solve=None, reopen=None, executor=None, **asked) -> Capture:
     monkeypatch.setattr("navapp.control.capture.capture.look_at", room.look)
     settings = CaptureSettings(DEPTH_MM, **{"stop_mm": 0.15, **asked})
     return Capture(
         room, room.clock, BOARD, settings,
-        executor=InlineExecutor(),
+        executor=executor or InlineExecutor(),
         store=room,
         solve=solve or (lambda pairs, report: Outcome(True, ())),
         hand=room,

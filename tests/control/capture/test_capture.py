@@ -16,6 +16,7 @@ from navapp.control.capture.states import (
     Take,
 )
 from navapp.control.capture.wishes import starting_view
+from navapp.control.executors import InlineExecutor, Job
 from navapp.errors import DeviceLost, InputError, ResultError
 from navapp.geometry.transform import RigidTransform
 from tests.calibration.marks import BOARD
@@ -230,13 +231,27 @@ def lose_camera(room, capture) -> None:
     room.plug_in = plug_in
 
 
-def reopening(room, monkeypatch):
+def reopening(room, monkeypatch, executor=None):
     def reopen():
         room.open()
         return room
 
     room.open = lambda: None
-    return capture_in(room, monkeypatch, reopen=reopen)
+    return capture_in(room, monkeypatch, reopen=reopen, executor=executor)
+
+
+class SlowExecutor(InlineExecutor):
+    """Holds jobs back until they are let go."""
+
+    def __init__(self) -> None:
+        self.held: list[Job] = []
+
+    def start(self, job: Job) -> None:
+        self.held.append(job)
+
+    def let_go(self) -> None:
+        while self.held:
+            self.held.pop(0).run()
 
 
 def test_a_lost_camera_is_said_waited_for_and_everything_kept_stays(room, monkeypatch):
@@ -276,6 +291,24 @@ def test_a_board_is_not_called_still_by_what_was_seen_before_the_loss(room, monk
         capture.step()
     first = next(s for s in (capture.step() for _ in range(9)) if s.checks)
     assert not next(check for check in first.checks if check.name == "still").is_met
+
+
+def test_a_picture_from_before_the_loss_is_not_kept_after_it(room, monkeypatch):
+    executor = SlowExecutor()
+    capture = reopening(room, monkeypatch, executor)
+    at_start(room)
+    capture.step()
+    assert executor.held
+    n_before = room.n_frames
+    lose_camera(room, capture)
+    room.plug_in()
+    while capture.snapshot.trouble:
+        capture.step()
+    capture.submit(Take())
+    while not room.kept:
+        executor.let_go()
+        capture.step()
+    assert all(sequence > n_before for sequence in room.kept.values())
 
 
 def test_the_loss_of_a_camera_that_nobody_opens_again_is_the_end(room, monkeypatch):

@@ -1,0 +1,207 @@
+"""The process that owns the window: black unless a living application vouches for a picture.
+
+Started by `drivers.window_display` as `python -m drivers.window_child MEMORY WAKE OUTPUT WIDTH
+HEIGHT`: the descriptor of the shared memory, that of a pipe of which every byte means "look again"
+and whose end means that the application is gone, and the output wanted. It says in one line of JSON
+on its standard output that the window stands, or why not.
+"""
+
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import closing
+
+from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, memory_bytes
+from drivers.window_outputs import Output, chosen, outputs
+from navapp.errors import DeviceError, DeviceNotFound
+
+# SDL falls back to drivers that draw into nothing; on Wayland a window cannot choose its place.
+_VISIBLE_DRIVER = "x11"
+# What X11 takes for a window manager to put the window where it belongs.
+_PLACING_S = 2.0
+
+
+class Window:
+    """A borderless window that covers an output, black at first.
+
+    Raises:
+        DeviceNotFound: no visible screen, no such output. WrongDevice: another size.
+        DeviceError: the window does not cover the output pixel for pixel.
+    """
+
+    def __init__(self, output_name: str, width: int, height: int) -> None:
+        # The operator's keys go to the terminal, not to the overlay.
+        os.environ.setdefault("SDL_WINDOW_NO_ACTIVATION_WHEN_SHOWN", "1")
+        os.environ.setdefault("SDL_VIDEODRIVER", _VISIBLE_DRIVER)
+        import pygame
+
+        self._pygame = pygame
+        try:
+            pygame.display.init()
+            driver = pygame.display.get_driver()
+        except pygame.error as error:
+            raise _no_screen(str(error)) from error
+        if driver != _VISIBLE_DRIVER:
+            raise _no_screen(f"SDL would draw with '{driver}'")
+        self.output: Output = chosen(outputs(), output_name, width, height)
+        self._screen = pygame.display.set_mode(
+            (width, height), pygame.NOFRAME, 32, display=self.output.index
+        )
+        pygame.mouse.set_visible(False)
+        self.draw(None)
+        self._check_pixels(width, height)
+        self._wait_until_placed()
+
+    def draw(self, pixels: memoryview | None) -> None:
+        """Prepare these pixels, or black; `flip` makes them visible."""
+        if pixels is None:
+            self._screen.fill((0, 0, 0))
+        else:
+            memoryview(self._screen.get_view("0"))[:] = pixels  # type: ignore[arg-type]
+
+    def flip(self) -> None:
+        """Show what was drawn."""
+        self._pygame.display.flip()
+
+    def was_disturbed(self) -> bool:
+        """Whether a part of the window was lost, so that it must be shown again."""
+        game = self._pygame
+        losses = (game.VIDEOEXPOSE, game.WINDOWEXPOSED, game.WINDOWSHOWN, game.WINDOWRESTORED)
+        return any(event.type in losses for event in game.event.get())
+
+    def is_in_place(self) -> bool:
+        """Whether it covers its output."""
+        position = self._pygame.display.get_window_position()
+        size = self._pygame.display.get_window_size()
+        output = self.output
+        return (*position, *size) == (output.left, output.top, output.width, output.height)
+
+    def close(self) -> None:
+        """Black, then gone when this returns."""
+        self.draw(None)
+        self.flip()
+        self._pygame.display.quit()
+
+    def _check_pixels(self, width: int, height: int) -> None:
+        screen = self._screen
+        layout = (screen.get_size(), screen.get_pitch(), screen.get_masks()[:3])
+        if layout != ((width, height), 4 * width, (0xFF0000, 0xFF00, 0xFF)):
+            raise DeviceError(
+                f"output {self.output} does not take pixels one to one",
+                subject=self.output.name,
+                remedy="use a screen of 24 bits a pixel, without scaling",
+            )
+
+    def _wait_until_placed(self) -> None:
+        end_s = time.monotonic() + _PLACING_S
+        while True:
+            self.was_disturbed()
+            self.flip()
+            if self.is_in_place():
+                return
+            if time.monotonic() > end_s:
+                raise DeviceError(
+                    f"the window manager does not let the window cover output {self.output}",
+                    subject=self.output.name,
+                    remedy="exempt it from tiling and panels, or run without a window manager",
+                )
+            time.sleep(0.01)
+
+
+class Keeper:
+    """Decides what is to be seen, and waits for reasons to decide again."""
+
+    def __init__(self, window: Window, memory: WindowMemory, wake: int) -> None:
+        self._window = window
+        self._memory = memory
+        self._wake = wake
+        self._parent = os.getppid()
+        self._seen = 0
+        self._forfeited = 0
+
+    def run(self) -> None:
+        """Until the application closes the window, is gone, or the window is not in its place."""
+        fields = self._memory.fields
+        while not fields[Field.QUIT] and os.getppid() == self._parent:
+            fields[Field.WINDOW_BEAT_NS] = time.monotonic_ns()
+            is_disturbed = self._window.was_disturbed()
+            if not self._window.is_in_place():
+                return
+            wanted = self._wanted()
+            if (is_disturbed or wanted != self._seen) and not self._show(wanted):
+                continue
+            if not self._wait():
+                return
+
+    def _wanted(self) -> int:
+        fields, now_ns = self._memory.fields, time.monotonic_ns()
+        picture = fields[Field.PUBLISHED]
+        if now_ns - fields[Field.APPLICATION_BEAT_NS] > HANG_LIMIT_NS:
+            # An application that wakes up again must show where the bone is now.
+            self._forfeited = picture
+        if picture <= max(fields[Field.WITHDRAWN], self._forfeited):
+            return 0
+        return picture if now_ns < self._memory.valid_until_ns(picture) else 0
+
+    def _show(self, picture: int) -> bool:
+        """Make it visible; False when it must not be seen any more, or was replaced meanwhile.
+
+        Its place is written again only after the picture between has been published.
+        """
+        self._window.draw(self._memory.pictures[picture % 2] if picture else None)
+        if picture and self._wanted() != picture:
+            return False
+        self._window.flip()
+        self._seen = self._memory.fields[Field.SEEN] = picture
+        return True
+
+    def _wait(self) -> bool:
+        """Until it is woken, the picture expires or it is time for a beat; False: all alone."""
+        patience_s = BEAT_S
+        if self._seen:
+            left_ns = self._memory.valid_until_ns(self._seen) - time.monotonic_ns()
+            patience_s = min(patience_s, max(0.0, left_ns / 1e9))
+        ready, _, _ = select.select([self._wake], [], [], patience_s)
+        return not ready or bool(os.read(self._wake, 4096))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Open the window, tell the application, keep the window, close it."""
+    # Ctrl-C goes to every process of the terminal; it is for the application to end in order.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    memory_descriptor, wake, width, height = (int(arguments[k]) for k in (0, 1, 3, 4))
+    try:
+        window = Window(arguments[2], width, height)
+    except DeviceError as error:
+        _tell({"error": type(error).__name__, "problem": error.problem, "remedy": error.remedy})
+        return
+    os.ftruncate(memory_descriptor, memory_bytes(width, height))
+    with closing(WindowMemory(memory_descriptor, width, height)) as memory:
+        memory.fields[Field.WINDOW_BEAT_NS] = time.monotonic_ns()
+        memory.fields[Field.APPLICATION_BEAT_NS] = time.monotonic_ns()
+        _tell({"output": window.output.name})
+        try:
+            Keeper(window, memory, wake).run()
+        finally:
+            window.close()
+
+
+def _tell(message: dict[str, str]) -> None:
+    sys.stdout.write(json.dumps(message) + "\n")
+    sys.stdout.flush()
+
+
+def _no_screen(why: str) -> DeviceNotFound:
+    return DeviceNotFound(
+        f"there is no X11 screen to open a window on ({why})",
+        subject="display",
+        remedy="start navapp in a graphical session with DISPLAY set, and see make system-deps",
+    )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

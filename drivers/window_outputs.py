@@ -1,0 +1,82 @@
+"""The outputs (monitors, projectors) of the X server, as SDL names them."""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from navapp.errors import DeviceError, DeviceNotFound, WrongDevice
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """One output: its number in SDL, its name, where it lies on the desktop and its size, px."""
+
+    index: int
+    name: str
+    left: int
+    top: int
+    width: int
+    height: int
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.width}x{self.height})"
+
+
+def outputs() -> list[Output]:
+    """All outputs; SDL's display module must have been initialised.
+
+    pygame tells neither names nor places, the SDL inside it does.
+
+    Raises:
+        DeviceError: SDL cannot be asked.
+    """
+    sdl = ctypes.CDLL(_loaded_sdl())
+    sdl.SDL_GetDisplayName.restype = ctypes.c_char_p
+    found = []
+    for index in range(sdl.SDL_GetNumVideoDisplays()):
+        bounds = (ctypes.c_int * 4)()
+        if sdl.SDL_GetDisplayBounds(index, bounds) != 0:
+            raise DeviceError(f"SDL does not tell the place of output {index}")
+        name = sdl.SDL_GetDisplayName(index) or b""
+        found.append(Output(index, name.decode(errors="replace"), *bounds))
+    return found
+
+
+def chosen(found: Sequence[Output], name: str, width: int, height: int) -> Output:
+    """The output of that name and size, px; without a name the only one.
+
+    Raises:
+        DeviceNotFound: none of that name, or several.
+        WrongDevice: it has another size.
+    """
+    listed = ", ".join(map(str, found)) or "none"
+    fitting = [output for output in found if name in ("", output.name)]
+    if not fitting:
+        raise DeviceNotFound(
+            f"there is no output '{name}'",
+            subject=name,
+            remedy=f"connect it, or name one of these under [display] output: {listed}",
+        )
+    if len(fitting) > 1:
+        raise DeviceNotFound(
+            f"output '{name}' is not the only one" if name else "there are several outputs",
+            subject=name,
+            remedy=f"[display] output must tell one of these from the others: {listed}",
+        )
+    (output,) = fitting
+    if (output.width, output.height) != (width, height):
+        raise WrongDevice(
+            f"output {output} has another size than {width}x{height}",
+            subject=output.name,
+            remedy="set the output's mode, or [display] size, so that they are equal",
+        )
+    return output
+
+
+def _loaded_sdl() -> str:
+    for line in Path("/proc/self/maps").read_text().splitlines():
+        path = line.partition("/")[2]
+        if Path(path).name.startswith("libSDL2-"):
+            return f"/{path}"
+    raise DeviceError("the SDL that pygame has loaded is not found")

@@ -1,0 +1,163 @@
+"""One axis of a Zaber device: flags that speak against its place, motions followed to their end.
+
+A reply says OK when a command was accepted, not when the axis has arrived.
+"""
+
+import re
+from collections.abc import Callable
+
+from drivers.clock import Clock
+from drivers.zaber_line import Reply, ZaberLine, rejection
+from drivers.zaber_warnings import costs_reference, is_harmless, named
+from navapp.errors import DeviceError, DeviceProtocolError, DeviceTimeout
+
+WHOLE = re.compile(r"-?\d{1,12}")
+# Shown from the beginning of a motion to its end, whatever the device says.
+INTERRUPTED = ("NI",)
+
+_FLAGS = re.compile(r"\d{2}( [A-Z][A-Z0-9])*")
+_POLL_NS, _RETRY_NS = 50_000_000, 50_000_000
+_RETRY_S = 2.0
+_LATER = ("AGAIN", "STATUSBUSY", "FULL")
+
+
+class ZaberAxis:
+    """What an axis says of itself.
+
+    Attributes:
+        talk: the line of its device.
+        is_homed: its position counts from its home.
+        against: flags since it was last sent somewhere that speak against its standing there.
+    """
+
+    def __init__(self, talk: ZaberLine, clock: Clock) -> None:
+        self.talk = talk
+        self._clock = clock
+        self._is_stop_asked = False
+        self.is_homed = False
+        self.against: tuple[str, ...] = ()
+
+    @property
+    def is_placed(self) -> bool:
+        """It stands where it was sent, as far as it says."""
+        return self.is_homed and not self.against
+
+    def trust(self) -> None:
+        """From here on its flags alone decide."""
+        self.is_homed, self.against = True, ()
+
+    def look(self) -> bool:
+        """Note all flags; whether it moves.
+
+        Raises:
+            DeviceLost, DeviceTimeout, DeviceProtocolError.
+        """
+        reply = self.talk.ask("")
+        if reply.warning:
+            self.note(reply.warning)
+            # A reply shows the most urgent flag only; `warnings` counts and lists them all.
+            every = self.talk.ask("warnings")
+            if not every.is_accepted or _FLAGS.fullmatch(every.data) is None:
+                raise DeviceProtocolError(
+                    f"the mirror lists its warnings as {every.data[:60]!r}", subject="mirror"
+                )
+            for flag in (every.warning, *every.data.split()[1:]):
+                self.note(flag)
+        return reply.is_busy
+
+    def note(self, flag: str) -> None:
+        """A flag was seen, in a reply or in an alert."""
+        if flag and not is_harmless(flag) and flag not in self.against:
+            self.against = (*self.against, flag)
+            self.is_homed = self.is_homed and not costs_reference(flag)
+
+    def steps(self) -> int:
+        """Position in microsteps, the same in two readings one after the other.
+
+        Raises:
+            DeviceProtocolError: three different readings. DeviceLost, DeviceTimeout.
+        """
+        readings = [int(self.talk.value("pos", WHOLE)) for _ in range(2)]
+        if readings[0] != readings[1]:
+            readings.append(int(self.talk.value("pos", WHOLE)))
+        if readings[-1] != readings[-2]:
+            raise DeviceProtocolError(
+                f"the mirror tells {readings[0]}, {readings[1]} and {readings[2]} steps at rest",
+                subject="mirror",
+                remedy="check its cable",
+            )
+        return readings[-1]
+
+    def home(self, timeout_s: float) -> None:
+        """Find the reference position, from which it counts; errors as of `move`."""
+        self.is_homed = False
+        self._tell("home", self.talk.ask)
+        self._wait_until_idle(timeout_s, "finding its home position")
+        # What the flags said on the way there does not count any more.
+        self.trust()
+        self._require_clear("homing")
+        if (found := self.steps()) != 0:
+            self.is_homed = False
+            raise DeviceProtocolError(
+                f"the mirror counts {found} steps at its home position",
+                subject="mirror",
+                remedy="home it again; a stage that does not count from 0 cannot be used",
+            )
+
+    def move(self, command: str, limit_s: float, *, is_repeatable: bool) -> None:
+        """Give a motion command and follow it to its end.
+
+        Args:
+            command: without address.
+            limit_s: how long it may take; then it is stopped.
+            is_repeatable: given twice it does no more than given once.
+
+        Raises:
+            UnsupportedControl: rejected; the reason is named.
+            DeviceError: stalled, stopped, turned by hand; the flags are named.
+            DeviceTimeout: not there in time. DeviceLost, DeviceProtocolError.
+        """
+        self.against = INTERRUPTED
+        self._tell(command, self.talk.ask if is_repeatable else self.talk.give)
+        self._wait_until_idle(limit_s, "moving")
+        self.against = ()
+        self._require_clear("moving")
+
+    def stop(self) -> None:
+        """Stop moving, now; a motion that another thread follows then raises."""
+        self._is_stop_asked = True
+        self.talk.ask("stop")
+
+    def _tell(self, command: str, give: Callable[[str], Reply]) -> None:
+        """Give a motion command; what the flags said of the last one is cleared first."""
+        self._is_stop_asked = False
+        self.talk.ask("warnings clear")
+        deadline_ns = self.talk.line.deadline_ns(_RETRY_S)
+        while not (reply := give(command)).is_accepted:
+            if reply.data not in _LATER or self._clock.now_ns() >= deadline_ns:
+                raise rejection(command, reply.data)
+            self._clock.wait_until_ns(self._clock.now_ns() + _RETRY_NS)
+
+    def _wait_until_idle(self, timeout_s: float, what: str) -> None:
+        deadline_ns = self.talk.line.deadline_ns(timeout_s)
+        while self.talk.ask("").is_busy:
+            if self._clock.now_ns() >= deadline_ns:
+                self.stop()
+                raise DeviceTimeout(
+                    f"the mirror was still {what} after {timeout_s:.1f} s and was stopped",
+                    subject="mirror",
+                    remedy="see whether something is in its way, then home it",
+                )
+            self._clock.wait_until_ns(self._clock.now_ns() + _POLL_NS)
+        if self._is_stop_asked:
+            raise DeviceError(f"the mirror was stopped while {what}", subject="mirror")
+
+    def _require_clear(self, what: str) -> None:
+        """Raise unless a motion ended without a flag that speaks against it."""
+        self.look()
+        if self.against:
+            raise DeviceError(
+                f"{what} the mirror failed: {named(self.against)}",
+                subject="mirror",
+                remedy="see what is in its way, then home it",
+            )

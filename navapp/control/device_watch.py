@@ -1,0 +1,149 @@
+"""Projector and mirror are asked in threads of their own: no frame waits for a serial line."""
+
+import threading
+
+from drivers.clock import Clock, SystemClock
+from navapp.control.device_care import Care, MirrorCare, ProjectorCare, Report
+from navapp.control.session import Session
+from navapp.control.states import DeviceHealth, DeviceLine, EventLevel, Snapshot
+from navapp.errors import DeviceError
+
+# Between two questions, and after which an answer that was not renewed counts no more. A mirror
+# that somebody turns is noticed within half a second; a projector takes 1.5 s to tell everything.
+MIRROR_TIMES_S = (0.2, 1.5)
+PROJECTOR_TIMES_S = (3.0, 20.0)
+_FIRST_RETRY_S, _LAST_RETRY_S = 1.0, 8.0
+
+
+_FAILED = (DeviceHealth.TROUBLE, DeviceHealth.LOST)
+
+
+class DeviceWatch:
+    """The newest report of one device; a lost one is opened again, with growing pauses.
+
+    The first report is made at once. A device that is not slow is asked for every report; a slow
+    one by a thread, and what that thread has not renewed in time counts as lost.
+    """
+
+    def __init__(
+        self, care: Care, times_s: tuple[float, float], clock: Clock | None = None
+    ) -> None:
+        """Make the first report.
+
+        Args:
+            care: of the device.
+            times_s: between two questions; after which a report is stale.
+            clock: of the reports' age.
+        """
+        self._care = care
+        self._period_s, self._stale_s = times_s
+        self._clock: Clock = clock or SystemClock()
+        self._wake = threading.Event()
+        self._is_over = False
+        self._n_asked = self._n_restored = 0
+        self._made = (self._clock.now_ns(), care.report())
+        self._thread: threading.Thread | None = None
+        if care.is_slow:
+            self._thread = threading.Thread(target=self._run, name="device watch", daemon=True)
+            self._thread.start()
+
+    @property
+    def report(self) -> Report:
+        """The newest."""
+        if self._thread is None:
+            return self._care.report()
+        made_ns, report = self._made
+        if self._is_restoring and self._care.restoring:
+            return self._with(report, DeviceHealth.TROUBLE, self._care.restoring)
+        is_lost = report.line.health is DeviceHealth.LOST
+        if not is_lost and self._clock.now_ns() - made_ns > self._stale_s * 1e9:
+            return self._with(report, DeviceHealth.LOST, "has not answered for a while")
+        return report
+
+    def restore(self) -> None:
+        """Open it if it is lost, and bring it to its place: now, without the pause."""
+        self._n_asked += 1
+        self._wake.set()
+
+    @property
+    def _is_restoring(self) -> bool:
+        return self._n_restored < self._n_asked
+
+    def close(self) -> None:
+        """End the thread, and what the device does."""
+        self._is_over = True
+        self._wake.set()
+        if self._thread is not None:
+            if self._is_restoring:
+                self._care.stop()
+            self._thread.join(20.0)
+
+    def _run(self) -> None:
+        retry_s = 0.0
+        while True:
+            self._wake.wait(retry_s or self._period_s)
+            self._wake.clear()
+            if self._is_over:
+                return
+            report = self._asked()
+            self._made = (self._clock.now_ns(), report)
+            is_lost = report.line.health is DeviceHealth.LOST
+            longer_s = min(_LAST_RETRY_S, max(_FIRST_RETRY_S, 2.0 * retry_s))
+            retry_s = longer_s if is_lost else 0.0
+
+    def _asked(self) -> Report:
+        n_asked, report = self._n_asked, self._made[1]
+        try:
+            if report.line.health is DeviceHealth.LOST:
+                self._care.reopen()
+            if self._is_restoring:
+                self._care.restore()
+            return self._care.report()
+        except DeviceError as error:
+            return self._with(report, DeviceHealth.LOST, str(error))
+        finally:
+            self._n_restored = n_asked
+
+    def _with(self, report: Report, health: DeviceHealth, detail: str) -> Report:
+        line = report.line
+        return Report(DeviceLine(line.kind, line.name, health, detail), self._care.reason)
+
+
+class SlowDevices:
+    """The session's projector and mirror.
+
+    The mirror is brought to its calibrated angle when the session begins.
+    """
+
+    def __init__(self, projector: ProjectorCare, mirror: MirrorCare) -> None:
+        self._watches = (
+            DeviceWatch(projector, PROJECTOR_TIMES_S),
+            DeviceWatch(mirror, MIRROR_TIMES_S),
+        )
+        self.restore()
+
+    @property
+    def reports(self) -> tuple[Report, ...]:
+        """Of the projector and of the mirror."""
+        return tuple(watch.report for watch in self._watches)
+
+    def restore(self) -> None:
+        """Open what is lost and bring the mirror to its place, now."""
+        for watch in self._watches:
+            watch.restore()
+
+    def close(self) -> None:
+        """End all watching; the devices stay open."""
+        for watch in self._watches:
+            watch.close()
+
+
+def tell_changes(session: Session, before: Snapshot, after: Snapshot) -> None:
+    """Say once what projector or mirror has begun, or has ceased, to have against guides."""
+    for reason in after.device_reasons:
+        if reason not in before.device_reasons:
+            details = "; ".join(line.detail for line in after.devices if line.health in _FAILED)
+            session.event("device", f"dark: {reason.value} ({details})", EventLevel.ALARM)
+    for reason in before.device_reasons:
+        if reason not in after.device_reasons:
+            session.event("device", f"no longer: {reason.value}")

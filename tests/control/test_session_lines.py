@@ -1,0 +1,215 @@
+"""A session with the real drivers on simulated firmware: every fault is told, and dark in time."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from navapp.control.states import DeviceHealth, EventLevel, Reconnect
+from navapp.errors import DeviceError
+from navapp.values import Reason
+from sim_devices.firmware.pseudo_terminal import PseudoTerminal
+from tests.control.fakes import Bench, navigating
+from tests.drivers.firmware_rigs import (
+    mirror_at,
+    projector_at,
+    projector_terminal,
+    stage_terminal,
+)
+
+# The mirror is asked five times a second, and answers within half a second or is asked again.
+MIRROR_DARK_S = 1.5
+
+
+class Room:
+    """A session with a mirror or a projector on a terminal."""
+
+    def __init__(self, bench: Bench, terminal: PseudoTerminal) -> None:
+        self.bench = bench
+        self.terminal = terminal
+
+    def happens(self, deed: Callable[[object], object]) -> None:
+        with self.terminal.held:
+            deed(self.terminal.wire.firmware)
+
+    def until(self, condition: Callable[[], bool], within_s: float) -> float:
+        """Step the session until it is so; how long it took."""
+        begin_s = time.monotonic()
+        while not condition():
+            assert time.monotonic() - begin_s < within_s
+            self.bench.frames(1)
+            time.sleep(0.005)
+        return time.monotonic() - begin_s
+
+    def is_dark_because(self, reason: Reason) -> bool:
+        return self.bench.is_dark and reason in self.bench.snapshot.reasons
+
+    def line(self, kind: str):
+        return next(line for line in self.bench.snapshot.devices if line.kind == kind)
+
+
+@pytest.fixture
+def with_mirror(monkeypatch, tmp_path) -> Iterator[Room]:
+    """Navigating with a mirror that was brought to its place."""
+    with ExitStack() as stack:
+        terminal = stack.enter_context(stage_terminal(tmp_path))
+        mirror = mirror_at(terminal)
+        mirror.open()
+        bench = Bench(monkeypatch, mirror=mirror)
+        stack.callback(bench.controller.close)
+        assert bench.is_dark
+        assert Reason.MIRROR_AWAY in bench.snapshot.reasons
+        room = Room(bench, terminal)
+        room.until(lambda: room.line("mirror").health is DeviceHealth.OK, 10.0)
+        assert room.line("mirror").detail == "45.0 deg"
+        navigating(bench)
+        room.until(lambda: bench.shows_guides, 2.0)
+        yield room
+
+
+MIRROR_FAULTS = {
+    "turned by hand": (lambda stage: stage.turn_by_hand(1.0), "position unknown"),
+    "pushed": (lambda stage: stage.push(1.0), "position unknown"),
+    "without power": (lambda stage: stage.lose_power(), "does not answer"),
+    "power failed shortly": (
+        lambda stage: (stage.lose_power(), stage.restore_power()),
+        "position unknown",
+    ),
+    "too hot": (lambda stage: stage.flags.add("FM"), "position unknown"),
+}
+
+
+@pytest.mark.parametrize(("deed", "words"), MIRROR_FAULTS.values(), ids=MIRROR_FAULTS)
+def test_a_mirrors_fault_is_told_and_dark_in_time(with_mirror, deed, words) -> None:
+    room = with_mirror
+    room.happens(deed)
+    room.until(lambda: room.is_dark_because(Reason.MIRROR_AWAY), MIRROR_DARK_S)
+    assert room.bench.state == "navigating"
+    room.until(lambda: words in room.line("mirror").detail, 2.0)
+    assert room.line("mirror").health in (DeviceHealth.TROUBLE, DeviceHealth.LOST)
+    alarm = next(e for e in reversed(room.bench.events) if e.level is EventLevel.ALARM)
+    assert "dark: the mirror does not stand where the display was calibrated" in alarm.text
+    room.bench.frames(5)
+    assert room.bench.is_dark
+
+
+def test_a_pulled_plug_is_dark_and_the_mirror_comes_back_by_itself(with_mirror) -> None:
+    room = with_mirror
+    room.terminal.unplug()
+    room.until(lambda: room.is_dark_because(Reason.MIRROR_AWAY), MIRROR_DARK_S)
+    assert room.line("mirror").health is DeviceHealth.LOST
+    room.terminal.plug()
+    room.until(lambda: room.bench.shows_guides, 10.0)
+    assert room.line("mirror").detail == "45.0 deg"
+
+
+def test_another_mount_in_its_place_stays_dark(with_mirror) -> None:
+    room = with_mirror
+    room.terminal.unplug()
+    room.until(lambda: room.is_dark_because(Reason.MIRROR_AWAY), MIRROR_DARK_S)
+    room.terminal.wire.firmware.model.serial = 7
+    room.terminal.plug()
+    room.bench.do(Reconnect())
+    room.until(lambda: "serial number 7, the rig's is 990123" in room.line("mirror").detail, 5.0)
+    assert room.is_dark_because(Reason.MIRROR_AWAY)
+
+
+def test_the_operator_brings_a_turned_mirror_back(with_mirror) -> None:
+    room = with_mirror
+    room.happens(lambda stage: stage.turn_by_hand(1.0))
+    room.until(lambda: room.is_dark_because(Reason.MIRROR_AWAY), MIRROR_DARK_S)
+    room.bench.do(Reconnect())
+    room.until(lambda: room.bench.shows_guides, 10.0)
+    assert room.terminal.wire.firmware.true_deg == pytest.approx(45.0, abs=0.01)
+
+
+@pytest.fixture
+def with_projector(monkeypatch, tmp_path) -> Iterator[Room]:
+    """Navigating with a projector whose lamp is on."""
+    monkeypatch.setattr("navapp.control.device_watch.PROJECTOR_TIMES_S", (0.2, 20.0))
+    with ExitStack() as stack:
+        terminal = stack.enter_context(projector_terminal(tmp_path))
+        projector = projector_at(terminal)
+        projector.open()
+        projector.set_power(True, 20.0)
+        bench = Bench(monkeypatch, projector=projector)
+        stack.callback(bench.controller.close)
+        room = Room(bench, terminal)
+        navigating(bench)
+        room.until(lambda: bench.shows_guides, 2.0)
+        yield room
+
+
+def setting(name: str, value: str) -> Callable[[object], None]:
+    return lambda projector: projector.model.settings.__setitem__(name, value)
+
+
+PROJECTOR_FAULTS = {
+    "flipped": (setting("HREVERSE", "ON"), Reason.PROJECTOR_ALTERS, "flipped"),
+    "frozen": (setting("FREEZE", "ON"), Reason.PROJECTOR_ALTERS, "frozen"),
+    "bent": (setting("VKEYSTONE", "130"), Reason.PROJECTOR_ALTERS, "another keystone"),
+    "swapped": (
+        lambda projector: setattr(projector.model, "serial", "OTHER"),
+        Reason.PROJECTOR_LOST,
+        "serial number OTHER",
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("deed", "reason", "words"), PROJECTOR_FAULTS.values(), ids=PROJECTOR_FAULTS
+)
+def test_a_projectors_fault_is_told_and_dark_in_time(with_projector, deed, reason, words) -> None:
+    """Within the pause and two full readings of 1.5 s."""
+    room = with_projector
+    room.happens(deed)
+    room.until(lambda: room.is_dark_because(reason), 5.0)
+    assert room.bench.state == "navigating"
+    assert words in room.line("projector").detail
+    room.bench.frames(3)
+    assert room.bench.is_dark
+
+
+@pytest.mark.slow
+def test_an_abnormal_projector_is_dark_within_the_time_of_its_probes(with_projector) -> None:
+    room = with_projector
+    room.happens(lambda projector: projector.break_down(0x04))
+    room.until(lambda: room.is_dark_because(Reason.PROJECTOR_LOST), 15.0)
+    assert "abnormal (lamp, heat)" in room.line("projector").detail
+    room.happens(lambda projector: (projector.lose_mains(), projector.restore_mains()))
+    room.until(lambda: room.line("projector").detail == "standby", 10.0)
+
+
+def test_a_projectors_pulled_plug_is_dark_and_it_comes_back_by_itself(with_projector) -> None:
+    room = with_projector
+    room.terminal.unplug()
+    room.until(lambda: room.is_dark_because(Reason.PROJECTOR_LOST), 5.0)
+    assert room.line("projector").health is DeviceHealth.LOST
+    room.terminal.plug()
+    room.until(lambda: room.bench.shows_guides, 10.0)
+
+
+def test_no_frame_waits_for_the_projectors_slow_line(with_projector) -> None:
+    """A full reading takes 1.5 s; a step does not."""
+    bench, longest_s = with_projector.bench, 0.0
+    end_s = time.monotonic() + 3.0
+    while time.monotonic() < end_s:
+        begin_s = time.monotonic()
+        bench.frames(1)
+        longest_s = max(longest_s, time.monotonic() - begin_s)
+        time.sleep(0.01)
+    assert longest_s < 0.75
+
+
+def test_closing_a_session_ends_a_motion(monkeypatch, tmp_path) -> None:
+    with stage_terminal(tmp_path, speed=0.2) as terminal:
+        mirror = mirror_at(terminal)
+        mirror.open()
+        bench = Bench(monkeypatch, mirror=mirror)
+        time.sleep(0.5)
+        begin_s = time.monotonic()
+        bench.controller.close()
+        assert time.monotonic() - begin_s < 5.0
+        with pytest.raises(DeviceError):
+            mirror.position_deg()
