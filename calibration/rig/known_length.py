@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,8 +45,12 @@ class LengthMeter:
 
     def __call__(self, left: Image, right: Image) -> MeasuredLength | None:
         """Measure; None where not both pictures show enough of the board."""
-        in_left = find_board(luma(left), self.board)
-        in_right = None if in_left is None else find_board(luma(right), self.board)
+        try:
+            in_left = find_board(luma(left), self.board)
+            in_right = None if in_left is None else find_board(luma(right), self.board)
+        except (cv2.error, np.linalg.LinAlgError):
+            # A detector that stumbles over some picture has not seen the board in it.
+            return None
         if in_left is None or in_right is None:
             return None
         return measured_length(self.board, self.rig, SeenPair(0, in_left, in_right))
@@ -87,10 +92,16 @@ def measured_length(board: Board, rig: StereoRig, pair: SeenPair) -> MeasuredLen
         )
         return np.ravel(off_px / sigma_px[:, None])
 
-    solved = least_squares(residuals, np.append(start, 1.0), method="lm", x_scale="jac")
+    begin = np.append(start, 1.0)
+    # Of points behind a camera nothing is known, nor can it be stepped back from there.
+    if not np.isfinite(residuals(begin)).all():
+        return None
+    solved = least_squares(residuals, begin, method="lm", x_scale="jac")
     slopes = np.asarray(solved.jac, dtype=np.float64)
     information = slopes.T @ slopes
-    if not solved.success or np.linalg.matrix_rank(information) < _N_UNKNOWN:
+    if not (solved.success and np.isfinite(information).all()):
+        return None
+    if np.linalg.matrix_rank(information) < _N_UNKNOWN:
         return None
     n_spare = len(solved.fun) - _N_UNKNOWN
     excess = max(1.0, 2.0 * float(solved.cost) / n_spare)

@@ -148,6 +148,7 @@ def _board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None
         LengthMeter(session.board, session.opened.rig),
         session.configuration.calibration.worst_length,
         InlineExecutor() if is_inline else ThreadExecutor("rig watch"),
+        session.opened.devices.clock.now_ns,
     )
 
 

@@ -11,7 +11,7 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from drivers.replay_camera import ReplaySettings
-    from navapp.cli.session_folder import RecordedSession
+    from navapp.cli.recorded_operation import MovedRig
     from navapp.config import Configuration
     from navapp.control.controller import SessionController
     from navapp.control.executors import Executor
@@ -72,7 +72,12 @@ def add_parser(subparsers: Any) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Replay:
-    """What is replayed, and who operates."""
+    """What is replayed, and who operates.
+
+    Attributes:
+        rig_moved: after which frame the recorded session found this rig moved, and how; None when
+            it did not, or another rig is used.
+    """
 
     rig: "StereoRig"
     plan: "Plan"
@@ -84,13 +89,14 @@ class _Replay:
     others: "tuple[StageSpec, ...]" = ()
     is_as_recorded: bool = False
     warnings: tuple[str, ...] = ()
+    rig_moved: "MovedRig | None" = None
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
     from navapp.cli.headless import FrameLog, check_accepted, check_start, finish, follow
     from navapp.cli.overlay_folder import OverlayFolder
-    from navapp.cli.results import frame_to_json
+    from navapp.cli.results import frame_to_json, moved_rig_to_json
     from navapp.config import find_file, load
     from navapp.devices import open_recording
 
@@ -115,7 +121,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         undo.callback(controller.close)
         seconds = follow(controller, replay.operator, log)
     frames = [frame_to_json(result, {}) for result in log.results]
-    return finish(frames, seconds, controller.failure, options, diagnostics)
+    rig = (
+        None if replay.rig_moved is None else moved_rig_to_json(replay.rig.name, *replay.rig_moved)
+    )
+    return finish(frames, seconds, controller.failure, options, diagnostics, rig)
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -146,6 +155,7 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.prior_files import read_prior
+    from navapp.cli.recorded_operation import moved_rig, operation, warnings
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.operators import RecordedOperator
     from navapp.control.stages import stage_by_name
@@ -168,7 +178,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     others = tuple(_stage_of(name, plan) for name in dict.fromkeys(options.also))
     if first.bone in {other.bone for other in others}:
         raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
-    operator, executor = _operation(session, options)
+    operator, executor = operation(session, options)
     return _Replay(
         read_rig(rig_path),
         plan,
@@ -179,37 +189,9 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         executor,
         others,
         isinstance(operator, RecordedOperator),
-        _warnings(session),
+        warnings(session, options),
+        moved_rig(session, options),
     )
-
-
-def _warnings(session: "RecordedSession | None") -> tuple[str, ...]:
-    if session is None or session.events.is_complete:
-        return ()
-    return ("the session was not recorded to its end; what there is will be replayed",)
-
-
-def _operation(
-    session: "RecordedSession | None", options: argparse.Namespace
-) -> "tuple[Operator, Executor]":
-    """The recorded operator, so that the same poses come out, or one that only follows."""
-    from navapp.control.executors import InlineExecutor, RecordedExecutor
-    from navapp.control.operators import RecordedOperator, ReplayOperator
-    from navapp.control.states import DistrustRig
-
-    is_changed = bool(
-        options.prior or options.bone or options.also or options.method or options.start
-    )
-    if session is None or is_changed or options.order != "forward":
-        return ReplayOperator(each_frame=options.order == "each"), InlineExecutor()
-    events = session.events
-    # What was said of the recorded rig says nothing of another one.
-    commands = [
-        (after, command)
-        for after, command in events.commands
-        if not (options.rig and isinstance(command, DistrustRig))
-    ]
-    return RecordedOperator(commands), RecordedExecutor(events.take_overs)
 
 
 def _stage_of(bone: str, plan: "Plan") -> "StageSpec":

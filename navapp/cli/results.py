@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from navapp.control.results import FrameResult
-from navapp.control.states import SessionState, Snapshot
+from navapp.control.session import rig_moved_text
+from navapp.control.states import DistrustRig, SessionState, Snapshot
 from navapp.values import LineTimings, Reason, Status, TrackedFrame
 
 
@@ -17,12 +18,15 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
         result: of the frame.
         tre_mm: bone -> error, of the bones whose truth is known.
     """
+    # Frames are handled in no other fault.
+    is_rig_moved = result.state is SessionState.FAULT
+    silence = Reason.RIG_MOVED if is_rig_moved else Reason.NOT_NAVIGATING
     return {
         "index": result.frame.index,
         "state": result.state.value,
         "stage": result.stage.name,
         "bone": result.stage.bone,
-        **_answer_to_json(result.tracked, result.timings, tre_mm.get(result.stage.bone)),
+        **_answer_to_json(result.tracked, result.timings, tre_mm.get(result.stage.bone), silence),
         "bodies": {
             name: _answer_to_json(tracked, tracked.timings, tre_mm.get(name))
             for name, tracked in result.others.items()
@@ -31,15 +35,18 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
 
 
 def _answer_to_json(
-    tracked: TrackedFrame | None, timings: LineTimings, tre_mm: float | None
+    tracked: TrackedFrame | None,
+    timings: LineTimings,
+    tre_mm: float | None,
+    silence: Reason = Reason.NOT_NAVIGATING,
 ) -> dict[str, Any]:
-    """What was said of one bone."""
+    """What was said of one bone; when nothing was, why."""
     pose = None if tracked is None else tracked.left_from_bone
     estimate = None if tracked is None else tracked.estimate
     return {
         "status": Status.LOST.value if tracked is None else tracked.verdict.status.value,
         "reasons": (
-            [Reason.NOT_NAVIGATING.value]
+            [silence.value]
             if tracked is None
             else [reason.value for reason in tracked.verdict.reasons]
         ),
@@ -70,10 +77,15 @@ def rig_to_json(snapshot: Snapshot) -> dict[str, Any]:
         else {
             "length_100_mm": {"mean": 100.0 * check.ratio, "bound_95": 100.0 * check.bound},
             "looks": check.n_looks,
-            "within": check.is_within,
+            "finding": check.finding.value,
             "age_s": (snapshot.time_ns - check.captured_ns) / 1e9,
         },
     }
+
+
+def moved_rig_to_json(name: str, after: int, found: DistrustRig) -> dict[str, Any]:
+    """The `rig` object of a replay: after which frame the session found the rig moved, and how."""
+    return {"name": name, "alarm": rig_moved_text(found.why), "moved_after_frame": after}
 
 
 def frame_text(result: FrameResult) -> str:

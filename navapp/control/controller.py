@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from drivers.frames import StereoFrame
 from drivers.interfaces import DeviceSet
 from navapp.control.board_watch import BoardWatch
+from navapp.control.bone_motion import BoneMotion
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import Commands
 from navapp.control.device_care import MirrorCare, ProjectorCare
@@ -99,7 +100,7 @@ class SessionController:
         self._lock = threading.Lock()
         others = OtherBones(self._pursuit, options.others)
         self._session = Session(devices.clock, hooks, self._pursuit, others, options.first_stage)
-        self._watch = RigWatch(self._session, self._display, board_watch)
+        self._watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._slow = SlowDevices(
             ProjectorCare(devices.projector), MirrorCare(devices.mirror, options.mirror_deg)
         )

@@ -1,8 +1,16 @@
 """What the devices panel says of camera, display and rig."""
 
 from drivers.interfaces import CameraInfo, DisplayInfo
-from navapp.control.length_check import LengthCheck
+from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.states import DeviceHealth, DeviceLine
+
+# What is not known is no good news.
+_FINDINGS = {
+    Finding.OFF: DeviceHealth.TROUBLE,
+    Finding.DOUBTFUL: DeviceHealth.TROUBLE,
+    Finding.WITHIN: DeviceHealth.OK,
+    Finding.NOT_JUDGED: DeviceHealth.UNKNOWN,
+}
 
 
 def camera_line(info: CameraInfo, trouble: str) -> DeviceLine:
@@ -18,13 +26,27 @@ def display_line(info: DisplayInfo, trouble: str) -> DeviceLine:
     return DeviceLine("display", info.name, health, trouble or f"{info.width}x{info.height}")
 
 
-def rig_line(name: str, problem: str, check: LengthCheck | None, now_ns: int) -> DeviceLine:
-    """The rig itself: what is wrong with it, or what a known length in view said of it last."""
+def rig_line(
+    name: str,
+    problem: str,
+    check: LengthCheck | None,
+    now_ns: int,
+    unjudged: LengthCheck | None = None,
+) -> DeviceLine:
+    """The rig itself: what is wrong with it, or what a known length in view said of it last.
+
+    Args:
+        name: of the rig.
+        problem: why it is not believed any more; empty while it is.
+        check: the newest that says something, else the newest; None before one.
+        now_ns: the session's time.
+        unjudged: the newest, as long as it says nothing.
+    """
     if problem:
         return DeviceLine("rig", name, DeviceHealth.TROUBLE, problem)
     if check is None:
-        return DeviceLine("rig", name, DeviceHealth.OK, "not checked: show the board")
-    is_doubted = check.is_judged and not check.is_within
-    health = DeviceHealth.TROUBLE if is_doubted else DeviceHealth.OK
-    age_s = max(now_ns - check.captured_ns, 0) // 1_000_000_000
-    return DeviceLine("rig", name, health, f"{check}, {age_s} s ago")
+        return DeviceLine("rig", name, DeviceHealth.UNKNOWN, "not checked: show the board")
+    told = f"{check}, {max(now_ns - check.captured_ns, 0) // 1_000_000_000} s ago"
+    if unjudged is not None and unjudged is not check:
+        told = f"{told}; now {unjudged}"
+    return DeviceLine("rig", name, _FINDINGS[check.finding], told)

@@ -20,6 +20,7 @@ from navapp.control.states import (
     Accept,
     Blank,
     Command,
+    DistrustRig,
     EnterStage,
     Propose,
     Register,
@@ -58,6 +59,17 @@ class ReplayOperator:
             is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
             return [Reject() if is_lost else Accept()]
         return []
+
+
+class Together:
+    """Several operators at one session: what each of them would do, in their order."""
+
+    def __init__(self, *operators: Operator) -> None:
+        self._operators = operators
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """Of all of them."""
+        return [one for operator in self._operators for one in operator.commands(snapshot)]
 
 
 class ScriptStep(Section):
@@ -168,6 +180,12 @@ class RecordedEvents:
     commands: list[tuple[int, Command]]
     take_overs: list[int]
     is_complete: bool
+
+    @property
+    def rig_moved(self) -> tuple[int, DistrustRig] | None:
+        """After which frame the rig was found moved first, and how; None when it was not."""
+        found = ((after, one) for after, one in self.commands if isinstance(one, DistrustRig))
+        return next(found, None)
 
 
 def read_events(path: str | Path) -> RecordedEvents:

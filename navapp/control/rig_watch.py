@@ -9,8 +9,9 @@ import numpy as np
 
 from drivers.frames import StereoFrame
 from navapp.control.board_watch import BoardWatch
+from navapp.control.bone_motion import BoneMotion
 from navapp.control.display_link import DisplayLink
-from navapp.control.length_check import LengthCheck
+from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.session import Session
 from navapp.control.states import DistrustRig, EventLevel
 from navapp.values import RowCheck
@@ -21,6 +22,8 @@ _WINDOW_NS = 5_000_000_000
 _LEAST_SPAN_NS, _FEWEST_PAIRS = 4_000_000_000, 10
 # A single pair may be wrong either way.
 _MOST_SHARE = 0.9
+# A bone's speed is hardly ever known twice as wrong.
+_MOST_EXPLAINED = 0.5
 
 
 class RowWatch:
@@ -29,11 +32,18 @@ class RowWatch:
     def __init__(self) -> None:
         self._told: deque[tuple[int, RowCheck]] = deque()
 
-    def add(self, rows: RowCheck | None, captured_ns: int) -> str:
-        """What is wrong with the rig, after one more pair; empty while nothing is sure."""
+    def add(self, rows: RowCheck | None, captured_ns: int, motion_px: float) -> str:
+        """What is wrong with the rig, after one more pair; empty while nothing is sure.
+
+        Args:
+            rows: of the pair; None when they say nothing.
+            captured_ns: when.
+            motion_px: by how much they may disagree because the bone moves between the exposures.
+                A leg that is carried steadily does not change its sign as a breath does.
+        """
         while self._told and captured_ns - self._told[0][0] > _WINDOW_NS:
             self._told.popleft()
-        if rows is None:
+        if rows is None or (rows.is_off and motion_px > _MOST_EXPLAINED * abs(rows.offset_px)):
             return ""
         self._told.append((captured_ns, rows))
         span_ns = captured_ns - self._told[0][0]
@@ -53,11 +63,15 @@ class RigWatch:
     Args:
         session: that is told.
         display: goes dark.
+        motion: of the followed bone.
         board: looks for a known length; None: nobody does.
     """
 
-    def __init__(self, session: Session, display: DisplayLink, board: BoardWatch | None) -> None:
+    def __init__(
+        self, session: Session, display: DisplayLink, motion: BoneMotion, board: BoardWatch | None
+    ) -> None:
         self._session, self._display, self._board = session, display, board
+        self._motion = motion
         self._rows = RowWatch()
 
     @property
@@ -67,21 +81,24 @@ class RigWatch:
 
     @property
     def length_check(self) -> LengthCheck | None:
-        """The newest, None before the first."""
-        return None if self._board is None else self._board.newest
+        """The newest that says something of the rig, else the newest; None before the first."""
+        return None if self._board is None else self._board.judged or self._board.newest
+
+    @property
+    def unjudged(self) -> LengthCheck | None:
+        """The newest, as long as it says nothing yet; None when it does."""
+        newest = None if self._board is None else self._board.newest
+        return None if newest is None or newest.is_judged else newest
 
     def take_over(self) -> None:
         """Before a frame: what a look at an earlier one has found."""
         session = self._session
-        found = None if self._board is None else self._board.take_over(session.clock.now_ns())
+        found = None if self._board is None else self._board.take_over()
         if found is None or session.rig_error is not None:
             return
-        if found.is_off:
-            # A replay cannot look again as fast as the session did: it is told.
-            command = DistrustRig(str(found))
-            session.tell(session.hooks.on_command, command, session.sequence)
-            self.distrust(command)
-        elif found.is_within:
+        if found.finding is Finding.OFF:
+            self._found(str(found))
+        elif found.finding is Finding.WITHIN:
             session.event("rig", f"rig checked: {found}")
         else:
             session.event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)
@@ -91,9 +108,11 @@ class RigWatch:
         if self._session.rig_error is not None:
             return
         tracked = self._session.tracked
-        why = self._rows.add(None if tracked is None else tracked.rows, frame.captured_ns)
+        motion_px = self._motion.row_px(frame, tracked)
+        rows = None if tracked is None else tracked.rows
+        why = self._rows.add(rows, frame.captured_ns, motion_px)
         if why:
-            self.distrust(DistrustRig(why))
+            self._found(why)
         elif self._board is not None:
             self._board.look(frame)
 
@@ -101,6 +120,12 @@ class RigWatch:
         """Dark, and for good."""
         self._display.darken()
         self._session.distrust_rig(command.why)
+
+    def _found(self, why: str) -> None:
+        # A replay cannot look again as fast as the session did, or follows otherwise: it is told.
+        command = DistrustRig(why)
+        self._session.tell(self._session.hooks.on_command, command, self._session.sequence)
+        self.distrust(command)
 
     def close(self) -> None:
         """Wait for a look that still runs."""

@@ -124,10 +124,7 @@ class Session:
         """What a rig that has moved does to the session: a fault that does not end."""
         if self.rig_error is not None:
             return
-        self.rig_error = RigError(
-            f"{Reason.RIG_MOVED.value} ({why})",
-            remedy="check the rig on the board, or calibrate it",
-        )
+        self.rig_error = RigError(rig_moved_text(why), remedy=Reason.RIG_MOVED.remedy)
         self.lose_sight()
         self.change(SessionState.FAULT, self.rig_error.problem, EventLevel.ALARM)
 
@@ -157,6 +154,11 @@ class Session:
                 listener(*words)
             except RecordingStopped as error:
                 self.event("recording", str(error), EventLevel.ALARM)
+
+
+def rig_moved_text(why: str) -> str:
+    """What is said of a rig that has moved, with how that was found."""
+    return f"{Reason.RIG_MOVED.value} ({why})"
 
 
 def with_bound(text: str, verdict: Verdict) -> str:

@@ -94,8 +94,9 @@ class SnapshotMaker:
         if self.session.rig_error is None and not self.rig_watch.has_board:
             return lines
         problem = "" if self.session.rig_error is None else self.session.rig_error.problem
-        check, now_ns = self.rig_watch.length_check, self.session.clock.now_ns()
-        return (*lines, rig_line(self.rig.name, problem, check, now_ns))
+        watch, now_ns = self.rig_watch, self.session.clock.now_ns()
+        line = rig_line(self.rig.name, problem, watch.length_check, now_ns, watch.unjudged)
+        return (*lines, line)
 
     def _progress(self) -> Progress | None:
         share = self.session.pursuit.progress

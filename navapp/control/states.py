@@ -137,6 +137,7 @@ class DeviceHealth(Enum):
 
     OK = "ok"
     ABSENT = "absent"
+    UNKNOWN = "unknown"
     TROUBLE = "trouble"
     LOST = "lost"
 
@@ -218,7 +219,8 @@ class Snapshot:
         device_reasons: what projector and mirror have against guides; nothing at all is shown then.
         is_camera_silent: no picture has come for longer than the camera's period explains.
         rig_alarm: why the rig is not believed any more; empty while it is.
-        length_check: the newest look at a known length, None before one.
+        length_check: the newest look at a known length that says something of the rig, else the
+            newest; None before one.
         events: the newest, oldest first.
     """
 

@@ -24,6 +24,7 @@ from navapp.ui.symbols import UNICODE, Symbols, symbols_for
 from navapp.ui.terminal import own_terminal
 from navapp.ui.theme import NAVAPP_THEME
 from navapp.ui.view import View
+from navapp.values import Reason
 
 POLLS_PER_S = 8
 # Numbers that change faster than four times a second cannot be read.
@@ -201,7 +202,7 @@ def _fault(snapshot: Snapshot) -> NavappError | None:
     if snapshot.state is not SessionState.FAULT:
         return None
     if snapshot.rig_alarm:
-        return RigError(snapshot.rig_alarm, remedy="check the rig on the board, or calibrate it")
+        return RigError(snapshot.rig_alarm, remedy=Reason.RIG_MOVED.remedy)
     alarms = [event.text for event in snapshot.events if event.level is EventLevel.ALARM]
     text = alarms[-1] if alarms else "the session ended in a fault"
     is_device = any(device.health is DeviceHealth.LOST for device in snapshot.devices)

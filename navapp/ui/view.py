@@ -50,6 +50,7 @@ _STATE_LEVELS = {
 _HEALTH_LEVELS = {
     DeviceHealth.OK: Level.OK,
     DeviceHealth.ABSENT: Level.QUIET,
+    DeviceHealth.UNKNOWN: Level.ATTENTION,
     DeviceHealth.TROUBLE: Level.ATTENTION,
     DeviceHealth.LOST: Level.BAD,
 }
@@ -97,8 +98,16 @@ class View:
     def is_picture_old(self) -> bool:
         """The preview is the last one before the camera fell silent."""
         is_fault = self.snapshot.state is SessionState.FAULT and not self.snapshot.rig_alarm
-        is_stopped = self.snapshot.is_camera_silent or is_fault
+        # A rig that has moved goes on showing pictures, until its camera is lost as well.
+        is_stopped = self.snapshot.is_camera_silent or is_fault or self._is_camera_lost
         return is_stopped and self.snapshot.preview is not None
+
+    @property
+    def _is_camera_lost(self) -> bool:
+        return any(
+            device.kind == "camera" and device.health is DeviceHealth.LOST
+            for device in self.snapshot.devices
+        )
 
     @property
     def level(self) -> Level:

@@ -85,7 +85,7 @@ _REMEDIES = {
     Reason.BLANKED: "press the show key to leave blank",
     Reason.CAMERA_SILENT: "check the camera's cable",
     Reason.DEVICE_FAULT: "see the events, then check the device",
-    Reason.RIG_MOVED: "end the session and calibrate the rig; the events say how it was found",
+    Reason.RIG_MOVED: "end the session; check the rig on the board, or calibrate it",
     Reason.MIRROR_AWAY: "reopen brings it back; keep hands off, see the devices",
     Reason.PROJECTOR_ALTERS: "set flips, keystone and freeze back on the projector",
     Reason.PROJECTOR_LOST: "check its mains, its lamp and its control cable",

@@ -2,8 +2,15 @@
 
 from dataclasses import replace
 
-from navapp.cli.results import frame_text, frame_to_json, summarise, summary_text
+from navapp.cli.results import (
+    frame_text,
+    frame_to_json,
+    moved_rig_to_json,
+    summarise,
+    summary_text,
+)
 from navapp.control.results import FrameResult
+from navapp.control.states import DistrustRig
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
 
@@ -57,3 +64,21 @@ def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
 def test_a_line_a_frame_names_the_other_bones(monkeypatch) -> None:
     assert frame_text(a_result(monkeypatch, tibia=TIBIA)).endswith(" | tibia DEGRADED 0 ms")
     assert "tibia" not in frame_text(a_result(monkeypatch))
+
+
+def test_a_frame_of_a_moved_rig_says_so(monkeypatch) -> None:
+    bench = navigating(Bench(monkeypatch))
+    bench.do(DistrustRig("bumped"))
+    bench.frames(2)
+    frame = frame_to_json(bench.results[-1], {})
+    assert frame["state"] == "fault"
+    assert frame["reasons"] == [Reason.RIG_MOVED.value]
+    assert frame_to_json(bench.results[0], {})["reasons"] == [Reason.NOT_NAVIGATING.value]
+
+
+def test_a_replay_says_where_its_session_found_the_rig_moved() -> None:
+    assert moved_rig_to_json("sim", 5, DistrustRig("bumped")) == {
+        "name": "sim",
+        "alarm": "rig moved, recalibrate (bumped)",
+        "moved_after_frame": 5,
+    }

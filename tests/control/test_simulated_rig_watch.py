@@ -10,6 +10,7 @@ from calibration.rig.known_length import LengthMeter
 from calibration.targets.boards import board_from
 from navapp.control.board_watch import BoardWatch
 from navapp.control.executors import InlineExecutor
+from navapp.control.length_check import Finding
 from navapp.control.states import Accept, EventLevel, Register
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import Reason, Status
@@ -89,7 +90,7 @@ def with_board(undo: ExitStack, faults: FaultScript) -> SimulatedRoom:
     place_mm = np.array([-110.0, -60.0, 420.0]) - rotation @ BOARD.points_mm.mean(axis=0)
     pose = RigidTransform.from_parts("left", "board", rotation, place_mm)
     sheet = sheet_of(BOARD)
-    watch = BoardWatch(LengthMeter(BOARD, default_rig()), WORST, InlineExecutor())
+    watch = BoardWatch(LengthMeter(BOARD, default_rig()), WORST, InlineExecutor(), lambda: 0)
     return SimulatedRoom(
         undo, faults=faults, rate_hz=2.0, board_watch=watch,
         seen=lambda world: SheetInView(world, sheet, lambda time_ns: pose, (0, 60 * S)),
@@ -123,4 +124,4 @@ def test_a_rig_that_has_not_moved_stays_believed(undo: ExitStack) -> None:
     room = navigating(with_board(undo, FaultScript()))
     until_s(room, 25.0)
     assert room.controller.snapshot.is_navigable
-    assert room.controller.snapshot.length_check.is_within
+    assert room.controller.snapshot.length_check.finding is Finding.WITHIN

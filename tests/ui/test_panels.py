@@ -224,11 +224,11 @@ def test_troubles_that_do_not_fit_are_counted() -> None:
 
 
 def test_a_device_that_is_not_there_gives_way_to_one_that_is() -> None:
-    rig = DeviceLine("rig", "sim:rig", DeviceHealth.OK, "not checked: show the board")
+    rig = DeviceLine("rig", "sim:rig", DeviceHealth.UNKNOWN, "not checked: show the board")
     view = view_of(snapshots.navigating(devices=(*snapshots.DEVICES, rig)))
     lines = lines_of(DevicesPanel(), view, WIDTH, DEVICE_LINES)
     assert len(lines) == DEVICE_LINES
-    assert "rig" in lines[1]
+    assert f"{view.symbols.attention} rig" in lines[1]
     assert "projector" not in " ".join(lines)
 
 
@@ -242,6 +242,20 @@ def test_a_rig_that_moved_is_said_over_a_live_picture() -> None:
     text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
     assert "NAVIGABLE  NO" in text
     assert "rig moved, recalibrate" in text
+
+
+def test_its_last_picture_is_old_when_the_camera_is_lost_as_well() -> None:
+    lost = DeviceLine("camera", "simulated stereo", DeviceHealth.LOST, "unplugged")
+    view = view_of(
+        snapshots.navigating(
+            state=SessionState.FAULT,
+            reasons=(Reason.RIG_MOVED,),
+            rig_alarm="rig moved, recalibrate",
+            devices=(lost, *snapshots.DEVICES[1:]),
+        )
+    )
+    assert view.is_picture_old
+    assert view.picture_title == "left view · OLD PICTURE, no new one comes"
 
 
 def test_no_devices_are_no_lines() -> None:

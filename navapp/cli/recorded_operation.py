@@ -1,0 +1,61 @@
+"""Who operates a replay: the recorded operator, or one that only follows."""
+
+import argparse
+
+from navapp.cli.session_folder import RecordedSession
+from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
+from navapp.control.operators import Operator, RecordedOperator, ReplayOperator, Together
+from navapp.control.states import DistrustRig
+
+# After which frame a session found its rig moved, and how.
+MovedRig = tuple[int, DistrustRig]
+
+
+def moved_rig(session: RecordedSession | None, options: argparse.Namespace) -> MovedRig | None:
+    """What a replay has to know of its rig; None when nothing was found, or another one is used.
+
+    What was said of the recorded rig says nothing of another one.
+    """
+    return None if session is None or options.rig else session.events.rig_moved
+
+
+def operation(
+    session: RecordedSession | None, options: argparse.Namespace
+) -> tuple[Operator, Executor]:
+    """The recorded operator, so that the same poses come out, or one that only follows.
+
+    Whatever is changed, the recorded rig is believed no longer than it was.
+    """
+    is_changed = bool(
+        options.prior or options.bone or options.also or options.method or options.start
+    )
+    if session is None or is_changed or options.order != "forward":
+        plain = ReplayOperator(each_frame=options.order == "each")
+        moved = moved_rig(session, options)
+        if moved is None or options.order == "pingpong":
+            return plain, InlineExecutor()
+        after, command = moved
+        # A replay that starts later has not a single frame before.
+        recorded = RecordedOperator([(-1 if options.start > after else after, command)])
+        return Together(recorded, plain), InlineExecutor()
+    events = session.events
+    commands = [
+        (after, command)
+        for after, command in events.commands
+        if not (options.rig and isinstance(command, DistrustRig))
+    ]
+    return RecordedOperator(commands), RecordedExecutor(events.take_overs)
+
+
+def warnings(session: RecordedSession | None, options: argparse.Namespace) -> tuple[str, ...]:
+    """What a person has to know before the replay begins."""
+    told = []
+    if session is not None and not session.events.is_complete:
+        told.append("the session was not recorded to its end; what there is will be replayed")
+    moved = moved_rig(session, options)
+    if moved is not None and options.order == "pingpong":
+        told.append(
+            f"the session found its rig moved after frame {moved[0]} ({moved[1].why}); --order "
+            "pingpong does not stop there: no pose in a later picture is to be believed"
+        )
+    return tuple(told)

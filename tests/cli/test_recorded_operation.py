@@ -1,0 +1,82 @@
+"""A replay believes the recorded rig no longer than its session did."""
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from navapp.cli.recorded_operation import moved_rig, operation, warnings
+from navapp.cli.session_folder import RecordedSession
+from navapp.control.operators import RecordedEvents
+from navapp.control.runner import run_headless
+from navapp.control.states import Accept, DistrustRig, Register
+from tests.control.fakes import Bench, FakeCamera
+
+FOUND = DistrustRig("100 mm are 100.13 mm")
+AFTER = 5
+
+
+def session(*, is_moved: bool = True) -> RecordedSession:
+    commands = [(0, Register()), (1, Accept()), *([(AFTER, FOUND)] if is_moved else [])]
+    here = Path()
+    return RecordedSession(
+        here, here, here, "bimcc", "opening", RecordedEvents(commands, [1], True)
+    )
+
+
+def options(**given) -> argparse.Namespace:
+    plain = {
+        "rig": None, "prior": None, "bone": None, "also": [], "method": None, "start": 0,
+        "order": "forward",
+    }  # fmt: skip
+    return argparse.Namespace(**(plain | given))
+
+
+def states(monkeypatch, recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
+    """Of 20 frames; the numbers of the pictures begin where the replay does."""
+    operator, executor = operation(recorded, given)
+    bench = Bench(monkeypatch, executor=executor, camera=FakeCamera(None, 20))
+    bench.camera._sequence, bench.camera._n_frames = given.start, given.start + 20
+    run_headless(bench.controller, operator)
+    assert not any(r.is_navigable for r in bench.results if r.frame.sequence > AFTER)
+    return [result.state.value for result in bench.results]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {}, {"prior": "p"}, {"bone": "femur"}, {"also": ["tibia"]}, {"method": "icp"},
+        {"order": "each"}, {"start": 2},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_moved_rig_stays_moved_whatever_else_is_changed(monkeypatch, changed) -> None:
+    said = states(monkeypatch, session(), options(**changed))
+    n_before = AFTER + 1 - changed.get("start", 0)
+    assert "fault" not in said[:n_before]
+    assert set(said[n_before:]) == {"fault"}
+    if "start" not in changed and "order" not in changed:
+        assert "navigating" in said[:n_before]
+
+
+def test_a_replay_that_starts_after_it_shows_nothing_at_all(monkeypatch) -> None:
+    assert set(states(monkeypatch, session(), options(start=9))) == {"fault"}
+
+
+def test_another_rig_is_not_the_one_that_moved(monkeypatch) -> None:
+    for given in (options(rig="r.yml"), options(rig="r.yml", method="icp")):
+        assert moved_rig(session(), given) is None
+        operator, executor = operation(session(), given)
+        bench = Bench(monkeypatch, executor=executor, camera=FakeCamera(None, 20))
+        run_headless(bench.controller, operator)
+        assert bench.results[-1].state.value == "navigating"
+
+
+def test_to_and_fro_it_is_said_instead() -> None:
+    given = options(order="pingpong")
+    assert moved_rig(session(), given) == (AFTER, FOUND)
+    (warning,) = warnings(session(), given)
+    assert "moved after frame 5 (100 mm are 100.13 mm)" in warning
+    assert warnings(session(is_moved=False), given) == ()
+    assert warnings(session(), options(method="icp")) == ()
+    assert warnings(None, given) == ()
