@@ -4,8 +4,9 @@ Every protocol has its contract in `drivers.contracts`. Closing always works: tw
 and afterwards no thread, descriptor or light remains. A backend is used from one thread at a time.
 """
 
+from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Protocol
 
@@ -29,6 +30,10 @@ class CameraInfo:
         measured_rate_hz, measured_skew_ms: of the frames handed out so far, None before.
         factory_rig: a calibration that the device itself carries.
         n_frames: length of a finite source, None for a live one.
+        n_unpaired: pictures that found no partner of their instant, since it was opened.
+        n_stale: pictures that came too old or damaged, since it was opened.
+        controls: as the device told them last, by the names of `set`.
+        notes: what else it told when it was opened: link, source of its times.
     """
 
     name: str
@@ -42,6 +47,10 @@ class CameraInfo:
     measured_skew_ms: float | None = None
     factory_rig: StereoRig | None = None
     n_frames: int | None = None
+    n_unpaired: int = 0
+    n_stale: int = 0
+    controls: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 class StereoCamera(Protocol):

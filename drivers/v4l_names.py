@@ -1,0 +1,103 @@
+"""Which video device is which camera: by serial number or port, never by a number that changes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from navapp.errors import DeviceNotFound, UsageError
+
+# A camera's second node (index1) carries descriptions of pictures, no pictures.
+_PICTURES = "-video-index0"
+
+
+@dataclass(frozen=True, slots=True)
+class FoundCamera:
+    """A connected camera.
+
+    Attributes:
+        path: a name of its device that stays when it is plugged in again.
+        node: the device behind it.
+        serial: its serial number; of a camera without one, the name that the system made for it.
+    """
+
+    path: Path
+    node: Path
+    serial: str
+
+
+@dataclass(frozen=True, slots=True)
+class V4lNames:
+    """The names that Linux gives to video devices.
+
+    Attributes:
+        links: folder with `by-id` and `by-path`.
+        sysfs: folder with a folder for every video device.
+    """
+
+    links: Path = Path("/dev/v4l")
+    sysfs: Path = Path("/sys/class/video4linux")
+
+    def connected(self) -> tuple[FoundCamera, ...]:
+        """Every camera once, by its serial number where that names it alone."""
+        by_node: dict[Path, FoundCamera] = {}
+        for path in self._all_links():
+            by_node.setdefault(path.resolve(), self._camera(path))
+        return tuple(by_node.values())
+
+    def find(self, wanted: str) -> FoundCamera:
+        """The camera with a serial number, or at a path below `by-id` or `by-path`.
+
+        Raises:
+            DeviceNotFound: it is not connected, or two cameras have that number.
+            UsageError: another path: the numbers of `/dev/videoN` change.
+        """
+        if "/" in wanted:
+            return self._at(Path(wanted))
+        cameras = self.connected()
+        found = [camera for camera in cameras if camera.serial == wanted]
+        if not found:
+            raise _absent(wanted, cameras)
+        if len(found) > 1:
+            raise DeviceNotFound(
+                f"{len(found)} cameras have the serial number {wanted}",
+                subject=wanted,
+                remedy=f"name each by its port, a path below {self.links / 'by-path'}",
+            )
+        return found[0]
+
+    def _at(self, path: Path) -> FoundCamera:
+        if path.parent not in (self.links / "by-id", self.links / "by-path"):
+            raise UsageError(
+                f"{path} does not name a camera for good",
+                subject=str(path),
+                remedy=f"use its serial number, or a path below {self.links / 'by-id'}",
+            )
+        if not path.exists():
+            raise _absent(str(path), self.connected())
+        return self._camera(path)
+
+    def _all_links(self) -> Iterator[Path]:
+        for folder in ("by-id", "by-path"):
+            if (self.links / folder).is_dir():
+                yield from sorted((self.links / folder).glob(f"*{_PICTURES}"))
+
+    def _camera(self, path: Path) -> FoundCamera:
+        node = path.resolve()
+        return FoundCamera(path, node, self._serial(node) or path.name.removesuffix(_PICTURES))
+
+    def _serial(self, node: Path) -> str:
+        """As the camera tells it; empty when it has none."""
+        interface = (self.sysfs / node.name / "device").resolve()
+        try:
+            return (interface.parent / "serial").read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError):
+            return ""
+
+
+def _absent(wanted: str, cameras: tuple[FoundCamera, ...]) -> DeviceNotFound:
+    seen = ", ".join(camera.serial for camera in cameras) or "none"
+    return DeviceNotFound(
+        f"camera {wanted} is not connected (connected: {seen})",
+        subject=wanted,
+        remedy="plug it in, or correct its name in the configuration",
+    )
