@@ -1,0 +1,36 @@
+"""Which pairs of a camera that pairs by itself are handed out."""
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class PairGate:
+    """Lets new, fresh pairs of one instant through, and counts the others.
+
+    Attributes:
+        max_skew_ns: greatest difference of the capture times in a pair.
+        max_age_ns: greatest age of a pair.
+        heard_ns: when the last new pair came, good or not.
+        n_unpaired: pictures in pairs that were too far apart.
+        n_stale: pairs that were too old.
+    """
+
+    max_skew_ns: int
+    max_age_ns: int
+    heard_ns: int
+    n_unpaired: int = 0
+    n_stale: int = 0
+    _last_ns: int = -1
+
+    def admits(self, captured_ns: int, skew_ns: int, now_ns: int) -> bool:
+        """Whether a pair goes through; one that is known or from the future is no pair."""
+        if not self._last_ns < captured_ns <= now_ns:
+            return False
+        self._last_ns, self.heard_ns = captured_ns, now_ns
+        if abs(skew_ns) > self.max_skew_ns:
+            self.n_unpaired += 2
+            return False
+        if now_ns - captured_ns > self.max_age_ns:
+            self.n_stale += 1
+            return False
+        return True
