@@ -8,7 +8,9 @@ from drivers.interfaces import StereoCamera
 from navapp.control.sources import FrameSource, open_source
 from navapp.errors import DeviceError
 
-_RETRY_EVERY_NS = 1_000_000_000
+# A camera that is plugged in again starts for some seconds, and each attempt costs the bus a reset.
+_FIRST_PAUSE_NS = 1_000_000_000
+_LONGEST_PAUSE_NS = 4_000_000_000
 _SILENT_AFTER_NS = 1_000_000_000
 
 Reopen = Callable[[], StereoCamera]
@@ -31,6 +33,7 @@ class CameraLink:
         self._lost_source: FrameSource | None = None
         self._last_frame_ns = clock.now_ns()
         self._retry_at_ns = 0
+        self._pause_ns = _FIRST_PAUSE_NS
 
     @property
     def is_down(self) -> bool:
@@ -68,7 +71,8 @@ class CameraLink:
             # Closing may wait for a reader that hangs: the caller makes the display dark first.
             self._lost_source, self._source = self._source, None
             self.trouble = str(error)
-            self._retry_at_ns = self._clock.now_ns() + _RETRY_EVERY_NS
+            self._pause_ns = _FIRST_PAUSE_NS
+            self._retry_at_ns = self._clock.now_ns() + self._pause_ns
             raise
         if frame is not None:
             self._last_frame_ns = self._clock.now_ns()
@@ -86,13 +90,16 @@ class CameraLink:
             # A manual clock only moves when somebody waits.
             self._clock.wait_until_ns(min(self._retry_at_ns, now_ns + round(timeout_s * 1e9)))
             return False
-        self._retry_at_ns = now_ns + _RETRY_EVERY_NS
+        self._pause_ns = min(2 * self._pause_ns, _LONGEST_PAUSE_NS)
         if self._reopen is None:
+            self._retry_at_ns = now_ns + self._pause_ns
             return False
         try:
             self.camera = self._reopen()
         except DeviceError as error:
             self.trouble = str(error)
+            # From the end of the attempt: one that takes long must not follow upon itself.
+            self._retry_at_ns = self._clock.now_ns() + self._pause_ns
             return False
         self._source = open_source(self.camera)
         self._last_frame_ns = self._clock.now_ns()

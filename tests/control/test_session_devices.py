@@ -1,6 +1,7 @@
 """The controller's devices: a camera that is lost or silent, a display that fails, the mirror."""
 
 import numpy as np
+import pytest
 
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState
@@ -33,7 +34,7 @@ def test_a_lost_camera_is_a_fault_and_dark_and_it_comes_back_suspended(bench: Be
         assert bench.frames(1).state.value == "fault"
     assert "still unplugged" in bench.snapshot.devices[0].detail
     bench.camera.error = bench.camera.opening_error = None
-    for _ in range(10):
+    for _ in range(40):
         if bench.frames(1).state.value == "suspended":
             break
     assert bench.state == "suspended"
@@ -66,7 +67,7 @@ def test_another_camera_is_not_taken_for_the_calibrated_one(bench: Bench) -> Non
     assert "serial numbers differ" in bench.snapshot.devices[0].detail
 
 
-def test_attempts_to_reopen_pause_for_a_second(bench: Bench) -> None:
+def test_attempts_to_reopen_pause_for_longer_and_longer(bench: Bench) -> None:
     attempts = []
     bench.frames(1)
     bench.camera.error = DeviceLost("gone")
@@ -78,10 +79,10 @@ def test_attempts_to_reopen_pause_for_a_second(bench: Bench) -> None:
 
     bench.camera.open = refuse
     start_ns = bench.clock.now_ns()
-    while bench.clock.now_ns() < start_ns + 5 * 10**9:
+    while bench.clock.now_ns() < start_ns + 20 * 10**9:
         bench.frames(1)
-    assert 4 <= len(attempts) <= 5
-    assert min(np.diff(attempts)) >= 10**9
+    pauses_s = np.diff([start_ns, *attempts]) * 1e-9
+    assert pauses_s == pytest.approx([1.0, 2.0, 4.0, 4.0, 4.0, 4.0], abs=0.3)
 
 
 def test_a_camera_that_nobody_can_reopen_ends_the_session(monkeypatch) -> None:
