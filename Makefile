@@ -50,9 +50,9 @@ $(STAMP): pyproject.toml constraints.txt
 	    { rm -rf $(VENV); $(PYTHON) -m venv $(VENV); }
 	@echo "installing the pinned packages into $(VENV) (once, some minutes)"
 ifneq ($(UV),)
-	@$(UV) pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[test]'
+	@$(UV) pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[test,oak]'
 else
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,oak]'
 endif
 	@echo "compiling the kernels (once)"
 	@printf '' > $(VENV)/empty.toml

@@ -12,15 +12,19 @@ import numpy as np
 from calibration.targets.boards import Board
 from calibration.targets.drawing import drawn, rastered
 from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.depthai_settings import DepthaiSettings
+from drivers.depthai_stereo import DepthaiStereo
 from drivers.escvp21_projector import BAUD_RATE as ESCVP21_BAUD_RATE
 from drivers.escvp21_projector import EscVp21Projector
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet, Display, MirrorMount, ProjectorControl, StereoCamera
 from drivers.no_projector import NoProjector
+from drivers.opencv_stereo import OpencvStereo, OpencvStereoSettings
 from drivers.pjlink_line import TcpConnection
 from drivers.pjlink_projector import PjlinkProjector
 from drivers.replay_camera import ReplayCamera, ReplaySettings
 from drivers.serial_port import SerialAddress
+from drivers.uvc_settings import UvcSettings
 from drivers.window_display import WindowDisplay
 from drivers.window_process import WindowSettings
 from drivers.zaber_line import BAUD_RATE as ZABER_BAUD_RATE
@@ -105,7 +109,7 @@ def open_live(
     """
     if configuration.camera.backend == "simulated":
         return _open_simulated(configuration, board, is_headless=is_headless)
-    return _open_third_party(configuration)
+    return _open_real(configuration)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,7 +142,7 @@ def open_capture(configuration: Configuration, board: Board, *, is_headless: boo
     """
     if configuration.camera.backend != "simulated":
         clock = SystemClock()
-        camera = _third_party_camera(configuration, clock)
+        camera = real_camera(configuration, clock)
         camera.open()
         return OpenedCapture(camera, clock, _reopener(camera, camera.open))
     settings = configuration.camera.simulated
@@ -281,13 +285,52 @@ def _simulation(world: World, camera: SimulatedCamera) -> Simulation:
     )
 
 
-def _open_third_party(configuration: Configuration) -> OpenedDevices:
+def _open_real(configuration: Configuration) -> OpenedDevices:
     clock = SystemClock()
-    camera = _third_party_camera(configuration, clock)
     rig = _configured_rig(configuration)
+    camera = real_camera(configuration, clock, rig.rig_id)
     _open_fitting(camera, rig)
     reopen = _reopener(camera, lambda: _open_fitting(camera, rig))
     return OpenedDevices(_device_set(configuration, camera, clock, rig), rig, reopen)
+
+
+def real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") -> StereoCamera:
+    """The configured camera, not opened yet; any but the simulated one.
+
+    Raises:
+        ConfigurationError, UsageError: no such backend, or settings that mean nothing.
+    """
+    if configuration.camera.backend == "opencv":
+        return _usb_camera(configuration, clock, rig_id)
+    if configuration.camera.backend == "depthai":
+        return _oak_camera(configuration, clock, rig_id)
+    return _third_party_camera(configuration, clock)
+
+
+def _usb_camera(configuration: Configuration, clock: Clock, rig_id: str) -> StereoCamera:
+    section = configuration.camera.opencv
+    eye = UvcSettings(
+        section.fourcc,
+        section.width,
+        section.height,
+        configuration.camera.rate_hz,
+        section.controls,
+        section.max_age_ms,
+    )
+    settings = OpencvStereoSettings(section.left, section.right, eye, section.max_skew_ms)
+    return OpencvStereo(settings, clock, rig_id=rig_id)
+
+
+def _oak_camera(configuration: Configuration, clock: Clock, rig_id: str) -> StereoCamera:
+    section = configuration.camera.depthai
+    settings = DepthaiSettings(
+        section.device,
+        section.width,
+        section.height,
+        configuration.camera.rate_hz,
+        section.controls,
+    )
+    return DepthaiStereo(settings, clock, rig_id=rig_id)
 
 
 def _third_party_camera(configuration: Configuration, clock: Clock) -> StereoCamera:
@@ -300,7 +343,7 @@ def _third_party_camera(configuration: Configuration, clock: Clock) -> StereoCam
         raise ConfigurationError(
             f"there is no camera backend '{name}'",
             subject="camera.backend",
-            remedy="use simulated, or install the package that provides it",
+            remedy="use simulated, opencv or depthai, or install the package that provides it",
         )
     settings = (configuration.camera.model_extra or {}).get(name, {})
     try:

@@ -9,6 +9,7 @@ import psutil
 import pytest
 
 import navapp  # sets the environment before any heavy import
+from navapp.config import Configuration, load
 
 assert navapp.__version__
 
@@ -54,10 +55,29 @@ def data() -> Path:
     return DATA
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--hardware",
+        metavar="FILE",
+        help="also run the contracts on the devices of this configuration",
+    )
+
+
+@pytest.fixture
+def hardware(request: pytest.FixtureRequest) -> Configuration:
+    """What names the connected devices; the test is skipped, and counted, without it."""
+    path = request.config.getoption("--hardware")
+    if path is None:
+        pytest.skip("no hardware (name it with --hardware FILE)")
+    return load(Path(path))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say how much was skipped: a silent skip looks like a pass."""
     skipped = terminalreporter.stats.get("skipped", [])
     without_data = sum("NAVAPP_DATA" in str(report.longrepr) for report in skipped)
+    without_hardware = sum("--hardware" in str(report.longrepr) for report in skipped)
     terminalreporter.write_line(
-        f"skipped: {len(skipped)} tests, {without_data} of them for want of recorded data"
+        f"skipped: {len(skipped)} tests, {without_data} of them for want of recorded data, "
+        f"{without_hardware} for want of hardware"
     )

@@ -4,24 +4,37 @@ import importlib.metadata
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import navapp.devices
 from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.depthai_stereo import DepthaiStereo
 from drivers.interfaces import PowerState
+from drivers.opencv_stereo import OpencvStereo
 from drivers.replay_camera import ReplaySettings
 from navapp.config import Configuration, as_toml, parse
 from navapp.devices import open_live, open_recording
-from navapp.errors import ConfigurationError, DeviceLost, DeviceNotFound, RigError, WrongDevice
+from navapp.errors import (
+    ConfigurationError,
+    DeviceLost,
+    DeviceNotFound,
+    RigError,
+    UsageError,
+    WrongDevice,
+)
 from navapp.geometry import write_rig
 from sim_devices.camera import SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.firmware import pjlink
 from sim_devices.firmware.pjlink_server import PjlinkServer
 from tests.drivers.firmware_rigs import SERIAL, STAGE_SERIAL, projector_terminal, stage_terminal
+from tests.drivers.losing import fails_within
 from tests.drivers.recordings import write_pairs
+from tests.drivers.usb_rigs import UsbRig
 from tests.sim_devices.plain_world import PlainWorld, plain_rig
 from tests.x_servers import seen, xvfb
 
@@ -244,3 +257,77 @@ def test_a_pjlink_projector_is_opened_with_the_password_of_a_file(tmp_path) -> N
             open_live(configuration, is_headless=True)
     finally:
         server.close()
+
+
+@pytest.fixture
+def usb(tmp_path, monkeypatch) -> UsbRig:
+    """Two fake USB cameras in the places where real ones are looked for."""
+    rig = UsbRig(tmp_path)
+    monkeypatch.setattr(
+        navapp.devices,
+        "OpencvStereo",
+        partial(OpencvStereo, names=rig.bus.names, open_capture=rig.bus.open_capture),
+    )
+    return rig
+
+
+def usb_configuration(tmp_path, **opencv: object) -> Configuration:
+    write_rig(tmp_path / "rig.yml", replace(plain_rig(64, 48), serials=("L1", "R1")))
+    table = {"left": "L1", "right": "R1", "width": 64, "height": 48, "max_skew_ms": 4.0, **opencv}
+    camera = {"backend": "opencv", "rate_hz": 100.0, "rig": str(tmp_path / "rig.yml")}
+    return parse({"camera": {**camera, "opencv": table}}, "x")
+
+
+def test_usb_cameras_are_opened_as_configured_and_come_back(usb, tmp_path) -> None:
+    opened = open_live(usb_configuration(tmp_path, exposure_ms=5.0), is_headless=True)
+    camera = opened.devices.camera
+    frame = camera.read(1.0)
+    assert frame.rig_id == opened.rig.rig_id
+    assert camera.info.controls["exposure_ms"] == 5.0
+    camera.close()
+    usb.bus.unplug(usb.left)
+    with pytest.raises(DeviceNotFound, match="L1 is not connected"):
+        opened.reopen_camera()
+    usb.bus.plug("L1", 9)
+    assert opened.reopen_camera().read(1.0).sequence > frame.sequence
+    opened.devices.close()
+
+
+def test_usb_cameras_of_another_rig_or_swapped_are_refused_and_closed(usb, tmp_path) -> None:
+    with pytest.raises(WrongDevice, match="serial numbers R1 and L1, the rig was calibrated with"):
+        open_live(usb_configuration(tmp_path, left="R1", right="L1"), is_headless=True)
+    assert usb.left.n_open == usb.right.n_open == 0
+
+
+def test_usb_cameras_without_a_name_are_refused(tmp_path) -> None:
+    with pytest.raises(UsageError, match="no camera is named"):
+        open_live(usb_configuration(tmp_path, left=""), is_headless=True)
+
+
+def test_an_oak_camera_is_opened_as_configured(tmp_path, monkeypatch) -> None:
+    host_oak = pytest.importorskip("tests.drivers.host_oak", reason="needs the package depthai")
+    oak = host_oak.HostOak("OAK-1")
+    monkeypatch.setattr(
+        navapp.devices, "DepthaiStereo", partial(DepthaiStereo, open_device=oak.open_parts)
+    )
+    rig = replace(plain_rig(64, 48), serials=("OAK-1", "OAK-1"))
+    write_rig(tmp_path / "rig.yml", rig)
+    table = {"device": "OAK-1", "width": 64, "height": 48, "exposure_ms": 3.0}
+    camera = {"backend": "depthai", "rate_hz": 100.0, "rig": str(tmp_path / "rig.yml")}
+    opened = open_live(parse({"camera": {**camera, "depthai": table}}, "x"), is_headless=True)
+    assert opened.devices.camera.read(1.0).rig_id == rig.rig_id
+    assert opened.devices.camera.info.controls["exposure_ms"] == pytest.approx(3.0)
+    oak.unplug()
+    fails_within(opened.devices.camera, DeviceLost)
+    opened.devices.camera.close()
+    with pytest.raises(DeviceNotFound):
+        opened.reopen_camera()
+    opened.devices.close()
+
+
+def test_an_oak_camera_that_is_absent_is_told_so(tmp_path) -> None:
+    write_rig(tmp_path / "rig.yml", plain_rig(64, 48))
+    camera = {"backend": "depthai", "rig": str(tmp_path / "rig.yml")}
+    table = {"device": "NONE-OF-THEM"}
+    with pytest.raises(DeviceNotFound):
+        open_live(parse({"camera": {**camera, "depthai": table}}, "x"), is_headless=True)

@@ -93,6 +93,73 @@ class SimulationSection(Section):
     """Scripted faults: kind, start_s, duration_s; delay_s of a delay, turn_deg of a turn."""
 
 
+class OpencvSection(Section):
+    """USB cameras through OpenCV."""
+
+    left: str = ""
+    """Serial number, or a path below /dev/v4l/by-id or /dev/v4l/by-path."""
+    right: str | None = None
+    """The same; left out when the left camera sends both eyes side by side."""
+    fourcc: Annotated[str, Field(min_length=4, max_length=4)] = "MJPG"
+    """Pixel format: MJPG, YUYV, ..."""
+    width: Annotated[int, Field(gt=0)] = 1280
+    """Of the picture of one eye, px."""
+    height: Annotated[int, Field(gt=0)] = 720
+    """Of the picture of one eye, px."""
+    exposure_ms: Positive | None = None
+    """Left out, it stays where the camera has it, like the other controls; none is automatic."""
+    gain: NotNegative | None = None
+    """In the camera's own unit."""
+    white_balance_k: Positive | None = None
+    """Colour temperature."""
+    focus: NotNegative | None = None
+    """In the camera's own unit."""
+    max_skew_ms: NotNegative = 5.0
+    """Pictures that are farther apart in time make no pair; below half of the frame period."""
+    max_age_ms: Positive = 250.0
+    """Older pictures are dropped."""
+
+    @property
+    def controls(self) -> dict[str, float]:
+        """Those that are asked for."""
+        asked = {
+            "exposure_ms": self.exposure_ms,
+            "gain": self.gain,
+            "white_balance_k": self.white_balance_k,
+            "focus": self.focus,
+        }
+        return {name: value for name, value in asked.items() if value is not None}
+
+
+class DepthaiSection(Section):
+    """The mono pair of an OAK camera."""
+
+    device: str = ""
+    """Its id; empty when only one is connected."""
+    width: Annotated[int, Field(gt=0)] = 1280
+    """Of one picture, px."""
+    height: Annotated[int, Field(gt=0)] = 720
+    """Of one picture, px."""
+    exposure_ms: Positive = 5.0
+    """Of both eyes."""
+    iso: Annotated[float, Field(ge=100.0, le=1600.0)] = 200.0
+    """Sensitivity of both eyes."""
+    ir_dots: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Brightness of the infrared dot projector; 0: off."""
+    ir_flood: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """Brightness of the infrared lamp; 0: off."""
+
+    @property
+    def controls(self) -> dict[str, float]:
+        """By the driver's names."""
+        return {
+            "exposure_ms": self.exposure_ms,
+            "iso": self.iso,
+            "ir_dots": self.ir_dots,
+            "ir_flood": self.ir_flood,
+        }
+
+
 class CameraSection(BaseModel):
     """Where the pictures come from."""
 
@@ -106,7 +173,7 @@ class CameraSection(BaseModel):
     )
 
     backend: str = "simulated"
-    """simulated, or the name of an installed device."""
+    """simulated, opencv, depthai, or the name of an installed device."""
     rig: str | None = None
     """Rig file (OpenCV YAML); simulated cameras bring their own."""
     rate_hz: Positive = 15.0
@@ -115,6 +182,10 @@ class CameraSection(BaseModel):
     """Nearest and farthest surface that the rig is used for."""
     simulated: SimulationSection = SimulationSection()
     """The simulated patient and rig."""
+    opencv: OpencvSection = OpencvSection()
+    """USB cameras through OpenCV."""
+    depthai: DepthaiSection = DepthaiSection()
+    """The mono pair of an OAK camera."""
 
 
 class DisplaySection(Section):

@@ -10,6 +10,8 @@ import pytest
 
 from drivers.clock import ManualClock, SystemClock
 from drivers.contracts import CAMERA_CHECKS, CameraUnderTest, ContractViolation
+from drivers.depthai_settings import DepthaiSettings
+from drivers.depthai_stereo import DepthaiStereo
 from drivers.replay_camera import ReplayCamera, ReplaySettings
 from drivers.session_files import SessionWriter
 from navapp.errors import DeviceTimeout
@@ -17,6 +19,7 @@ from sim_devices.camera import SimulatedCamera
 from sim_devices.scenario import Scenario
 from sim_devices.world import World
 from tests.drivers.recordings import frame, write_pairs, write_video
+from tests.drivers.usb_rigs import UsbRig
 from tests.sim_devices.plain_world import PlainWorld
 
 Make = Callable[[], CameraUnderTest]
@@ -83,7 +86,38 @@ def one_video(path: Path) -> Make:
     return replayed(video, ReplaySettings(is_side_by_side=True))
 
 
-BACKENDS = (stepped, free_running, rendered, folder, session, two_videos, one_video)
+def two_usb_cameras(path: Path) -> Make:
+    def make() -> CameraUnderTest:
+        rig = UsbRig(path)
+        return CameraUnderTest(rig.camera, rig.clock, ("exposure_ms", 5.0))
+
+    return make
+
+
+def usb_camera_without_stamps(path: Path) -> Make:
+    def make() -> CameraUnderTest:
+        rig = UsbRig(path, is_side_by_side=True)
+        rig.left.stamps = "none"
+        return CameraUnderTest(rig.camera, rig.clock, ("gain", 3.0))
+
+    return make
+
+
+def oak(_: Path) -> Make:
+    host_oak = pytest.importorskip("tests.drivers.host_oak", reason="needs the package depthai")
+
+    def make() -> CameraUnderTest:
+        clock = SystemClock()
+        size = host_oak.WIDTH, host_oak.HEIGHT
+        settings = DepthaiSettings("", *size, rate_hz=host_oak.RATE_HZ)
+        camera = DepthaiStereo(settings, clock, open_device=host_oak.HostOak().open_parts)
+        return CameraUnderTest(camera, clock, ("exposure_ms", 5.0))
+
+    return make
+
+
+USB = (two_usb_cameras, usb_camera_without_stamps)
+BACKENDS = (*USB, oak, stepped, free_running, rendered, folder, session, two_videos, one_video)
 
 
 @pytest.mark.parametrize("check", CAMERA_CHECKS, ids=lambda check: check.__name__)
