@@ -7,6 +7,7 @@ import argparse
 import contextlib
 import random
 import select
+import signal
 import socket
 import sys
 import threading
@@ -125,10 +126,13 @@ def main(arguments: Sequence[str]) -> None:
     options = parser.parse_args(arguments)
     projector = PjlinkProjector(SystemClock(), password=options.password)
     server = PjlinkServer(projector, port=options.port)
+    stopping = threading.Event()
+    # Also where the shell that started it has interrupts ignored.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stopping.set())
     server.start()
     print(f"PJLink projector on 127.0.0.1 port {server.port}; Ctrl-C ends it", flush=True)  # noqa: T201
-    with contextlib.suppress(KeyboardInterrupt):
-        threading.Event().wait()
+    stopping.wait()
     server.close()
 
 

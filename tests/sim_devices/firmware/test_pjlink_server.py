@@ -113,4 +113,7 @@ def test_the_command_for_a_person() -> None:
         projector = driver(int(words[words.index("port") + 1]))
         assert projector.name == "sim:projector"
         running.send_signal(signal.SIGINT)
-        assert running.wait(10.0) == 0
+        try:
+            assert running.wait(20.0) == 0
+        finally:
+            running.kill()
