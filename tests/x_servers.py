@@ -41,7 +41,8 @@ def xvfb(width: int, height: int) -> Iterator[str]:
     """One screen of that size; its DISPLAY. Skips where Xvfb is missing."""
     if shutil.which("Xvfb") is None:
         pytest.skip("no Xvfb (make system-deps)")
-    with _server(["Xvfb", "-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp"]) as display:
+    screen = ["-screen", "0", f"{width}x{height}x24"]
+    with _server(["Xvfb", "-noreset", "-nolisten", "tcp", *screen]) as display:
         yield display
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import navapp.devices
+import navapp.devices.cameras
 from drivers.clock import Clock, ManualClock, SystemClock
 from drivers.depthai_stereo import DepthaiStereo
 from drivers.interfaces import PowerState
@@ -264,7 +264,7 @@ def usb(tmp_path, monkeypatch) -> UsbRig:
     """Two fake USB cameras in the places where real ones are looked for."""
     rig = UsbRig(tmp_path)
     monkeypatch.setattr(
-        navapp.devices,
+        navapp.devices.cameras,
         "OpencvStereo",
         partial(OpencvStereo, names=rig.bus.names, open_capture=rig.bus.open_capture),
     )
@@ -308,7 +308,7 @@ def test_an_oak_camera_is_opened_as_configured(tmp_path, monkeypatch) -> None:
     host_oak = pytest.importorskip("tests.drivers.host_oak", reason="needs the package depthai")
     oak = host_oak.HostOak("OAK-1")
     monkeypatch.setattr(
-        navapp.devices, "DepthaiStereo", partial(DepthaiStereo, open_device=oak.open_parts)
+        navapp.devices.cameras, "DepthaiStereo", partial(DepthaiStereo, open_device=oak.open_parts)
     )
     rig = replace(plain_rig(64, 48), serials=("OAK-1", "OAK-1"))
     write_rig(tmp_path / "rig.yml", rig)

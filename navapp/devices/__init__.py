@@ -1,0 +1,16 @@
+"""Composition root: the only place that turns a configuration into opened devices."""
+
+from navapp.devices.cameras import real_camera
+from navapp.devices.capture import OpenedCapture, open_capture
+from navapp.devices.opening import OpenedDevices, open_live, open_recording
+from navapp.devices.simulated_room import Simulation
+
+__all__ = [
+    "OpenedCapture",
+    "OpenedDevices",
+    "Simulation",
+    "open_capture",
+    "open_live",
+    "open_recording",
+    "real_camera",
+]

@@ -1,0 +1,60 @@
+"""An opened camera in front of a board, for a guided capture."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from calibration.targets.boards import Board
+from drivers.clock import Clock, SystemClock
+from drivers.interfaces import StereoCamera
+from navapp.config import Configuration
+from navapp.devices.cameras import real_camera
+from navapp.devices.fitting import reopener
+from navapp.devices.simulated_board import hand_with, printed
+from navapp.devices.simulated_room import Pace, simulated_camera
+from sim_devices.hand import Hand
+from sim_devices.sheet import SheetScene
+
+# A board that waits to be photographed needs no more frames than this.
+_STEPPED_CAPTURE_HZ = 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedCapture:
+    """An opened camera that need not be calibrated yet.
+
+    Attributes:
+        camera: opened.
+        clock: of its frames.
+        reopen: opens it again when it was lost.
+        hand: holds the board in front of simulated cameras, else None.
+    """
+
+    camera: StereoCamera
+    clock: Clock
+    reopen: Callable[[], StereoCamera]
+    hand: Hand | None = None
+
+
+def open_capture(configuration: Configuration, board: Board, *, is_headless: bool) -> OpenedCapture:
+    """Open the configured camera in front of a board; a simulated one sees a simulated board.
+
+    Args:
+        configuration: in force; it need not name a rig.
+        board: what a simulated camera is shown.
+        is_headless: nobody watches; a simulated camera then waits to be read.
+
+    Raises:
+        DeviceError, ConfigurationError.
+    """
+    hand: Hand | None = None
+    clock: Clock = SystemClock()
+    if configuration.camera.backend == "simulated":
+        settings, rate_hz = configuration.camera.simulated, configuration.camera.rate_hz
+        pace, hand = Pace.of(settings, is_headless=is_headless), hand_with(board, settings.seed)
+        scene, clock = SheetScene(printed(board), hand.left_from_body), pace.clock
+        rate_hz = min(rate_hz, _STEPPED_CAPTURE_HZ) if pace.is_stepped else rate_hz
+        camera: StereoCamera = simulated_camera(scene, settings, pace, rate_hz)
+    else:
+        camera = real_camera(configuration, clock)
+    camera.open()
+    return OpenedCapture(camera, clock, reopener(camera, camera.open), hand)

@@ -1,0 +1,91 @@
+"""What stands around the camera: display, projector and mirror."""
+
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+
+from drivers.clock import Clock, SystemClock
+from drivers.escvp21_projector import BAUD_RATE as ESCVP21_BAUD_RATE
+from drivers.escvp21_projector import EscVp21Projector
+from drivers.fixed_mirror import FixedMirror
+from drivers.interfaces import DeviceSet, Display, MirrorMount, ProjectorControl, StereoCamera
+from drivers.no_projector import NoProjector
+from drivers.pjlink_line import TcpConnection
+from drivers.pjlink_projector import PjlinkProjector
+from drivers.serial_port import SerialAddress
+from drivers.window_display import WindowDisplay
+from drivers.window_process import WindowSettings
+from drivers.zaber_line import BAUD_RATE as ZABER_BAUD_RATE
+from drivers.zaber_mirror import ZaberMirror
+from navapp.config import Configuration, DisplaySection, MirrorSection, ProjectorSection
+from navapp.errors import ConfigurationError
+from navapp.geometry import StereoRig
+from sim_devices.display import SimulatedDisplay
+
+
+def device_set(
+    configuration: Configuration,
+    camera: StereoCamera,
+    clock: Clock,
+    rig: StereoRig,
+    *,
+    is_live: bool = True,
+) -> DeviceSet:
+    """The camera as it is, the others opened; when one cannot be opened, all are closed.
+
+    A recording lights no display, moves no mirror and asks no projector.
+    """
+    projector: ProjectorControl = NoProjector()
+    mirror: MirrorMount = FixedMirror(configuration.mirror.calibrated_deg)
+    display: Display = SimulatedDisplay(clock, rig.width, rig.height)
+    if is_live:
+        projector, mirror = _projector(configuration.projector), _mirror(configuration.mirror)
+        display = _display(configuration.display, clock, rig)
+    devices = DeviceSet(camera, display, projector, mirror, clock)
+    with ExitStack() as undo:
+        undo.callback(devices.close)
+        for device in (display, mirror, projector):
+            device.open()
+        undo.pop_all()
+    return devices
+
+
+def _display(settings: DisplaySection, clock: Clock, rig: StereoRig) -> Display:
+    if settings.backend == "window" and settings.size_px is not None:
+        flips = (settings.flip_horizontally, settings.flip_vertically)
+        return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
+    return SimulatedDisplay(clock, rig.width, rig.height)
+
+
+def _projector(settings: ProjectorSection) -> ProjectorControl:
+    if settings.backend == "pjlink":
+        return _pjlink_projector(settings)
+    if settings.backend == "escvp21":
+        address = SerialAddress(settings.port, ESCVP21_BAUD_RATE)
+        return EscVp21Projector(address, SystemClock(), settings.serial)
+    return NoProjector()
+
+
+def _pjlink_projector(settings: ProjectorSection) -> PjlinkProjector:
+    connect = partial(TcpConnection, settings.host, settings.tcp_port)
+    password = "" if settings.password_file is None else _password(Path(settings.password_file))
+    return PjlinkProjector(settings.host, SystemClock(), connect, password)
+
+
+def _password(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8").rstrip("\r\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(
+            f"the password file {path} cannot be read",
+            subject="projector.password_file",
+            remedy="write the projector's PJLink password into it, readable by you alone",
+        ) from error
+
+
+def _mirror(settings: MirrorSection) -> MirrorMount:
+    if settings.backend == "zaber":
+        address = SerialAddress(settings.port, ZABER_BAUD_RATE)
+        axis = (settings.device, settings.axis)
+        return ZaberMirror(address, SystemClock(), settings.serial, axis)
+    return FixedMirror(settings.calibrated_deg)

@@ -1,0 +1,29 @@
+"""A printed board and the hand that holds it before simulated cameras."""
+
+import numpy as np
+
+from calibration.targets.boards import Board
+from calibration.targets.drawing import drawn, rastered
+from navapp.geometry import RigidTransform
+from sim_devices.hand import Hand
+from sim_devices.rigs import WORKING_DISTANCE_MM
+from sim_devices.sheet import PrintedSheet
+
+# Finer than any picture shows it.
+_SHEET_PX_PER_MM, _MOST_SHEET_PX, _SHEET_MARGIN_MM = 12.0, 6000.0, 8.0
+
+
+def printed(board: Board) -> PrintedSheet:
+    """The board on a sheet of paper."""
+    drawing = drawn(board)
+    px_per_mm = min(_SHEET_PX_PER_MM, _MOST_SHEET_PX / max(board.size_mm))
+    left_mm, top_mm = drawing.low_mm - _SHEET_MARGIN_MM
+    white = rastered(drawing, px_per_mm, _SHEET_MARGIN_MM)
+    return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
+
+
+def hand_with(board: Board, seed: int) -> Hand:
+    """A hand that holds the board's middle in front of the left camera."""
+    middle_mm = board.points_mm.mean(axis=0)
+    place_mm = np.array([0.0, 0.0, WORKING_DISTANCE_MM]) - middle_mm
+    return Hand(RigidTransform.from_parts("left", "board", np.eye(3), place_mm), middle_mm, seed)

@@ -1,0 +1,129 @@
+"""The simulated room as it is configured, and what it tells apart from its devices."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calibration.targets.boards import Board
+from drivers.clock import Clock, ManualClock, SystemClock
+from navapp.config import FaultSection, SimulationSection
+from navapp.devices.simulated_board import hand_with, printed
+from navapp.geometry import RigidTransform, TriangleMesh
+from navapp.geometry.transform import FloatArray
+from sim_devices.camera import Scene, SimulatedCamera
+from sim_devices.faults import Fault, FaultKind, FaultScript
+from sim_devices.scenario import Scenario
+from sim_devices.sensor import SensorModel
+from sim_devices.sheet import SheetInView
+from sim_devices.truth import TruthOracle
+from sim_devices.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation:
+    """What the simulated room hands to its caller, apart from the devices.
+
+    Attributes:
+        bones: name -> surface as planned.
+        side: of the knee.
+        targets: `bone/name` -> point, mm, bone coordinates.
+        curves: vessels and nerves beside the femur.
+        nominal_left_from_bone: how the knee was laid on the table; rough starts.
+        approach_axis, approach_half_angle_deg: of the approach cone.
+        oracle: the truth, for evaluation after the run only.
+        set_stage: tells the room which stage is in force.
+    """
+
+    bones: Mapping[str, TriangleMesh]
+    side: Literal["left", "right"]
+    targets: Mapping[str, FloatArray]
+    curves: Mapping[str, FloatArray]
+    nominal_left_from_bone: Mapping[str, RigidTransform]
+    approach_axis: FloatArray
+    approach_half_angle_deg: float
+    oracle: TruthOracle
+    set_stage: Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How a simulated camera runs: by itself, or stepped by its reader."""
+
+    clock: Clock
+    is_stepped: bool
+
+    @classmethod
+    def of(cls, settings: SimulationSection, *, is_headless: bool) -> "Pace":
+        """As configured; by default it is stepped where nobody watches."""
+        is_stepped = is_headless if settings.stepped is None else settings.stepped
+        return cls(ManualClock() if is_stepped else SystemClock(), is_stepped)
+
+
+def simulated_camera(
+    scene: Scene, settings: SimulationSection, pace: Pace, rate_hz: float
+) -> SimulatedCamera:
+    """A camera before a scene, with the configured noise and faults; not opened yet."""
+    return SimulatedCamera(
+        scene,
+        pace.clock,
+        is_stepped=pace.is_stepped,
+        rate_hz=rate_hz,
+        scale=settings.scale,
+        sensor=SensorModel(seed=settings.seed, is_grey=settings.grey),
+        faults=FaultScript(tuple(_fault(section) for section in settings.faults)),
+        skew_ns=round(settings.skew_ms * 1e6),
+    )
+
+
+def scenario_of(settings: SimulationSection) -> Scenario:
+    """Who lies in the room, and what happens there."""
+    return Scenario(
+        seed=settings.seed,
+        side=settings.side,
+        sex=settings.sex,
+        age_group=settings.age_group,
+        cartilage_mm=settings.cartilage_mm,
+        motion=settings.motion,
+        instrument=settings.instrument,
+    )
+
+
+def _fault(section: FaultSection) -> Fault:
+    kind = FaultKind(section.kind)
+    return Fault(kind, section.start_s, section.duration_s, section.delay_s, section.turn_deg)
+
+
+def with_board(world: World, board: Board | None, settings: SimulationSection) -> Scene:
+    """The room, with a board held into the view when there is one to be shown."""
+    if board is None or settings.board_s is None:
+        return world
+    hand = hand_with(board, settings.seed)
+    from_s, to_s = settings.board_s
+    shown_ns = (round(from_s * 1e9), round(to_s * 1e9))
+    return SheetInView(world, printed(board), hand.left_from_body, shown_ns)
+
+
+def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
+    """What a room tells apart from its devices."""
+    anatomy = world.anatomy
+    joint_z_mm = float(anatomy.bones["femur"].vertices_mm[:, 2].min())
+    return Simulation(
+        bones=dict(anatomy.bones),
+        side=world.scenario.side,
+        targets={name: np.array(point) for name, point in anatomy.landmarks.items()},
+        # Beyond the joint a vessel follows the tibia: with the knee flexed it is elsewhere.
+        curves={
+            name: np.asarray(points)[np.asarray(points)[:, 2] > joint_z_mm]
+            for name, points in anatomy.curves.items()
+        },
+        nominal_left_from_bone={
+            "femur": world.nominal_left_from_femur,
+            "tibia": world.nominal_left_from_tibia,
+        },
+        approach_axis=np.asarray(world.approach_axis),
+        approach_half_angle_deg=world.approach_half_angle_deg,
+        oracle=TruthOracle(world, camera.world_time_ns),
+        set_stage=world.set_stage,
+    )
