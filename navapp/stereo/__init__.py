@@ -1,6 +1,7 @@
 """From a rectified pair to a surface: matching, occlusion filling, reprojection."""
 
 from navapp.stereo.chains import (
+    MODEL_REFINEMENT,
     StereoAnswer,
     match_baseline,
     match_on_support,
@@ -14,6 +15,7 @@ from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
 from navapp.stereo.surface import reproject
 
 __all__ = [
+    "MODEL_REFINEMENT",
     "PictureHealth",
     "RefineSettings",
     "StereoAnswer",

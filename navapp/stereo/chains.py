@@ -22,6 +22,9 @@ from navapp.values import DisparityMap, LineTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
+# What the residual of a window does not show is less on the model than on a surface that is
+# guessed; at the true poses of simulated knees it is so much (docs/accuracy.md).
+MODEL_REFINEMENT = RefineSettings(systematic_px=0.08)
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
 _NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
 # Chance and repeated texture confirm a few per cent of any support, in specks.
@@ -104,7 +107,6 @@ def match_on_support(
     *,
     fills: bool,
     max_gap_px: int | None = None,
-    settings: RefineSettings | None = None,
 ) -> StereoAnswer:
     """Sub-pixel matching where a predicted surface says what to expect.
 
@@ -113,10 +115,9 @@ def match_on_support(
         support_px: (h, w) float32 expected disparity; NaN where none is expected, nor filled.
         fills: from what was measured, never from the support.
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
-        settings: of the refinement.
     """
     started = time.perf_counter_ns()
-    left = _without_specks(refine(pair, support_px, settings))
+    left = _without_specks(refine(pair, support_px, MODEL_REFINEMENT))
     n_expected = int(np.isfinite(support_px).sum())
     if left.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
         return _nothing(pair, _NOT_CONFIRMED, started)

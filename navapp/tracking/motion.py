@@ -13,7 +13,7 @@ _DAMPING = 0.7
 # A gap longer than this says nothing about the velocity any more.
 _MAX_GAP_NS = 400_000_000
 # A search for a buried bone that keeps finding nothing is made again after twice as many frames, at
-# most so many: it takes as long as ten frames do.
+# most so many: it takes as long as many frames do.
 _MOST_BETWEEN_SEARCHES = 8
 # What speaks against a pose's place, not against its accuracy.
 _AGAINST = frozenset(

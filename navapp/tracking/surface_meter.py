@@ -13,7 +13,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
-    RefineSettings,
+    MODEL_REFINEMENT,
     match_baseline,
     match_coarsely,
     match_on_support,
@@ -27,9 +27,6 @@ from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
 FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
-# What the residual of a window does not show is less on the model than on a surface that is
-# guessed; at the true poses of simulated knees it is so much (docs/accuracy.md).
-MODEL_REFINEMENT = RefineSettings(systematic_px=0.08)
 _SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, last_step_px=0.3)
 _SAMPLES_PX = 6
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
@@ -211,12 +208,7 @@ class SurfaceMeter:
         Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
         it answers nothing.
         """
-        answer = match_on_support(
-            expected.pair,
-            expected.support_px,
-            fills=False,
-            settings=MODEL_REFINEMENT,
-        )
+        answer = match_on_support(expected.pair, expected.support_px, fills=False)
         found, is_expected = answer.disparity, np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
         share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)

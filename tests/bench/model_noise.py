@@ -4,7 +4,7 @@ usage: python -m tests.bench.model_noise [--seeds N] [--first SEED]
 
 One frame each of simulated knees whose plans are exact. The claimed sigma is that of the residual
 in a window, and in squares with it an error that the residual does not show
-(`tracking/surface_meter.py`). What lies on the model but is not the bone (tissue, an edge) is off
+(`stereo/chains.py`). What lies on the model but is not the bone (tissue, an edge) is off
 by more than a matching step can tell and counts up to three tenths of a pixel.
 """
 
@@ -13,8 +13,9 @@ import argparse
 import numpy as np
 
 from navapp.registration import RegistrationModel
+from navapp.stereo import MODEL_REFINEMENT
 from navapp.tracking.locator import NEAR_VIEW, LocatorSettings
-from navapp.tracking.surface_meter import MODEL_REFINEMENT, SurfaceMeter
+from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import Origin
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee

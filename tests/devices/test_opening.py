@@ -1,8 +1,6 @@
 """The composition root: what it opens, refuses and closes again."""
 
-import importlib.metadata
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +9,7 @@ import numpy as np
 import pytest
 
 import navapp.devices.cameras
-from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.clock import SystemClock
 from drivers.depthai_stereo import DepthaiStereo
 from drivers.interfaces import PowerState
 from drivers.opencv_stereo import OpencvStereo
@@ -28,41 +26,17 @@ from navapp.errors import (
 )
 from navapp.geometry import write_rig
 from sim_devices.camera import SimulatedCamera
-from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.firmware import pjlink
 from sim_devices.firmware.pjlink_server import PjlinkServer
+from tests.devices.installed import Entry, announce
 from tests.drivers.firmware_rigs import SERIAL, STAGE_SERIAL, projector_terminal, stage_terminal
 from tests.drivers.losing import fails_within
 from tests.drivers.recordings import write_pairs
 from tests.drivers.usb_rigs import UsbRig
-from tests.sim_devices.plain_world import PlainWorld, plain_rig
+from tests.sim_devices.plain_world import plain_rig
 from tests.x_servers import seen, xvfb
 
 SMALL = {"camera": {"simulated": {"scale": 0.2}}}
-
-
-class Entry:
-    """An installed camera, as its package announces it."""
-
-    name = "camera.acme"
-
-    def __init__(self) -> None:
-        self.camera = SimulatedCamera(
-            PlainWorld(), ManualClock(), is_stepped=True,
-            faults=FaultScript((Fault(FaultKind.WRONG_SERIAL, 0.1, 9.0),)),
-        )  # fmt: skip
-
-    def load(self) -> Callable[[object, Clock], SimulatedCamera]:
-        return lambda settings, clock: self.camera
-
-
-def announce(monkeypatch: pytest.MonkeyPatch, entries: list[Entry]) -> None:
-    real = importlib.metadata.entry_points
-
-    def entry_points(**selection: str) -> object:
-        return entries if selection.get("group") == "navapp.devices" else real(**selection)
-
-    monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
 
 
 @pytest.fixture
