@@ -32,10 +32,12 @@ class V4lNames:
     Attributes:
         links: folder with `by-id` and `by-path`.
         sysfs: folder with a folder for every video device.
+        devices: folder of the devices themselves.
     """
 
     links: Path = Path("/dev/v4l")
     sysfs: Path = Path("/sys/class/video4linux")
+    devices: Path = Path("/dev")
 
     def connected(self) -> tuple[FoundCamera, ...]:
         """Every camera once, by its serial number where that names it alone."""
@@ -65,6 +67,29 @@ class V4lNames:
             )
         return found[0]
 
+    def nodes(self) -> tuple[Path, ...]:
+        """Devices that the kernel knows, with or without a lasting name; those of pictures only."""
+        entries = self.sysfs.glob("video*") if self.sysfs.is_dir() else ()
+        return tuple(
+            self.devices / entry.name for entry in entries if _told(entry / "index") in ("", "0")
+        )
+
+    def card(self, node: Path) -> str:
+        """A camera's name for people, as the kernel has it; empty when it has none."""
+        return _told(self.sysfs / node.name / "name")
+
+    def serial(self, node: Path) -> str:
+        """As the camera tells it; empty when it has none."""
+        interface = (self.sysfs / node.name / "device").resolve()
+        return _told(interface.parent / "serial")
+
+    def port(self, node: Path) -> Path | None:
+        """The path of the port that a camera is plugged into."""
+        for path in self._all_links():
+            if path.parent.name == "by-path" and path.resolve() == node:
+                return path
+        return None
+
     def _at(self, path: Path) -> FoundCamera:
         if path.parent not in (self.links / "by-id", self.links / "by-path"):
             raise UsageError(
@@ -83,15 +108,15 @@ class V4lNames:
 
     def _camera(self, path: Path) -> FoundCamera:
         node = path.resolve()
-        return FoundCamera(path, node, self._serial(node) or path.name.removesuffix(_PICTURES))
+        return FoundCamera(path, node, self.serial(node) or path.name.removesuffix(_PICTURES))
 
-    def _serial(self, node: Path) -> str:
-        """As the camera tells it; empty when it has none."""
-        interface = (self.sysfs / node.name / "device").resolve()
-        try:
-            return (interface.parent / "serial").read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError):
-            return ""
+
+def _told(file: Path) -> str:
+    """Content of a small file of the kernel's; empty when it cannot be read."""
+    try:
+        return file.read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError):
+        return ""
 
 
 def _absent(wanted: str, cameras: tuple[FoundCamera, ...]) -> DeviceNotFound:

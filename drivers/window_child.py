@@ -16,11 +16,9 @@ from collections.abc import Sequence
 from contextlib import closing
 
 from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, memory_bytes
-from drivers.window_outputs import Output, chosen, outputs
-from navapp.errors import DeviceError, DeviceNotFound
+from drivers.window_outputs import Output, chosen, outputs, start_sdl
+from navapp.errors import DeviceError
 
-# SDL falls back to drivers that draw into nothing; on Wayland a window cannot choose its place.
-_VISIBLE_DRIVER = "x11"
 # What X11 takes for a window manager to put the window where it belongs.
 _PLACING_S = 2.0
 
@@ -36,17 +34,7 @@ class Window:
     def __init__(self, output_name: str, width: int, height: int) -> None:
         # The operator's keys go to the terminal, not to the overlay.
         os.environ.setdefault("SDL_WINDOW_NO_ACTIVATION_WHEN_SHOWN", "1")
-        os.environ.setdefault("SDL_VIDEODRIVER", _VISIBLE_DRIVER)
-        import pygame
-
-        self._pygame = pygame
-        try:
-            pygame.display.init()
-            driver = pygame.display.get_driver()
-        except pygame.error as error:
-            raise _no_screen(str(error)) from error
-        if driver != _VISIBLE_DRIVER:
-            raise _no_screen(f"SDL would draw with '{driver}'")
+        self._pygame = pygame = start_sdl()
         self.output: Output = chosen(outputs(), output_name, width, height)
         self._screen = pygame.display.set_mode(
             (width, height), pygame.NOFRAME, 32, display=self.output.index
@@ -61,7 +49,7 @@ class Window:
         if pixels is None:
             self._screen.fill((0, 0, 0))
         else:
-            memoryview(self._screen.get_view("0"))[:] = pixels  # type: ignore[arg-type]
+            memoryview(self._screen.get_view("0"))[:] = pixels
 
     def flip(self) -> None:
         """Show what was drawn."""
@@ -193,14 +181,6 @@ def main(arguments: Sequence[str]) -> None:
 def _tell(message: dict[str, str]) -> None:
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()
-
-
-def _no_screen(why: str) -> DeviceNotFound:
-    return DeviceNotFound(
-        f"there is no X11 screen to open a window on ({why})",
-        subject="display",
-        remedy="start navapp in a graphical session with DISPLAY set, and see make system-deps",
-    )
 
 
 if __name__ == "__main__":

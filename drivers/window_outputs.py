@@ -1,11 +1,16 @@
 """The outputs (monitors, projectors) of the X server, as SDL names them."""
 
 import ctypes
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from navapp.errors import DeviceError, DeviceNotFound, WrongDevice
+
+# SDL falls back to drivers that draw into nothing; on Wayland a window cannot choose its place.
+_VISIBLE_DRIVER = "x11"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +28,33 @@ class Output:
         return f"{self.name} ({self.width}x{self.height})"
 
 
+def start_sdl() -> Any:
+    """The module pygame, with SDL's display started on a screen that somebody can see.
+
+    Raises:
+        DeviceNotFound: no pygame, no X server, or SDL would draw into nothing.
+    """
+    os.environ.setdefault("SDL_VIDEODRIVER", _VISIBLE_DRIVER)
+    try:
+        import pygame
+    except ImportError as error:
+        raise DeviceNotFound(
+            f"a window needs the package pygame-ce ({error})",
+            subject="display",
+            remedy="install pygame-ce; if it is there, make system-deps",
+        ) from error
+    try:
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+    except pygame.error as error:
+        raise _no_screen(str(error)) from error
+    if driver != _VISIBLE_DRIVER:
+        raise _no_screen(f"SDL would draw with '{driver}'")
+    return pygame
+
+
 def outputs() -> list[Output]:
-    """All outputs; SDL's display module must have been initialised.
+    """All outputs; `start_sdl` must have been called.
 
     pygame tells neither names nor places, the SDL inside it does.
 
@@ -80,3 +110,11 @@ def _loaded_sdl() -> str:
         if Path(path).name.startswith("libSDL2-"):
             return f"/{path}"
     raise DeviceError("the SDL that pygame has loaded is not found")
+
+
+def _no_screen(why: str) -> DeviceNotFound:
+    return DeviceNotFound(
+        f"there is no X11 screen to open a window on ({why})",
+        subject="display",
+        remedy="start navapp in a graphical session with DISPLAY set, and see make system-deps",
+    )

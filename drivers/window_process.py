@@ -9,9 +9,9 @@ import sys
 import threading
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import IO, cast
 
+from drivers.child_environment import child_environment
 from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound, DeviceTimeout, WrongDevice
 
@@ -113,14 +113,13 @@ class WindowProcess:
 def _started(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-P", "-m", "drivers.window_child"]
     numbers = (settings.width, settings.height)
-    paths = [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
     return subprocess.Popen(
         [*command, str(descriptor), str(woken), settings.output, *map(str, numbers)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         pass_fds=(descriptor, woken),
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
+        env=child_environment(),
     )
 
 

@@ -1,34 +1,15 @@
 """`navapp doctor`: what is there, what is missing, and what to do about it."""
 
 import argparse
-import os
-import subprocess
-import sys
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import ConfigurationError
 
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing looked at.
-
-    Attributes:
-        name: of it.
-        is_fine: it is as it must be.
-        is_needed: the simulated session cannot do without it.
-        detail: what was seen.
-        remedy: what to do when it is not fine.
-    """
-
-    name: str
-    is_fine: bool
-    is_needed: bool
-    detail: str
-    remedy: str = ""
+if TYPE_CHECKING:
+    from navapp.config import Configuration
+    from navapp.inventory.finding import Finding
 
 
 def add_parser(subparsers: Any) -> None:
@@ -36,6 +17,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "doctor",
         help="what is there, what is missing, and what to do about it",
+        description="Look at the installation, at what the system grants, and at the configured "
+        "devices, without opening any. Exit code 4 when a session could not begin.",
         epilog="example: navapp doctor",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -44,100 +27,74 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
+    from navapp.inventory.finding import Health
+
     check_writable(options.json)
-    findings = [check() for check in _CHECKS]
-    is_well = all(finding.is_fine for finding in findings if finding.is_needed)
-    content = {"well": is_well, "findings": [asdict(finding) for finding in findings]}
+    findings = _findings(options.config)
+    is_well = all(finding.health is not Health.FAILED for finding in findings)
+    content = {"well": is_well, "findings": [_to_json(finding) for finding in findings]}
     write_json(options.json, "doctor", content)
     if options.json != "-":
-        for finding in findings:
-            word = "ok  " if finding.is_fine else ("MISS" if finding.is_needed else "none")
-            remedy = f" -> {finding.remedy}" if finding.remedy and not finding.is_fine else ""
-            diagnostics.say(f"{word}  {finding.name}: {finding.detail}{remedy}")
+        diagnostics.say(text(findings))
     return 0 if is_well else 4
 
 
-def _python() -> Finding:
-    version = ".".join(str(part) for part in sys.version_info[:3])
-    return Finding(
-        "python", sys.version_info >= (3, 11), True, version, "install Python 3.11 or newer"
-    )
+def text(findings: Sequence["Finding"]) -> str:
+    """For people: a line each, the remedy below what is not as it should be."""
+    from navapp.inventory.finding import Health
+
+    width = max(len(finding.name) for finding in findings)
+    lines = []
+    for finding in findings:
+        lines.append(f"{finding.health.value:<7}  {finding.name:<{width}}  {finding.detail}")
+        if finding.health is not Health.OK:
+            lines.append(f"{'':<7}  {'':<{width}}  -> {finding.remedy}")
+    return "\n".join(lines)
 
 
-def _package(name: str, module: str, is_needed: bool, use: str) -> Callable[[], Finding]:
-    """Whether a package imports, tried in a process of its own: a broken one may crash."""
-
-    def check() -> Finding:
-        from importlib.metadata import PackageNotFoundError, version
-
-        try:
-            installed = version(name)
-        except PackageNotFoundError:
-            return Finding(name, False, is_needed, f"not installed ({use})", "run `make setup`")
-        done = subprocess.run(
-            [sys.executable, "-c", f"import navapp, {module}"],
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        if done.returncode == 0:
-            return Finding(name, True, is_needed, f"{installed} ({use})")
-        last = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
-        return Finding(name, False, is_needed, f"{installed} {last}", "run `make system-deps`")
-
-    return check
-
-
-def _kernel_cache() -> Finding:
-    folder = Path(os.environ["NUMBA_CACHE_DIR"])
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        is_writable = os.access(folder, os.W_OK)
-    except OSError:
-        is_writable = False
-    n_files = len(list(folder.rglob("*.nbc"))) if is_writable else 0
-    detail = f"{folder}, {n_files} compiled kernels" if is_writable else f"{folder} not writable"
-    return Finding("kernel cache", is_writable, True, detail, "set NUMBA_CACHE_DIR")
-
-
-def _terminal() -> Finding:
-    encoding = (sys.stdout.encoding or "").lower()
-    is_unicode = "utf" in encoding
-    return Finding(
-        "terminal",
-        is_unicode,
-        False,
-        f"{os.environ.get('TERM', 'none')}, {encoding or 'no encoding'}",
-        "set a UTF-8 locale (LANG=C.UTF-8) for the full picture",
-    )
-
-
-def _configuration() -> Finding:
-    from navapp.config import find_file, load
-    from navapp.errors import ConfigurationError
+def _findings(config: str | None) -> "list[Finding]":
+    from navapp.cli.software_checks import software_findings
 
     try:
-        path = find_file(None)
-        load(path)
+        configuration, told = _configuration(config)
+    except ImportError:
+        # The package that is missing is named among the software.
+        return software_findings(None)
+    return [*software_findings(configuration), told, *_device_findings(configuration)]
+
+
+def _device_findings(configuration: "Configuration") -> "list[Finding]":
+    from navapp.inventory.configured_checks import configured_findings
+    from navapp.inventory.looking import look
+    from navapp.inventory.system_checks import system_findings
+
+    found = look()
+    return [
+        *system_findings(configuration, found),
+        *configured_findings(configuration, found),
+    ]
+
+
+def _configuration(config: str | None) -> "tuple[Configuration, Finding]":
+    """The one in force; the defaults in the place of one that is not valid."""
+    from navapp.config import Configuration, find_file, load
+    from navapp.inventory.finding import Finding, Health
+
+    try:
+        path = find_file(config)
+        configuration = load(path)
     except ConfigurationError as error:
-        return Finding("configuration", False, True, error.problem, error.remedy)
-    return Finding("configuration", True, True, str(path) if path else "defaults (no file)")
+        told = Finding("configuration", Health.FAILED, error.problem, error.remedy)
+        return Configuration(), told
+    detail = str(path) if path else "defaults (no file)"
+    return configuration, Finding("configuration", Health.OK, detail)
 
 
-_CHECKS: tuple[Callable[[], Finding], ...] = (
-    _python,
-    _package("numpy", "numpy", True, "arrays"),
-    _package("scipy", "scipy.spatial", True, "look-ups"),
-    _package("numba", "numba", True, "compiled kernels"),
-    _package("opencv-python-headless", "cv2", True, "pictures and stereo"),
-    _package("pydantic", "pydantic", True, "configuration"),
-    _package("textual", "textual.app", True, "operator's screen"),
-    _package("open3d-cpu", "open3d", False, "referee in tests; needs system libraries"),
-    _package("depthai", "depthai", False, "OAK cameras"),
-    _package("pyserial", "serial", False, "projector and mirror lines"),
-    _package("pygame-ce", "pygame", False, "window on a monitor or projector"),
-    _kernel_cache,
-    _terminal,
-    _configuration,
-)
+def _to_json(finding: "Finding") -> dict[str, str]:
+    is_fine = finding.health.value == "ok"
+    return {
+        "name": finding.name,
+        "status": finding.health.value,
+        "detail": finding.detail,
+        "remedy": "" if is_fine else finding.remedy,
+    }

@@ -10,7 +10,18 @@ from navapp.cli.diagnostics import Diagnostics, report
 from navapp.errors import NavappError
 
 # Verb -> module with `add_parser(subparsers)` and `run(arguments, diagnostics) -> int`.
-_VERBS = ("run", "replay", "plan", "stereo", "register", "calibrate", "rig", "doctor", "config")
+_VERBS = (
+    "run",
+    "replay",
+    "plan",
+    "stereo",
+    "register",
+    "calibrate",
+    "rig",
+    "devices",
+    "doctor",
+    "config",
+)
 
 
 def run(arguments: Sequence[str]) -> int:

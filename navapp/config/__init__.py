@@ -12,7 +12,7 @@ from navapp.config.sections import (
     Section,
     SimulationSection,
 )
-from navapp.config.toml_text import as_toml
+from navapp.config.toml_text import as_toml, one_table
 
 __all__ = [
     "FILE_NAME",
@@ -28,5 +28,6 @@ __all__ = [
     "checked",
     "find_file",
     "load",
+    "one_table",
     "parse",
 ]

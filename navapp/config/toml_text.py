@@ -20,6 +20,11 @@ def as_toml(configuration: Configuration, with_comments: bool) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
+def one_table(name: str, values: Mapping[str, Any]) -> str:
+    """A table with some keys: what a person adds to a file."""
+    return "\n".join([f"[{name}]", *(f"{_key(k)} = {_literal(v)}" for k, v in values.items())])
+
+
 def _table(name: str, model: type[BaseModel], values: BaseModel, with_comments: bool) -> list[str]:
     lines = [f"[{name}]"]
     inner: list[str] = []
@@ -34,8 +39,7 @@ def _table(name: str, model: type[BaseModel], values: BaseModel, with_comments: 
         lines.append(f"# {key} =" if value is None else f"{key} = {_literal(value)}")
     for key, value in (values.model_extra or {}).items():
         if isinstance(value, Mapping):
-            entries = [f"{_key(k)} = {_literal(v)}" for k, v in value.items()]
-            inner += [f"[{name}.{_key(key)}]", *entries, ""]
+            inner += [one_table(f"{name}.{_key(key)}", value), ""]
     return [*lines, "", *inner]
 
 

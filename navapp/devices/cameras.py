@@ -7,9 +7,7 @@ from drivers.interfaces import StereoCamera
 from drivers.opencv_stereo import OpencvStereo, OpencvStereoSettings
 from drivers.uvc_settings import UvcSettings
 from navapp.config import Configuration
-from navapp.errors import ConfigurationError, DeviceError
-
-_ENTRY_POINTS = "navapp.devices"
+from navapp.devices.installed import installed_camera
 
 
 def real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") -> StereoCamera:
@@ -17,12 +15,15 @@ def real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") ->
 
     Raises:
         ConfigurationError, UsageError: no such backend, or settings that mean nothing.
+        DeviceError: an installed package that cannot be loaded.
     """
     if configuration.camera.backend == "opencv":
         return _usb_camera(configuration, clock, rig_id)
     if configuration.camera.backend == "depthai":
         return _oak_camera(configuration, clock, rig_id)
-    return _third_party_camera(configuration, clock)
+    backend = configuration.camera.backend
+    settings = (configuration.camera.model_extra or {}).get(backend, {})
+    return installed_camera(backend, settings, clock)
 
 
 def _usb_camera(configuration: Configuration, clock: Clock, rig_id: str) -> StereoCamera:
@@ -49,23 +50,3 @@ def _oak_camera(configuration: Configuration, clock: Clock, rig_id: str) -> Ster
         section.controls,
     )
     return DepthaiStereo(settings, clock, rig_id=rig_id)
-
-
-def _third_party_camera(configuration: Configuration, clock: Clock) -> StereoCamera:
-    """A camera of the entry-point group `navapp.devices`, entry `camera.NAME`."""
-    from importlib.metadata import entry_points
-
-    name = configuration.camera.backend
-    found = [entry for entry in entry_points(group=_ENTRY_POINTS) if entry.name == f"camera.{name}"]
-    if not found:
-        raise ConfigurationError(
-            f"there is no camera backend '{name}'",
-            subject="camera.backend",
-            remedy="use simulated, opencv or depthai, or install the package that provides it",
-        )
-    settings = (configuration.camera.model_extra or {}).get(name, {})
-    try:
-        camera: StereoCamera = found[0].load()(settings, clock)
-    except (ImportError, AttributeError, TypeError) as error:
-        raise DeviceError(f"camera backend '{name}' cannot be loaded: {error}") from error
-    return camera

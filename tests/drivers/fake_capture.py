@@ -1,5 +1,6 @@
 """USB cameras as OpenCV's capture object shows them, with all that it hides."""
 
+import shutil
 import threading
 import time
 from dataclasses import dataclass, field
@@ -161,7 +162,7 @@ class FakeBus:
     """Folders as udev and sysfs make them, and an opener of what is plugged in."""
 
     def __init__(self, root: Path) -> None:
-        self.names = V4lNames(root / "v4l", root / "sysfs")
+        self.names = V4lNames(root / "v4l", root / "sysfs", root / "dev")
         self.root = root
         self.cameras: dict[Path, FakeCamera] = {}
         self.films: dict[Path, Path] = {}
@@ -182,6 +183,8 @@ class FakeBus:
         entry = self.root / "sysfs" / node.name
         entry.mkdir(parents=True, exist_ok=True)
         _link(entry / "device", interface)
+        (entry / "index").write_text("0\n")
+        (entry / "name").write_text(f"Acme Cam {port}\n")
         links = self.names.links
         _link(links / "by-id" / f"usb-Acme_Cam_{serial}-video-index0", node)
         _link(links / "by-path" / f"pci-0-usb-0:{port}-video-index0", node)
@@ -196,6 +199,7 @@ class FakeBus:
         for link in self.names.links.glob("by-*/*"):
             if link.resolve() == node:
                 link.unlink()
+        shutil.rmtree(self.root / "sysfs" / node.name)
         del self.cameras[node]
         node.unlink()
 

@@ -16,6 +16,7 @@ import pytest
 
 from drivers.clock import SystemClock
 from drivers.contracts import CAMERA_CHECKS, CameraUnderTest
+from drivers.discovery import list_usb_cameras
 from drivers.opencv_stereo import OpencvStereo, OpencvStereoSettings
 from drivers.uvc_settings import UvcSettings
 from navapp.errors import (
@@ -29,8 +30,8 @@ from tests.drivers.fake_capture import FakeBus
 from tests.drivers.losing import fails_within
 
 # As in v4l2_fake.c.
-LINE = struct.Struct("iiiid")
-PLUGGED, STALLED, NO_BANDWIDTH, N_OPEN, OFFSET = range(5)
+LINE = struct.Struct("iiiiid")
+PLUGGED, STALLED, NO_BANDWIDTH, FORBIDDEN, N_OPEN, OFFSET = range(6)
 ROOT = Path(os.environ["V4L2_FAKE_ROOT"])
 
 
@@ -49,6 +50,7 @@ class Bus(FakeBus):
         self.write(port, PLUGGED, 1)
         self.write(port, STALLED, 0)
         self.write(port, NO_BANDWIDTH, 0)
+        self.write(port, FORBIDDEN, 0)
         self.write(port, OFFSET, offset_s)
 
     def pull(self, port: int) -> None:
@@ -211,3 +213,12 @@ def cycle(bus: Bus, camera: OpencvStereo) -> None:
 
 def lost(camera: OpencvStereo, sentence: str) -> None:
     assert sentence in str(fails_within(camera, DeviceLost))
+
+
+def test_a_running_session_is_not_disturbed_by_a_look_at_its_cameras(bus, camera):
+    """A session holds its cameras open; this stand-in lets nobody else open them, unlike most."""
+    camera.open()
+    first = camera.read(2.0)
+    listing = list_usb_cameras(bus.names)
+    assert [one.serial for one in listing.found] == ["LEFT", "RIGHT"]
+    assert camera.read(2.0).sequence > first.sequence

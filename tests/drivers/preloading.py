@@ -1,5 +1,6 @@
 """Small C libraries, compiled when a test needs them and preloaded into a child process."""
 
+import mmap
 import os
 import shutil
 import subprocess
@@ -24,6 +25,19 @@ def compiled(source: str, folder: Path) -> Path:
     if done.returncode != 0:
         pytest.skip(f"{source} cannot be compiled: {done.stderr.strip()[:200]}")
     return built
+
+
+def v4l2(folder: Path) -> tuple[Path, dict[str, str]]:
+    """The library that plays USB cameras, and its environment; skipped where it cannot play."""
+    library = compiled("v4l2_fake.c", folder)
+    (folder / "dev").mkdir()
+    (folder / "page").write_bytes(bytes(mmap.PAGESIZE))
+    root = {"V4L2_FAKE_ROOT": str(folder)}
+    opening = "import os; os.open(os.environ['V4L2_FAKE_ROOT'] + '/dev/video0', os.O_RDWR)"
+    (folder / "dev" / "video0").touch()
+    if "No such device" not in python(library, "-c", opening, **root).stderr:
+        pytest.skip("a preloaded library does not answer for the kernel here")
+    return library, root
 
 
 def python(

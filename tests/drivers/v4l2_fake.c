@@ -26,7 +26,7 @@
 
 /* One camera's line of the page; tests/drivers/preloaded_v4l2.py packs the same. */
 struct line {
-    int32_t is_plugged, is_stalled, has_no_bandwidth, n_open;
+    int32_t is_plugged, is_stalled, has_no_bandwidth, is_forbidden, n_open;
     double offset_s;
 };
 
@@ -114,6 +114,7 @@ static void set_format(struct device *d, uint32_t format, uint32_t width, uint32
 
 static int open_camera(int camera) {
     if (!page[camera].is_plugged) return errno = ENODEV, -1;
+    if (page[camera].is_forbidden) return errno = EACCES, -1;
     if (devices[camera]) return errno = EBUSY, -1;
     struct device *d = calloc(1, sizeof *d);
     d->fd = memfd_create("v4l2-fake", MFD_CLOEXEC);
@@ -331,6 +332,24 @@ static int list_formats(struct v4l2_fmtdesc *f) {
     return 0;
 }
 
+static int is_known(uint32_t format) { return format == FORMATS[0] || format == FORMATS[1]; }
+
+static int list_sizes(struct v4l2_frmsizeenum *f) {
+    if (f->index >= 2 || !is_known(f->pixel_format)) return errno = EINVAL, -1;
+    f->type = V4L2_FRMSIZE_TYPE_DISCRETE;
+    f->discrete.width = SIZES[f->index][0];
+    f->discrete.height = SIZES[f->index][1];
+    return 0;
+}
+
+static int list_rates(struct v4l2_frmivalenum *f) {
+    if (f->index >= 2 || !is_known(f->pixel_format)) return errno = EINVAL, -1;
+    f->type = V4L2_FRMIVAL_TYPE_DISCRETE;
+    f->discrete.numerator = 1;
+    f->discrete.denominator = RATES_HZ[f->index];
+    return 0;
+}
+
 static int change_format(struct device *d, struct v4l2_format *f, int is_tried) {
     if (d->n_buffers && !is_tried) return errno = EBUSY, -1;
     struct device copy = *d, *to = is_tried ? &copy : d;
@@ -349,6 +368,8 @@ static int answer(struct device *d, unsigned long request, void *data) {
     case VIDIOC_G_INPUT: return *(int *)data = 0;
     case VIDIOC_S_INPUT: return 0;
     case VIDIOC_ENUM_FMT: return list_formats(data);
+    case VIDIOC_ENUM_FRAMESIZES: return list_sizes(data);
+    case VIDIOC_ENUM_FRAMEINTERVALS: return list_rates(data);
     case VIDIOC_G_FMT: return tell_format(d, data), 0;
     case VIDIOC_TRY_FMT: return change_format(d, data, 1);
     case VIDIOC_S_FMT: return change_format(d, data, 0);

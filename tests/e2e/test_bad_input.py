@@ -278,7 +278,7 @@ def test_wrong_usage_is_exit_code_2(capsys) -> None:
 
 
 @pytest.mark.parametrize(
-    "verb", ["run", "replay", "plan", "stereo", "register", "doctor", "config"]
+    "verb", ["run", "replay", "plan", "stereo", "register", "devices", "doctor", "config"]
 )
 def test_every_verb_has_help_with_an_example(verb: str, capsys) -> None:
     assert run([verb, "--help"]) == 0

@@ -1,0 +1,96 @@
+"""The USB cameras of this computer, each with the name by which a configuration chooses it."""
+
+import errno
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.discovery.listing import Listing, Unseen
+from drivers.discovery.permissions import group_of, joining
+from drivers.discovery.v4l_formats import PixelFormat, VideoDevice, ask
+from drivers.v4l_names import FoundCamera, V4lNames
+
+
+@dataclass(frozen=True, slots=True)
+class UsbCamera:
+    """A camera behind V4L2.
+
+    Attributes:
+        node: its device file, whose number changes.
+        path: the name of that file that stays; None where the system gives it none.
+        chosen_by: what `[camera.opencv] left` takes: its serial number where no other camera has
+            the same, else the path of its port; empty when there is neither.
+        serial: as it tells it; empty when it does not.
+        card: its name for people; empty when it could not be asked.
+        formats: empty when it could not be asked.
+    """
+
+    node: Path
+    path: Path | None
+    chosen_by: str
+    serial: str
+    card: str
+    formats: tuple[PixelFormat, ...]
+
+
+def list_usb_cameras(names: V4lNames | None = None) -> Listing[UsbCamera]:
+    """Every camera once; what keeps one from being asked or chosen is told beside it."""
+    names = names or V4lNames()
+    named = {camera.node: camera for camera in names.connected()}
+    counts = Counter(camera.serial for camera in named.values())
+    cameras: list[UsbCamera] = []
+    unseen: list[Unseen] = []
+    for node in sorted({*named, *names.nodes()}, key=_number):
+        camera = named.get(node)
+        try:
+            device = ask(node)
+        except OSError as error:
+            unseen.append(_unasked(node, error))
+            device = VideoDevice(names.card(node), is_camera=True, formats=())
+        if not device.is_camera:
+            continue
+        chosen_by = _chosen_by(camera, counts, names)
+        if not chosen_by:
+            unseen.append(_unnamed(node, names))
+        path = None if camera is None else camera.path
+        serial = names.serial(node)
+        cameras.append(UsbCamera(node, path, chosen_by, serial, device.card, device.formats))
+    return Listing(tuple(cameras), tuple(unseen))
+
+
+def _chosen_by(camera: FoundCamera | None, counts: Counter[str], names: V4lNames) -> str:
+    if camera is None:
+        return ""
+    if counts[camera.serial] == 1:
+        return camera.serial
+    # Cameras of one serial number share one name in by-id: only their ports tell them apart.
+    port = names.port(camera.node)
+    return "" if port is None else str(port)
+
+
+def _number(node: Path) -> tuple[int, str]:
+    digits = "".join(letter for letter in node.name if letter.isdigit())
+    return int(digits or 0), node.name
+
+
+def _unasked(node: Path, error: OSError) -> Unseen:
+    remedies = {
+        errno.EACCES: joining(group_of(node, "video")),
+        errno.EPERM: f"give this container or sandbox access to {node}",
+        errno.ENOENT: f"give this container or sandbox the device {node}",
+        errno.EBUSY: "end the other program that uses it to see its formats",
+        errno.ENODEV: "plug it in again",
+    }
+    return Unseen(
+        str(node),
+        f"camera {node} cannot be asked for its formats ({error.strerror})",
+        remedies.get(error.errno or 0, "plug it in again, and see dmesg"),
+    )
+
+
+def _unnamed(node: Path, names: V4lNames) -> Unseen:
+    return Unseen(
+        str(node),
+        f"camera {node} has no name that stays, and cannot be chosen",
+        f"let udev make the links in {names.links}; into a container share that folder too",
+    )

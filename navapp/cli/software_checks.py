@@ -1,0 +1,102 @@
+"""What `navapp doctor` sees of Python, the packages, the kernels' cache and the terminal."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from navapp.inventory.finding import Finding, Health, unless
+
+if TYPE_CHECKING:
+    from navapp.config import Configuration
+
+
+@dataclass(frozen=True, slots=True)
+class _Package:
+    """A package, what is imported of it, what for, and which configurations need it."""
+
+    name: str
+    module: str
+    use: str
+    needs_it: "Callable[[Configuration], bool] | None" = None
+
+
+def _has_a_line(configuration: "Configuration") -> bool:
+    return configuration.projector.backend == "escvp21" or configuration.mirror.backend == "zaber"
+
+
+_PACKAGES = (
+    _Package("numpy", "numpy", "arrays"),
+    _Package("scipy", "scipy.spatial", "look-ups"),
+    _Package("numba", "numba", "compiled kernels"),
+    _Package("opencv-python-headless", "cv2", "pictures and stereo"),
+    _Package("pydantic", "pydantic", "configuration"),
+    _Package("textual", "textual.app", "operator's screen"),
+    _Package("open3d-cpu", "open3d", "referee in tests", lambda c: False),
+    _Package("depthai", "depthai", "OAK cameras", lambda c: c.camera.backend == "depthai"),
+    _Package("pyserial", "serial", "projector and mirror lines", _has_a_line),
+    _Package("pygame-ce", "pygame", "window", lambda c: c.display.backend == "window"),
+)
+
+
+def software_findings(configuration: "Configuration | None") -> list[Finding]:
+    """All of it; packages that only other configurations need give warnings."""
+    packages = [_package(one, _is_needed(one, configuration)) for one in _PACKAGES]
+    return [_python(), *packages, _kernel_cache(), _terminal()]
+
+
+def _is_needed(package: _Package, configuration: "Configuration | None") -> bool:
+    if package.needs_it is None:
+        return True
+    return configuration is not None and package.needs_it(configuration)
+
+
+def _python() -> Finding:
+    version = ".".join(str(part) for part in sys.version_info[:3])
+    is_new = sys.version_info >= (3, 11)
+    return Finding("python", unless(is_new, True), version, "install Python 3.11 or newer")
+
+
+def _package(package: _Package, is_needed: bool) -> Finding:
+    """Whether a package imports, tried in a process of its own: a broken one may crash."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    health = unless(False, is_needed)
+    try:
+        installed = version(package.name)
+    except PackageNotFoundError:
+        detail = f"not installed ({package.use})"
+        return Finding(package.name, health, detail, "run `make setup`")
+    done = subprocess.run(
+        [sys.executable, "-c", f"import navapp, {package.module}"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    if done.returncode == 0:
+        return Finding(package.name, Health.OK, f"{installed} ({package.use})")
+    last = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
+    return Finding(package.name, health, f"{installed} {last}", "run `make system-deps`")
+
+
+def _kernel_cache() -> Finding:
+    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        is_writable = os.access(folder, os.W_OK)
+    except OSError:
+        is_writable = False
+    n_files = len(list(folder.rglob("*.nbc"))) if is_writable else 0
+    detail = f"{folder}, {n_files} compiled kernels" if is_writable else f"{folder} not writable"
+    return Finding("kernel cache", unless(is_writable, True), detail, "set NUMBA_CACHE_DIR")
+
+
+def _terminal() -> Finding:
+    encoding = (sys.stdout.encoding or "").lower()
+    detail = f"{os.environ.get('TERM', 'none')}, {encoding or 'no encoding'}"
+    remedy = "set a UTF-8 locale (LANG=C.UTF-8) for the full picture"
+    return Finding("terminal", unless("utf" in encoding, False), detail, remedy)

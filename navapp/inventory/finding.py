@@ -1,0 +1,36 @@
+"""One thing that `navapp doctor` looked at."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Health(Enum):
+    """What a finding means for a session of this configuration."""
+
+    OK = "ok"
+    WARNING = "warning"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked at.
+
+    Attributes:
+        name: of it.
+        health: FAILED: the configured session cannot do without it.
+        detail: what was seen.
+        remedy: what to do when it is not OK.
+    """
+
+    name: str
+    health: Health
+    detail: str
+    remedy: str = ""
+
+
+def unless(is_fine: bool, is_needed: bool) -> Health:
+    """OK, or how bad it is that it is not."""
+    if is_fine:
+        return Health.OK
+    return Health.FAILED if is_needed else Health.WARNING

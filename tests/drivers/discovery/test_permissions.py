@@ -1,0 +1,62 @@
+import grp
+import os
+from types import SimpleNamespace
+
+import pytest
+
+from drivers.discovery import permissions
+from drivers.discovery.permissions import group_of, is_member, joining
+
+GID = 4044
+
+
+@pytest.fixture
+def group(monkeypatch):
+    """A group of its own and a user who is not root; its members can be changed."""
+    group = SimpleNamespace(gr_name="video", gr_gid=GID, gr_mem=[])
+
+    def by_name(name):
+        if name != "video":
+            raise KeyError(name)
+        return group
+
+    monkeypatch.setattr(grp, "getgrnam", by_name)
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(os, "getgroups", lambda: [1000])
+    monkeypatch.setattr(permissions.getpass, "getuser", lambda: "ann")
+    return group
+
+
+def test_a_stranger_to_the_group_is_told_how_to_join(group):
+    assert not is_member("video")
+    assert joining("video") == "sudo usermod -aG video $USER, then log out and in again"
+
+
+def test_who_joined_after_logging_in_is_told_to_log_in_again(group):
+    group.gr_mem.append("ann")
+    assert joining("video").startswith("log out and in again: the user is in the group video")
+
+
+def test_a_member_is_one(group, monkeypatch):
+    monkeypatch.setattr(os, "getgroups", lambda: [1000, GID])
+    assert is_member("video")
+
+
+def test_root_needs_no_group(group, monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    assert is_member("video")
+
+
+def test_a_group_that_the_system_does_not_have_has_no_members(group):
+    assert not is_member("nobody-has-this")
+    assert "usermod -aG nobody-has-this" in joining("nobody-has-this")
+
+
+@pytest.mark.parametrize(("owner", "named"), [("plugdev", "plugdev"), ("root", "video")])
+def test_the_owning_group_is_named_unless_it_is_roots(tmp_path, monkeypatch, owner, named):
+    monkeypatch.setattr(grp, "getgrgid", lambda gid: SimpleNamespace(gr_name=owner))
+    assert group_of(tmp_path, "video") == named
+
+
+def test_of_an_absent_device_the_usual_group_is_named(tmp_path):
+    assert group_of(tmp_path / "absent", "video") == "video"
