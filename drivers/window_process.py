@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import IO, cast
 
-from drivers.child_environment import child_environment
+from drivers.child_python import child_environment
 from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound, DeviceTimeout, WrongDevice
 

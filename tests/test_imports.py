@@ -27,6 +27,12 @@ def test_the_whole_line_runs_without_hardware_packages_and_open3d() -> None:
     assert not loaded & {"open3d", "depthai", "textual", "serial", "pygame"}
 
 
+def test_what_is_missing_is_told_without_what_may_be_missing() -> None:
+    rooms = "navapp.inventory.configured_checks, navapp.inventory.system_checks"
+    assert not modules_after(f"import {rooms}") & {*HEAVY, "numpy"}
+    assert not modules_after(f"import navapp.cli.doctor, {rooms}") & set(HEAVY)
+
+
 def test_the_simulator_loads_nothing_that_it_is_used_to_test() -> None:
     loaded = modules_after("import sim_devices.world, sim_devices.camera, sim_devices.truth")
     ours = {name for name in loaded if name.startswith("navapp.")}
@@ -70,6 +76,7 @@ BREACHES = [
     ("navapp/tracking/line.py", "import sim_devices.truth", "the pipeline never sees"),
     ("navapp/tracking/judge.py", "import navapp.overlay", "tracking stands on"),
     ("navapp/control/pursuit.py", "import sim_devices.world", "control is handed"),
+    ("navapp/control/states.py", "import navapp.inventory.looking", "control is handed"),
     ("navapp/control/sources.py", "import drivers.replay_camera", "control knows the device"),
     ("navapp/ui/app.py", "import navapp.devices", "the screen reads snapshots"),
     ("drivers/clock.py", "import navapp.cli.main", "only the command line"),

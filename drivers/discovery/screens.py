@@ -10,7 +10,7 @@ import subprocess
 import sys
 from dataclasses import asdict
 
-from drivers.child_environment import child_environment
+from drivers.child_python import last_words, run_python
 from drivers.discovery.listing import Listing, Unseen
 from drivers.window_outputs import Output, outputs, start_sdl
 from navapp.errors import DeviceError
@@ -20,23 +20,13 @@ _PATIENCE_S = 15.0
 
 def list_screens() -> Listing[Output]:
     """Every output, and what keeps SDL from seeing or telling them apart."""
-    command = [sys.executable, "-P", "-m", "drivers.discovery.screens"]
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=_PATIENCE_S,
-            check=False,
-            env=child_environment(),
-        )
+        done = run_python("-m", "drivers.discovery.screens", timeout_s=_PATIENCE_S)
         answer = json.loads(done.stdout)
     except subprocess.TimeoutExpired:
         return _blind(f"the X server does not answer within {_PATIENCE_S:.0f} s", "start it again")
     except ValueError:
-        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        return _blind(f"SDL ended while it was asked ({last})", "see navapp doctor")
+        return _blind(f"SDL ended while it was asked ({last_words(done)})", "see navapp doctor")
     if "problem" in answer:
         return _blind(answer["problem"], answer["remedy"])
     found = tuple(Output(**output) for output in answer["outputs"])

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from drivers.child_python import last_words, run_python
 from navapp.inventory.finding import Finding, Health, unless
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
+
+_IMPORTING_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +73,15 @@ def _package(package: _Package, is_needed: bool) -> Finding:
     except PackageNotFoundError:
         detail = f"not installed ({package.use})"
         return Finding(package.name, health, detail, "run `make setup`")
-    done = subprocess.run(
-        [sys.executable, "-c", f"import navapp, {package.module}"],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    try:
+        done = run_python("-c", f"import navapp, {package.module}", timeout_s=_IMPORTING_S)
+    except subprocess.TimeoutExpired:
+        detail = f"{installed} does not load within {_IMPORTING_S:.0f} s"
+        return Finding(package.name, health, detail, "run `make setup`")
     if done.returncode == 0:
         return Finding(package.name, Health.OK, f"{installed} ({package.use})")
-    last = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
-    return Finding(package.name, health, f"{installed} {last}", "run `make system-deps`")
+    detail = f"{installed} {last_words(done)}"
+    return Finding(package.name, health, detail, "run `make system-deps`")
 
 
 def _kernel_cache() -> Finding:

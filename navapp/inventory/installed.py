@@ -1,12 +1,11 @@
 """Cameras of other packages: entry points `camera.NAME` of the group `navapp.devices`."""
 
 import subprocess
-import sys
 from collections import Counter
 from dataclasses import dataclass
 from importlib import metadata
 
-from drivers.child_environment import child_environment
+from drivers.child_python import last_words, run_python
 from drivers.discovery import Listing, Unseen
 
 GROUP, KIND = "navapp.devices", "camera."
@@ -67,17 +66,7 @@ def _fault(entry: metadata.EntryPoint, counts: Counter[str]) -> tuple[str, str]:
 def _why_not_loading(factory: str) -> str:
     """Last words of a process that loads it; empty when all went well."""
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", _LOAD, factory],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=_LOADING_S,
-            check=False,
-            env=child_environment(),
-        )
+        done = run_python("-c", _LOAD, factory, timeout_s=_LOADING_S)
     except subprocess.TimeoutExpired:
         return f"it takes longer than {_LOADING_S:.0f} s"
-    if done.returncode == 0:
-        return ""
-    return (done.stderr.strip().splitlines() or [f"it ends with code {done.returncode}"])[-1]
+    return "" if done.returncode == 0 else last_words(done)

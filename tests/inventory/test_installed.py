@@ -49,7 +49,7 @@ def test_a_broken_package_is_told_by_name_and_the_rest_is_listed(site):
     ("source", "words"),
     [
         ("import os; os.write(2, b'segmentation fault'); os.abort()", "segmentation fault"),
-        ("import os; os._exit(3)", "it ends with code 3"),
+        ("import os; os._exit(3)", "it ended with code 3"),
         ("raise SystemExit('no licence')", "no licence"),
         ("made = 1", "has no attribute 'make'"),
     ],

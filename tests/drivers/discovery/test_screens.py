@@ -1,10 +1,10 @@
+import os
 import subprocess
-import sys
 from types import SimpleNamespace
 
 import pytest
 
-from drivers.discovery import list_screens, screens
+from drivers.discovery import list_screens
 from drivers.window_outputs import Output
 from tests.x_servers import two_monitors
 
@@ -38,14 +38,14 @@ def test_a_driver_that_draws_into_nothing_is_no_screen(monkeypatch):
 
 def test_without_the_package_a_sentence_says_what_to_do(tmp_path, monkeypatch):
     (tmp_path / "pygame.py").write_text("raise ImportError('libSDL is missing')")
-    monkeypatch.setattr(screens, "child_environment", lambda: {"PYTHONPATH": path_with(tmp_path)})
+    put_first(tmp_path, monkeypatch)
     (why,) = list_screens().unseen
     assert why.problem == "a window needs the package pygame-ce (libSDL is missing)"
 
 
 def test_a_library_that_ends_the_process_is_no_error_here(tmp_path, monkeypatch):
     (tmp_path / "pygame.py").write_text("import os; os.write(2, b'bang'); os.abort()")
-    monkeypatch.setattr(screens, "child_environment", lambda: {"PYTHONPATH": path_with(tmp_path)})
+    put_first(tmp_path, monkeypatch)
     (why,) = list_screens().unseen
     assert why.problem == "SDL ended while it was asked (bang)"
 
@@ -70,5 +70,7 @@ def test_outputs_of_one_name_cannot_be_chosen(monkeypatch):
     ]
 
 
-def path_with(folder):
-    return ":".join([str(folder), *filter(None, sys.path)])
+def put_first(folder, monkeypatch):
+    """A child process finds modules in this folder before all others."""
+    paths = [str(folder), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))
