@@ -3,7 +3,10 @@
 import getpass
 import grp
 import os
+import stat
 from pathlib import Path
+
+_GROUP_MAY = stat.S_IRGRP | stat.S_IWGRP
 
 
 def may_use(path: Path) -> bool:
@@ -21,13 +24,16 @@ def is_member(group: str) -> bool:
         return False
 
 
-def group_of(path: Path, usual: str) -> str:
-    """The group that owns a device file; the usual one when that cannot be told, or is root's."""
+def allowing(path: Path, usual: str) -> str:
+    """What to do so that this user may use a device file, whose group is usually that."""
     try:
-        name = grp.getgrgid(path.stat().st_gid).gr_name
+        status = path.stat()
+        group = grp.getgrgid(status.st_gid).gr_name
     except (OSError, KeyError):
-        return usual
-    return usual if name == "root" else name
+        return joining(usual)
+    if group != "root" and status.st_mode & _GROUP_MAY == _GROUP_MAY:
+        return joining(group)
+    return f"let udev give {path} to the group {usual} (MODE 0660); {joining(usual)}"
 
 
 def joining(group: str) -> str:

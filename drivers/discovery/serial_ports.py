@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.discovery.listing import Listing, Unseen
-from drivers.discovery.permissions import group_of, joining, may_use
+from drivers.discovery.permissions import allowing, may_use
 
 _LINKS = Path("/dev/serial")
 _TTYS = Path("/sys/class/tty")
@@ -76,5 +76,5 @@ def _lasting_name(device: str, links: Path) -> str:
 
 
 def _forbidden(device: Path) -> Unseen:
-    group = group_of(device, "dialout")
-    return Unseen(str(device), f"this user may not open the port {device}", joining(group))
+    problem = f"this user may not open the port {device}"
+    return Unseen(str(device), problem, allowing(device, "dialout"))

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from drivers.discovery.permissions import group_of, joining, may_use
+from drivers.discovery.permissions import allowing, may_use
 from drivers.v4l_names import V4lNames
 from drivers.window_outputs import chosen
 from navapp.config import Configuration
@@ -46,6 +46,9 @@ def _usb_camera(name: str, wanted: str, names: V4lNames) -> Finding:
         camera = names.find(wanted)
     except NavappError as error:
         return Finding(name, Health.FAILED, error.problem, error.remedy)
+    if not may_use(camera.node):
+        detail = f"{wanted} is {camera.node}, but this user may not open it"
+        return Finding(name, Health.FAILED, detail, allowing(camera.node, "video"))
     return Finding(name, Health.OK, f"{wanted} is {camera.node}")
 
 
@@ -115,7 +118,7 @@ def _on_port(name: str, port: str) -> Finding:
         return Finding(name, Health.FAILED, f"there is no port {port}", _LOOK)
     is_fine = may_use(path)
     detail = f"the port {port} is there" + ("" if is_fine else ", but this user may not open it")
-    remedy = "" if is_fine else joining(group_of(path, "dialout"))
+    remedy = "" if is_fine else allowing(path, "dialout")
     return Finding(name, unless(is_fine, True), detail, remedy)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from drivers.discovery.oak_cameras import UDEV_REMEDY, oak_nodes
-from drivers.discovery.permissions import group_of, is_member, joining, may_use
+from drivers.discovery.permissions import allowing, is_member, joining, may_use
 from navapp.config import Configuration
 from navapp.inventory.finding import Finding, Health, unless
 from navapp.inventory.looking import Inventory
@@ -51,20 +51,22 @@ def _has_local_port(configuration: Configuration) -> bool:
     return any(is_used and "://" not in port for is_used, port in used)
 
 
-def _group(usual: str, devices: str, nodes: Sequence[Path], is_needed: bool) -> list[Finding]:
-    """Whether this user may open the device files, through a group or otherwise."""
+def _group(group: str, devices: str, nodes: Sequence[Path], is_configured: bool) -> list[Finding]:
+    """Whether this user may open what is connected, through the group or otherwise.
+
+    Of the configured devices themselves another check says so, and fails.
+    """
     nodes = [node for node in nodes if node.exists()]
-    if not nodes and not is_needed:
-        return []
-    forbidden = [node for node in nodes if not may_use(node)]
-    group = group_of(forbidden[0], usual) if forbidden else usual
     name = f"group {group}"
+    if not nodes and not is_configured:
+        return []
+    if os.geteuid() == 0:
+        return [Finding(name, Health.OK, f"root may open all {devices}")]
+    forbidden = [node for node in nodes if not may_use(node)]
     if forbidden:
         listed = ", ".join(map(str, forbidden))
         detail = f"this user may not open {listed} ({devices})"
-        return [Finding(name, unless(False, is_needed), detail, joining(group))]
-    if os.geteuid() == 0:
-        return [Finding(name, Health.OK, f"root may open all {devices}")]
+        return [Finding(name, Health.WARNING, detail, allowing(forbidden[0], group))]
     if nodes:
         return [Finding(name, Health.OK, f"this user may open the connected {devices}")]
     detail = f"{devices} are configured and none is connected; this user is "
@@ -73,9 +75,9 @@ def _group(usual: str, devices: str, nodes: Sequence[Path], is_needed: bool) -> 
     return [Finding(name, Health.WARNING, f"{detail}not in the group", joining(group))]
 
 
-def _udev_rule(nodes: Sequence[Path], is_needed: bool) -> list[Finding]:
+def _udev_rule(nodes: Sequence[Path], is_configured: bool) -> list[Finding]:
     """Whether OAK cameras may be opened: seen on the camera itself, else from the rules."""
-    if not nodes and not is_needed:
+    if not nodes and not is_configured:
         return []
     name = "udev rule for OAK"
     if os.geteuid() == 0:
@@ -83,7 +85,7 @@ def _udev_rule(nodes: Sequence[Path], is_needed: bool) -> list[Finding]:
     forbidden = [node for node in nodes if not may_use(node)]
     if forbidden:
         detail = f"this user may not use the camera at {', '.join(map(str, forbidden))}"
-        return [Finding(name, unless(False, is_needed), detail, UDEV_REMEDY)]
+        return [Finding(name, Health.WARNING, detail, UDEV_REMEDY)]
     if nodes:
         return [Finding(name, Health.OK, "this user may use the connected camera")]
     rules = [path for folder in _RULE_FOLDERS for path in sorted(folder.glob("*.rules"))]

@@ -43,6 +43,16 @@ def test_each_usb_camera_is_looked_up_by_its_name(tmp_path):
     )
 
 
+def test_a_usb_camera_that_this_user_may_not_open_is_a_failure(tmp_path, monkeypatch):
+    bus = FakeBus(tmp_path)
+    bus.plug("A1", 1)
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    camera = {"backend": "opencv", "opencv": {"left": "A1"}}
+    told = finding("camera, left", names=bus.names, camera=camera)
+    assert told.health is FAILED
+    assert "the group video" in told.remedy
+
+
 @pytest.mark.parametrize(
     ("left", "words"), [("", "names none"), ("/dev/video0", "does not name a camera for good")]
 )
@@ -106,7 +116,7 @@ def test_a_port_must_be_there_and_allowed(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     forbidden = finding("mirror", mirror=mirror)
     assert forbidden.health is FAILED
-    assert "usermod -aG" in forbidden.remedy
+    assert "the group dialout" in forbidden.remedy
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from drivers.discovery import permissions
-from drivers.discovery.permissions import group_of, is_member, joining
+from drivers.discovery.permissions import allowing, is_member, joining
 
 GID = 4044
 
@@ -52,11 +52,25 @@ def test_a_group_that_the_system_does_not_have_has_no_members(group):
     assert "usermod -aG nobody-has-this" in joining("nobody-has-this")
 
 
-@pytest.mark.parametrize(("owner", "named"), [("plugdev", "plugdev"), ("root", "video")])
-def test_the_owning_group_is_named_unless_it_is_roots(tmp_path, monkeypatch, owner, named):
+@pytest.fixture
+def device(tmp_path):
+    path = tmp_path / "ttyUSB0"
+    path.touch()
+    path.chmod(0o660)
+    return path
+
+
+def test_a_device_is_opened_by_joining_the_group_that_owns_it(group, device, monkeypatch):
+    monkeypatch.setattr(grp, "getgrgid", lambda gid: SimpleNamespace(gr_name="plugdev"))
+    assert allowing(device, "dialout").startswith("sudo usermod -aG plugdev $USER")
+
+
+@pytest.mark.parametrize(("owner", "mode"), [("root", 0o660), ("dialout", 0o600)])
+def test_of_a_device_that_no_group_may_use_udev_is_asked(group, device, monkeypatch, owner, mode):
     monkeypatch.setattr(grp, "getgrgid", lambda gid: SimpleNamespace(gr_name=owner))
-    assert group_of(tmp_path, "video") == named
+    device.chmod(mode)
+    assert allowing(device, "dialout").startswith(f"let udev give {device} to the group dialout")
 
 
-def test_of_an_absent_device_the_usual_group_is_named(tmp_path):
-    assert group_of(tmp_path / "absent", "video") == "video"
+def test_of_an_absent_device_the_usual_group_is_named(group, tmp_path):
+    assert allowing(tmp_path / "absent", "video").startswith("sudo usermod -aG video")
