@@ -5,6 +5,7 @@ A reply says OK when a command was accepted, not when the axis has arrived.
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 
 from drivers.clock import Clock
 from drivers.zaber_line import Reply, ZaberLine, rejection
@@ -88,11 +89,14 @@ class ZaberAxis:
             )
         return readings[-1]
 
+    def begin(self) -> None:
+        """A motion is asked for: from here on a `stop` ends it, also before it is given."""
+        self._is_stop_asked = False
+
     def home(self, timeout_s: float) -> None:
         """Find the reference position, from which it counts; errors as of `move`."""
         self.is_homed = False
-        self._tell("home", self.talk.ask)
-        self._wait_until_idle(timeout_s, "finding its home position")
+        self._run("home", self.talk.ask, timeout_s, "finding its home position")
         # What the flags said on the way there does not count any more.
         self.trust()
         self._require_clear("homing")
@@ -105,7 +109,7 @@ class ZaberAxis:
             )
 
     def move(self, command: str, limit_s: float, *, is_repeatable: bool) -> None:
-        """Give a motion command and follow it to its end.
+        """Give a motion command, after `begin`, and follow it to its end.
 
         Args:
             command: without address.
@@ -118,39 +122,55 @@ class ZaberAxis:
             DeviceTimeout: not there in time. DeviceLost, DeviceProtocolError.
         """
         self.against = INTERRUPTED
-        self._tell(command, self.talk.ask if is_repeatable else self.talk.give)
-        self._wait_until_idle(limit_s, "moving")
+        self._run(command, self.talk.ask if is_repeatable else self.talk.give, limit_s, "moving")
         self.against = ()
         self._require_clear("moving")
 
     def stop(self) -> None:
-        """Stop moving, now; a motion that another thread follows then raises."""
+        """Stop moving, now; a motion that another thread has begun then raises."""
         self._is_stop_asked = True
         self.talk.ask("stop")
 
-    def _tell(self, command: str, give: Callable[[str], Reply]) -> None:
+    def _run(self, command: str, give: Callable[[str], Reply], limit_s: float, what: str) -> None:
+        """Give a motion command and follow it; one that cannot be followed is stopped."""
+        try:
+            self._tell(command, give, what)
+            self._wait_until_idle(limit_s, what)
+        except DeviceError:
+            with suppress(DeviceError):
+                self.talk.ask("stop")
+            raise
+
+    def _tell(self, command: str, give: Callable[[str], Reply], what: str) -> None:
         """Give a motion command; what the flags said of the last one is cleared first."""
-        self._is_stop_asked = False
         self.talk.ask("warnings clear")
         deadline_ns = self.talk.line.deadline_ns(_RETRY_S)
-        while not (reply := give(command)).is_accepted:
+        while not (reply := self._given(command, give, what)).is_accepted:
             if reply.data not in _LATER or self._clock.now_ns() >= deadline_ns:
                 raise rejection(command, reply.data)
             self._clock.wait_until_ns(self._clock.now_ns() + _RETRY_NS)
+
+    def _given(self, command: str, give: Callable[[str], Reply], what: str) -> Reply:
+        # Under the lock a stop is either seen here or reaches the device after the command.
+        with self.talk.line.lock:
+            self._require_unstopped(what)
+            return give(command)
+
+    def _require_unstopped(self, what: str) -> None:
+        if self._is_stop_asked:
+            raise DeviceError(f"the mirror was stopped while {what}", subject="mirror")
 
     def _wait_until_idle(self, timeout_s: float, what: str) -> None:
         deadline_ns = self.talk.line.deadline_ns(timeout_s)
         while self.talk.ask("").is_busy:
             if self._clock.now_ns() >= deadline_ns:
-                self.stop()
                 raise DeviceTimeout(
                     f"the mirror was still {what} after {timeout_s:.1f} s and was stopped",
                     subject="mirror",
                     remedy="see whether something is in its way, then home it",
                 )
             self._clock.wait_until_ns(self._clock.now_ns() + _POLL_NS)
-        if self._is_stop_asked:
-            raise DeviceError(f"the mirror was stopped while {what}", subject="mirror")
+        self._require_unstopped(what)
 
     def _require_clear(self, what: str) -> None:
         """Raise unless a motion ended without a flag that speaks against it."""

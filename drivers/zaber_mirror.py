@@ -102,6 +102,7 @@ class ZaberMirror:
             DeviceError: it stalled or has another fault; the flags are named.
             DeviceTimeout: it does not get there; it was stopped.
         """
+        self._axis.begin()
         self._require_serial()
         self._axis.home(timeout_s)
 
@@ -113,6 +114,7 @@ class ZaberMirror:
             DeviceError: it stalled, was stopped or turned by hand; the flags are named.
             DeviceTimeout: it does not get there in the time, or in that of its speed.
         """
+        self._axis.begin()
         travel, steps = self._target(angle_deg)
         self._require_rest()
         if not self._axis.is_homed:
@@ -132,6 +134,7 @@ class ZaberMirror:
 
     def move_by(self, change_deg: float, timeout_s: float) -> None:
         """Move by that much from where it stands, homed or not; errors as of `move_to`."""
+        self._axis.begin()
         travel, change = self._target(change_deg, is_change=True)
         self._require_rest()
         if self._axis.is_homed:

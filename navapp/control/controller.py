@@ -158,14 +158,14 @@ class SessionController:
         return self._snapshot
 
     def close(self) -> None:
-        """End everything, the display first; safe to call twice."""
+        """End everything, the display first, then what moves; safe to call twice."""
         self._display.close()
+        self._slow.close()
         self._session.is_over = True
         self._pursuit.drop()
         self._executor.close()
         self._watch.close()
         self._camera.close()
-        self._slow.close()
         self._devices.close()
         self._session.state = SessionState.OFFLINE
         self._snapshot = self._maker.make()

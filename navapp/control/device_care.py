@@ -62,7 +62,7 @@ class Care(Protocol):
         ...
 
     def stop(self) -> None:
-        """End what `restore` does; called by another thread; never fails."""
+        """End what `restore` does, for good; called by another thread; never fails."""
         ...
 
 
@@ -131,6 +131,7 @@ class MirrorCare:
         self._mirror = mirror
         self._calibrated_deg = calibrated_deg
         self._failure = ""
+        self._is_over = False
         self.restoring = f"being moved to {calibrated_deg:.1f} deg"
         self.is_slow = mirror.info.is_movable
 
@@ -161,9 +162,10 @@ class MirrorCare:
             angle_deg = self._mirror.position_deg()
             if self._is_there(angle_deg):
                 return
-            if angle_deg is None:
+            if angle_deg is None and not self._is_over:
                 self._mirror.home(_MOTION_S)
-            self._mirror.move_to(self._calibrated_deg, _MOTION_S)
+            if not self._is_over:
+                self._mirror.move_to(self._calibrated_deg, _MOTION_S)
         except DeviceError as error:
             self._failure = str(error)
 
@@ -173,7 +175,8 @@ class MirrorCare:
         self._mirror.open()
 
     def stop(self) -> None:
-        """It stands still, wherever it is."""
+        """It stands still, wherever it is, and is not moved any more."""
+        self._is_over = True
         try:
             self._mirror.stop()
         except DeviceError as error:

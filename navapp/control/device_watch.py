@@ -1,6 +1,7 @@
 """Projector and mirror are asked in threads of their own: no frame waits for a serial line."""
 
 import threading
+import time
 
 from drivers.clock import Clock, SystemClock
 from navapp.control.device_care import Care, MirrorCare, ProjectorCare, Report
@@ -13,7 +14,8 @@ from navapp.errors import DeviceError
 MIRROR_TIMES_S = (0.2, 1.5)
 PROJECTOR_TIMES_S = (3.0, 20.0)
 _FIRST_RETRY_S, _LAST_RETRY_S = 1.0, 8.0
-
+# A projector takes 9 s to be found silent.
+_LONGEST_END_S, _STOP_PERIOD_S = 20.0, 0.1
 
 _FAILED = (DeviceHealth.TROUBLE, DeviceHealth.LOST)
 
@@ -73,10 +75,11 @@ class DeviceWatch:
         """End the thread, and what the device does."""
         self._is_over = True
         self._wake.set()
-        if self._thread is not None:
-            if self._is_restoring:
-                self._care.stop()
-            self._thread.join(20.0)
+        end_s = time.monotonic() + _LONGEST_END_S
+        # A motion may be about to begin: one stop could come just before it.
+        while self._thread is not None and self._thread.is_alive() and time.monotonic() < end_s:
+            self._care.stop()
+            self._thread.join(_STOP_PERIOD_S)
 
     def _run(self) -> None:
         retry_s = 0.0
@@ -133,8 +136,8 @@ class SlowDevices:
             watch.restore()
 
     def close(self) -> None:
-        """End all watching; the devices stay open."""
-        for watch in self._watches:
+        """End all watching, the mirror's first: it may move; the devices stay open."""
+        for watch in reversed(self._watches):
             watch.close()
 
 

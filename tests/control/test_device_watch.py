@@ -1,7 +1,7 @@
 """The watch over slow devices: what it reports, when it tries again, and what it leaves behind."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -27,8 +27,9 @@ class Care:
         self.gate = threading.Event()
         self.gate.set()
         self.is_held_in_restore = False
+        self.n_stops_needed = 1
         self.error: DeviceError | None = None
-        self.n_asked = self.n_reopened = self.n_restored = self.n_stopped = 0
+        self.n_asked = self.n_reopened = self.n_begun = self.n_restored = self.n_stopped = 0
 
     def report(self) -> Report:
         self.n_asked += 1
@@ -37,6 +38,7 @@ class Care:
         return Report(DeviceLine("mirror", "m", self.health, "detail"))
 
     def restore(self) -> None:
+        self.n_begun += 1
         self.gate.wait()
         self.n_restored += 1
 
@@ -47,7 +49,8 @@ class Care:
 
     def stop(self) -> None:
         self.n_stopped += 1
-        self.gate.set()
+        if self.n_stopped >= self.n_stops_needed:
+            self.gate.set()
 
 
 @pytest.fixture
@@ -143,8 +146,22 @@ def test_while_it_is_restored_it_is_said_and_closing_stops_it(care, clock) -> No
     watch.restore()
     assert watch.report.line.detail == "being moved"
     assert watch.report.reason is Reason.MIRROR_AWAY
+    wait_for(lambda: care.n_begun == 1, "its beginning")
     watch.close()
-    assert care.n_stopped == 1
+    assert care.n_stopped > 0
+
+
+def test_closing_stops_it_until_it_stands(care, clock) -> None:
+    """A stop that comes before a motion begins ends nothing."""
+    care.n_stops_needed = 3
+    care.is_held_in_restore = True
+    watch = DeviceWatch(care, (0.01, 1.0), clock)
+    care.gate.clear()
+    watch.restore()
+    wait_for(lambda: care.n_begun == 1, "its beginning")
+    watch.close()
+    assert care.n_stopped == 3
+    assert care.n_restored == 1
 
 
 class Projector:
@@ -201,12 +218,14 @@ class Mount:
         self.angle_deg = angle_deg
         self.error: DeviceError | None = None
         self.done: list[str] = []
+        self.on_home: Callable[[], object] = lambda: None
 
     def position_deg(self) -> float | None:
         return self.angle_deg
 
     def home(self, timeout_s: float) -> None:
         self.done.append("home")
+        self.on_home()
         self.angle_deg = 0.0
 
     def move_to(self, angle_deg: float, timeout_s: float) -> None:
@@ -244,3 +263,14 @@ def test_what_kept_a_mirror_from_its_place_is_told_until_it_is_there() -> None:
     assert "calibrated" in care.report().line.detail
     care.stop()
     assert care.report().line.detail == "gone"
+
+
+def test_a_mirror_that_was_stopped_is_not_moved_any_more() -> None:
+    mount = Mount(None)
+    care = MirrorCare(mount, 45.0)
+    mount.on_home = care.stop
+    care.restore()
+    assert mount.done == ["home"], "stopped between its two motions"
+    mount.angle_deg = None
+    care.restore()
+    assert mount.done == ["home"]

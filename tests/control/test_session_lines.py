@@ -6,11 +6,12 @@ from contextlib import ExitStack
 
 import pytest
 
+from navapp.control.executors import InlineExecutor
 from navapp.control.states import DeviceHealth, EventLevel, Reconnect
 from navapp.errors import DeviceError
 from navapp.values import Reason
 from sim_devices.firmware.pseudo_terminal import PseudoTerminal
-from tests.control.fakes import Bench, navigating
+from tests.control.fakes import Bench, navigating, wait_for
 from tests.drivers.firmware_rigs import (
     mirror_at,
     projector_at,
@@ -202,14 +203,32 @@ def test_no_frame_waits_for_the_projectors_slow_line(with_projector) -> None:
     assert longest_s < 0.75
 
 
-def test_closing_a_session_ends_a_motion(monkeypatch, tmp_path) -> None:
+class Ending(InlineExecutor):
+    """Notes what is so when it is closed."""
+
+    def __init__(self, is_so: Callable[[], bool]) -> None:
+        self._is_so = is_so
+        self.noted: list[bool] = []
+
+    def close(self) -> None:
+        self.noted.append(self._is_so())
+
+
+def test_closing_a_session_ends_a_motion_before_anything_else(monkeypatch, tmp_path) -> None:
     with stage_terminal(tmp_path, speed=0.2) as terminal:
+        stage = terminal.wire.firmware
+        begin_deg = stage.true_deg
         mirror = mirror_at(terminal)
         mirror.open()
-        bench = Bench(monkeypatch, mirror=mirror)
-        time.sleep(0.5)
-        begin_s = time.monotonic()
+        executor = Ending(lambda: stage.is_busy)
+        bench = Bench(monkeypatch, mirror=mirror, executor=executor)
+        wait_for(lambda: abs(stage.true_deg - begin_deg) > 0.1, "a motion")
         bench.controller.close()
-        assert time.monotonic() - begin_s < 5.0
+        assert executor.noted == [False]
+        stands_deg = stage.true_deg
+        assert 1.0 < stands_deg < begin_deg, "neither where it began nor at its home"
+        time.sleep(0.5)
+        assert not stage.is_busy
+        assert stage.true_deg == stands_deg
         with pytest.raises(DeviceError):
             mirror.position_deg()

@@ -3,11 +3,12 @@
 import random
 import threading
 import time
+from collections.abc import Callable
 
 import pytest
 
 from drivers import zaber_warnings
-from drivers.zaber_line import checksum
+from drivers.zaber_line import Reply, checksum
 from navapp.errors import (
     DeviceError,
     DeviceLost,
@@ -214,6 +215,56 @@ def test_a_motion_that_takes_too_long_is_stopped() -> None:
     rig.firmware.model.speed *= 10.0
     rig.driver.move_to(10.0, 30.0)
     assert rig.driver.position_deg() == pytest.approx(10.0, abs=0.001)
+
+
+def after(rig: StageRig, words: str, deed: Callable[[], object]) -> None:
+    """Do something whenever those words were answered."""
+    ask = rig.driver._talk.ask
+
+    def asked(command: str, **more: bool) -> Reply:
+        reply = ask(command, **more)
+        if command.startswith(words):
+            deed()
+        return reply
+
+    rig.driver._talk.ask = asked
+
+
+@pytest.mark.parametrize("words", ["get pos", "warnings clear", "move abs"])
+def test_a_stop_before_the_command_is_accepted_lets_nothing_move(words) -> None:
+    rig = at_45()
+    rig.firmware.rejections = ["AGAIN"]
+    after(rig, words, rig.driver.stop)
+    with pytest.raises(DeviceError, match="was stopped while moving"):
+        rig.driver.move_to(10.0, 30.0)
+    rig.clock.advance_ns(10**10)
+    assert rig.firmware.true_deg == pytest.approx(45.0, abs=0.001)
+    assert rig.driver.position_deg() is None
+
+
+@pytest.mark.parametrize("words", ["get system.serial", "warnings clear", "home"])
+def test_a_stop_before_homing_is_accepted_lets_nothing_move(words) -> None:
+    rig = at_45()
+    rig.firmware.rejections = ["FULL"]
+    after(rig, words, rig.driver.stop)
+    with pytest.raises(DeviceError, match="was stopped while finding its home position"):
+        rig.driver.home(30.0)
+    rig.clock.advance_ns(10**10)
+    assert rig.firmware.true_deg == pytest.approx(45.0, abs=0.001)
+    assert rig.driver.position_deg() is None
+
+
+@pytest.mark.parametrize("from_deg", [0.0, 20.0], ids=["at its beginning", "on its way"])
+def test_a_motion_that_cannot_be_followed_is_stopped(from_deg) -> None:
+    rig = homed()
+    rig.wire.spoiler = lambda message: (
+        [] if rig.firmware.is_busy and rig.firmware.true_deg >= from_deg else wire.whole(message)
+    )
+    with pytest.raises(DeviceTimeout, match="does not answer"):
+        rig.driver.move_to(110.0, 30.0)
+    rig.clock.advance_ns(10**10)
+    assert from_deg <= rig.firmware.true_deg < 80.0
+    assert rig.driver.position_deg() is None
 
 
 def test_a_device_that_says_idle_without_being_there_is_not_believed() -> None:
