@@ -19,6 +19,7 @@ INTERRUPTED = ("NI",)
 _FLAGS = re.compile(r"\d{2}( [A-Z][A-Z0-9])*")
 _POLL_NS, _RETRY_NS = 50_000_000, 50_000_000
 _RETRY_S = 2.0
+_HOME, _CLEAR = "home", "warnings clear"
 _LATER = ("AGAIN", "STATUSBUSY", "FULL")
 
 
@@ -27,7 +28,8 @@ class ZaberAxis:
 
     Attributes:
         talk: the line of its device.
-        is_homed: its position counts from its home.
+        is_homed: its position counts from its home; so it is at first if its flags do not deny it,
+            and what denied it once does so until it is homed, also over a reopening.
         against: flags since it was last sent somewhere that speak against its standing there.
     """
 
@@ -35,17 +37,13 @@ class ZaberAxis:
         self.talk = talk
         self._clock = clock
         self._is_stop_asked = False
-        self.is_homed = False
+        self.is_homed = True
         self.against: tuple[str, ...] = ()
 
     @property
     def is_placed(self) -> bool:
         """It stands where it was sent, as far as it says."""
         return self.is_homed and not self.against
-
-    def trust(self) -> None:
-        """From here on its flags alone decide."""
-        self.is_homed, self.against = True, ()
 
     def look(self) -> bool:
         """Note all flags; whether it moves.
@@ -96,9 +94,9 @@ class ZaberAxis:
     def home(self, timeout_s: float) -> None:
         """Find the reference position, from which it counts; errors as of `move`."""
         self.is_homed = False
-        self._run("home", self.talk.ask, timeout_s, "finding its home position")
+        self._run(_HOME, self.talk.ask, timeout_s, "finding its home position")
         # What the flags said on the way there does not count any more.
-        self.trust()
+        self.is_homed, self.against = True, ()
         self._require_clear("homing")
         if (found := self.steps()) != 0:
             self.is_homed = False
@@ -134,7 +132,12 @@ class ZaberAxis:
     def _run(self, command: str, give: Callable[[str], Reply], limit_s: float, what: str) -> None:
         """Give a motion command and follow it; one that cannot be followed is stopped."""
         try:
+            # A command that is refused leaves the device what speaks against its reference.
+            if self.is_homed:
+                self.talk.ask(_CLEAR)
             self._tell(command, give, what)
+            if command == _HOME:
+                self.talk.ask(_CLEAR)
             self._wait_until_idle(limit_s, what)
         except DeviceError:
             with suppress(DeviceError):
@@ -142,8 +145,7 @@ class ZaberAxis:
             raise
 
     def _tell(self, command: str, give: Callable[[str], Reply], what: str) -> None:
-        """Give a motion command; what the flags said of the last one is cleared first."""
-        self.talk.ask("warnings clear")
+        """Give a motion command, again while it is refused for now."""
         deadline_ns = self.talk.line.deadline_ns(_RETRY_S)
         while not (reply := self._given(command, give, what)).is_accepted:
             if reply.data not in _LATER or self._clock.now_ns() >= deadline_ns:

@@ -89,7 +89,6 @@ class ZaberMirror:
                 self._talk.ask(f"set {setting} 1", of_device=True)
             self._require_serial()
             self._travel = self._read_travel()
-            self._axis.trust()
             self._axis.look()
         except BaseException:
             self._talk.close()

@@ -9,6 +9,7 @@ import pytest
 
 from drivers import zaber_warnings
 from drivers.zaber_line import Reply, checksum
+from drivers.zaber_mirror import ZaberMirror
 from navapp.errors import (
     DeviceError,
     DeviceLost,
@@ -19,6 +20,7 @@ from navapp.errors import (
     WrongDevice,
 )
 from sim_devices.firmware import wire
+from sim_devices.firmware.memory_port import MemoryAddress
 from sim_devices.firmware.stage_motion import StageModel
 from tests.drivers.firmware_rigs import STAGE_SERIAL, StageRig, mirror_at, stage_terminal
 
@@ -100,6 +102,72 @@ def test_a_stall_is_named_and_costs_the_reference() -> None:
     rig.driver.home(30.0)
     rig.driver.move_to(45.0, 30.0)
     assert rig.driver.position_deg() == pytest.approx(45.0, abs=0.001)
+
+
+def miscounting() -> StageRig:
+    """At 67.5 deg, stalled on its way to 90; it counted all its steps."""
+    rig = at_45()
+    stall = rig.firmware._stall
+
+    def stalled() -> None:
+        stall()
+        rig.firmware._zero -= 24_000.0
+
+    rig.firmware._stall = stalled
+    rig.firmware.stalls_at = 0.5
+    with pytest.raises(DeviceError, match=r"\(FS\)"):
+        rig.driver.move_to(90.0, 30.0)
+    assert int(rig.firmware._get("pos", "1")[1]) == 96_000
+    assert rig.firmware.true_deg == pytest.approx(67.5, abs=0.001)
+    return rig
+
+
+def test_a_reopening_does_not_bring_the_reference_back() -> None:
+    rig = miscounting()
+    rig.firmware.flags.clear()
+    rig.driver.close()
+    rig.driver.open()
+    assert rig.driver.position_deg() is None
+    with pytest.raises(UnsupportedControl, match="home it first"):
+        rig.driver.move_to(45.0, 30.0)
+    rig.driver.home(30.0)
+    assert rig.driver.position_deg() == 0.0
+    assert rig.firmware.true_deg == 0.0
+
+
+def test_a_reopening_does_not_forget_an_interruption() -> None:
+    rig = at_45()
+    rig.firmware.turn_by_hand(1.0)
+    assert rig.driver.position_deg() is None
+    rig.clock.advance_ns(10**9)
+    rig.firmware.flags.clear()
+    rig.driver.close()
+    rig.driver.open()
+    assert rig.driver.position_deg() is None
+
+
+@pytest.mark.parametrize(
+    "motion", [lambda driver: driver.home(30.0), lambda driver: driver.move_by(1.0, 30.0)]
+)
+def test_a_motion_that_is_refused_leaves_the_device_its_flags(motion) -> None:
+    """Another program, which knows nothing else, must see them."""
+    rig = miscounting()
+    rig.firmware.rejections = ["PARKED"]
+    with pytest.raises(UnsupportedControl, match="it is parked"):
+        motion(rig.driver)
+    assert "FS" in rig.firmware.flags
+    rig.driver.close()
+    other = ZaberMirror(MemoryAddress(rig.wire), rig.clock, STAGE_SERIAL)
+    other.open()
+    assert other.position_deg() is None
+
+
+def test_homing_clears_what_only_a_command_clears() -> None:
+    rig = at_45()
+    rig.firmware._forget = lambda: None
+    rig.firmware.flags.add("NC")
+    rig.driver.home(30.0)
+    assert rig.driver.position_deg() == 0.0
 
 
 def test_a_home_that_is_not_at_zero_is_not_believed() -> None:
@@ -242,7 +310,7 @@ def test_a_stop_before_the_command_is_accepted_lets_nothing_move(words) -> None:
     assert rig.driver.position_deg() is None
 
 
-@pytest.mark.parametrize("words", ["get system.serial", "warnings clear", "home"])
+@pytest.mark.parametrize("words", ["get system.serial", "home"])
 def test_a_stop_before_homing_is_accepted_lets_nothing_move(words) -> None:
     rig = at_45()
     rig.firmware.rejections = ["FULL"]
