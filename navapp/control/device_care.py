@@ -69,7 +69,7 @@ class Care(Protocol):
 class ProjectorCare:
     """The projector must show the picture as it comes: neither flipped, bent nor frozen.
 
-    Keystone is compared with what it was first: it belongs to the calibration of the display.
+    Keystone and source are compared with what they were first: the display was calibrated so.
     """
 
     reason = Reason.PROJECTOR_LOST
@@ -78,6 +78,7 @@ class ProjectorCare:
     def __init__(self, projector: ProjectorControl) -> None:
         self._projector = projector
         self._keystone: tuple[int, int] | None = None
+        self._source: str | None = None
         self.is_slow = True
 
     def report(self) -> Report:
@@ -94,9 +95,10 @@ class ProjectorCare:
         if changes := self._changes(status):
             line = DeviceLine("projector", name, DeviceHealth.TROUBLE, f"picture {changes}")
             return Report(line, Reason.PROJECTOR_ALTERS)
-        if status.faults or status.power is PowerState.FAULT:
-            faults = ", ".join(status.faults)
-            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, faults)
+        is_on = status.power is PowerState.ON
+        if status.faults or not is_on:
+            told = ", ".join((*(() if is_on else (status.power.value,)), *status.faults))
+            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, told)
             return Report(line, self.reason if status.power is PowerState.FAULT else None)
         return Report(DeviceLine("projector", name, DeviceHealth.OK, status.power.value))
 
@@ -113,11 +115,14 @@ class ProjectorCare:
 
     def _changes(self, status: ProjectorStatus) -> str:
         self._keystone = self._keystone or status.keystone
+        self._source = self._source or status.source
+        is_other = status.source is not None and status.source != self._source
         is_bent = status.keystone is not None and status.keystone != self._keystone
         found = {
             "flipped": status.flips_horizontally or status.flips_vertically,
             "frozen": status.is_frozen,
             "with another keystone": is_bent,
+            "of another source": is_other,
         }
         return ", ".join(name for name, is_found in found.items() if is_found)
 

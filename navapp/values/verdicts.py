@@ -87,7 +87,7 @@ _REMEDIES = {
     Reason.DEVICE_FAULT: "see the events, then check the device",
     Reason.RIG_MOVED: "end the session; check the rig on the board, or calibrate it",
     Reason.MIRROR_AWAY: "reopen brings it back; keep hands off, see the devices",
-    Reason.PROJECTOR_ALTERS: "set flips, keystone and freeze back on the projector",
+    Reason.PROJECTOR_ALTERS: "set flips, keystone, freeze and source back on the projector",
     Reason.PROJECTOR_LOST: "check its mains, its lamp and its control cable",
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",

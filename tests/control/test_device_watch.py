@@ -186,19 +186,40 @@ class Projector:
         ({"flips_vertically": True}, "flipped"),
         ({"is_frozen": True}, "frozen"),
         ({"keystone": (126, 130)}, "with another keystone"),
+        ({"source": "A0"}, "of another source"),
     ],
 )
 def test_a_projector_that_alters_the_picture_forbids_guides(status, words) -> None:
-    projector = Projector(keystone=(126, 126), flips_horizontally=False)
+    projector = Projector(keystone=(126, 126), source="30", flips_horizontally=False)
     care = ProjectorCare(projector)
     assert care.report().reason is None
-    projector.say(**{"keystone": (126, 126), **status})
+    projector.say(**{"keystone": (126, 126), "source": "30", **status})
     report = care.report()
     assert report.reason is Reason.PROJECTOR_ALTERS
     assert report.line.health is DeviceHealth.TROUBLE
     assert words in report.line.detail
     projector.say(keystone=(126, 126))
     assert care.report().reason is None
+
+
+def test_a_source_that_changed_while_the_lamp_was_out_forbids_guides() -> None:
+    projector = Projector(power=PowerState.WARMING)
+    care = ProjectorCare(projector)
+    for source, reason in (("30", None), (None, None), ("A0", Reason.PROJECTOR_ALTERS)):
+        care.report()
+        projector.say(PowerState.ON if source else PowerState.STANDBY, source=source)
+        assert care.report().reason is reason
+
+
+@pytest.mark.parametrize(
+    "power", [PowerState.STANDBY, PowerState.WARMING, PowerState.COOLING, PowerState.UNKNOWN]
+)
+def test_a_lamp_that_is_not_on_is_told(power) -> None:
+    report = ProjectorCare(Projector(power=power)).report()
+    assert (report.line.health, report.line.detail) == (DeviceHealth.TROUBLE, power.value)
+    assert report.reason is None, "nobody sees guides that no lamp shows"
+    both = ProjectorCare(Projector(power=power, faults=("filter",))).report().line.detail
+    assert both == f"{power.value}, filter"
 
 
 def test_a_fault_of_the_lamp_forbids_guides_and_a_clogged_filter_does_not() -> None:

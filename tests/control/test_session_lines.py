@@ -150,6 +150,7 @@ PROJECTOR_FAULTS = {
     "flipped": (setting("HREVERSE", "ON"), Reason.PROJECTOR_ALTERS, "flipped"),
     "frozen": (setting("FREEZE", "ON"), Reason.PROJECTOR_ALTERS, "frozen"),
     "bent": (setting("VKEYSTONE", "130"), Reason.PROJECTOR_ALTERS, "another keystone"),
+    "of another source": (setting("SOURCE", "A0"), Reason.PROJECTOR_ALTERS, "another source"),
     "swapped": (
         lambda projector: setattr(projector.model, "serial", "OTHER"),
         Reason.PROJECTOR_LOST,
