@@ -30,9 +30,9 @@ T = TypeVar("T")
 
 
 class EscVp21Projector:
-    """A projector bound to a serial number, when one is given.
+    """A projector bound to a serial number: the given one, otherwise the first that is read.
 
-    The serial number can be read only while the lamp is on: until it was, nothing is verified.
+    It can be read only while the lamp is on; nothing is verified in whose course it was not.
     """
 
     def __init__(self, address: Address, clock: Clock, serial: str = "") -> None:
@@ -40,7 +40,7 @@ class EscVp21Projector:
         self._address = address
         self._clock = clock
         self._serial = serial
-        self._is_known = False
+        self._whose = "rig" if serial else "session"
 
     @property
     def name(self) -> str:
@@ -57,7 +57,6 @@ class EscVp21Projector:
         """
         if self._talk.line.is_open:
             return
-        self._is_known = False
         self._talk.open()
         try:
             if self._power() is PowerState.ON:
@@ -71,7 +70,8 @@ class EscVp21Projector:
 
         A lamp that is warming or cooling is waited for first, because the command would be refused
         or lost. Going on takes 40 s as a rule, 100 s when the lamp does not catch at once.
-        ACCEPTED: the lamp is not there yet; FINISHED: it is on (or out), but not proven.
+        ACCEPTED: the lamp is not there yet; FINISHED: it is on (or out), but not proven. One that
+        was out before does not tell whose it is.
         """
         deadline_ns = self._deadline_ns(timeout_s)
         wanted = PowerState.ON if is_on else PowerState.STANDBY
@@ -80,17 +80,16 @@ class EscVp21Projector:
             raise DeviceTimeout(
                 f"the projector is still {power.value}", subject="projector", remedy="wait for it"
             )
+        serial = self._read_serial() if power is PowerState.ON else ""
         if power is not wanted:
             command = "PWR ON" if is_on else "PWR OFF"
             self._talk.tell(command, self._talk.line.remaining_s(deadline_ns))
             power = self._settled_power(deadline_ns)
+            serial = self._read_serial() if power is PowerState.ON else serial
         if power is not wanted:
             is_out = not is_on and power is PowerState.COOLING
             return CommandResult.FINISHED if is_out else CommandResult.ACCEPTED
-        if is_on:
-            self._is_known = False
-            self._read_serial()
-        is_proven = self._power() is wanted and (self._is_known or not is_on)
+        is_proven = serial and self._power() is wanted
         return CommandResult.VERIFIED if is_proven else CommandResult.FINISHED
 
     def set_source(self, source: str, timeout_s: float) -> CommandResult:
@@ -101,8 +100,7 @@ class EscVp21Projector:
                 subject="projector",
                 remedy="give two hexadecimal digits, for example 30",
             )
-        deadline_ns = self._deadline_ns(min(timeout_s, _SOURCE_S))
-        return self._set("SOURCE", source, _HEX, deadline_ns)
+        return self._set("SOURCE", source, _HEX, min(timeout_s, _SOURCE_S))
 
     def set_mute(self, is_muted: bool, timeout_s: float) -> CommandResult:
         """Hide picture and sound."""
@@ -129,14 +127,12 @@ class EscVp21Projector:
         except DeviceTimeout:
             if not self._talk.is_silent:
                 raise
-            self._is_known = False
             return ProjectorStatus(PowerState.FAULT, faults=(SILENT,))
         power = power_state(code)
         broken = faults(self._talk.ask("ERR", _HEX))
         if power is PowerState.FAULT:
             broken = (*broken, f"power state {code or 'not told'}")
         if power is not PowerState.ON:
-            self._is_known = False
             return ProjectorStatus(power, lamp_hours=self._lamp_hours(), faults=broken)
         return ProjectorStatus(
             power,
@@ -171,17 +167,14 @@ class EscVp21Projector:
         return power
 
     def _switch(self, name: str, is_on: bool, timeout_s: float) -> CommandResult:
-        deadline_ns = self._deadline_ns(min(timeout_s, _SETTING_S))
-        return self._set(name, "ON" if is_on else "OFF", _SWITCH, deadline_ns)
+        return self._set(name, "ON" if is_on else "OFF", _SWITCH, min(timeout_s, _SETTING_S))
 
-    def _set(self, name: str, value: str, form: re.Pattern[str], deadline_ns: int) -> CommandResult:
-        if not self._is_known:
-            self._read_serial()
+    def _set(self, name: str, value: str, form: re.Pattern[str], timeout_s: float) -> CommandResult:
+        serial = self._read_serial()
+        deadline_ns = self._deadline_ns(timeout_s)
         self._talk.tell(f"{name} {value}", self._talk.line.remaining_s(deadline_ns))
         result = self._read_back(lambda: self._talk.ask(name, form), value, deadline_ns)
-        if result is CommandResult.VERIFIED and not self._is_known:
-            return CommandResult.FINISHED
-        return result
+        return CommandResult.FINISHED if result is CommandResult.VERIFIED and not serial else result
 
     def _read_back(
         self, read: Callable[[], T | None], wanted: T, deadline_ns: int
@@ -206,19 +199,27 @@ class EscVp21Projector:
         Raises:
             WrongDevice: not the bound one. The line is closed: nothing may be told to a stranger.
         """
-        serial = self._talk.ask("SNO", _SERIAL) or ""
-        # One byte that was changed on its way must not end a session.
-        if self._serial and serial not in ("", self._serial):
-            serial = self._talk.ask("SNO", _SERIAL) or ""
-        if self._serial and serial not in ("", self._serial):
+        serial = self._told_serial()
+        self._serial = self._serial or serial
+        if serial not in ("", self._serial):
             self.close()
             raise WrongDevice(
-                f"the projector has serial number {serial}, the rig's is {self._serial}",
+                f"the projector has serial number {serial}, the {self._whose}'s is {self._serial}",
                 subject="projector",
                 remedy="connect the rig's projector, or calibrate with this one",
             )
-        self._is_known = serial == self._serial or not self._serial
         return serial
+
+    def _told_serial(self) -> str:
+        """One that is not expected must be told twice in a row; empty when none is."""
+        before = ""
+        for _ in range(3):
+            serial = self._talk.ask("SNO", _SERIAL) or ""
+            if serial in ("", before, self._serial):
+                return serial
+            # One byte that was changed on its way must neither bind nor end a session.
+            before = serial
+        return ""
 
     def _is_on(self, name: str) -> bool | None:
         value = self._talk.ask(name, _SWITCH)

@@ -31,12 +31,15 @@ from navapp.errors import (
     DeviceProtocolError,
     DeviceTimeout,
     UnsupportedControl,
+    WrongDevice,
 )
 
 _POLL_NS = 1_000_000_000
 # A projector that did not take a command to heart is told again, but not in the middle of obeying.
 _RESEND_NS = 10_000_000_000
 _STATUS_S = 10.0
+# Its name, its maker, its product: what class 1 has instead of a serial number.
+_IDENTITY = ("NAME", "INF1", "INF2")
 _TROUBLE = (DeviceLost, DeviceNotFound, DeviceTimeout, DeviceProtocolError)
 
 
@@ -53,6 +56,9 @@ class _Wish:
 class PjlinkProjector:
     """Speaks PJLink class 1, which has neither flips nor a serial number.
 
+    It is bound to the first name, maker and product that it tells; they are asked for at opening
+    and with every status.
+
     A command is VERIFIED when two questions after it, one after the other, are answered as it
     should be (the protocol has no checksum), ACCEPTED when the projector said OK and it did not
     come to that in time. PJLink has no answer that would mean FINISHED.
@@ -67,29 +73,30 @@ class PjlinkProjector:
             connect: makes a new connection.
             password: of PJLink, empty for none; appears in no message.
         """
-        self._name = f"projector at {address}"
+        self._address = f"projector at {address}"
         self._clock = clock
         self._connect = connect
         self._password = password
         self._is_open = False
+        self._identity: dict[str, str] = {}
 
     @property
     def name(self) -> str:
-        """The one that the projector carries, once it was opened."""
-        return self._name
+        """The one that the projector carries, once it has told it."""
+        return self._identity.get("NAME", self._address)
 
     def open(self) -> None:
         """Connect once, to see that it is there and takes the password.
 
         Raises:
-            DeviceNotFound, DeviceLost, DeviceTimeout, DeviceProtocolError; DeviceError for a
-            password that is refused.
+            DeviceNotFound, DeviceLost, DeviceTimeout, DeviceProtocolError, WrongDevice; DeviceError
+            for a password that is refused.
         """
         if self._is_open:
             return
         with self._line(self._until_ns(_STATUS_S)) as line:
             line.ask("POWR")
-            self._name = line.ask("NAME").value or self._name
+            self._require_same(line)
         self._is_open = True
 
     def set_power(self, is_on: bool, timeout_s: float) -> CommandResult:
@@ -105,7 +112,7 @@ class PjlinkProjector:
         if not is_source(source):
             raise UnsupportedControl(
                 f"'{source[:40]}' is no PJLink source",
-                subject=self._name,
+                subject=self.name,
                 remedy="give two digits, such as 31 for the first digital input",
             )
         wish = _Wish("source", "INPT", source, lambda value: value == source)
@@ -125,8 +132,8 @@ class PjlinkProjector:
         """Refused: PJLink does not know them."""
         self._check_open()
         raise UnsupportedControl(
-            f"{self._name} cannot be told over PJLink to mirror its picture",
-            subject=self._name,
+            f"{self.name} cannot be told over PJLink to mirror its picture",
+            subject=self.name,
             remedy="set it in the projector's own menu",
         )
 
@@ -134,6 +141,7 @@ class PjlinkProjector:
         """Read everything back that PJLink tells."""
         self._check_open()
         with self._line(self._until_ns(_STATUS_S)) as line:
+            self._require_same(line)
             power, mute, chosen = (line.ask(name) for name in ("POWR", "AVMT", "INPT"))
             found, hours = line.ask("ERST"), line.ask("LAMP")
         return ProjectorStatus(
@@ -175,6 +183,21 @@ class PjlinkProjector:
             raise trouble
         return CommandResult.ACCEPTED
 
+    def _require_same(self, line: PjlinkLine) -> None:
+        for command in _IDENTITY:
+            told = line.ask(command).value
+            bound = self._identity.get(command)
+            # What is not expected is believed when it is told twice: there is no checksum.
+            if told in ("", bound) or line.ask(command).value != told:
+                continue
+            if self._identity.setdefault(command, told) != told:
+                self.close()
+                raise WrongDevice(
+                    f"the projector calls itself {told[:40]!r}, the session's is {bound!r}",
+                    subject=self.name,
+                    remedy="connect the session's projector, or begin a new session",
+                )
+
     def _is_so(self, line: PjlinkLine, wish: _Wish) -> bool | None:
         """Whether two answers agree that it is as wished; None when it cannot be asked."""
         for _ in range(2):
@@ -192,7 +215,7 @@ class PjlinkProjector:
             return True
         if answer.error == "ERR4":
             raise DeviceError(
-                f"{self._name} reports a failure", subject=self._name, remedy="see its own lamps"
+                f"{self.name} reports a failure", subject=self.name, remedy="see its own lamps"
             )
         if answer.error == "ERR3":
             if wish.command != "POWR" and line.ask("POWR").value == STANDBY:
@@ -201,25 +224,25 @@ class PjlinkProjector:
         if answer.error:
             raise self._refused(wish, f"({answer.error})", "see its manual for what it has")
         raise DeviceProtocolError(
-            f"the projector answers {answer.value[:40]!r} to {wish.command}", subject=self._name
+            f"the projector answers {answer.value[:40]!r} to {wish.command}", subject=self.name
         )
 
     def _refused(self, wish: _Wish, how: str, remedy: str) -> UnsupportedControl:
         return UnsupportedControl(
-            f"{self._name} does not take its {wish.name} to be set {how}",
-            subject=self._name,
+            f"{self.name} does not take its {wish.name} to be set {how}",
+            subject=self.name,
             remedy=remedy,
         )
 
     def _late(self, wish: _Wish) -> DeviceError:
         return DeviceTimeout(
-            f"{self._name} was not ready in time to set its {wish.name}", subject=self._name
+            f"{self.name} was not ready in time to set its {wish.name}", subject=self.name
         )
 
     def _check_open(self) -> None:
         if not self._is_open:
             raise DeviceLost(
-                f"{self._name} is not open", subject=self._name, remedy="open it before use"
+                f"{self.name} is not open", subject=self.name, remedy="open it before use"
             )
 
     def _until_ns(self, timeout_s: float) -> int:

@@ -39,7 +39,7 @@ class _Travel:
 
 
 class ZaberMirror:
-    """The mirror's mount, bound to a serial number when one is given.
+    """The mirror's mount, bound to a serial number: the given one, otherwise the first one read.
 
     `stop` may be called by any thread; the motion that it ends then raises.
     """
@@ -55,22 +55,21 @@ class ZaberMirror:
         self._talk = ZaberLine(address, clock, axis, self._hear)
         self._axis = ZaberAxis(self._talk, clock)
         self._address = address
-        self._bound_serial = serial
-        self._serial = ""
+        self._serial = serial
+        self._whose = "rig" if serial else "session"
         self._travel: _Travel | None = None
 
     @property
     def info(self) -> MirrorInfo:
-        """Movable; the serial number once it was read."""
-        serial = self._serial or self._bound_serial
+        """Movable; the serial number once it is known."""
         mark = "sim:" if self._address.is_simulated else ""
-        name = f"{mark}Zaber mount {serial or self._address.name}"
+        name = f"{mark}Zaber mount {self._serial or self._address.name}"
         return MirrorInfo(
             name,
             "zaber",
             is_simulated=self._address.is_simulated,
             is_movable=True,
-            serial=serial,
+            serial=self._serial,
         )
 
     def open(self) -> None:
@@ -170,14 +169,15 @@ class ZaberMirror:
 
     def _require_serial(self) -> None:
         serial = self._talk.value("system.serial", WHOLE, of_device=True)
-        if self._bound_serial and serial != self._bound_serial:
+        self._serial = self._serial or serial
+        if serial != self._serial:
             self._talk.close()
             raise WrongDevice(
-                f"the mirror's mount has serial number {serial}, the rig's is {self._bound_serial}",
+                f"the mirror's mount has serial number {serial}, "
+                f"the {self._whose}'s is {self._serial}",
                 subject="mirror",
                 remedy="connect the rig's mount, or calibrate with this one",
             )
-        self._serial = serial
 
     def _read_travel(self) -> _Travel:
         names = ("limit.cycle.dist", "limit.min", "limit.max")

@@ -35,6 +35,7 @@ class PjlinkProjector:
         is_failed: POWR, INPT and AVMT answer ERR4.
         lacks: commands that it does not know.
         is_powered: it has mains.
+        name: that it carries.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class PjlinkProjector:
         self.is_failed = False
         self.lacks: tuple[str, ...] = ()
         self.is_powered = True
+        self.name = "sim:projector"
         self._lamp, self._until_ns = Lamp.STANDBY, 0
         self._lit_ns, self._lamp_ns = 0, 1633 * 3600 * _NS
         self._input, self._mute = "31", "30"
@@ -114,7 +116,7 @@ class PjlinkProjector:
             "LAMP": self._hours(),
             "ERST": self.faults,
             "INST": " ".join(self.inputs),
-            "NAME": "sim:projector",
+            "NAME": self.name,
             "INF1": "SIMULATED",
             "INF2": "PJLink class 1",
             "INFO": "",

@@ -97,6 +97,32 @@ def test_nothing_is_verified_before_the_serial_number_was_read() -> None:
     assert rig.driver.set_power(True, 150.0) is FINISHED
     assert rig.driver.set_mute(True, 3.0) is FINISHED
     assert rig.firmware.model.settings["MUTE"] == "ON"
+    assert rig.driver.set_power(False, 150.0) is FINISHED
+    assert rig.firmware.power is Power.STANDBY
+
+
+def test_a_lamp_that_is_out_proves_nothing_of_whose_it_is() -> None:
+    rig = opened()
+    assert rig.driver.set_power(False, 150.0) is FINISHED
+    rig.driver.set_power(True, 150.0)
+    assert rig.driver.set_power(False, 150.0) is VERIFIED
+    rig.driver.status()
+    assert rig.driver.set_power(False, 150.0) is FINISHED, "it may have been swapped since"
+
+
+def test_a_stranger_is_not_switched_off() -> None:
+    rig = lit()
+    rig.firmware.model.serial = "OTHER"
+    with pytest.raises(WrongDevice, match="OTHER"):
+        rig.driver.set_power(False, 150.0)
+    rig.clock.advance_ns(10**11)
+    assert rig.firmware.power is Power.ON
+
+
+@pytest.mark.parametrize("serial", [SERIAL, ""])
+def test_without_a_configured_serial_number_nothing_is_proven_either(serial) -> None:
+    """The lamp is out, so that not even the first number can be read."""
+    assert opened(serial=serial).driver.set_power(False, 150.0) is FINISHED
 
 
 @pytest.mark.parametrize(
@@ -212,6 +238,39 @@ def test_a_projector_swapped_while_it_was_off_is_refused() -> None:
         rig.driver.set_power(True, 150.0)
 
 
+def test_without_a_configured_serial_number_it_is_bound_to_the_first_one() -> None:
+    rig = opened(serial="")
+    assert "memory" in rig.driver.name
+    rig.driver.set_power(True, 150.0)
+    assert rig.driver.name.endswith(SERIAL)
+    rig.wire.is_connected = False
+    with pytest.raises(DeviceLost):
+        rig.driver.status()
+    rig.firmware.model.serial = "OTHER"
+    rig.wire.is_connected = True
+    with pytest.raises(WrongDevice, match=f"number OTHER, the session's is {SERIAL}"):
+        rig.driver.open()
+    rig.firmware.model.serial = SERIAL
+    rig.driver.open()
+    assert rig.driver.status().serial == SERIAL
+
+
+@pytest.mark.parametrize("serial", [SERIAL, ""])
+def test_a_serial_number_that_was_misread_neither_binds_nor_ends_a_session(serial) -> None:
+    rig = opened(serial=serial)
+    lies = ["SIM1200133", "SIM1200122"]
+
+    def lie(message: bytes) -> wire.Pieces:
+        is_serial = message.startswith(b"SNO=")
+        return wire.whole(f"SNO={lies.pop()}\r:".encode() if is_serial and lies else message)
+
+    rig.wire.spoiler = lie
+    rig.driver.set_power(True, 150.0)
+    assert not lies
+    assert rig.driver.set_mute(True, 3.0) is VERIFIED
+    assert rig.driver.status().serial == SERIAL
+
+
 def test_loss_of_mains_is_silence_and_it_comes_back_by_itself() -> None:
     rig = lit()
     rig.firmware.lose_mains()
@@ -289,7 +348,8 @@ def test_nothing_but_garbage_is_a_protocol_error_and_passes() -> None:
     with pytest.raises((DeviceProtocolError, DeviceTimeout)):
         rig.driver.set_mute(True, 3.0)
     rig.wire.spoiler = wire.whole
-    assert rig.driver.status().is_muted is True
+    assert rig.driver.status().is_muted is False, "who does not say who it is, is told nothing"
+    assert rig.driver.set_mute(True, 3.0) is VERIFIED
 
 
 def test_noise_after_plugging_in_does_no_harm() -> None:

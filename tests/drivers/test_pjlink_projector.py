@@ -9,7 +9,7 @@ from drivers.clock import ManualClock
 from drivers.interfaces import CommandResult, PowerState, ProjectorStatus
 from drivers.pjlink_messages import PasswordRefused
 from drivers.pjlink_projector import PjlinkProjector as Pjlink
-from navapp.errors import DeviceError, DeviceLost, DeviceProtocolError, DeviceTimeout
+from navapp.errors import DeviceError, DeviceLost, DeviceProtocolError, DeviceTimeout, WrongDevice
 from navapp.errors import UnsupportedControl as Unsupported
 from sim_devices.firmware.pjlink import Lamp, PjlinkProjector
 from tests.drivers.pjlink_wires import driver
@@ -189,6 +189,37 @@ def test_trouble_on_the_way_is_overcome(firmware, spoil) -> None:
     projector.close()
     with pytest.raises(DeviceLost, match="is not open"):
         projector.status()
+
+
+def test_another_projector_at_its_address_is_refused(firmware) -> None:
+    projector = driver(firmware)
+    projector.open()
+    firmware.name = "OTHER"
+    with pytest.raises(WrongDevice, match="calls itself 'OTHER', the session's is 'sim:projector'"):
+        projector.status()
+    with pytest.raises(DeviceLost, match="is not open"):
+        projector.status()
+    with pytest.raises(WrongDevice):
+        projector.open()
+    firmware.name = "sim:projector"
+    projector.open()
+    assert projector.status().power is PowerState.STANDBY
+
+
+def test_a_name_that_was_misread_neither_binds_nor_ends_a_session(firmware) -> None:
+    lies = [b"%1NAME=sin:projector\r"]
+
+    def lie(reply: bytes) -> bytes:
+        return lies.pop() if lies and reply.startswith(b"%1NAME") else reply
+
+    projector = driver(firmware, lie)
+    projector.open()
+    assert projector.name == "projector at test"
+    projector.status()
+    assert projector.name == "sim:projector"
+    lies.append(b"%1NAME=sim:projectos\r")
+    assert projector.status().power is PowerState.STANDBY
+    assert not lies
 
 
 def spoiler(chance: random.Random) -> Callable[[bytes], bytes | None]:

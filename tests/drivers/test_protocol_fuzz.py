@@ -10,12 +10,20 @@ from navapp.errors import DeviceError
 from sim_devices.firmware import wire
 from sim_devices.firmware.escvp21 import Power, ProjectorModel
 from sim_devices.firmware.wire import Pieces
-from tests.drivers.firmware_rigs import ProjectorRig, StageRig
+from tests.drivers.firmware_rigs import SERIAL, ProjectorRig, StageRig
 
 N_REPLIES = 100_000
 # Beyond all that a driver may wait for: lamp, probes, retries.
 LONGEST_S = 400.0
 TOLERANCE_DEG = 0.01
+SWITCHES = ("MUTE", "HREVERSE", "VREVERSE")
+POWERS = {
+    Power.STANDBY: PowerState.STANDBY,
+    Power.WARMING: PowerState.WARMING,
+    Power.ON: PowerState.ON,
+    Power.COOLING: PowerState.COOLING,
+    Power.ABNORMAL: PowerState.FAULT,
+}
 
 
 class Fuzz:
@@ -102,7 +110,7 @@ def drive(
 def test_a_projector_never_believes_a_spoilt_line() -> None:
     rig = ProjectorRig(ProjectorModel(is_quick=True, has_events=True, cooling_s=5.0))
     fuzz, model = Fuzz(1), rig.firmware.model
-    n_verified = dict.fromkeys(("power", "source", "mute", "flips"), 0)
+    n_verified = dict.fromkeys(("power", "source", "mute", "flips", "status"), 0)
 
     def verified(what: str, result: CommandResult, truth: Callable[[], object], wanted: object):
         if result is CommandResult.VERIFIED:
@@ -132,9 +140,25 @@ def test_a_projector_never_believes_a_spoilt_line() -> None:
         verified("flips", result, lambda: [model.settings[n] == "ON" for n in names], wanted)
 
     def status() -> None:
-        assert isinstance(rig.driver.status().power, PowerState)
+        assert rig.driver.status().serial in ("", SERIAL)
 
-    n_well, n_failed = drive(rig, fuzz, [power, source, mute, flips, status])
+    def status_after_noise() -> None:
+        """When the last spoilt answer has come, nothing of what was is taken for what is."""
+        rig.clock.advance_ns(10 * 10**9)
+        fuzz.share = 0.0
+        before = rig.firmware.power
+        told = rig.driver.status()
+        if before is rig.firmware.power:
+            # FAULT is also what it says when commands do not reach it.
+            assert told.power in (POWERS[before], PowerState.FAULT)
+        if told.power is PowerState.ON:
+            truth = (model.settings["SOURCE"], *(model.settings[n] == "ON" for n in SWITCHES))
+            switches = (told.is_muted, told.flips_horizontally, told.flips_vertically)
+            for said, so in zip((told.source, *switches), truth, strict=True):
+                assert said in (None, so)
+            n_verified["status"] += said is not None
+
+    n_well, n_failed = drive(rig, fuzz, [power, source, mute, flips, status, status_after_noise])
     assert n_well > 1000
     assert n_failed > 1000
     # The test sees something: each kind of command was verified often.

@@ -377,6 +377,18 @@ def test_another_mount_is_refused_at_opening_and_before_homing() -> None:
         rig.driver.home(30.0)
 
 
+def test_without_a_configured_serial_number_it_is_bound_to_the_first_one() -> None:
+    rig = StageRig(serial="").homed()
+    assert rig.driver.info.serial == STAGE_SERIAL
+    rig.driver.close()
+    rig.firmware.model.serial = 7
+    with pytest.raises(WrongDevice, match=f"number 7, the session's is {STAGE_SERIAL}"):
+        rig.driver.open()
+    rig.firmware.model.serial = int(STAGE_SERIAL)
+    rig.driver.open()
+    assert rig.driver.position_deg() == 0.0
+
+
 def test_a_pulled_plug_is_lost_and_opening_brings_it_back() -> None:
     rig = at_45()
     rig.wire.is_connected = False
