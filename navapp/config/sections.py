@@ -225,7 +225,7 @@ class ProjectorSection(Section):
     port: str = ""
     """Of an ESC/VP21 projector: serial port (/dev/serial/by-id/...) or socket://host:port."""
     serial: str = ""
-    """Serial number of the rig's ESC/VP21 projector; another one is refused. Empty: any."""
+    """Serial number of the rig's ESC/VP21 projector; others are refused. Empty: the first read."""
 
     @model_validator(mode="after")
     def _has_a_host(self) -> Self:
@@ -244,7 +244,7 @@ class MirrorSection(Section):
     port: str = ""
     """Serial port (/dev/serial/by-id/...) or socket://host:port."""
     serial: str = ""
-    """Serial number of the rig's mount; another one is refused. Empty: any."""
+    """Serial number of the rig's mount; others are refused. Empty: the first one read."""
     device: Annotated[int, Field(ge=1, le=99)] = 1
     """Its number on the line."""
     axis: Annotated[int, Field(ge=1, le=9)] = 1

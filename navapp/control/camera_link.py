@@ -5,12 +5,12 @@ from collections.abc import Callable
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
+from navapp.control.pauses import Pauses
 from navapp.control.sources import FrameSource, open_source
 from navapp.errors import DeviceError
 
 # A camera that is plugged in again starts for some seconds, and each attempt costs the bus a reset.
-_FIRST_PAUSE_NS = 1_000_000_000
-_LONGEST_PAUSE_NS = 4_000_000_000
+_PAUSES_S = (1.0, 4.0)
 _SILENT_AFTER_NS = 1_000_000_000
 
 Reopen = Callable[[], StereoCamera]
@@ -33,7 +33,7 @@ class CameraLink:
         self._lost_source: FrameSource | None = None
         self._last_frame_ns = clock.now_ns()
         self._retry_at_ns = 0
-        self._pause_ns = _FIRST_PAUSE_NS
+        self._pauses = Pauses(*_PAUSES_S)
 
     @property
     def is_down(self) -> bool:
@@ -71,8 +71,8 @@ class CameraLink:
             # Closing may wait for a reader that hangs: the caller makes the display dark first.
             self._lost_source, self._source = self._source, None
             self.trouble = str(error)
-            self._pause_ns = _FIRST_PAUSE_NS
-            self._retry_at_ns = self._clock.now_ns() + self._pause_ns
+            self._pauses.begin_again()
+            self._pause()
             raise
         if frame is not None:
             self._last_frame_ns = self._clock.now_ns()
@@ -90,16 +90,15 @@ class CameraLink:
             # A manual clock only moves when somebody waits.
             self._clock.wait_until_ns(min(self._retry_at_ns, now_ns + round(timeout_s * 1e9)))
             return False
-        self._pause_ns = min(2 * self._pause_ns, _LONGEST_PAUSE_NS)
         if self._reopen is None:
-            self._retry_at_ns = now_ns + self._pause_ns
+            self._pause()
             return False
         try:
             self.camera = self._reopen()
         except DeviceError as error:
             self.trouble = str(error)
             # From the end of the attempt: one that takes long must not follow upon itself.
-            self._retry_at_ns = self._clock.now_ns() + self._pause_ns
+            self._pause()
             return False
         self._source = open_source(self.camera)
         self._last_frame_ns = self._clock.now_ns()
@@ -112,6 +111,9 @@ class CameraLink:
         if self._source is not None:
             self._source.close()
         self.camera.close()
+
+    def _pause(self) -> None:
+        self._retry_at_ns = self._clock.now_ns() + round(self._pauses.take_s() * 1e9)
 
     def _release(self) -> None:
         if self._lost_source is not None:

@@ -5,6 +5,7 @@ import time
 
 from drivers.clock import Clock, SystemClock
 from navapp.control.device_care import Care, MirrorCare, ProjectorCare, Report
+from navapp.control.pauses import Pauses
 from navapp.control.session import Session
 from navapp.control.states import DeviceHealth, DeviceLine, EventLevel, Snapshot
 from navapp.errors import DeviceError
@@ -13,7 +14,7 @@ from navapp.errors import DeviceError
 # that somebody turns is noticed within half a second; a projector takes 1.5 s to tell everything.
 MIRROR_TIMES_S = (0.2, 1.5)
 PROJECTOR_TIMES_S = (3.0, 20.0)
-_FIRST_RETRY_S, _LAST_RETRY_S = 1.0, 8.0
+_PAUSES_S = (1.0, 8.0)
 # A projector takes 9 s to be found silent.
 _LONGEST_END_S, _STOP_PERIOD_S = 20.0, 0.1
 
@@ -40,6 +41,7 @@ class DeviceWatch:
         self._care = care
         self._period_s, self._stale_s = times_s
         self._clock: Clock = clock or SystemClock()
+        self._pauses = Pauses(*_PAUSES_S)
         self._wake = threading.Event()
         self._is_over = False
         self._n_asked = self._n_restored = 0
@@ -82,17 +84,19 @@ class DeviceWatch:
             self._thread.join(_STOP_PERIOD_S)
 
     def _run(self) -> None:
-        retry_s = 0.0
+        pause_s = self._period_s
         while True:
-            self._wake.wait(retry_s or self._period_s)
+            self._wake.wait(pause_s)
             self._wake.clear()
             if self._is_over:
                 return
             report = self._asked()
             self._made = (self._clock.now_ns(), report)
-            is_lost = report.line.health is DeviceHealth.LOST
-            longer_s = min(_LAST_RETRY_S, max(_FIRST_RETRY_S, 2.0 * retry_s))
-            retry_s = longer_s if is_lost else 0.0
+            if report.line.health is DeviceHealth.LOST:
+                pause_s = self._pauses.take_s()
+            else:
+                self._pauses.begin_again()
+                pause_s = self._period_s
 
     def _asked(self) -> Report:
         n_asked, report = self._n_asked, self._made[1]
@@ -104,6 +108,8 @@ class DeviceWatch:
             return self._care.report()
         except DeviceError as error:
             return self._with(report, DeviceHealth.LOST, str(error))
+        except Exception as error:  # noqa: BLE001 (a bug must end as a lost device, not as a silent thread)
+            return self._with(report, DeviceHealth.LOST, f"failed: {error!r}")
         finally:
             self._n_restored = n_asked
 

@@ -3,10 +3,11 @@
 import threading
 
 from drivers.interfaces import Display
+from navapp.control.pauses import Pauses
 from navapp.control.pictures import Image, fitted
 from navapp.errors import DeviceError, DeviceLost
 
-_FIRST_PAUSE_S, _LAST_PAUSE_S = 0.5, 8.0
+_PAUSES_S = (0.5, 8.0)
 
 
 class DisplayLink:
@@ -44,10 +45,10 @@ class DisplayLink:
         self._has_guides = False
 
     def show(self, image: Image, valid_until_ns: int, *, has_guides: bool) -> bool:
-        """Show a picture, fitted to the display; whether the display has just begun to fail."""
+        """Show a picture, fitted to the display; whether there is a new trouble to tell."""
         if self.is_blanked or self._reopening.is_under_way:
             return False
-        has_begun_to_fail = False
+        is_new = False
         self._has_guides = has_guides
         try:
             info = self._display.info
@@ -55,12 +56,13 @@ class DisplayLink:
             self.trouble = ""
             self._reopening.succeeded()
         except DeviceError as error:
-            has_begun_to_fail = not self.trouble
-            self.trouble = str(error)
+            failure = self._reopening.failure
+            is_new = not self.trouble or failure not in ("", self.trouble)
+            self.trouble = failure or str(error)
             if isinstance(error, DeviceLost):
                 self._reopening.begin()
         self._keep_dark()
-        return has_begun_to_fail
+        return is_new
 
     def _keep_dark(self) -> None:
         """The operator may have blanked the display while a picture was on its way."""
@@ -79,12 +81,17 @@ class DisplayLink:
 
 
 class _Reopening:
-    """Opens a lost display in a thread, which no frame waits for, with growing pauses."""
+    """Opens a lost display in a thread, which no frame waits for, with growing pauses.
+
+    Attributes:
+        failure: what the last attempt failed with that no display should; empty for nothing.
+    """
 
     def __init__(self, display: Display) -> None:
         self._display = display
         self._thread: threading.Thread | None = None
-        self._pause_s = _FIRST_PAUSE_S
+        self.failure = ""
+        self._pauses = Pauses(*_PAUSES_S)
         self._is_over = threading.Event()
 
     @property
@@ -100,7 +107,7 @@ class _Reopening:
 
     def succeeded(self) -> None:
         """A picture was shown: the next loss is a new one."""
-        self._pause_s = _FIRST_PAUSE_S
+        self._pauses.begin_again()
 
     def close(self) -> None:
         """Wait for the attempt that is under way."""
@@ -109,12 +116,13 @@ class _Reopening:
             self._thread.join()
 
     def _run(self) -> None:
-        is_over = self._is_over.wait(self._pause_s)
-        self._pause_s = min(2.0 * self._pause_s, _LAST_PAUSE_S)
-        if is_over:
+        if self._is_over.wait(self._pauses.take_s()):
             return
+        self.failure = ""
         try:
             self._display.open()
         except DeviceError:
             # The next picture finds it lost and says why.
             return
+        except Exception as error:  # noqa: BLE001 (a bug must be told, not end as a silent thread)
+            self.failure = f"opening the display failed: {error!r}"

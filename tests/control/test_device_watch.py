@@ -9,6 +9,7 @@ from drivers.clock import ManualClock
 from drivers.interfaces import MirrorInfo, PowerState, ProjectorStatus
 from navapp.control.device_care import MirrorCare, ProjectorCare, Report
 from navapp.control.device_watch import DeviceWatch
+from navapp.control.pauses import Pauses
 from navapp.control.states import DeviceHealth, DeviceLine
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound
 from navapp.values import Reason
@@ -28,13 +29,16 @@ class Care:
         self.gate.set()
         self.is_held_in_restore = False
         self.n_stops_needed = 1
-        self.error: DeviceError | None = None
+        self.error: Exception | None = None
+        self.report_error: Exception | None = None
         self.n_asked = self.n_reopened = self.n_begun = self.n_restored = self.n_stopped = 0
 
     def report(self) -> Report:
         self.n_asked += 1
         if not self.is_held_in_restore:
             self.gate.wait()
+        if self.report_error is not None:
+            raise self.report_error
         return Report(DeviceLine("mirror", "m", self.health, "detail"))
 
     def restore(self) -> None:
@@ -99,8 +103,8 @@ def test_an_answer_that_stays_away_makes_the_device_lost(watch, care, clock) -> 
     assert watch.report.reason is None
 
 
-def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, clock, monkeypatch) -> None:
-    monkeypatch.setattr("navapp.control.device_watch._FIRST_RETRY_S", 0.01)
+def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, clock) -> None:
+    watch._pauses = Pauses(0.01, 8.0)
     care.error = DeviceNotFound("not plugged in")
     care.health = DeviceHealth.LOST
     wait_for(lambda: watch.report.line.detail == "not plugged in", "the error")
@@ -113,10 +117,25 @@ def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, clock, mo
     assert care.n_reopened >= 2
 
 
+@pytest.mark.parametrize("where", ["report_error", "error"])
+def test_a_bug_ends_as_a_lost_device_and_the_thread_goes_on(watch, care, where) -> None:
+    watch._pauses = Pauses(0.01, 0.01)
+    care.health = DeviceHealth.LOST
+    setattr(care, where, RuntimeError("a bug"))
+    wait_for(lambda: "RuntimeError('a bug')" in watch.report.line.detail, "the words")
+    assert watch.report.line.health is DeviceHealth.LOST
+    assert watch.report.reason is Reason.MIRROR_AWAY
+    watch.restore()
+    wait_for(lambda: not watch._is_restoring, "an end of what the operator asked for")
+    setattr(care, where, None)
+    care.health = DeviceHealth.OK
+    wait_for(lambda: watch.report.line.health is DeviceHealth.OK, "its return")
+    assert watch.report.reason is None
+
+
 def test_the_pauses_between_attempts_double(care, clock, monkeypatch) -> None:
     pauses_s = []
-    monkeypatch.setattr("navapp.control.device_watch._FIRST_RETRY_S", 0.01)
-    monkeypatch.setattr("navapp.control.device_watch._LAST_RETRY_S", 0.05)
+    monkeypatch.setattr("navapp.control.device_watch._PAUSES_S", (0.01, 0.05))
     care.health, care.error = DeviceHealth.LOST, DeviceLost("gone")
     watch = DeviceWatch(care, (0.002, 1.0), clock)
     wait = watch._wake.wait
@@ -128,9 +147,8 @@ def test_the_pauses_between_attempts_double(care, clock, monkeypatch) -> None:
     assert pauses_s == sorted(pauses_s), "never shorter while it stays away"
 
 
-def test_attempts_become_rarer_and_the_operator_does_not_wait(watch, care, monkeypatch) -> None:
-    monkeypatch.setattr("navapp.control.device_watch._FIRST_RETRY_S", 30.0)
-    monkeypatch.setattr("navapp.control.device_watch._LAST_RETRY_S", 30.0)
+def test_attempts_become_rarer_and_the_operator_does_not_wait(watch, care) -> None:
+    watch._pauses = Pauses(30.0, 30.0)
     care.health, care.error = DeviceHealth.LOST, DeviceLost("gone")
     wait_for(lambda: watch.report.line.health is DeviceHealth.LOST, "the loss")
     assert care.n_reopened <= 1

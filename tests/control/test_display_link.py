@@ -25,6 +25,7 @@ class Cable(SimulatedDisplay):
         self.gate = threading.Event()
         self.gate.set()
         self.n_attempts = 0
+        self.bug: Exception | None = None
 
     def unplug(self) -> None:
         self.is_plugged = False
@@ -33,6 +34,8 @@ class Cable(SimulatedDisplay):
     def open(self) -> None:
         self.n_attempts += 1
         self.gate.wait(5.0)
+        if self.bug is not None:
+            raise self.bug
         if not self.is_plugged:
             raise DeviceNotFound("no such output")
         super().open()
@@ -40,7 +43,7 @@ class Cable(SimulatedDisplay):
 
 @pytest.fixture
 def cable(monkeypatch) -> Cable:
-    monkeypatch.setattr(display_link, "_FIRST_PAUSE_S", 0.01)
+    monkeypatch.setattr(display_link, "_PAUSES_S", (0.01, 8.0))
     display = Cable()
     display.open()
     return display
@@ -92,6 +95,26 @@ def test_nobody_waits_for_a_display_that_opens_slowly(cable) -> None:
     assert not shown(link)
     link.show_again()
     assert shown(link)
+    link.close()
+
+
+def test_a_bug_in_opening_is_told_once_and_does_not_end_the_attempts(cable) -> None:
+    link = DisplayLink(cable)
+    cable.unplug()
+    cable.bug = RuntimeError("a bug")
+    tellings = [""]
+
+    def is_told_and_tried(n_attempts: int) -> bool:
+        if link.show(PICTURE, 10**12, has_guides=True):
+            tellings.append(link.trouble)
+        return cable.n_attempts >= n_attempts
+
+    wait_until(lambda: is_told_and_tried(5))
+    assert [text for text in tellings if "RuntimeError('a bug')" in text] == tellings[2:]
+    assert len(tellings) == 3
+    cable.bug, cable.is_plugged = None, True
+    wait_until(lambda: shown(link))
+    assert link.trouble == ""
     link.close()
 
 
