@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 
 from drivers.clock import Clock
@@ -13,7 +13,7 @@ from drivers.uvc_controls import check_control
 from drivers.uvc_pairs import UvcPairs
 from drivers.uvc_settings import UvcSettings
 from drivers.v4l_names import FoundCamera, V4lNames
-from navapp.errors import DeviceLost, UsageError, WrongDevice
+from navapp.errors import DeviceError, DeviceLost, UnsupportedControl, UsageError, WrongDevice
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,15 +156,23 @@ class OpencvStereo:
         return frame
 
     def set(self, control: str, value: float) -> float:
-        """Set a control of both eyes; it survives a reopening.
+        """Set a control of both eyes; a reopening asks for the same value again.
 
         Raises:
-            UnsupportedControl: see `StereoCamera.set`.
+            UnsupportedControl: see `StereoCamera.set`; both eyes are then as they were.
             DeviceLost, DeviceTimeout: not open, or no answer.
         """
         check_control(control, value, self._settings.eye.rate_hz)
-        has = self._running().set(control, value)
-        controls = {**self._settings.eye.controls, control: has}
+        pairs = self._running()
+        before = {**_common_controls(pairs), **self._settings.eye.controls}
+        try:
+            has = pairs.set(control, value)
+        except UnsupportedControl:
+            if control in before:
+                with suppress(DeviceError):
+                    pairs.set(control, before[control])
+            raise
+        controls = {**self._settings.eye.controls, control: value}
         self._settings = replace(self._settings, eye=replace(self._settings.eye, controls=controls))
         return has
 

@@ -104,12 +104,13 @@ class UvcCamera:
         """Ask for a control and return what the camera has.
 
         Raises:
-            UnsupportedControl: no such control, or a value that no camera can take.
+            UnsupportedControl: see `set_control`.
         """
         rate_hz = self._settings.rate_hz
-        has = set_control(self._capture, control_name, value, rate_hz, self.identity.serial)
-        self.controls = read_controls(self._capture)
-        return has
+        try:
+            return set_control(self._capture, control_name, value, rate_hz, self.identity.serial)
+        finally:
+            self.controls = read_controls(self._capture)
 
     def close(self) -> None:
         """Give the device back."""

@@ -125,13 +125,7 @@ def lock_controls(capture: Capture, settings: UvcSettings, name: str) -> dict[st
                 remedy="use a camera whose pictures do not change by themselves",
             )
     for control_name, wish in settings.controls.items():
-        has = set_control(capture, control_name, wish, settings.rate_hz, name)
-        if abs(has - wish) > _NEARNESS * abs(wish):
-            raise UnsupportedControl(
-                f"camera {name} was asked for {control_name} {wish:g} and has {has:g}",
-                subject=control_name,
-                remedy="ask for a value that it can take",
-            )
+        set_control(capture, control_name, wish, settings.rate_hz, name)
     return read_controls(capture)
 
 
@@ -141,7 +135,8 @@ def set_control(
     """Ask for a control and return what the camera says it has, in the same unit.
 
     Raises:
-        UnsupportedControl: no such control, or a value that no camera can take.
+        UnsupportedControl: no such control, a value that no camera can take, or the camera took
+            another one.
     """
     check_control(control_name, value, rate_hz)
     control = _CONTROLS[control_name]
@@ -152,7 +147,14 @@ def set_control(
             remedy="leave it out of the configuration",
         )
     capture.set(control.property_id, float(round(value * control.raw_per_unit)))
-    return capture.get(control.property_id) / control.raw_per_unit
+    has = capture.get(control.property_id) / control.raw_per_unit
+    if abs(has - value) > _NEARNESS * abs(value):
+        raise UnsupportedControl(
+            f"camera {name} was asked for {control_name} {value:g} and has {has:g}",
+            subject=control_name,
+            remedy="ask for a value that it can take",
+        )
+    return has
 
 
 def check_control(control_name: str, value: float, rate_hz: float) -> None:

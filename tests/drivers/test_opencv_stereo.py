@@ -106,15 +106,38 @@ def test_a_driver_that_keeps_more_pictures_is_told(rig):
 def test_the_step_that_the_camera_takes_is_what_is_told(rig):
     rig.camera.open()
     rig.left.steps = rig.right.steps = {cv2.CAP_PROP_EXPOSURE: 20.0}
-    assert rig.camera.set("exposure_ms", 5.1) == 6.0
+    assert rig.camera.set("exposure_ms", 5.9) == 6.0
     assert rig.camera.info.controls["exposure_ms"] == 6.0
 
 
 def test_eyes_that_take_different_values_are_refused(rig):
     rig.camera.open()
-    rig.right.stubborn.add(cv2.CAP_PROP_GAIN)
-    with pytest.raises(UnsupportedControl, match="different values for gain: 8 and 0"):
+    rig.right.steps = {cv2.CAP_PROP_GAIN: 8.5}
+    with pytest.raises(UnsupportedControl, match=r"different values for gain: 8 and 8\.5"):
         rig.camera.set("gain", 8.0)
+    assert rig.camera.info.controls["gain"] == 0.0
+
+
+def test_a_value_that_one_eye_does_not_take_leaves_both_as_they_were(rig):
+    rig.camera.open()
+    rig.right.stubborn.add(cv2.CAP_PROP_EXPOSURE)
+    with pytest.raises(UnsupportedControl, match="R1 was asked for exposure_ms 8 and has 5"):
+        rig.camera.set("exposure_ms", 8.0)
+    assert rig.camera.info.controls["exposure_ms"] == 5.0
+    rig.camera.close()
+    rig.right.stubborn.clear()
+    rig.camera.open()
+    assert rig.camera.info.controls["exposure_ms"] == 5.0
+
+
+def test_a_reopening_asks_for_what_was_wished_and_not_for_what_it_became(rig):
+    rig.camera.open()
+    rig.left.steps = rig.right.steps = {cv2.CAP_PROP_EXPOSURE: 20.0}
+    assert rig.camera.set("exposure_ms", 5.9) == 6.0
+    rig.camera.close()
+    rig.left.steps = rig.right.steps = {}
+    rig.camera.open()
+    assert rig.camera.info.controls["exposure_ms"] == 5.9
 
 
 def test_a_control_that_was_set_survives_a_reopening(rig):
