@@ -34,6 +34,8 @@ _NEARNESS = 0.1
 _FAST = ("SUPER", "SUPER_PLUS")
 # A closed camera starts anew and is absent meanwhile.
 _RESTART_NS, _SEARCH_EVERY_NS = 6_000_000_000, 250_000_000
+# When those that were closed are back at the latest; whoever closed them, they are absent for all.
+_BACK_BY_NS: dict[str, int] = {}
 
 
 class DepthaiStereo:
@@ -65,7 +67,6 @@ class DepthaiStereo:
         self._notes: tuple[str, ...] = ()
         self._controls: dict[str, float] = {}
         self._is_lost = False
-        self._back_by_ns = 0
         self._gate = self._new_gate()
         self._sequence = 0
         self._meter = FrameMeter()
@@ -160,7 +161,8 @@ class DepthaiStereo:
         parts, self._parts = self._parts, None
         if parts is not None:
             _close(parts)
-            self._back_by_ns = 0 if self._is_lost else self._clock.now_ns() + _RESTART_NS
+            if not self._is_lost:
+                _BACK_BY_NS[self._device_id] = self._clock.now_ns() + _RESTART_NS
 
     def _booted(self) -> DepthaiParts:
         """Open the device; one that was closed in good health is waited for."""
@@ -168,8 +170,12 @@ class DepthaiStereo:
             try:
                 return self._open_device(self._settings)
             except DeviceNotFound:
-                now_ns = self._clock.now_ns()
-                if now_ns >= self._back_by_ns:
+                now_ns, device = self._clock.now_ns(), self._settings.device
+                if all(
+                    now_ns >= back_by_ns
+                    for device_id, back_by_ns in tuple(_BACK_BY_NS.items())
+                    if device in ("", device_id)
+                ):
                     raise
                 self._clock.wait_until_ns(now_ns + _SEARCH_EVERY_NS)
 
@@ -181,6 +187,7 @@ class DepthaiStereo:
                 remedy="connect the camera that it began with",
             )
         self._device_id, self._is_lost = parts.device_id, False
+        _BACK_BY_NS.pop(self._device_id, None)
         self._controls = {}
         for lamp in ("ir_dots", "ir_flood"):
             brightness = self._settings.controls[lamp]

@@ -1,6 +1,7 @@
 """The OAK driver above DepthAI's own pipeline, messages and calibration on the host."""
 
 import time
+from dataclasses import replace
 from datetime import timedelta
 
 import numpy as np
@@ -21,6 +22,7 @@ from navapp.errors import (
 from tests.drivers.host_oak import HEIGHT, RATE_HZ, WIDTH, HostOak
 from tests.drivers.losing import fails_within
 
+OAK_ID = "14442C10D13EABCE00"
 SETTINGS = DepthaiSettings(width=WIDTH, height=HEIGHT, rate_hz=RATE_HZ)
 
 
@@ -144,6 +146,30 @@ def test_a_camera_that_starts_anew_after_closing_is_waited_for(oak, camera):
     begin_s = time.monotonic()
     with pytest.raises(DeviceNotFound):  # one that was pulled is not
         camera.open()
+    assert time.monotonic() - begin_s < 1.0
+
+
+@pytest.mark.parametrize("device", ["", OAK_ID])
+def test_whoever_opens_a_camera_that_starts_anew_waits_for_it(oak, camera, device):
+    camera.open()
+    camera.close()
+    oak.n_absent = 2
+    other = DepthaiStereo(
+        replace(SETTINGS, device=device), SystemClock(), open_device=oak.open_parts
+    )
+    other.open()
+    assert oak.n_absent == 0
+    other.close()
+
+
+def test_nobody_waits_for_another_camera(oak, camera):
+    camera.open()
+    camera.close()
+    settings = replace(SETTINGS, device="ANOTHER")
+    other = DepthaiStereo(settings, SystemClock(), open_device=oak.open_parts)
+    begin_s = time.monotonic()
+    with pytest.raises(DeviceNotFound):
+        other.open()
     assert time.monotonic() - begin_s < 1.0
 
 
