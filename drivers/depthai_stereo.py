@@ -105,7 +105,7 @@ class DepthaiStereo:
         try:
             self._take_over(parts)
         except BaseException:
-            _close(parts)
+            self._release(parts)
             raise
         self._parts = parts
 
@@ -160,9 +160,7 @@ class DepthaiStereo:
         """Stop and release; the camera then starts anew, for some seconds."""
         parts, self._parts = self._parts, None
         if parts is not None:
-            _close(parts)
-            if not self._is_lost:
-                _BACK_BY_NS[self._device_id] = self._clock.now_ns() + _RESTART_NS
+            self._release(parts)
 
     def _booted(self) -> DepthaiParts:
         """Open the device; one that was closed in good health is waited for."""
@@ -170,14 +168,21 @@ class DepthaiStereo:
             try:
                 return self._open_device(self._settings)
             except DeviceNotFound:
-                now_ns, device = self._clock.now_ns(), self._settings.device
-                if all(
-                    now_ns >= back_by_ns
-                    for device_id, back_by_ns in tuple(_BACK_BY_NS.items())
-                    if device in ("", device_id)
-                ):
+                now_ns = self._clock.now_ns()
+                if now_ns >= self._back_by_ns():
                     raise
                 self._clock.wait_until_ns(now_ns + _SEARCH_EVERY_NS)
+
+    def _back_by_ns(self) -> int:
+        wanted = self._settings.device or self._device_id
+        back_by = tuple(_BACK_BY_NS.items())
+        return max((at_ns for device_id, at_ns in back_by if wanted in ("", device_id)), default=0)
+
+    def _release(self, parts: DepthaiParts) -> None:
+        with suppress(Exception):  # a camera that is gone cannot be told so
+            parts.close()
+        if not self._is_lost:
+            _BACK_BY_NS[parts.device_id] = self._clock.now_ns() + _RESTART_NS
 
     def _take_over(self, parts: DepthaiParts) -> None:
         if self._device_id and parts.device_id != self._device_id:
@@ -283,8 +288,3 @@ class DepthaiStereo:
             f"OAK camera {self._device_id} gave no pair within {timeout_s:g} s",
             subject=self._device_id,
         )
-
-
-def _close(parts: DepthaiParts) -> None:
-    with suppress(Exception):  # a camera that is gone cannot be told so
-        parts.close()
