@@ -1,13 +1,14 @@
 """A room without pictures: black frames, and a line that answers what the test says."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivers.clock import ManualClock
+from drivers.clock import Clock, ManualClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
@@ -17,7 +18,7 @@ from navapp.control.controller import SessionController, SessionOptions
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
 from navapp.control.results import FrameResult
 from navapp.control.session import SessionHooks
-from navapp.control.states import Accept, Command, Event, Register, Snapshot
+from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Snapshot
 from navapp.errors import DeviceError, DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
@@ -192,6 +193,7 @@ class Bench:
         mirror: MirrorMount | None = None,
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
+        make_display: Callable[[Clock, int, int], SimulatedDisplay] = SimulatedDisplay,
     ) -> None:
         self.script = Script()
         line = type("ScriptedLine", (FakeLine,), {"script": self.script})
@@ -199,7 +201,7 @@ class Bench:
         self.clock = ManualClock(10**9)
         self.camera = camera or FakeCamera(self.clock)
         self.camera._clock = self.clock
-        self.display = SimulatedDisplay(self.clock, WIDTH, HEIGHT)
+        self.display = make_display(self.clock, WIDTH, HEIGHT)
         self.events: list[Event] = []
         self.results: list[FrameResult] = []
         self.take_overs: list[int] = []
@@ -252,6 +254,18 @@ class Bench:
             self.controller.step()
         return self.snapshot
 
+    def until(self, condition: Callable[[], bool], within_s: float) -> None:
+        """Go on, frame by frame, until it is so."""
+        end_s = time.monotonic() + within_s
+        while not condition():
+            assert time.monotonic() < end_s
+            self.frames(1)
+            time.sleep(0.005)
+
+    def line(self, kind: str) -> DeviceLine:
+        """Of the devices panel."""
+        return next(line for line in self.snapshot.devices if line.kind == kind)
+
     def do(self, command: Command) -> Snapshot:
         """Give a command and have it handled."""
         self.controller.submit(command)
@@ -291,8 +305,6 @@ def hanging_registration(monkeypatch) -> Iterator[Bench]:
 
 def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) -> None:
     """Poll something that another thread brings about."""
-    import time
-
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end, f"waited in vain for {what}"
