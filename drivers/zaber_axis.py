@@ -139,7 +139,7 @@ class ZaberAxis:
             if command == _HOME:
                 self.talk.ask(_CLEAR)
             self._wait_until_idle(limit_s, what)
-        except DeviceError:
+        except BaseException:
             with suppress(DeviceError):
                 self.talk.ask("stop")
             raise

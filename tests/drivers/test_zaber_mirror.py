@@ -335,6 +335,23 @@ def test_a_motion_that_cannot_be_followed_is_stopped(from_deg) -> None:
     assert rig.driver.position_deg() is None
 
 
+def test_a_bug_in_following_a_motion_stops_it_as_well() -> None:
+    rig = homed()
+
+    def fail_on_the_way() -> None:
+        if rig.firmware.true_deg > 20.0:
+            raise RuntimeError("a bug")
+
+    ask = rig.driver._talk.ask
+    after(rig, "", fail_on_the_way)
+    with pytest.raises(RuntimeError):
+        rig.driver.move_to(110.0, 30.0)
+    rig.driver._talk.ask = ask
+    rig.clock.advance_ns(10**10)
+    assert 20.0 < rig.firmware.true_deg < 80.0
+    assert rig.driver.position_deg() is None
+
+
 def test_a_device_that_says_idle_without_being_there_is_not_believed() -> None:
     rig = homed()
     rig.firmware._set_off = lambda end, at_end=None: None
