@@ -73,6 +73,7 @@ class SimulatedCamera:
         sensor: SensorModel | None = None,
         faults: FaultScript | None = None,
         skew_ns: int = 0,
+        unstamped_skew_ns: int = 0,
         n_frames: int | None = None,
     ) -> None:
         """Set up; nothing is rendered before `open`.
@@ -86,6 +87,7 @@ class SimulatedCamera:
             sensor: of both eyes; its exposure is that of `NOMINAL_EXPOSURE_MS`.
             faults: what goes wrong, none when absent.
             skew_ns: how much later the right eye exposes.
+            unstamped_skew_ns: how much later it exposes on top of that, unknown to its frames.
             n_frames: the sequence ends after so many, None for never.
 
         Raises:
@@ -102,6 +104,7 @@ class SimulatedCamera:
         self._nominal_sensor = sensor or SensorModel()
         self._faults = faults or FaultScript()
         self._skew_ns = skew_ns
+        self._true_skew_ns = skew_ns + unstamped_skew_ns
         self._n_frames = n_frames
         self._controls: Mapping[str, float] = MappingProxyType(
             {"exposure_ms": NOMINAL_EXPOSURE_MS, "gain_db": 0.0}
@@ -250,7 +253,7 @@ class SimulatedCamera:
         while exposed_ns <= limit_ns and self._faults.is_active(FaultKind.DROP, exposed_ns):
             self._next_instant += 1
             exposed_ns = self._instant_ns(self._next_instant)
-        delay_ns = self._faults.delay_ns(exposed_ns) + max(0, self._skew_ns)
+        delay_ns = self._faults.delay_ns(exposed_ns) + max(0, self._true_skew_ns)
         return exposed_ns, exposed_ns + delay_ns
 
     def _instant_ns(self, number: int) -> int:
@@ -297,7 +300,7 @@ class SimulatedCamera:
         captured_ns = exposed_ns + (self._origin_ns or 0)
         return StereoFrame(
             left=self._picture("left", exposed_ns),
-            right=self._picture("right", max(0, exposed_ns + self._skew_ns)),
+            right=self._picture("right", max(0, exposed_ns + self._true_skew_ns)),
             captured_ns=captured_ns,
             received_ns=captured_ns,
             skew_ns=self._skew_ns,

@@ -1,4 +1,4 @@
-"""`navapp calibrate`: a stereo rig that knows how good it is, and the tip of a tool."""
+"""`navapp calibrate`: a stereo rig that knows how good it is, delays, the tip of a tool."""
 
 import argparse
 import importlib
@@ -12,6 +12,7 @@ _PARTS = {
     "capture": "calibrate_capture",
     "stereo": "calibrate_stereo",
     "check": "calibrate_check",
+    "latency": "calibrate_latency",
     "pivot": "calibrate_pivot",
 }
 
@@ -21,6 +22,7 @@ examples:
   navapp calibrate capture --board board.json --out capture/
   navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
   navapp calibrate check rig.yml today/ --board board.json
+  navapp calibrate latency
   navapp calibrate pivot poses.csv
 """
 
@@ -29,7 +31,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the verb and its parts."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="a board, its pictures, a stereo rig from them, its check; a tool's tip",
+        help="a board, its pictures, a stereo rig from them, its check; delays; a tool's tip",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

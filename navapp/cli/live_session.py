@@ -127,7 +127,7 @@ def controller_of(
                 depth_mm=configuration.camera.depth_mm,
             ),
             first_stage=session.stage,
-            overlay_valid_ms=configuration.display.valid_ms,
+            overlay_valid_ms=configuration.display.withdrawn_ms,
             is_recording=configuration.recording.folder is not None,
             mirror_deg=configuration.mirror.calibrated_deg,
         ),

@@ -85,6 +85,8 @@ class SimulationSection(Section):
     """Whether frames wait to be read; by default in headless sessions only."""
     skew_ms: float = 0.0
     """The right camera exposes later by this."""
+    unstamped_skew_ms: float = 0.0
+    """The right camera exposes later by this as well, and its time stamps do not say so."""
     grey: bool = False
     """Grey pictures, like those of an OAK camera."""
     board_s: Annotated[tuple[NotNegative, Positive], AfterValidator(_rising)] | None = None
@@ -188,6 +190,15 @@ class CameraSection(BaseModel):
     """The mono pair of an OAK camera."""
 
 
+class DisplaySimulationSection(Section):
+    """The display that `navapp calibrate latency` shows to simulated cameras."""
+
+    delay_ms: NotNegative = 40.0
+    """From the call to the first refresh that can show it."""
+    refresh_hz: Positive = 59.94
+    """Refreshes in a second; a picture waits for the next one."""
+
+
 class DisplaySection(Section):
     """Where the overlay is shown."""
 
@@ -203,12 +214,23 @@ class DisplaySection(Section):
     """The window shows every picture upside down."""
     valid_ms: Positive = 500.0
     """A picture without a newer one turns black after this."""
+    delay_ms: NotNegative = 0.0
+    """What is shown is seen so much later (calibrate latency), and withdrawn so much earlier."""
+    simulated: DisplaySimulationSection = DisplaySimulationSection()
+    """The display that simulated cameras see."""
 
     @model_validator(mode="after")
-    def _has_a_size(self) -> Self:
+    def _is_possible(self) -> Self:
         if self.backend == "window" and self.size_px is None:
             raise ValueError("a window needs size_px")
+        if self.delay_ms >= self.valid_ms:
+            raise ValueError("delay_ms must be smaller than valid_ms")
         return self
+
+    @property
+    def withdrawn_ms(self) -> float:
+        """After this a picture is withdrawn, so that its light is gone after `valid_ms`."""
+        return self.valid_ms - self.delay_ms
 
 
 class ProjectorSection(Section):

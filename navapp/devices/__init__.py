@@ -2,14 +2,17 @@
 
 from navapp.devices.cameras import real_camera
 from navapp.devices.capture import OpenedCapture, open_capture
+from navapp.devices.latency import OpenedLatency, open_latency
 from navapp.devices.opening import OpenedDevices, open_live, open_recording
 from navapp.devices.simulated_room import Simulation
 
 __all__ = [
     "OpenedCapture",
     "OpenedDevices",
+    "OpenedLatency",
     "Simulation",
     "open_capture",
+    "open_latency",
     "open_live",
     "open_recording",
     "real_camera",

@@ -51,10 +51,16 @@ def device_set(
 
 
 def _display(settings: DisplaySection, clock: Clock, rig: StereoRig) -> Display:
-    if settings.backend == "window" and settings.size_px is not None:
-        flips = (settings.flip_horizontally, settings.flip_vertically)
-        return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
-    return SimulatedDisplay(clock, rig.width, rig.height)
+    window = window_display(settings, clock)
+    return SimulatedDisplay(clock, rig.width, rig.height) if window is None else window
+
+
+def window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay | None:
+    """The configured window, not opened yet; None when the display is a simulated one."""
+    if settings.backend != "window" or settings.size_px is None:
+        return None
+    flips = (settings.flip_horizontally, settings.flip_vertically)
+    return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
 
 
 def _projector(settings: ProjectorSection) -> ProjectorControl:

@@ -74,6 +74,7 @@ def simulated_camera(
         sensor=SensorModel(seed=settings.seed, is_grey=settings.grey),
         faults=FaultScript(tuple(_fault(section) for section in settings.faults)),
         skew_ns=round(settings.skew_ms * 1e6),
+        unstamped_skew_ns=round(settings.unstamped_skew_ms * 1e6),
     )
 
 

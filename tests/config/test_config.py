@@ -29,6 +29,7 @@ CHANGED: dict[str, Any] = {
             "scale": 0.5,
             "stepped": True,
             "skew_ms": -3.5,
+            "unstamped_skew_ms": 2.5,
             "grey": True,
             "board_s": [0.0, 8.0],
             "faults": [
@@ -66,6 +67,8 @@ CHANGED: dict[str, Any] = {
         "flip_horizontally": True,
         "flip_vertically": True,
         "valid_ms": 100.0,
+        "delay_ms": 55.5,
+        "simulated": {"delay_ms": 12.0, "refresh_hz": 50.0},
     },
     "projector": {
         "backend": "escvp21",
