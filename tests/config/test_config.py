@@ -238,7 +238,7 @@ def test_an_unknown_key_names_the_nearest_known_one(content, key, nearest):
 
 
 def test_an_unknown_key_like_no_other_names_what_is_known():
-    with pytest.raises(ConfigurationError, match=r"known here: backend, output, .*valid_ms$"):
+    with pytest.raises(ConfigurationError, match=r"known here: backend, output, .*simulated$"):
         parse({"display": {"xyzzy": 1}}, "x")
     with pytest.raises(ConfigurationError, match=r"known here: nothing$"):
         parse({"ui": {"xyzzy": 1}}, "x")
@@ -293,6 +293,8 @@ def test_a_wrong_type_names_the_key(key, value):
         ("camera.simulated.scale", 1.01),
         ("camera.simulated.skew_ms", float("nan")),
         ("display.valid_ms", 0.0),
+        ("display.delay_ms", -1.0),
+        ("display.simulated.refresh_hz", 0.0),
         ("display.size_px", [0, 720]),
         ("projector.tcp_port", 65536),
         ("mirror.calibrated_deg", float("inf")),
@@ -319,6 +321,13 @@ def test_a_value_out_of_bounds_names_the_key(key, value):
 def test_a_device_needs_to_be_described(table, backend, text):
     with pytest.raises(ConfigurationError, match=text):
         parse({table: {"backend": backend}}, "x")
+
+
+def test_a_picture_is_valid_for_longer_than_it_is_late():
+    display = parse({"display": {"valid_ms": 200.0, "delay_ms": 60.0}}, "x").display
+    assert display.withdrawn_ms == 140.0
+    with pytest.raises(ConfigurationError, match="delay_ms must be smaller than valid_ms"):
+        parse({"display": {"valid_ms": 200.0, "delay_ms": 200.0}}, "x")
 
 
 @pytest.mark.parametrize("key", ["camera.simulated.cartilage_mm", "camera.simulated.scale"])

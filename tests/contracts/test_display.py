@@ -6,6 +6,7 @@ import pytest
 from drivers.clock import ManualClock
 from drivers.contracts import DISPLAY_CHECKS, ContractViolation, DisplayUnderTest
 from sim_devices.display import SimulatedDisplay
+from sim_devices.lit_display import LitDisplay
 
 
 def subject(kind: type[SimulatedDisplay], **flips: bool) -> DisplayUnderTest:
@@ -18,6 +19,16 @@ def subject(kind: type[SimulatedDisplay], **flips: bool) -> DisplayUnderTest:
 @pytest.mark.parametrize("flips", [{}, {"flips_horizontally": True}, {"flips_vertically": True}])
 def test_simulated_display_keeps_its_contract(check, flips):
     check(lambda: subject(SimulatedDisplay, **flips))
+
+
+@pytest.mark.parametrize("check", DISPLAY_CHECKS, ids=lambda check: check.__name__)
+def test_display_in_view_of_simulated_cameras_keeps_the_contract(check):
+    def make() -> DisplayUnderTest:
+        clock = ManualClock(10**9)
+        display = LitDisplay(clock, 40, 24, delay_ns=0, refresh_hz=60.0)
+        return DisplayUnderTest(display, clock, display._display.visible_image)
+
+    check(make)
 
 
 class NeverExpires(SimulatedDisplay):

@@ -99,6 +99,13 @@ def test_right_eye_is_rendered_later_by_the_skew():
     assert bench.camera.info.measured_skew_ms == pytest.approx(4.0)
 
 
+def test_an_unstamped_skew_moves_the_right_exposure_and_no_stamp():
+    bench = Bench(skew_ns=4_000_000, unstamped_skew_ns=-1_000_000)
+    frame = [bench.camera.read(1.0) for _ in range(2)][1]
+    assert frame.skew_ns == 4_000_000
+    assert bench.world.rendered[2:] == [("left", S // 10), ("right", S // 10 + 3_000_000)]
+
+
 def test_scale_makes_smaller_pictures_and_another_rig():
     bench = Bench(scale=0.5)
     frame, info = bench.camera.read(1.0), bench.camera.info
