@@ -130,9 +130,10 @@ def _tell(found: "Latency", names: tuple[str, str], diagnostics: Diagnostics) ->
         f"{found.left.swing:.0f} and {found.right.swing:.0f} grey values from dark to light"
     )
     if abs(found.late.value_ms) > found.late.bound_ms:
+        order = "early" if found.late.value_ms > 0.0 else "late"
         diagnostics.warn(
-            f"the right camera exposes {found.late.value_ms:+.1f} ms later than its time stamps "
-            "say: both cameras see a moving bone at different moments; trigger them together"
+            f"the right camera's time stamps are {abs(found.late.value_ms):.1f} ms too {order}: "
+            "the two pictures of a moving bone are not of one moment; trigger the cameras together"
         )
     if delay.value_ms > 0.0:
         diagnostics.say(f"for the configuration:\n\n[display]\ndelay_ms = {delay.value_ms:.1f}")

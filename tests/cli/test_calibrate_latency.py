@@ -37,7 +37,7 @@ def test_what_the_configuration_simulates_is_found(measure, capsys) -> None:
     assert told["display_delay_ms"]["bound"] < 3.0
     assert (told["display"], told["camera"]) == ("sim:display", "sim:stereo camera")
     said = capsys.readouterr()
-    assert "than its time stamps say" in said.err
+    assert "ms too early" in said.err
     # What it offers for the configuration is one.
     offered = tomllib.loads(said.out[said.out.index("[display]") :])
     delay_ms = parse(offered, "x").display.delay_ms
