@@ -1,4 +1,4 @@
-"""From what two eyes saw of a code to two delays, or to one sentence why there are none."""
+"""From what two eyes saw of a code to the lag of either, and to what may be said of both."""
 
 import math
 from dataclasses import dataclass
