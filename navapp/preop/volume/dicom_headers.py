@@ -2,6 +2,7 @@
 
 import logging
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -79,12 +80,17 @@ class OtherFile:
 
 
 def is_dicom(file: Path) -> bool:
-    """Whether a file begins as DICOM files do; False when it cannot be opened."""
+    """Whether a file begins as DICOM files do.
+
+    So may one that cannot be opened, or that was cut to nothing or to its first empty bytes.
+    """
     try:
         with file.open("rb") as stream:
             start = stream.read(_MAGIC_AT + len(_MAGIC))
     except OSError:
-        return False
+        return True
+    if len(start) < _MAGIC_AT + len(_MAGIC) and not start.strip(b"\0"):
+        return True
     return start[_MAGIC_AT:] == _MAGIC or start.startswith(_BARE_BEGINNING)
 
 
@@ -104,12 +110,20 @@ def read_header(file: Path) -> tuple[SliceHeader | OtherFile, set[str]]:
                 specific_tags=[*_SLICE_TAGS, *NAMING_TAGS],
             )
             names = naming_values(header)
-        except Exception:  # noqa: BLE001 (pydicom raises whatever the wrong bytes lead it to)
+        except OSError as error:
+            return OtherFile(file, NO_UID, f"it cannot be opened ({error.strerror})"), set()
+        except Exception:  # noqa: BLE001 (as in _understood)
             return OtherFile(file, NO_UID, "its header is damaged"), set()
-        try:
-            return _slice(file, header), names
-        except (AttributeError, ValueError, TypeError, IndexError, OverflowError):
-            return _no_slice(file, header), names
+        return _understood(file, header), names
+
+
+def _understood(file: Path, header: Any) -> SliceHeader | OtherFile:
+    # Values are converted when they are asked for, and pydicom raises whatever wrong bytes lead to.
+    with suppress(Exception):
+        return _slice(file, header)
+    with suppress(Exception):
+        return _no_slice(file, header)
+    return OtherFile(file, NO_UID, "its tags are damaged")
 
 
 def _slice(file: Path, header: Any) -> SliceHeader:
@@ -146,7 +160,7 @@ def _no_slice(file: Path, header: Any) -> OtherFile:
     kind = header.get("SOPClassUID") or meta.get("MediaStorageSOPClassUID")
     if kind is None:
         return OtherFile(file, uid, "its header is damaged or cut short")
-    if "Image Storage" not in getattr(kind, "name", ""):
+    if kind.name != str(kind) and "Image Storage" not in kind.name:
         return OtherFile(file, uid, "")
     if "Rows" not in header:
         return OtherFile(file, uid, "its header is damaged or cut short")
@@ -154,7 +168,7 @@ def _no_slice(file: Path, header: Any) -> OtherFile:
         return OtherFile(file, uid, "it holds many slices in one file")
     if header.get("SamplesPerPixel", 1) != 1:
         return OtherFile(file, uid, "it is a colour picture")
-    return OtherFile(file, uid, "its tags do not say where it lies")
+    return OtherFile(file, uid, "its tags do not say where it lies, or are damaged")
 
 
 def _uid(header: Any) -> str:

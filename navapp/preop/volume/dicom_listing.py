@@ -35,7 +35,7 @@ class SeriesInfo:
 
     def __str__(self) -> str:
         words = self.description or "no description"
-        return f"{self.uid} ({self.modality} '{words}', {self.n_slices} slices)"
+        return f"{self.uid} ({self.modality} '{words}', {_counted(self.n_slices, 'slice')})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,10 @@ def scan_folder(path: Path) -> Folder:
     files = sorted(
         file
         for file in path.rglob("*")
-        if file.is_file() and not file.name.startswith(".") and file.name.upper() != _DIRECTORY
+        # A link that leads nowhere may stand for a slice.
+        if (file.is_file() or not file.exists())
+        and not file.name.startswith(".")
+        and file.name.upper() != _DIRECTORY
     )
     dicom = [file for file in files if is_dicom(file)]
     found, names = [], set()
@@ -149,7 +152,9 @@ def choose_series(folder: Folder, uid: str | None) -> tuple[SeriesInfo, list[str
             f"holds {len(infos)} series", remedy=f"choose one with --series UID: {listed}"
         )
     chosen = volumes[0] if volumes else infos[0]
-    passed = [f"series {info} was left out: no volume" for info in infos if info is not chosen]
+    passed = [
+        f"left out: series {info}, which is no volume" for info in infos if info is not chosen
+    ]
     return chosen, passed
 
 
@@ -159,16 +164,24 @@ def check_others(folder: Folder, uid: str) -> list[str]:
     Raises:
         InputError: a file of the series, or one that does not say whose it is, is damaged.
     """
-    for other in folder.others:
-        if other.why and other.series_uid in (NO_UID, uid):
+    unusable = [other for other in folder.others if other.why]
+    for other in unusable:
+        if other.series_uid in (NO_UID, uid):
             raise folder.refused(
                 f"holds the file {folder.name_of(other.file)}, and {other.why}",
                 remedy="export the series again, or move that file away if it is not of the series",
             )
-    if not folder.n_foreign:
-        return []
-    files = "1 file is" if folder.n_foreign == 1 else f"{folder.n_foreign} files are"
-    return [f"{files} not DICOM and left out; a slice that was cut to nothing would be, too"]
+    warnings = []
+    if unusable:
+        files = _counted(len(unusable), "file")
+        warnings.append(f"left out: {files} of another series, because {unusable[0].why}")
+    if folder.n_foreign:
+        warnings.append(f"left out: {_counted(folder.n_foreign, 'file')} without DICOM in it")
+    return warnings
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _without_slices(folder: Folder, n_files: int) -> InputError:
