@@ -45,8 +45,7 @@ class _Placed:
             raise ValueError("a volume has three axes and at least one voxel")
         if spacing.shape != (3,) or not np.allclose(spacing, steps_mm(matrix), rtol=1e-6):
             raise ValueError("spacing_mm must be the lengths of the matrix's columns")
-        # A thousandth of a cube of these edges: flatter is a direction that is lost, not a tilt.
-        if abs(np.linalg.det(matrix[:3, :3])) < 1e-3 * float(spacing.prod()):
+        if not is_invertible(matrix):
             raise ValueError("the axes of lps_from_index lie in one plane")
         object.__setattr__(self, "lps_from_index", matrix)
         object.__setattr__(self, "spacing_mm", spacing)
@@ -150,6 +149,17 @@ def steps_mm(lps_from_index: FloatArray) -> FloatArray:
     """(3,) lengths of one step along i, j, k."""
     lengths: FloatArray = np.sqrt((lps_from_index[:3, :3] ** 2).sum(axis=0))
     return lengths
+
+
+def is_invertible(lps_from_index: FloatArray) -> bool:
+    """Whether the axes are finite and span a volume.
+
+    At least a thousandth of a box of their lengths: flatter is a direction that is lost, no tilt.
+    """
+    if not np.isfinite(lps_from_index).all():
+        return False
+    volume_mm3 = abs(float(np.linalg.det(lps_from_index[:3, :3])))
+    return bool(volume_mm3 > 1e-3 * float(steps_mm(lps_from_index).prod()) > 0.0)
 
 
 def _mapped(matrix: FloatArray, points: ArrayLike) -> FloatArray:

@@ -16,10 +16,12 @@ _COMPLAINT = re.compile(rb"corrupt|premature|not read completely|error", re.IGNO
 
 
 def simple_itk() -> Any:
-    """The module, its C++ warnings switched off."""
+    """The module, its C++ warnings switched off, leaning NIfTI axes allowed (see volume_files)."""
     import SimpleITK as module  # noqa: N813 (a package's name)
 
     module.ProcessObject.GlobalWarningDisplayOff()
+    # Else a NIfTI file with leaning axes is refused or, worse, read by another of its matrices.
+    os.environ["ITK_NIFTI_SFORM_PERMISSIVE"] = "ON"
     return module
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.errors import InputError
 from navapp.geometry.transform import FloatArray
+from navapp.preop.volume.ct_volume import is_invertible
 from navapp.preop.volume.dicom_headers import is_dicom
 from navapp.preop.volume.itk_package import (
     codecs_heard,
@@ -16,9 +17,11 @@ from navapp.preop.volume.itk_package import (
     read_image,
     voxels_of,
 )
-from navapp.preop.volume.nifti_length import nifti_is_whole
+from navapp.preop.volume.nifti_header import NiftiHeader, read_nifti_header
 
 _NIFTI, _NRRD = (".nii", ".nii.gz"), (".nrrd", ".nhdr")
+# Rounding of quaternions moves a far corner by less.
+_SAME_PLACE_MM = 0.1
 SUFFIXES = (*_NIFTI, *_NRRD, ".mha", ".mhd")
 
 
@@ -46,7 +49,8 @@ def read_file(path: Path) -> FileVolume:
         InputError: missing, of another kind, damaged or cut short, or no three-dimensional volume.
     """
     suffix = _suffix(path)
-    if suffix in _NIFTI and not nifti_is_whole(path):
+    header = read_nifti_header(path) if suffix in _NIFTI else None
+    if suffix in _NIFTI and (header is None or not header.is_whole):
         # SimpleITK fills what is missing with zeros, without a word.
         raise _damaged(path)
     with codecs_heard() as has_complained:
@@ -64,8 +68,15 @@ def read_file(path: Path) -> FileVolume:
             subject=str(path),
             remedy="export one three-dimensional volume",
         )
-    warnings = tuple(_space_warnings(path, suffix, image))
-    return FileVolume(suffix, values, lps_from_index_of(image), warnings)
+    matrix, warnings = _place(image, header)
+    warnings += _space_warnings(path, suffix, image)
+    if not is_invertible(matrix):
+        raise InputError(
+            f"{path} has axes that do not span a volume",
+            subject=str(path),
+            remedy="export it again with its directions",
+        )
+    return FileVolume(suffix, values, matrix, tuple(warnings))
 
 
 def _suffix(path: Path) -> str:
@@ -92,6 +103,26 @@ def _suffix(path: Path) -> str:
         subject=str(path),
         remedy=f"name a DICOM folder, or a file with one of {' '.join(SUFFIXES)}",
     )
+
+
+def _place(image: Any, header: NiftiHeader | None) -> tuple[FloatArray, list[str]]:
+    """(4, 4) where an image lies. SimpleITK turns a NIfTI file's leaning axes upright."""
+    matrix = lps_from_index_of(image)
+    if header is None or header.lps_from_index is None:
+        return matrix, []
+    if image.GetMetaData("ITK_sform_corrected") == "YES":
+        return header.lps_from_index, [
+            "the axes are not at right angles, as with a tilted gantry: every voxel is taken where "
+            "the file says, nothing is resampled"
+        ]
+    corner = [*(extent - 1 for extent in image.GetSize()), 1]
+    off = (matrix - header.lps_from_index) @ np.array([[0, 0, 0, 1], corner]).T
+    if np.abs(off).max() > _SAME_PLACE_MM:
+        return matrix, [
+            f"the file says in two ways where it lies, {np.abs(off).max():.3g} mm apart (qform, "
+            "sform): the first is taken"
+        ]
+    return matrix, []
 
 
 def _space_warnings(path: Path, suffix: str, image: Any) -> list[str]:

@@ -1,4 +1,5 @@
 import gzip
+import struct
 
 import numpy as np
 import pytest
@@ -111,6 +112,56 @@ def test_a_file_that_names_no_space_is_read_with_a_warning(tmp_path):
     (tmp_path / "ct.nrrd").write_bytes(header.encode() + HU.tobytes())
     for name in ("ct.nii", "ct.nrrd"):
         assert any("no coordinate space" in said for said in read_ct(tmp_path / name).warnings)
+
+
+def with_sform(path, rows, codes):
+    """A file with another affine map (RAS), and codes of its two ways to say its place."""
+    write(path, HU)
+    content = bytearray(path.read_bytes())
+    struct.pack_into("<hh", content, 252, *codes)
+    struct.pack_into("<12f", content, 280, *np.ravel(rows))
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("codes", [(0, 1), (1, 1), (1, 2)])
+@pytest.mark.parametrize("lean_mm", [0.01, 0.3])
+def test_a_nifti_with_leaning_axes_keeps_them(tmp_path, codes, lean_mm):
+    rows = [[-0.5, 0, 0, 30], [0, -0.75, lean_mm, -12], [0, 0, 1.25, 700]]
+    with_sform(tmp_path / "ct.nii", rows, codes)
+    ct = read_ct(tmp_path / "ct.nii")
+    expected = np.array(rows) * [[-1], [-1], [1]]
+    np.testing.assert_allclose(ct.volume.lps_from_index[:3], expected, rtol=1e-6, atol=1e-6)
+    np.testing.assert_array_equal(ct.volume.hu, HU)
+    assert any("not at right angles" in said for said in ct.warnings)
+
+
+def test_a_nifti_that_says_two_places_is_read_with_a_warning(tmp_path):
+    rows = [[-0.5, 0, 0, 30], [0, -0.75, 0, -12], [0, 0, 1.25, 709]]
+    with_sform(tmp_path / "ct.nii", rows, (1, 2))
+    assert any(
+        "in two ways where it lies" in said for said in read_ct(tmp_path / "ct.nii").warnings
+    )
+
+
+@pytest.mark.parametrize("last", [(0, 0.0, 1.0), (0, 0, 0), (np.nan, 0, 1)])
+def test_axes_that_span_no_volume_are_refused(tmp_path, last):
+    rows = np.array([[-0.5, 0, 0, 30], [0, -0.75, 0, -12], [0, 0, 0, 700]])
+    rows[:, 1], rows[:3, 2] = (0, 0, 1), last
+    with_sform(tmp_path / "ct.nii", rows, (0, 1))
+    with pytest.raises(InputError, match=r"do not span a volume|damaged"):
+        read_ct(tmp_path / "ct.nii")
+
+
+def test_nrrd_axes_that_lean_are_kept(tmp_path):
+    header = (
+        "NRRD0004\ntype: int16\ndimension: 3\nspace: right-anterior-superior\nsizes: 7 6 5\n"
+        "space directions: (0.5,0,0) (0,0.6,0) (0,0.2,0.7)\nspace origin: (1,2,3)\n"
+        "kinds: domain domain domain\nendian: little\nencoding: raw\n\n"
+    )
+    (tmp_path / "ct.nrrd").write_bytes(header.encode() + HU.tobytes())
+    expected = [[-0.5, 0, 0, -1], [0, -0.6, -0.2, -2], [0, 0, 0.7, 3]]
+    found = read_ct(tmp_path / "ct.nrrd").volume.lps_from_index
+    np.testing.assert_allclose(found[:3], expected, atol=1e-9)
 
 
 def test_what_is_no_volume_is_refused(tmp_path):

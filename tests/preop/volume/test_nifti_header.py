@@ -1,9 +1,10 @@
 import gzip
 import struct
 
+import numpy as np
 import pytest
 
-from navapp.preop.volume.nifti_length import nifti_is_whole
+from navapp.preop.volume.nifti_header import read_nifti_header
 
 
 def nifti(version, order, extents, bits):
@@ -35,18 +36,36 @@ def test_one_byte_less_is_not_whole(tmp_path, version, order, extents, pack):
     content = nifti(version, order, extents, 16)
     path = tmp_path / "any"
     path.write_bytes(pack(content))
-    assert nifti_is_whole(path)
+    assert read_nifti_header(path).is_whole
     path.write_bytes(pack(content + b"more"))
-    assert nifti_is_whole(path)
+    assert read_nifti_header(path).is_whole
     path.write_bytes(pack(content[:-1]))
-    assert not nifti_is_whole(path)
+    assert not read_nifti_header(path).is_whole
     path.write_bytes(pack(content)[:-1])
-    assert not nifti_is_whole(path)
+    header = read_nifti_header(path)
+    assert header is None or not header.is_whole
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 400, b"\x1f\x8b", b"text " * 200])
 def test_something_else_is_not_whole(tmp_path, content):
     path = tmp_path / "any"
     path.write_bytes(content)
-    assert not nifti_is_whole(path)
-    assert not nifti_is_whole(tmp_path / "missing")
+    assert read_nifti_header(path) is None
+    assert read_nifti_header(tmp_path / "missing") is None
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize(("unit", "in_mm"), [(0, 1.0), (1, 1000.0), (2 + 8, 1.0), (3, 0.001)])
+def test_the_affine_map_is_in_lps_and_mm(tmp_path, version, order, unit, in_mm):
+    content = bytearray(nifti(version, order, (4, 5, 6), 16))
+    ras = np.array([[0.5, 0.0, 0.25, 1.0], [0.0, 2.0, 0.0, -3.0], [0.0, 0.0, 4.0, 7.0]])
+    (tmp_path / "any").write_bytes(content)
+    assert read_nifti_header(tmp_path / "any").lps_from_index is None
+    at = (254, "h", 280, "12f", 123, "b") if version == 1 else (348, "i", 400, "12d", 500, "i")
+    struct.pack_into(order + at[1], content, at[0], 2)
+    struct.pack_into(order + at[3], content, at[2], *ras.ravel())
+    struct.pack_into(order + at[5], content, at[4], unit)
+    (tmp_path / "any").write_bytes(content)
+    expected = in_mm * ras * [[-1.0], [-1.0], [1.0]]
+    np.testing.assert_allclose(read_nifti_header(tmp_path / "any").lps_from_index[:3], expected)
