@@ -2,6 +2,7 @@
 
 import logging
 import traceback
+import warnings
 
 import pytest
 
@@ -46,6 +47,18 @@ def test_warnings_and_source_do_not_name_the_patient(folder, caplog, capfd):
     assert ct.source.description == "Knee of [hidden] 1.0"
     said = [*ct.warnings, repr(ct.source), *map(str, infos), repr(infos), caplog.text]
     assert_no_secret(" ".join(said))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_pydicom_quotes_is_not_heard(folder, caplog, capfd):
+    # A UID that is none draws a warning that quotes it.
+    for file in write(folder, FrameOfReferenceUID="1.2.3.4.5"):
+        file.write_bytes(file.read_bytes().replace(b"1.2.3.4.5", b"Zebrowska"))
+    with caplog.at_level(logging.DEBUG), warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        read_ct(folder)
+    assert said == []
+    assert caplog.text == ""
     assert capfd.readouterr() == ("", "")
 
 

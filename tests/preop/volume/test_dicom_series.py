@@ -146,6 +146,17 @@ def test_a_range_of_padding_reads_as_air(tmp_path):
     assert_in_place(read_ct(tmp_path).volume, series, expected)
 
 
+def test_padding_is_rescaled_like_any_value(tmp_path):
+    series = axial(RescaleSlope=2, RescaleIntercept=-24, PixelPaddingValue=800)
+    series.stored[:, 0, :3] = 800
+    # 776 HU: where the padding would be without the slope.
+    series.stored[0, 1, 1] = 400
+    series.write(tmp_path)
+    expected = np.maximum(2 * series.stored - 24, -1024)
+    expected[series.stored == 800] = -1024
+    assert_in_place(read_ct(tmp_path).volume, series, expected)
+
+
 @pytest.mark.parametrize("compressor", ["JPEG2000", "JPEG"])
 def test_compressed_slices_are_read(tmp_path, compressor):
     series = axial()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import SimpleITK as sitk  # noqa: N813
 
-from navapp.preop.volume.itk_package import codecs_heard, lps_from_index_of, voxels_of
+from navapp.preop.volume.itk_package import codecs_heard, lps_from_index_of, simple_itk, voxels_of
 
 
 def test_what_is_written_to_the_terminal_by_a_codec_is_heard_and_not_shown(capfd):
@@ -27,6 +27,10 @@ def test_the_terminal_comes_back_after_an_error(capfd):
     os.write(2, b"shown\n")
     assert capfd.readouterr().err == "shown\n"
     assert len(os.listdir("/proc/self/fd")) == n_open
+
+
+def test_warnings_of_the_package_are_off():
+    assert not simple_itk().ProcessObject.GetGlobalWarningDisplay()
 
 
 def test_a_matrix_is_what_simpleitk_does_with_an_index():

@@ -102,6 +102,17 @@ def test_values_beyond_16_bit_are_kept(tmp_path):
     assert read_ct(tmp_path / "ct.nrrd").volume.hu.max() == 60000.0
 
 
+def test_what_the_content_says_is_told_with_the_rest(tmp_path):
+    values = HU.copy()
+    values[1:3, 1:3, 1:3] = 3071
+    with_sform(tmp_path / "ct.nii", [[-0.5, 0, 0, 3], [0, -0.8, 0.2, 1], [0, 0, 1, 7]], (0, 1))
+    write(tmp_path / "metal.mha", values)
+    assert any("metal" in said for said in read_ct(tmp_path / "metal.mha").warnings)
+    said = read_ct(tmp_path / "ct.nii").warnings
+    assert any("right angles" in text for text in said)
+    assert any("field of view" in text for text in said)
+
+
 def test_a_file_that_names_no_space_is_read_with_a_warning(tmp_path):
     write(tmp_path / "ct.nii", HU)
     content = bytearray((tmp_path / "ct.nii").read_bytes())
