@@ -1,11 +1,13 @@
 """DICOM series written for tests, and the check that every voxel was read where it was written."""
 
+import locale
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pydicom
+import SimpleITK as sitk  # noqa: N813
 from pydicom.dataset import FileDataset, FileMetaDataset
 from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, generate_uid
 
@@ -37,6 +39,29 @@ class Series:
         files = [folder / name for name in names]
         for k, file in enumerate(files):
             self.dataset(k).save_as(file, enforce_file_format=True)
+        return files
+
+    def write_compressed(self, folder: Path, compressor: str) -> list[Path]:
+        """The same by SimpleITK with "JPEG" (lossless) or "JPEG2000"; stacks along z only."""
+        files = [folder / f"slice{k}.dcm" for k in range(len(self.stored))]
+        writer = sitk.ImageFileWriter()
+        writer.KeepOriginalImageUIDOn()
+        writer.UseCompressionOn()
+        writer.SetCompressor(compressor)
+        # GDCM's writer leaves another locale behind.
+        locale_before = locale.setlocale(locale.LC_CTYPE)
+        for file, picture, place in zip(files, self.stored, self.positions_mm, strict=True):
+            image = sitk.GetImageFromArray(picture.astype(np.int16)[None])
+            image.SetSpacing((*self.pixel_mm[::-1], 2.0))
+            image.SetOrigin(place.tolist())
+            for key, value in (
+                ("0008|0060", "CT"), ("0020|000e", UID), ("0020|0052", "1.2.3"),
+                ("0020|0032", "\\".join(map(str, place))), ("0020|0037", "1\\0\\0\\0\\1\\0"),
+            ):  # fmt: skip
+                image.SetMetaData(key, value)
+            writer.SetFileName(str(file))
+            writer.Execute(image)
+        locale.setlocale(locale.LC_CTYPE, locale_before)
         return files
 
     def dataset(self, k: int) -> FileDataset:
