@@ -79,7 +79,7 @@ def stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
     if off.max() > tolerance:
         at = int(off.argmax())
         raise folder.refused(
-            f"has slices that are shifted against each other, first by {off[at]:.2f} mm "
+            f"has slices that are shifted against each other, by up to {off[at]:.2f} mm "
             f"between {_at(positions[at])} and {_at(positions[at + 1])}",
             _AGAIN,
         )
