@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-HEAVY = ("open3d", "depthai", "textual", "SimpleITK", "pygame", "numba", "scipy", "cv2", "serial")
+HEAVY = (
+    "open3d", "depthai", "textual", "SimpleITK", "pydicom", "pygame", "numba", "scipy", "cv2",
+    "serial",
+)  # fmt: skip
 
 
 def modules_after(statement: str) -> set[str]:
@@ -24,7 +27,12 @@ def test_the_command_line_starts_without_any_heavy_package() -> None:
 
 def test_the_whole_line_runs_without_hardware_packages_and_open3d() -> None:
     loaded = modules_after("import navapp.control.controller, navapp.devices, navapp.cli.run")
-    assert not loaded & {"open3d", "depthai", "textual", "serial", "pygame"}
+    hardware = {"depthai", "serial", "pygame"}
+    assert not loaded & (hardware | {"open3d", "textual", "SimpleITK", "pydicom"})
+
+
+def test_a_ct_reader_that_is_not_used_loads_nothing() -> None:
+    assert not modules_after("import navapp.preop.volume") & {"SimpleITK", "pydicom"}
 
 
 def test_what_is_missing_is_told_without_what_may_be_missing() -> None:
@@ -74,6 +82,7 @@ def test_the_contracts_hold(checkout: Path) -> None:
 BREACHES = [
     ("navapp/geometry/camera.py", "import navapp.values", "the rooms of navapp"),
     ("navapp/tracking/line.py", "import sim_devices.truth", "the pipeline never sees"),
+    ("navapp/tracking/line.py", "import pydicom", "only planning reads a CT"),
     ("navapp/tracking/judge.py", "import navapp.overlay", "tracking stands on"),
     ("navapp/control/pursuit.py", "import sim_devices.world", "control is handed"),
     ("navapp/control/states.py", "import navapp.inventory.looking", "control is handed"),

@@ -39,6 +39,8 @@ _PACKAGES = (
     _Package("pydantic", "pydantic", "configuration"),
     _Package("textual", "textual.app", "operator's screen"),
     _Package("open3d-cpu", "open3d", "referee in tests", lambda c: False),
+    _Package("simpleitk", "SimpleITK", "reading a CT", lambda c: False),
+    _Package("pydicom", "pydicom", "reading a CT from DICOM", lambda c: False),
     _Package("depthai", "depthai", "OAK cameras", lambda c: c.camera.backend == "depthai"),
     _Package("pyserial", "serial", "projector and mirror lines", _has_a_line),
     _Package("pygame-ce", "pygame", "window", lambda c: c.display.backend == "window"),

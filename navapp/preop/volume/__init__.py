@@ -1,0 +1,16 @@
+"""A CT as it was recorded: voxels in HU and where each of them lies, checked before use."""
+
+from navapp.preop.volume.ct_volume import CtVolume, LabelVolume
+from navapp.preop.volume.dicom_listing import SeriesInfo, list_series
+from navapp.preop.volume.reading import CtSource, ReadCt, read_ct, read_labels
+
+__all__ = [
+    "CtSource",
+    "CtVolume",
+    "LabelVolume",
+    "ReadCt",
+    "SeriesInfo",
+    "list_series",
+    "read_ct",
+    "read_labels",
+]
