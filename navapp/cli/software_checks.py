@@ -38,7 +38,7 @@ _PACKAGES = (
     _Package("opencv-python-headless", "cv2", "pictures and stereo"),
     _Package("pydantic", "pydantic", "configuration"),
     _Package("textual", "textual.app", "operator's screen"),
-    _Package("open3d-cpu", "open3d", "referee in tests", lambda c: False),
+    _Package("open3d-cpu", "open3d", "surfaces of a CT, a file's cartilage", lambda c: False),
     _Package("simpleitk", "SimpleITK", "reading a CT", lambda c: False),
     _Package("pydicom", "pydicom", "reading a CT from DICOM", lambda c: False),
     _Package("depthai", "depthai", "OAK cameras", lambda c: c.camera.backend == "depthai"),

@@ -1,0 +1,116 @@
+"""Bone surfaces of a segmented CT, where the cortex's edge is and not where a threshold puts it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.simplify import simplified
+from navapp.geometry.transform import FloatArray
+from navapp.preop.ct_surface.blur import axial_share
+from navapp.preop.ct_surface.cortex_model import Scan, sample_positions_mm
+from navapp.preop.ct_surface.isosurface import surface_around
+from navapp.preop.ct_surface.profiles import along, cubic
+from navapp.preop.ct_surface.refinement import refine_surface
+from navapp.preop.ct_surface.scan_estimate import UNKNOWN_SCAN, estimate_scan
+from navapp.preop.segmentation import Segmentation
+from navapp.preop.volume import CtVolume, LabelVolume
+
+# How far a surface may be off in each round: a voxel of any threshold first.
+_REACHES_MM = (1.5, 0.6, 0.6)
+# Profiles that tell what the scanner did, drawn evenly from all bones.
+_N_PROFILES = 1000
+# The model that is worked with: what a camera can tell needs no more.
+_WORKING_VERTICES, _WORKING_WITHIN_MM = 7000, 0.1
+# The flat end of a cut shaft: its rim is rounded by smoothing.
+_CUT_VOXELS = 0.75
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoneSurface:
+    """One bone.
+
+    Attributes:
+        mesh: LPS mm, closed, normals outward.
+        is_cut: (V,) the flat end where the volume cuts the shaft: no anatomy.
+        is_measured: (V,) the density there told the edge.
+    """
+
+    mesh: TriangleMesh
+    is_cut: NDArray[np.bool_]
+    is_measured: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CtSurfaces:
+    """Surfaces by name, and what the scanner was found to do."""
+
+    bones: Mapping[str, BoneSurface]
+    scan: Scan
+
+
+def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: None) -> CtSurfaces:
+    """The surface of each named bone.
+
+    In each round the scanner is estimated on the surfaces so far, and they are moved with it:
+    normals that lean make its blur look wider than it is.
+    """
+    tell("laying first surfaces")
+    density = cubic(found.ct)
+    bones = {name: _first_surface(found, number) for name, number in found.names.items()}
+    scan = UNKNOWN_SCAN
+    for reach_mm in _REACHES_MM:
+        tell("estimating the density of cortex and the blur of the scanner")
+        scan = _scan(bones, found.ct, density, reach_mm, scan)
+        for name, bone in bones.items():
+            tell(f"finding the edge of the {name}")
+            is_other = (found.bones > 0) & (found.bones != found.names[name])
+            refined = refine_surface(
+                bone.mesh, bone.is_cut, found.ct, is_other, density, scan, reach_mm
+            )
+            bones[name] = BoneSurface(refined.mesh, bone.is_cut, refined.is_measured)
+    return CtSurfaces({name: _working(bone, found.ct) for name, bone in bones.items()}, scan)
+
+
+def surface_of_labels(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
+    """The surface of a ready segmentation: voxels are all that is known of it."""
+    mesh = surface_around(mask, volume)
+    surface = BoneSurface(mesh, _is_cut(mesh, volume), np.zeros(len(mesh.vertices_mm), dtype=bool))
+    return _working(surface, volume)
+
+
+def _working(surface: BoneSurface, volume: CtVolume | LabelVolume) -> BoneSurface:
+    """In as few triangles as keep every vertex within a tenth of a millimetre."""
+    from scipy.spatial import cKDTree
+
+    mesh = simplified(surface.mesh, _WORKING_VERTICES, _WORKING_WITHIN_MM)
+    _, nearest = cKDTree(surface.mesh.vertices_mm).query(mesh.vertices_mm)
+    return BoneSurface(mesh, _is_cut(mesh, volume), surface.is_measured[nearest])
+
+
+def _first_surface(found: Segmentation, number: int) -> BoneSurface:
+    mesh = surface_around(found.bones == number, found.ct)
+    return BoneSurface(mesh, _is_cut(mesh, found.ct), np.zeros(len(mesh.vertices_mm), dtype=bool))
+
+
+def _scan(
+    bones: Mapping[str, BoneSurface],
+    ct: CtVolume,
+    density: Callable[[FloatArray], FloatArray],
+    reach_mm: float,
+    start: Scan,
+) -> Scan:
+    points = np.concatenate([bone.mesh.vertices_mm[~bone.is_cut] for bone in bones.values()])
+    normals = np.concatenate([bone.mesh.normals[~bone.is_cut] for bone in bones.values()])
+    every = np.linspace(0, len(points) - 1, min(_N_PROFILES, len(points))).astype(np.intp)
+    profiles = along(points[every], normals[every], sample_positions_mm(), density)
+    return estimate_scan(profiles, axial_share(ct, normals[every]), reach_mm, start)
+
+
+def _is_cut(mesh: TriangleMesh, volume: CtVolume | LabelVolume) -> NDArray[np.bool_]:
+    indices = volume.indices_of(mesh.vertices_mm)
+    last = np.array(volume.size) - 1
+    is_beyond = (indices < _CUT_VOXELS) | (indices > last - _CUT_VOXELS)
+    return np.asarray(is_beyond.any(axis=1))

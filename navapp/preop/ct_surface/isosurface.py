@@ -1,0 +1,47 @@
+"""The first surface of a bone: around its voxels, smooth, closed."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.simplify import simplified
+from navapp.preop.segmentation.masks import bounds
+from navapp.preop.volume import CtVolume, LabelVolume
+
+_SMOOTHING_MM = 0.6
+_PADDING = 4
+# One vertex a square millimetre is as much as a CT can tell.
+_VERTICES_PER_MM2 = 1.0
+_WITHIN_MM = 0.3
+
+
+def surface_around(mask: NDArray[np.bool_], volume: CtVolume | LabelVolume) -> TriangleMesh:
+    """A closed surface around the voxels of a mask, LPS mm, normals outward.
+
+    Args:
+        mask: (D, H, W) of the volume's voxels; where the volume ends the surface is closed flat.
+        volume: says where the voxels are.
+    """
+    import open3d
+    from scipy.ndimage import gaussian_filter
+
+    box = bounds(mask, np.zeros(3, dtype=np.intp))
+    padded = np.pad(mask[box], _PADDING).astype(np.float32)
+    smooth = gaussian_filter(padded, _SMOOTHING_MM / volume.spacing_mm[::-1], truncate=3.0)
+    found = open3d.t.geometry.TriangleMesh.create_isosurfaces(
+        open3d.core.Tensor.from_numpy(np.ascontiguousarray(smooth)), [0.5]
+    )
+    # Its points are ordered as indices i, j, k.
+    indices = found.vertex.positions.numpy().astype(np.float64) - _PADDING
+    indices += [edge.start for edge in box[::-1]]
+    faces = found.triangle.indices.numpy().astype(np.int32)
+    mesh = TriangleMesh(volume.points_lps_mm(indices), faces).largest_component()
+    if mesh.volume_mm3() < 0.0:
+        mesh = mesh.flipped()
+    return simplified(mesh, int(_VERTICES_PER_MM2 * area_mm2(mesh)), _WITHIN_MM)
+
+
+def area_mm2(mesh: TriangleMesh) -> float:
+    """Area of a surface."""
+    a, b, c = (mesh.vertices_mm[mesh.faces[:, corner]] for corner in range(3))
+    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())

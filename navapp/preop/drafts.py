@@ -1,0 +1,146 @@
+"""Drafts of plans: bones out of a CT or a ready segmentation, with all there is to say of them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from navapp.errors import PlanError, UsageError
+from navapp.geometry.transform import FloatArray
+from navapp.preop.ct_surface import BoneSurface, surface_of_labels, surfaces_of
+from navapp.preop.plan_origin import PlanOrigin
+from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU, NO_SEEDS, segment
+from navapp.preop.slices import draw_slices
+from navapp.preop.volume import CtVolume, LabelVolume, ReadCt
+from navapp.values import BoneModel, Side
+
+# Bones that are followed; the fibula is found to keep it apart, and to tell the side.
+FOLLOWED = ("femur", "tibia", "patella")
+_LEAST_LABEL_MM3 = 1000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CtSettings:
+    """What an operator may override.
+
+    Attributes:
+        threshold_hu: what is denser may be bone; the surface does not depend on it.
+        seeds: name -> (3,) LPS point in that bone.
+        region_mm: (x0, x1, y0, y1, z0, z1) LPS box to look at; None for all.
+        side: of the knee; None to be estimated.
+    """
+
+    threshold_hu: float = DEFAULT_THRESHOLD_HU
+    seeds: Mapping[str, FloatArray] = field(default_factory=lambda: NO_SEEDS)
+    region_mm: tuple[float, float, float, float, float, float] | None = None
+    side: Side | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draft:
+    """Bones before they become a plan.
+
+    Attributes:
+        bones: name -> model, those that are followed.
+        origin: facts for people.
+        beside: bones that are not followed (the fibula), which tell the side.
+        slices: bone -> PNG of three slices of the volume with the surface's contour.
+    """
+
+    bones: Mapping[str, BoneModel]
+    origin: PlanOrigin
+    beside: Mapping[str, BoneModel] = field(default_factory=dict)
+    slices: Mapping[str, bytes] = field(default_factory=dict)
+
+
+def draft_from_ct(
+    read: ReadCt, settings: CtSettings | None = None, tell: Callable[[str], None] = lambda _: None
+) -> Draft:
+    """Bones of a CT of one knee, no seeds needed.
+
+    Raises:
+        PlanError: there is no bone, no knee, more than one, or a region without any.
+    """
+    settings = settings or CtSettings()
+    ct = read.volume if settings.region_mm is None else _within(read.volume, settings.region_mm)
+    found = segment(ct, settings.threshold_hu, settings.seeds, tell)
+    surfaces = surfaces_of(found, tell)
+    tell("drawing")
+    scan = surfaces.scan
+    origin = PlanOrigin(
+        "CT",
+        read.source.description,
+        tuple(float(step) for step in read.volume.spacing_mm),
+        read.volume.size,
+        settings.threshold_hu,
+        scan.cortex_hu,
+        (scan.blur_in_plane_mm, scan.blur_axial_mm),
+        {name: float(bone.is_measured.mean()) for name, bone in surfaces.bones.items()},
+        (*read.warnings, *found.warnings),
+    )
+    side = settings.side
+    slices = {name: draw_slices(found.ct, surface.mesh) for name, surface in surfaces.bones.items()}
+    return _draft(surfaces.bones, side, origin, slices)
+
+
+def draft_from_labels(
+    volume: LabelVolume, values: Mapping[str, int], side: Side | None = None
+) -> Draft:
+    """Bones of a ready segmentation, taken as it is.
+
+    Raises:
+        UsageError: a value that the segmentation does not hold.
+        PlanError: a label too small for a bone.
+    """
+    surfaces, slices = {}, {}
+    for name, value in values.items():
+        mask = volume.labels == value
+        if not mask.any():
+            there = ", ".join(str(v) for v in np.unique(volume.labels)[:20] if v)
+            raise UsageError(
+                f"--label {name}={value}: the segmentation holds no such value",
+                remedy=f"it holds {there}",
+            )
+        if float(mask.sum() * np.prod(volume.spacing_mm)) < _LEAST_LABEL_MM3:
+            raise PlanError(
+                f"label {value} for the {name} fills less than a cubic centimetre",
+                remedy="give the value of the whole bone",
+            )
+        surfaces[name] = surface_of_labels(mask, volume)
+        slices[name] = draw_slices(volume, surfaces[name].mesh)
+    origin = PlanOrigin("labels", "", tuple(float(step) for step in volume.spacing_mm), volume.size)
+    return _draft(surfaces, side, origin, slices)
+
+
+def _draft(
+    surfaces: Mapping[str, BoneSurface],
+    side: Side | None,
+    origin: PlanOrigin,
+    slices: Mapping[str, bytes],
+) -> Draft:
+    models = {
+        name: BoneModel(name, surface.mesh, side, is_removed=surface.is_cut)
+        for name, surface in surfaces.items()
+    }
+    return Draft(
+        {name: models[name] for name in FOLLOWED if name in models},
+        origin,
+        {name: model for name, model in models.items() if name not in FOLLOWED},
+        slices,
+    )
+
+
+def _within(ct: CtVolume, region_mm: tuple[float, ...]) -> CtVolume:
+    """The smallest box of voxels that holds an LPS region."""
+    x0, x1, y0, y1, z0, z1 = region_mm
+    corners = np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (z0, z1)])
+    indices = ct.indices_of(corners)
+    lower = np.clip(np.floor(indices.min(axis=0)).astype(int), 0, ct.size)
+    upper = np.clip(np.ceil(indices.max(axis=0)).astype(int) + 1, 0, ct.size)
+    if (upper - lower < 2).any():
+        middle = ct.points_lps_mm(np.array([ct.size]) / 2.0)[0]
+        raise UsageError(
+            "--region lies outside the CT",
+            remedy="its middle is at " + ", ".join(f"{value:.0f}" for value in middle) + " (LPS)",
+        )
+    return ct.cropped(lower, upper)

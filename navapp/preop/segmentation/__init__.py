@@ -1,0 +1,10 @@
+"""From the density of a CT to named bones."""
+
+from navapp.preop.segmentation.segment import (
+    DEFAULT_THRESHOLD_HU,
+    NO_SEEDS,
+    Segmentation,
+    segment,
+)
+
+__all__ = ["DEFAULT_THRESHOLD_HU", "NO_SEEDS", "Segmentation", "segment"]

@@ -1,0 +1,75 @@
+"""Masks of voxels: distances, components, closing; SimpleITK underneath, which uses every core.
+
+Masks are (D, H, W) bool arrays with axes k, j, i; spacings are (3,) mm of i, j, k. Distances are
+those of a lattice at right angles: in a stack that leans they are off by what it leans.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray
+from navapp.preop.volume.itk_package import simple_itk, voxels_of
+
+BoolArray = NDArray[np.bool_]
+LabelArray = NDArray[np.int32]
+
+
+def as_image(voxels: NDArray[Any], spacing_mm: FloatArray) -> Any:
+    """The voxels as a SimpleITK image; a mask as bytes."""
+    values = voxels.astype(np.uint8) if voxels.dtype == np.bool_ else voxels
+    image = simple_itk().GetImageFromArray(values)
+    image.SetSpacing([float(step) for step in spacing_mm])
+    return image
+
+
+def depth_mm(mask: BoolArray, spacing_mm: FloatArray) -> NDArray[np.float32]:
+    """How far each voxel lies inside a mask: positive inside, negative outside, 0 at its rim."""
+    image = simple_itk().SignedMaurerDistanceMap(as_image(mask, spacing_mm), True, False, True)
+    depth: NDArray[np.float32] = voxels_of(image)
+    return depth
+
+
+def components(mask: BoolArray, spacing_mm: FloatArray, least_mm3: float) -> LabelArray:
+    """Connected parts (by faces) of at least a volume, 1 for the largest and so on, 0 for none."""
+    itk = simple_itk()
+    least = max(1, int(np.ceil(least_mm3 / float(np.prod(spacing_mm)))))
+    parts = itk.ConnectedComponent(as_image(mask, spacing_mm), False)
+    sorted_parts = itk.RelabelComponent(parts, minimumObjectSize=least)
+    return voxels_of(sorted_parts).astype(np.int32)
+
+
+def largest(mask: BoolArray, spacing_mm: FloatArray) -> BoolArray:
+    """The largest connected part."""
+    part: BoolArray = components(mask, spacing_mm, 0.0) == 1
+    return part
+
+
+def closed(mask: BoolArray, spacing_mm: FloatArray, radius_mm: float) -> BoolArray:
+    """The mask with gaps closed that are narrower than twice a radius, and its holes filled."""
+    margin = np.ceil(radius_mm / spacing_mm).astype(int) + 2
+    room = [(int(n), int(n)) for n in margin[::-1]]
+    grown = depth_mm(np.pad(mask, room), spacing_mm) >= -radius_mm
+    shut = depth_mm(grown, spacing_mm) > radius_mm
+    shut |= np.pad(mask, room)
+    filled = simple_itk().BinaryFillhole(as_image(shut, spacing_mm))
+    inner = tuple(slice(n, -n) for n, _ in room)
+    result: BoolArray = voxels_of(filled).astype(bool)[inner]
+    return result
+
+
+def bounds(mask: BoolArray, margin: NDArray[np.intp]) -> tuple[slice, slice, slice]:
+    """The box (k, j, i) of what is set, widened by margins in voxels (k, j, i)."""
+    slices = []
+    for axis in range(3):
+        others = tuple(other for other in range(3) if other != axis)
+        set_at = np.flatnonzero(mask.any(axis=others))
+        first, last = int(set_at[0]), int(set_at[-1])
+        slices.append(
+            slice(
+                max(first - int(margin[axis]), 0),
+                min(last + int(margin[axis]) + 1, mask.shape[axis]),
+            )
+        )
+    return slices[0], slices[1], slices[2]
