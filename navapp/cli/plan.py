@@ -1,22 +1,26 @@
 """`navapp plan`: make a pre-operative plan, or show one."""
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.cli.plan_draft import aspects_of, drafted, with_cartilage
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
-    from navapp.preop import ImportedSurface
+    from navapp.preop import PlanOrigin
     from navapp.values import BoneModel, Plan
 
 _EXAMPLE = """\
 examples:
+  navapp plan --ct CT_FOLDER --out plans/knee
+  navapp plan --ct ct.nii.gz --seed femur=-70,-10,30 --out plans/knee
+  navapp plan --ct ct.nii.gz --region=-130,-20,-70,60,-60,60 --out plans/knee
+  navapp plan --labels labels.nrrd --label femur=5 --label tibia=6 --side right --out plans/knee
   navapp plan --surface femur=femur.ply --surface tibia=tibia.ply --side right --out plans/knee
-  navapp plan --surface femur=femur.ply --cartilage femur=cartilage.ply --out plans/knee
   navapp plan --surface femur=femur.ply --cartilage femur=2.0:0.6 --out plans/knee
   navapp plan show plans/knee
+points are LPS in mm; look at summary.html in the plan's folder before it is used
 """
 
 _CARTILAGE_HELP = """\
@@ -25,26 +29,18 @@ where it lies on the bone or further than 6 mm from it), or one mean thickness a
 deviation for the whole bone but its flat or open ends, each 0 to 10 mm. A surface's thickness is
 taken to be good to 0.4 mm: an assumption, about one voxel of the pictures it is segmented in"""
 
-_BONES = ("femur", "tibia", "patella")
-
 
 def add_parser(subparsers: Any) -> None:
     """Declare the verb."""
     parser = subparsers.add_parser(
         "plan",
-        help="make a pre-operative plan from bone surfaces, or show one",
+        help="make a pre-operative plan from a CT, a segmentation or surfaces, or show one",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("what", nargs="?", choices=("show",), help="show: print a plan's summary")
     parser.add_argument("folder", nargs="?", metavar="P", help="plan folder to show")
-    parser.add_argument(
-        "--surface",
-        action="append",
-        default=[],
-        metavar="NAME=FILE",
-        help="a bone's surface (PLY, LPS, mm); may be given for several bones",
-    )
+    _add_sources(parser)
     parser.add_argument(
         "--cartilage",
         action="append",
@@ -57,102 +53,83 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
 
+def _add_sources(parser: argparse.ArgumentParser) -> None:
+    source = parser.add_argument_group("what the plan is made from (one of these)")
+    source.add_argument(
+        "--ct", metavar="PATH", help="CT of one knee: a DICOM folder, or NIfTI, NRRD, MHA"
+    )
+    source.add_argument(
+        "--labels", metavar="FILE", help="ready segmentation (NIfTI, NRRD, MHA), with --label"
+    )
+    source.add_argument(
+        "--surface",
+        action="append",
+        default=[],
+        metavar="NAME=FILE",
+        help="a bone's surface (PLY, LPS, mm); may be given for several bones",
+    )
+    ct = parser.add_argument_group("with --ct")
+    ct.add_argument("--series", metavar="UID", help="which of several series in the folder")
+    ct.add_argument(
+        "--threshold",
+        type=float,
+        metavar="HU",
+        help="what is denser may be bone (200); the surface does not depend on it",
+    )
+    ct.add_argument(
+        "--seed", action="append", default=[], metavar="NAME=X,Y,Z", help="a point in that bone"
+    )
+    ct.add_argument("--region", metavar="X0,X1,Y0,Y1,Z0,Z1", help="box to look at")
+    labels = parser.add_argument_group("with --labels")
+    labels.add_argument(
+        "--label", action="append", default=[], metavar="NAME=VALUE", help="value of a bone"
+    )
+
+
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
-    from navapp.preop import read_plan
+    from navapp.preop import read_origin, read_plan
 
     check_writable(options.json)
     if options.what == "show":
-        if options.folder is None or options.surface or options.cartilage or options.out:
+        made_from = (options.surface, options.cartilage, options.ct, options.labels, options.out)
+        if options.folder is None or any(made_from):
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")
-        plan = read_plan(options.folder)
-        warnings: list[str] = []
+        plan, origin = read_plan(options.folder), read_origin(options.folder)
     else:
-        plan, warnings = _make(options)
-    for warning in warnings:
-        diagnostics.warn(warning)
-    write_json(options.json, "plan", _content(plan, warnings))
+        plan, origin = _made(options, diagnostics)
+        for warning in origin.warnings:
+            diagnostics.warn(warning)
+    write_json(options.json, "plan", _content(plan, origin))
     if options.json != "-":
-        diagnostics.say(_summary(plan))
+        diagnostics.say(_summary(plan, origin))
     return 0
 
 
-def _make(options: argparse.Namespace) -> "tuple[Plan, list[str]]":
-    from navapp.preop import import_surface, write_plan
+def _made(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[Plan, PlanOrigin]":
+    """The plan, written."""
+    from navapp.preop import check_place, write_plan
     from navapp.values import Plan
 
-    if not options.surface:
-        raise UsageError("no surface is given", remedy="add --surface femur=FILE")
+    sources = [options.ct is not None, options.labels is not None, bool(options.surface)]
+    if sum(sources) != 1:
+        raise UsageError(
+            "nothing to plan from" if not any(sources) else "more than one thing to plan from",
+            remedy="give one of --ct PATH, --labels FILE, --surface NAME=FILE",
+        )
     if options.out is None:
         raise UsageError("--out is missing", remedy="name the plan folder to write")
-    surfaces = _by_bone("--surface", options.surface, "FILE", "femur=femur.ply")
-    cartilages = _by_bone(
-        "--cartilage", options.cartilage, "FILE.ply or NAME=MEAN_MM:SD_MM", "femur=2.0:0.6"
-    )
-    for name in cartilages:
-        if name not in surfaces:
-            raise UsageError(
-                f"--cartilage names the {name}, which has no surface",
-                remedy=f"add --surface {name}=FILE",
-            )
-    bones = {}
-    warnings: list[str] = []
-    for name, path in surfaces.items():
-        imported = import_surface(name, path, options.side)
-        warnings += imported.warnings
-        if name in cartilages:
-            imported = _covered(imported.bone, cartilages[name])
-            warnings += imported.warnings
-        bones[name] = imported.bone
-    plan = Plan(bones, name=str(options.out).rstrip("/").rsplit("/", 1)[-1])
-    write_plan(options.out, plan)
-    return plan, warnings
+    check_place(options.out)
+    draft = drafted(options, diagnostics)
+    draft = with_cartilage(draft, options.cartilage)
+    aspects = aspects_of(draft.bones, diagnostics)
+    name = str(options.out).rstrip("/").rsplit("/", 1)[-1]
+    plan = Plan(draft.bones, aspects=aspects, name=name)
+    write_plan(options.out, plan, draft.origin, draft.slices)
+    return plan, draft.origin
 
 
-def _by_bone(option: str, entries: list[str], value: str, example: str) -> dict[str, str]:
-    """Values of an option that is given once a bone, in the order given."""
-    found: dict[str, str] = {}
-    for entry in entries:
-        name, equals, text = entry.partition("=")
-        if not equals or not name or not text:
-            raise UsageError(f"{option} {entry} is not NAME={value}", remedy=example)
-        if name not in _BONES:
-            raise UsageError(
-                f"{option}: '{name}' is no bone of the knee that is followed",
-                remedy="use femur, tibia or patella",
-            )
-        if name in found:
-            raise UsageError(
-                f"{option}: the {name} is given twice", remedy=f"give one {option} a bone"
-            )
-        found[name] = text
-    return found
-
-
-def _covered(bone: "BoneModel", text: str) -> "ImportedSurface":
-    """The bone with the cartilage of a file, or of MEAN_MM:SD_MM."""
-    from navapp.preop import ImportedSurface, even_cartilage, import_cartilage
-    from navapp.preop.cartilage import LARGEST_MM
-
-    if text.lower().endswith(".ply") or Path(text).is_file():
-        return import_cartilage(bone, text)
-    try:
-        mean_mm, sd_mm = (float(word) for word in text.split(":"))
-    except ValueError as error:
-        raise UsageError(
-            f"--cartilage {bone.name}={text} is neither a PLY file nor MEAN_MM:SD_MM",
-            remedy=f"{bone.name}=cartilage.ply or {bone.name}=2.0:0.6",
-        ) from error
-    for what, value_mm in (("mean", mean_mm), ("standard deviation", sd_mm)):
-        if not 0.0 <= value_mm <= LARGEST_MM:
-            raise UsageError(
-                f"--cartilage {bone.name}={text}: a {what} of {value_mm:g} mm is not possible",
-                remedy=f"give 0 to {LARGEST_MM:g} mm",
-            )
-    return ImportedSurface(even_cartilage(bone, mean_mm, sd_mm), ())
-
-
-def _content(plan: "Plan", warnings: list[str]) -> dict[str, Any]:
+def _content(plan: "Plan", origin: "PlanOrigin") -> dict[str, Any]:
     return {
         "bones": {
             name: {
@@ -164,8 +141,8 @@ def _content(plan: "Plan", warnings: list[str]) -> dict[str, Any]:
             }
             for name, bone in plan.bones.items()
         },
-        "ct": None,
-        "warnings": warnings,
+        "ct": origin.ct,
+        "warnings": list(origin.warnings),
         "hash": plan.digest,
     }
 
@@ -179,10 +156,13 @@ def _cartilage(bone: "BoneModel") -> dict[str, float] | None:
     return {"mean": found.mean_mm, "max": found.max_mm, "sd": found.sd_mm}
 
 
-def _summary(plan: "Plan") -> str:
+def _summary(plan: "Plan", origin: "PlanOrigin") -> str:
     from navapp.preop import figures_of
 
     lines = [f"plan {plan.name} ({plan.digest})"]
+    if origin.spacing_mm:
+        spacing = " x ".join(f"{step:.3g}" for step in origin.spacing_mm)
+        lines.append(f"  from {origin.kind}, voxels of {spacing} mm")
     for name, bone in plan.bones.items():
         size = " x ".join(f"{extent:.0f}" for extent in bone.mesh.size_mm)
         volume_cm3 = bone.mesh.volume_mm3() / 1000.0

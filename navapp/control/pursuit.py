@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job, JobCancelled
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.preop import build_aspects
@@ -242,8 +243,11 @@ class Pursuit:
         axis = prior.axis_for(name)
         if name in prior.left_from_bone or axis is None or name in self._edged:
             return self._line(stage)
-        bone = self._plan.bones[name]
-        aspects = build_aspects(bone, axis, prior.approach_half_angle_deg)
+        bone, built = self._plan.bones[name], self._plan.aspects.get(name)
+        if built is None:
+            aspects = build_aspects(bone, axis, prior.approach_half_angle_deg)
+        else:
+            aspects = built.within(ViewCone(axis, prior.approach_half_angle_deg))
         line = Line(self._rig, bone, self._settings, aspects)
         self._lines[name] = line
         self._edged.add(name)

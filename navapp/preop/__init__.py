@@ -1,20 +1,24 @@
-"""Before the operation: surfaces and targets become a plan."""
+"""Before the operation: a CT, a segmentation or surfaces become a plan."""
 
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.aspects import AspectSettings, build_aspects
 from navapp.preop.cartilage import even_cartilage, figures_of, import_cartilage
-from navapp.preop.plan_files import read_plan, write_plan
+from navapp.preop.plan_files import check_place, read_origin, read_plan, write_plan
+from navapp.preop.plan_origin import PlanOrigin
 from navapp.preop.surfaces import ImportedSurface, import_surface
 
 __all__ = [
     "AspectSettings",
     "ImportedSurface",
+    "PlanOrigin",
     "build_aspects",
+    "check_place",
     "even_cartilage",
     "figures_of",
     "import_cartilage",
     "import_surface",
     "read_aspects",
+    "read_origin",
     "read_plan",
     "write_aspects",
     "write_plan",

@@ -4,26 +4,43 @@ import hashlib
 import json
 import shutil
 import tempfile
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from navapp.errors import InputError, PlanError
 from navapp.geometry.transform import FloatArray
+from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.bone_files import read_bone, write_bone
+from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
 from navapp.preop.preview import draw_preview
-from navapp.values import BoneModel, Plan
+from navapp.preop.summary import summary_page
+from navapp.values import AspectGraph, BoneModel, Plan
 
 _FILE = "plan.json"
+NO_SLICES: Mapping[str, bytes] = MappingProxyType({})
 _CONVENTIONS = {"format": 1, "space": "LPS", "unit": "mm"}
 
 
-def write_plan(folder: str | Path, plan: Plan) -> None:
+def write_plan(
+    folder: str | Path,
+    plan: Plan,
+    origin: PlanOrigin | None = None,
+    slices: Mapping[str, bytes] = NO_SLICES,
+) -> None:
     """Write a plan folder whole: it appears complete or not at all.
 
     An older plan at the same place is replaced; any other folder with something in it is refused.
+
+    Args:
+        folder: of the plan.
+        plan: what is written.
+        origin: where its surfaces come from; None for nothing known.
+        slices: bone -> PNG of its contour in the volume, for its picture.
 
     Raises:
         PlanError: the place is taken by something that is not a plan, or cannot be written.
@@ -31,25 +48,35 @@ def write_plan(folder: str | Path, plan: Plan) -> None:
     folder = Path(folder)
     if not plan.bones:
         raise PlanError("a plan needs at least one bone", remedy="give --surface femur=FILE")
-    if folder.exists() and not (folder / _FILE).is_file() and any(_entries(folder)):
-        raise PlanError(
-            f"{folder} exists and is not a plan",
-            subject=str(folder),
-            remedy="choose a new folder for --out",
-        )
+    check_place(folder)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     except OSError as error:
         raise _not_written(folder, error) from error
     try:
-        _write_content(temporary, plan)
+        _write_content(temporary, plan, origin or PlanOrigin(), slices)
         temporary.chmod(0o755)
         _put_in_place(temporary, folder)
     except OSError as error:
         raise _not_written(folder, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_place(folder: str | Path) -> None:
+    """Refuse a place that is taken by something else, before the work begins.
+
+    Raises:
+        PlanError: there is something at that place that is not a plan.
+    """
+    folder = Path(folder)
+    if folder.exists() and not (folder / _FILE).is_file() and any(_entries(folder)):
+        raise PlanError(
+            f"{folder} exists and is not a plan",
+            subject=str(folder),
+            remedy="choose a new folder for --out",
+        )
 
 
 def read_plan(folder: str | Path) -> Plan:
@@ -72,6 +99,7 @@ def read_plan(folder: str | Path) -> Plan:
             bones,
             {name: _points(points) for name, points in content["targets"].items()},
             {name: _points(points) for name, points in content["curves"].items()},
+            _read_aspects(folder, content["bones"]),
             name=folder.name,
         )
     except (
@@ -97,6 +125,32 @@ def read_plan(folder: str | Path) -> Plan:
     return plan
 
 
+def read_origin(folder: str | Path) -> PlanOrigin:
+    """Where the surfaces of a plan come from; nothing known of a plan without that entry.
+
+    Raises:
+        PlanError: missing or damaged.
+    """
+    folder = Path(folder)
+    try:
+        content = _read_content(folder)
+        return origin_from_json(content["origin"]) if "origin" in content else PlanOrigin()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise _damaged(folder, str(error)) from error
+
+
+def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGraph]:
+    aspects = {}
+    for name, entry in bones.items():
+        if entry.get("aspects_sha256") is None:
+            continue
+        path = folder / f"aspects_{name}.npz"
+        if not path.is_file() or _sha256(path) != entry["aspects_sha256"]:
+            raise _damaged(folder, f"{path.name} is missing or was changed")
+        aspects[name] = read_aspects(path)
+    return aspects
+
+
 def _read_content(folder: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads((folder / _FILE).read_text(encoding="utf-8"))
     if any(content[key] != value for key, value in _CONVENTIONS.items()):
@@ -105,6 +159,8 @@ def _read_content(folder: Path) -> dict[str, Any]:
             subject=str(folder),
             remedy="make it again with `navapp plan`",
         )
+    if "file_hash" in content and content["file_hash"] != _hash_of(content):
+        raise _damaged(folder, f"{_FILE} was edited")
     return content
 
 
@@ -112,27 +168,49 @@ def _entries(folder: Path) -> list[Path]:
     return list(folder.iterdir()) if folder.is_dir() else [folder]
 
 
-def _write_content(folder: Path, plan: Plan) -> None:
+def _write_content(
+    folder: Path, plan: Plan, origin: PlanOrigin, slices: Mapping[str, bytes]
+) -> None:
     bones: dict[str, Any] = {}
     for name, bone in plan.bones.items():
         file = f"{name}.ply"
         write_bone(folder / file, bone)
-        (folder / f"preview_{name}.png").write_bytes(draw_preview(bone.mesh))
+        (folder / f"preview_{name}.png").write_bytes(draw_preview(bone.mesh, slices.get(name)))
         bones[name] = {
             "file": file,
             "sha256": _sha256(folder / file),
             "side": bone.side,
             "version": bone.version,
             "removed": np.flatnonzero(bone.is_removed).tolist(),
+            "aspects_sha256": _write_aspects(folder, plan, name),
         }
     content = {
         **_CONVENTIONS,
         "bones": bones,
         "targets": {name: points.tolist() for name, points in plan.targets.items()},
         "curves": {name: points.tolist() for name, points in plan.curves.items()},
+        "origin": origin_to_json(origin),
         "hash": plan.digest,
     }
+    content["file_hash"] = _hash_of(content)
     (folder / _FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
+    page = summary_page(plan, origin, folder)
+    (folder / "summary.html").write_text(page, encoding="utf-8")
+
+
+def _write_aspects(folder: Path, plan: Plan, name: str) -> str | None:
+    if name not in plan.aspects:
+        return None
+    path = folder / f"aspects_{name}.npz"
+    write_aspects(path, plan.aspects[name])
+    return _sha256(path)
+
+
+def _hash_of(content: Mapping[str, Any]) -> str:
+    """Of everything in plan.json but itself: no fact can be edited unseen."""
+    rest = {key: value for key, value in content.items() if key != "file_hash"}
+    text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
 def _put_in_place(temporary: Path, folder: Path) -> None:

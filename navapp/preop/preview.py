@@ -18,8 +18,13 @@ _VIEWS = (
 )
 
 
-def draw_preview(mesh: TriangleMesh) -> bytes:
-    """PNG with three shaded views side by side."""
+def draw_preview(mesh: TriangleMesh, slices: bytes | None = None) -> bytes:
+    """PNG with three shaded views side by side.
+
+    Args:
+        mesh: LPS mm.
+        slices: PNG to put above them.
+    """
     import cv2
 
     pictures = []
@@ -27,7 +32,14 @@ def draw_preview(mesh: TriangleMesh) -> bytes:
         picture = _shaded(mesh, np.array(rotation, dtype=np.float64))
         cv2.putText(picture, title, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (220, 220, 220), 1)
         pictures.append(picture)
-    _, encoded = cv2.imencode(".png", np.hstack(pictures))
+    picture = np.hstack(pictures)
+    if slices is not None:
+        above = np.asarray(cv2.imdecode(np.frombuffer(slices, np.uint8), cv2.IMREAD_COLOR))
+        width = max(above.shape[1], picture.shape[1])
+        picture = np.vstack([
+            np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in (above, picture)
+        ])  # fmt: skip
+    _, encoded = cv2.imencode(".png", picture)
     return encoded.tobytes()
 
 

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh, vertex_normals
 from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
@@ -108,6 +109,23 @@ class AspectGraph:
 
     def __len__(self) -> int:
         return len(self.directions)
+
+    def within(self, cone: ViewCone) -> "AspectGraph":
+        """The views from inside a cone; the nearest one when none is."""
+        away_deg = cone.off_axis_deg(self.directions)
+        kept = np.flatnonzero(away_deg <= cone.half_angle_deg)
+        if len(kept) == 0 and len(away_deg):
+            kept = np.array([int(away_deg.argmin())])
+        of_point = np.repeat(np.arange(len(self)), np.diff(self.starts))
+        is_kept = np.isin(of_point, kept)
+        sizes = np.diff(self.starts)[kept]
+        return AspectGraph(
+            self.bone,
+            self.directions[kept],
+            np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+            self.points_mm[is_kept],
+            self.tangents[is_kept],
+        )
 
 
 def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:

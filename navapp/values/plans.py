@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.values.bones import BoneModel
+from navapp.values.bones import AspectGraph, BoneModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +47,7 @@ class Plan:
         bones: name -> model.
         targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
         curves: name -> (N, 3) polylines beside the femur (vessels, nerves), mm.
+        aspects: bone -> its edges from all around, where they were built beforehand.
         digest: hash of the content.
         name: for people.
     """
@@ -54,6 +55,7 @@ class Plan:
     bones: Mapping[str, BoneModel]
     targets: Mapping[str, FloatArray] = field(default_factory=dict)
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
+    aspects: Mapping[str, AspectGraph] = field(default_factory=dict)
     digest: str = ""
     name: str = ""
 
@@ -61,6 +63,7 @@ class Plan:
         object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
         object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
         object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
+        object.__setattr__(self, "aspects", MappingProxyType(dict(self.aspects)))
         if not self.digest:
             object.__setattr__(self, "digest", _digest(self))
 
