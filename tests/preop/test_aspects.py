@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.errors import PlanError
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh
 from navapp.preop import AspectSettings, build_aspects, read_aspects, write_aspects
 from navapp.preop.aspects_kernels import contour_segments, spread_out
@@ -223,3 +224,25 @@ def test_spreading_is_that_of_the_reference() -> None:
     assert order.tolist() == farthest_first(points, 20)
     twice = np.concatenate([points[:5], points[:5]])
     assert spread_out(twice, order) == 5
+
+
+def test_views_of_a_cone_are_those_of_the_whole_graph() -> None:
+    graph = build_aspects(BoneModel("ball", sphere()), settings=AspectSettings(step_deg=25.0))
+    cone = ViewCone(np.array([0.0, -1.0, 0.0]), 40.0)
+    part = graph.within(cone)
+    inside = np.flatnonzero(graph.directions @ cone.axis >= np.cos(np.radians(40.0)))
+    assert 0 < len(part) < len(graph)
+    assert np.array_equal(part.directions, graph.directions[inside])
+    for k, view in enumerate(inside):
+        mine = slice(part.starts[k], part.starts[k + 1])
+        whole = slice(graph.starts[view], graph.starts[view + 1])
+        assert np.array_equal(part.points_mm[mine], graph.points_mm[whole])
+        assert np.array_equal(part.tangents[mine], graph.tangents[whole])
+
+
+def test_a_cone_between_the_views_has_the_nearest_one() -> None:
+    graph = build_aspects(BoneModel("ball", sphere()), settings=AspectSettings(step_deg=60.0))
+    between = graph.directions[0] + graph.directions[1]
+    part = graph.within(ViewCone(between, 0.5))
+    assert len(part) == 1
+    assert part.directions[0] @ between == pytest.approx((graph.directions @ between).max())

@@ -8,7 +8,7 @@ import pytest
 
 from navapp.errors import PlanError
 from navapp.geometry.ply import read_ply
-from navapp.preop import plan_files, read_plan, write_plan
+from navapp.preop import PlanOrigin, plan_files, read_origin, read_plan, write_plan
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
 
@@ -84,6 +84,7 @@ def test_the_folder_holds_a_surface_and_a_picture_for_each_bone(tmp_path):
         "plan.json",
         "preview_femur.png",
         "preview_tibia.png",
+        "summary.html",
         "tibia.ply",
     ]
     assert names(tmp_path / "deep") == ["plan"]
@@ -141,7 +142,9 @@ def test_an_older_plan_is_replaced(tmp_path):
     newer = make_plan(31.0, bones={"femur": BoneModel("femur", sphere(31.0))})
     write_plan(tmp_path / "plan", newer)
     assert read_plan(tmp_path / "plan").digest == newer.digest
-    assert names(tmp_path / "plan") == ["femur.ply", "plan.json", "preview_femur.png"]
+    assert names(tmp_path / "plan") == [
+        "femur.ply", "plan.json", "preview_femur.png", "summary.html",
+    ]  # fmt: skip
     assert names(tmp_path) == ["plan"]
 
 
@@ -239,9 +242,27 @@ def written(tmp_path):
 
 
 def edit(folder, change):
+    """Change an entry as an older plan would have it, without the hash of the whole file."""
     content = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
+    content.pop("file_hash", None)
     change(content)
     (folder / "plan.json").write_text(json.dumps(content), encoding="utf-8")
+
+
+@pytest.mark.parametrize("key", ["kind", "warnings", "threshold_hu"])
+def test_an_edited_fact_is_noticed(written, key):
+    file = written / "plan.json"
+    content = json.loads(file.read_text(encoding="utf-8"))
+    content["origin"][key] = {"kind": "CT", "warnings": ["all is well"], "threshold_hu": 9.0}[key]
+    file.write_text(json.dumps(content), encoding="utf-8")
+    for read in (read_plan, read_origin):
+        with pytest.raises(PlanError, match=r"plan\.json was edited"):
+            read(written)
+
+
+def test_nothing_is_known_of_the_origin_of_an_older_plan(written):
+    edit(written, lambda content: content.pop("origin"))
+    assert read_origin(written) == PlanOrigin()
 
 
 def test_a_plan_without_bones_is_called_empty(written):
