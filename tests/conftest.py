@@ -47,7 +47,7 @@ def _lives_on(thread: threading.Thread) -> bool:
     return thread.name.startswith(("asyncio_", "ThreadPoolExecutor", "Dummy"))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def data() -> Path:
     """The folder of recorded data; the test is skipped, and counted, without it."""
     if not DATA.is_dir():

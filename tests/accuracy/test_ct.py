@@ -1,0 +1,37 @@
+"""Surfaces out of a CT whose truth is known: told apart without a seed, where the cortex ends."""
+
+import pytest
+
+from navapp.geometry.ply import read_ply
+from navapp.geometry.simplify import is_closed
+from navapp.preop.drafts import Draft, draft_from_ct
+from navapp.preop.volume import read_ct
+from tests.bench.ct_surfaces import BONES, errors_mm
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def draft(data) -> Draft:
+    """The bones of the recorded phantom's CT, with defaults."""
+    return draft_from_ct(read_ct(data / "phantom_a" / "ct.nii.gz"))
+
+
+@pytest.mark.parametrize("name", BONES)
+def test_a_bone_lies_where_it_is(draft, data, name) -> None:
+    mesh = draft.bones[name].mesh
+    true, _ = read_ply(data / "phantom_a" / f"{name}.ply")
+    median_mm, most_mm, signed_mm, beyond_mm = errors_mm(mesh, true, is_lower=name == "tibia")
+    assert median_mm <= 0.10
+    assert most_mm <= 0.40
+    assert abs(signed_mm) <= 0.08
+    # No part of another bone, and no bridge to one.
+    assert beyond_mm <= 1.0
+    assert is_closed(mesh)
+
+
+def test_cut_shafts_are_marked_and_the_patella_is_whole(draft) -> None:
+    for name, is_cut in (("femur", True), ("tibia", True), ("patella", False)):
+        assert draft.bones[name].is_removed.any() == is_cut
+    assert set(draft.beside) == {"fibula"}
+    assert not draft.origin.warnings
