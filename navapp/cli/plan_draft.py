@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 _SEEDED = ("femur", "tibia", "patella", "fibula")
 _CT_ONLY = ("series", "threshold", "seed", "region")
+_NO_CARTILAGE = (
+    "no cartilage is known (--cartilage); a camera sees 1 to 3 mm of it where it is not worn, and "
+    "takes its surface for the bone's"
+)
 # The steps of a segmentation that are told, for the share of the work that is done.
 _N_STEPS = 21
 
@@ -50,6 +54,9 @@ def with_cartilage(draft: "Draft", entries: list[str]) -> "Draft":
         imported = covered(bones[name], text)
         bones[name] = imported.bone
         warnings += imported.warnings
+    bare = [name for name in bones if name not in texts]
+    if bare and draft.origin.kind != "surfaces":
+        warnings.append(f"{', '.join(bare)}: {_NO_CARTILAGE}")
     origin = replace(draft.origin, warnings=tuple(warnings))
     return replace(draft, bones=bones, origin=origin)
 

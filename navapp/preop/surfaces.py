@@ -8,6 +8,7 @@ import numpy as np
 from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import PlyHeader, read_ply
+from navapp.geometry.simplify import is_closed
 from navapp.values import BoneModel, Side
 
 # A knee's bone end measures 35 (patella) to 500 mm (a whole femur) across.
@@ -56,6 +57,8 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
     if whole.volume_mm3() < 0.0:
         whole = whole.flipped()
         warnings.append(f"{name}: normals pointed inwards and were turned")
+    if not is_closed(whole):
+        warnings.append(f"{name}: the surface is open or has stray triangles; no edge is looked for there")
     if side is None:
         warnings.append(f"{name}: side not given, handedness is not checked (give --side)")
     return ImportedSurface(BoneModel(name, whole, side), tuple(warnings))

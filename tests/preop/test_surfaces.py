@@ -34,6 +34,13 @@ def test_a_clean_surface_is_taken_as_it_is(imported):
     np.testing.assert_array_equal(surface.bone.mesh.faces, BONE.faces)
 
 
+@pytest.mark.parametrize("kind", ["open", "stray"])
+def test_a_surface_that_is_not_closed_is_told(imported, kind):
+    faces = BONE.faces[5:] if kind == "open" else np.vstack([BONE.faces, BONE.faces[:1, ::-1]])
+    surface = imported(TriangleMesh(BONE.vertices_mm, faces))
+    assert [w for w in surface.warnings if "open or has stray triangles" in w]
+
+
 def test_ras_becomes_lps(imported):
     surface = imported(BONE, space="RAS")
     np.testing.assert_array_equal(
