@@ -87,12 +87,6 @@ class SimulatedRoom:
             self.controller.step()
 
 
-@pytest.fixture
-def undo():
-    with ExitStack() as stack:
-        yield stack
-
-
 @pytest.mark.slow
 def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right_one(undo) -> None:
     room = SimulatedRoom(undo, n_frames=8)
