@@ -213,12 +213,11 @@ def test_two_monitors(tmp_path, monkeypatch) -> None:
         on_first, on_second = (0, 0, 960, 540), (960, 0, 800, 600)
         left = window(output="DUMMY0", width=960, height=540)
         right = window(output="DUMMY1", width=800, height=600)
-        with left as first, right as second:
-            with mss.MSS(display=server) as eye:
-                first.show(wide, time.monotonic_ns() + MINUTE_NS)
-                second.show(small, time.monotonic_ns() + MINUTE_NS)
-                seconds_until(eye, lambda p: np.array_equal(p, wide), 5.0, on_first)
-                seconds_until(eye, lambda p: np.array_equal(p, small), 5.0, on_second)
-                first.blank()
-                seconds_until(eye, is_black, 5.0, on_first)
-                assert np.array_equal(look(eye, on_second), small)
+        with left as first, right as second, mss.MSS(display=server) as eye:
+            first.show(wide, time.monotonic_ns() + MINUTE_NS)
+            second.show(small, time.monotonic_ns() + MINUTE_NS)
+            seconds_until(eye, lambda p: np.array_equal(p, wide), 5.0, on_first)
+            seconds_until(eye, lambda p: np.array_equal(p, small), 5.0, on_second)
+            first.blank()
+            seconds_until(eye, is_black, 5.0, on_first)
+            assert np.array_equal(look(eye, on_second), small)
