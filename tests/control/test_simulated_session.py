@@ -155,7 +155,7 @@ def test_a_blackout_suspends_and_light_resumes(undo) -> None:
 @pytest.mark.slow
 def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
     """Free-running camera, reader thread, worker: a proposed pose makes small pictures enough."""
-    room = SimulatedRoom(undo, scale=0.3, is_live=True)
+    room = SimulatedRoom(undo, scale=0.3, is_live=True, rate_hz=5.0)
     runner = SessionRunner(room.controller)
     undo.callback(runner.stop)
     runner.start()
