@@ -18,6 +18,7 @@ from navapp.registration.model import RegistrationModel
 
 assert navapp.__version__
 
+MOST_SURFACES = 16
 DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
 
 
@@ -45,6 +46,8 @@ def _surfaces_prepared_once() -> Iterator[None]:
         key = told.digest()
         if key not in kept:
             kept[key] = prepare(model)
+            while len(kept) > MOST_SURFACES:
+                del kept[next(iter(kept))]
         return kept[key]
 
     shared = cached_property(arrays)
