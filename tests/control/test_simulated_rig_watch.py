@@ -53,7 +53,7 @@ def until_s(room: SimulatedRoom, seconds: float) -> None:
 
 @pytest.mark.slow
 def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: ExitStack) -> None:
-    room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5), rate_hz=2.5))
+    room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5), rate_hz=3.0))
     until_s(room, 12.0)
     assert room.state == "fault"
     assert room.clock.now_ns() < 8.5 * S
@@ -69,7 +69,7 @@ def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: E
 
 @pytest.mark.slow
 def test_a_camera_that_swings_back_is_believed_again(undo: ExitStack) -> None:
-    room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5, 1.5), rate_hz=2.5))
+    room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5, 1.5), rate_hz=3.0))
     until_s(room, 8.0)
     disturbed = [r for r in room.results if 2.5 * S <= r.frame.captured_ns < 4.0 * S]
     assert all(Reason.ROWS_DISAGREE in r.tracked.verdict.reasons for r in disturbed)
