@@ -7,10 +7,14 @@ BIN    := $(VENV)/bin
 PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
-KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/registration \
-    tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py \
+# Every kernel is run by one of them at least.
+KERNEL_TESTS := tests/geometry/test_zbuffer.py \
+    tests/registration --ignore tests/registration/test_register.py \
+    tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
     tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \
-    tests/stereo tests/tracking/test_agreement.py tests/calibration/targets
+    tests/stereo tests/tracking/test_agreement.py tests/tracking/test_contour_kernels.py \
+    tests/tracking/test_outline_kernels.py tests/overlay/test_tint.py tests/preop/test_aspects.py \
+    tests/calibration/targets
 
 # The window's libraries: SDL draws into nothing without them. Then screens for the tests.
 SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
@@ -31,7 +35,7 @@ test: setup check  ## the whole test suite
 	# Compiled code does not check its indices: the kernels' tests run again with the check, and
 	# with a cache of their own, because the cache does not know about that switch.
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck \
-	    $(BIN)/python -m pytest -q -n 2 $(KERNEL_TESTS)
+	    $(BIN)/python -m pytest -q -n 2 --dist loadgroup $(KERNEL_TESTS)
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -1,18 +1,24 @@
 """Shared by all tests: the user's settings hidden, leaks found, skips counted."""
 
+import hashlib
 import os
 import threading
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
 import navapp  # sets the environment before any heavy import
 from navapp.config import Configuration, load
+from navapp.registration.lookup_kernels import ModelArrays
+from navapp.registration.model import RegistrationModel
 
 assert navapp.__version__
 
+MOST_SURFACES = 16
 DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
 
 
@@ -24,6 +30,31 @@ def _own_settings(
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
     monkeypatch.delenv("NO_COLOR", raising=False)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _surfaces_prepared_once() -> Iterator[None]:
+    """The look-up over a bone takes longer than most sessions on it: equal surfaces share it."""
+    prepare = RegistrationModel.arrays.func
+    kept: dict[bytes, ModelArrays] = {}
+
+    def arrays(model: RegistrationModel) -> ModelArrays:
+        told = hashlib.blake2b()
+        parts = (model.points_mm, model.normals, model.sigma_mm, model.is_usable)
+        for part in (*parts, model.bone.mesh.faces):
+            told.update(str(part.shape).encode() + np.ascontiguousarray(part).tobytes())
+        key = told.digest()
+        if key not in kept:
+            kept[key] = prepare(model)
+            while len(kept) > MOST_SURFACES:
+                del kept[next(iter(kept))]
+        return kept[key]
+
+    shared = cached_property(arrays)
+    shared.__set_name__(RegistrationModel, "arrays")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RegistrationModel, "arrays", shared)
+        yield
 
 
 @pytest.fixture(autouse=True)
@@ -53,6 +84,17 @@ def data() -> Path:
     if not DATA.is_dir():
         pytest.skip(f"no recorded data in {DATA} (set NAVAPP_DATA)")
     return DATA
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that share what is made once for their module run in one worker: it is made there."""
+    for item in items:
+        if not isinstance(item, pytest.Function):
+            continue
+        used = item._fixtureinfo.name2fixturedefs.values()
+        if any(definitions[-1].scope == "module" for definitions in used):
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

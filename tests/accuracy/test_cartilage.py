@@ -19,7 +19,8 @@ from tests.bench.cartilage import (
     unknown,
 )
 
-SEEDS = (3, 5)
+# One worker takes the pictures of a patient, and follows each plan once.
+SEEDS = [pytest.param(seed, marks=pytest.mark.xdist_group(f"patient {seed}")) for seed in (3, 5)]
 N_FRAMES = 2
 # Never shown beyond this.
 WRONG_MM = 1.0

@@ -1,3 +1,6 @@
+from collections.abc import Iterator
+from contextlib import ExitStack
+
 import pytest
 
 from tests.control.fakes import Bench
@@ -6,3 +9,10 @@ from tests.control.fakes import Bench
 @pytest.fixture
 def bench(monkeypatch) -> Bench:
     return Bench(monkeypatch)
+
+
+@pytest.fixture
+def undo() -> Iterator[ExitStack]:
+    """What is entered here ends with the test."""
+    with ExitStack() as stack:
+        yield stack

@@ -51,12 +51,6 @@ def until_s(room: SimulatedRoom, seconds: float) -> None:
         room.frames(1)
 
 
-@pytest.fixture
-def undo():
-    with ExitStack() as stack:
-        yield stack
-
-
 @pytest.mark.slow
 def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: ExitStack) -> None:
     room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5), rate_hz=3.0))
@@ -76,7 +70,7 @@ def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: E
 @pytest.mark.slow
 def test_a_camera_that_swings_back_is_believed_again(undo: ExitStack) -> None:
     room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5, 1.5), rate_hz=3.0))
-    until_s(room, 12.0)
+    until_s(room, 8.0)
     disturbed = [r for r in room.results if 2.5 * S <= r.frame.captured_ns < 4.0 * S]
     assert all(Reason.ROWS_DISAGREE in r.tracked.verdict.reasons for r in disturbed)
     assert disturbed
@@ -92,7 +86,7 @@ def with_board(undo: ExitStack, faults: FaultScript) -> SimulatedRoom:
     sheet = sheet_of(BOARD)
     watch = BoardWatch(LengthMeter(BOARD, default_rig()), WORST, InlineExecutor(), lambda: 0)
     return SimulatedRoom(
-        undo, faults=faults, rate_hz=2.0, board_watch=watch,
+        undo, faults=faults, rate_hz=1.0, board_watch=watch,
         seen=lambda world: SheetInView(world, sheet, lambda time_ns: pose, (0, 60 * S)),
     )  # fmt: skip
 
@@ -122,6 +116,6 @@ def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack, sign
 @pytest.mark.slow
 def test_a_rig_that_has_not_moved_stays_believed(undo: ExitStack) -> None:
     room = navigating(with_board(undo, FaultScript()))
-    until_s(room, 25.0)
+    until_s(room, 16.0)
     assert room.controller.snapshot.is_navigable
     assert room.controller.snapshot.length_check.finding is Finding.WITHIN

@@ -87,12 +87,6 @@ class SimulatedRoom:
             self.controller.step()
 
 
-@pytest.fixture
-def undo():
-    with ExitStack() as stack:
-        yield stack
-
-
 @pytest.mark.slow
 def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right_one(undo) -> None:
     room = SimulatedRoom(undo, n_frames=8)
@@ -161,7 +155,7 @@ def test_a_blackout_suspends_and_light_resumes(undo) -> None:
 @pytest.mark.slow
 def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
     """Free-running camera, reader thread, worker: a proposed pose makes small pictures enough."""
-    room = SimulatedRoom(undo, scale=0.3, is_live=True)
+    room = SimulatedRoom(undo, scale=0.3, is_live=True, rate_hz=5.0)
     runner = SessionRunner(room.controller)
     undo.callback(runner.stop)
     runner.start()

@@ -1,5 +1,6 @@
 """The OAK driver above DepthAI's own pipeline, messages and calibration on the host."""
 
+import re
 import time
 from dataclasses import replace
 from datetime import timedelta
@@ -179,7 +180,10 @@ def test_a_stalled_camera_times_out_then_is_lost(oak, camera):
     oak.is_stalled = True
     time.sleep(0.05)
     fails_within(camera, DeviceTimeout)
-    assert "no new pair for 3 s" in str(fails_within(camera, DeviceLost))
+    error = str(fails_within(camera, DeviceLost))
+    silent_s = re.search(r"no new pair for (\d+) s", error)
+    assert silent_s is not None, error
+    assert int(silent_s[1]) >= 3  # longer on a busy machine
 
 
 def test_old_and_skewed_pairs_are_dropped_and_counted(oak, camera):

@@ -1,5 +1,6 @@
 """The driver of USB cameras above fake capture objects: settings, pairs, faults."""
 
+import re
 import threading
 import time
 from dataclasses import replace
@@ -325,8 +326,10 @@ def test_the_last_picture_for_ever_is_no_picture(rig):
     rig.camera.open()
     rig.camera.read(1.0)
     rig.left.is_frozen = True
-    error = fails_within(rig.camera, DeviceLost)
-    assert "L1 has given no new picture for 3 s" in str(error)
+    error = str(fails_within(rig.camera, DeviceLost))
+    silent_s = re.search(r"L1 has given no new picture for (\d+) s", error)
+    assert silent_s is not None, error
+    assert int(silent_s[1]) >= 3  # longer on a busy machine
 
 
 def test_a_grab_that_never_returns_blocks_neither_reading_nor_closing(rig):

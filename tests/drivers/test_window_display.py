@@ -15,7 +15,7 @@ from drivers.window_display import WindowDisplay
 from drivers.window_process import WindowSettings
 from navapp.errors import DeviceLost, DeviceNotFound, WrongDevice
 from tests.drivers.window_application import application
-from tests.x_servers import seen, shot, two_monitors, xvfb
+from tests.x_servers import shot, two_monitors, xvfb
 
 WIDTH, HEIGHT = 320, 200
 MINUTE_NS = 60 * 10**9
@@ -52,16 +52,24 @@ def noise(width: int, height: int, seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).integers(1, 256, (height, width, 3), np.uint8)
 
 
-def look(screen: mss.MSS) -> np.ndarray:
-    return shot(screen, 0, 0, WIDTH, HEIGHT)
+# Left, top, width, height of a screen.
+Part = tuple[int, int, int, int]
+WHOLE: Part = (0, 0, WIDTH, HEIGHT)
+
+
+def look(screen: mss.MSS, part: Part = WHOLE) -> np.ndarray:
+    return shot(screen, *part)
 
 
 def seconds_until(
-    screen: mss.MSS, is_reached: Callable[[np.ndarray], bool], limit_s: float
+    screen: mss.MSS,
+    is_reached: Callable[[np.ndarray], bool],
+    limit_s: float,
+    part: Part = WHOLE,
 ) -> float:
-    """How long it takes until the whole screen is so."""
+    """How long it takes until all of that part is so."""
     begin_s = time.monotonic()
-    while not is_reached(look(screen)):
+    while not is_reached(look(screen, part)):
         assert time.monotonic() - begin_s < limit_s, "the screen is not as it must be in time"
         time.sleep(0.005)  # without a pause the server forgets to clear up after the dead
     return time.monotonic() - begin_s
@@ -202,15 +210,14 @@ def test_two_monitors(tmp_path, monkeypatch) -> None:
         with pytest.raises(DeviceNotFound, match=r"several outputs.*DUMMY0 .*DUMMY1"), window():
             pass
         wide, small = noise(960, 540, 1), noise(800, 600, 2)
+        on_first, on_second = (0, 0, 960, 540), (960, 0, 800, 600)
         left = window(output="DUMMY0", width=960, height=540)
         right = window(output="DUMMY1", width=800, height=600)
-        with left as first, right as second:
+        with left as first, right as second, mss.MSS(display=server) as eye:
             first.show(wide, time.monotonic_ns() + MINUTE_NS)
             second.show(small, time.monotonic_ns() + MINUTE_NS)
-            time.sleep(0.5)
-            assert np.array_equal(seen(server, 0, 0, 960, 540), wide)
-            assert np.array_equal(seen(server, 960, 0, 800, 600), small)
+            seconds_until(eye, lambda p: np.array_equal(p, wide), 5.0, on_first)
+            seconds_until(eye, lambda p: np.array_equal(p, small), 5.0, on_second)
             first.blank()
-            time.sleep(0.5)
-            assert is_black(seen(server, 0, 0, 960, 540))
-            assert np.array_equal(seen(server, 960, 0, 800, 600), small)
+            seconds_until(eye, is_black, 5.0, on_first)
+            assert np.array_equal(look(eye, on_second), small)

@@ -370,12 +370,13 @@ def test_another_camera_than_the_rigs(tmp_path, capsys) -> None:
 
 
 def test_a_camera_that_stays_away_ends_the_session(tmp_path, capsys) -> None:
-    path, out = tmp_path / "c.toml", tmp_path / "o.json"
+    path, out, script = (tmp_path / name for name in ("c.toml", "o.json", "idle.toml"))
+    script.write_text('[[step]]\ndo = "show"\n', encoding="utf-8")
     path.write_text(
         "[camera.simulated]\nscale = 0.25\n"
         'faults = [{ kind = "unplug", start_s = 0.3, duration_s = 1000.0 }]\n',
         encoding="utf-8",
     )
     arguments = ["--config", str(path), "run", "--headless", "--frames", "40", "--json", str(out)]
-    refused(arguments, capsys, 5, "camera")
+    refused([*arguments, "--operator", str(script)], capsys, 5, "camera")
     assert 1 < len(json.loads(out.read_text(encoding="utf-8"))["frames"]) < 10
