@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.cli.plan_contents import add_arguments, completed, content_of, lines_of
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ examples:
   navapp plan --surface femur=femur.ply --surface tibia=tibia.ply --side right --out plans/knee
   navapp plan --surface femur=femur.ply --cartilage femur=cartilage.ply --out plans/knee
   navapp plan --surface femur=femur.ply --cartilage femur=2.0:0.6 --out plans/knee
+  navapp plan --surface femur=femur.ply --contents contents.toml --out plans/knee
+  navapp plan --surface femur=femur.ply --markups "drill femur 8mm.mrk.json" --out plans/knee
   navapp plan show plans/knee
 """
 
@@ -52,6 +55,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME=FILE.ply|MEAN_MM:SD_MM",
         help=_CARTILAGE_HELP,
     )
+    add_arguments(parser)
     parser.add_argument("--side", choices=("left", "right"), help="of the knee")
     parser.add_argument("--out", metavar="P", help="plan folder to write")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
@@ -63,7 +67,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
     check_writable(options.json)
     if options.what == "show":
-        if options.folder is None or options.surface or options.cartilage or options.out:
+        given = (options.surface, options.cartilage, options.out, options.contents, options.markups)
+        if options.folder is None or any(given):
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")
         plan = read_plan(options.folder)
         warnings: list[str] = []
@@ -78,7 +83,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 
 def _make(options: argparse.Namespace) -> "tuple[Plan, list[str]]":
-    from navapp.preop import import_surface, write_plan
+    from navapp.preop import import_surface, with_side, write_plan
     from navapp.values import Plan
 
     if not options.surface:
@@ -104,9 +109,11 @@ def _make(options: argparse.Namespace) -> "tuple[Plan, list[str]]":
             imported = _covered(imported.bone, cartilages[name])
             warnings += imported.warnings
         bones[name] = imported.bone
+    bones, about_side = with_side(bones, options.side)
     plan = Plan(bones, name=str(options.out).rstrip("/").rsplit("/", 1)[-1])
+    plan, about_content = completed(plan, options)
     write_plan(options.out, plan)
-    return plan, warnings
+    return plan, [*warnings, *about_side, *about_content]
 
 
 def _by_bone(option: str, entries: list[str], value: str, example: str) -> dict[str, str]:
@@ -164,6 +171,7 @@ def _content(plan: "Plan", warnings: list[str]) -> dict[str, Any]:
             }
             for name, bone in plan.bones.items()
         },
+        "content": content_of(plan),
         "ct": None,
         "warnings": warnings,
         "hash": plan.digest,
@@ -196,5 +204,5 @@ def _summary(plan: "Plan") -> str:
                 f"    cartilage: mean {found.mean_mm:.1f} mm, at most {found.max_mm:.1f} mm, "
                 f"sd {found.sd_mm:.1f} mm, on {100.0 * found.share:.0f} % of the vertices"
             )
-    lines += [f"  target {name}" for name in plan.targets]
+    lines += lines_of(plan)
     return "\n".join(lines)

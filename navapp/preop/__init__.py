@@ -3,6 +3,7 @@
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.aspects import AspectSettings, build_aspects
 from navapp.preop.cartilage import even_cartilage, figures_of, import_cartilage
+from navapp.preop.completing import complete, with_side
 from navapp.preop.plan_files import read_plan, write_plan
 from navapp.preop.surfaces import ImportedSurface, import_surface
 
@@ -10,12 +11,14 @@ __all__ = [
     "AspectSettings",
     "ImportedSurface",
     "build_aspects",
+    "complete",
     "even_cartilage",
     "figures_of",
     "import_cartilage",
     "import_surface",
     "read_aspects",
     "read_plan",
+    "with_side",
     "write_aspects",
     "write_plan",
 ]

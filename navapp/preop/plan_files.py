@@ -13,8 +13,9 @@ import numpy as np
 from navapp.errors import InputError, PlanError
 from navapp.geometry.transform import FloatArray
 from navapp.preop.bone_files import read_bone, write_bone
+from navapp.preop.content_files import content_from_json, content_to_json
 from navapp.preop.preview import draw_preview
-from navapp.values import BoneModel, Plan
+from navapp.values import BoneModel, Plan, SurgicalContent
 
 _FILE = "plan.json"
 _CONVENTIONS = {"format": 1, "space": "LPS", "unit": "mm"}
@@ -73,6 +74,7 @@ def read_plan(folder: str | Path) -> Plan:
             {name: _points(points) for name, points in content["targets"].items()},
             {name: _points(points) for name, points in content["curves"].items()},
             name=folder.name,
+            content=_surgical(content, folder),
         )
     except (
         OSError,
@@ -130,6 +132,7 @@ def _write_content(folder: Path, plan: Plan) -> None:
         "bones": bones,
         "targets": {name: points.tolist() for name, points in plan.targets.items()},
         "curves": {name: points.tolist() for name, points in plan.curves.items()},
+        "content": content_to_json(plan.content, folder),
         "hash": plan.digest,
     }
     (folder / _FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
@@ -173,6 +176,13 @@ def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
         cartilage_sd_mm,
         is_removed,
         version=int(entry["version"]),
+    )
+
+
+def _surgical(content: dict[str, Any], folder: Path) -> SurgicalContent:
+    """Plans from before there was any have none."""
+    return (
+        content_from_json(content["content"], folder) if "content" in content else SurgicalContent()
     )
 
 

@@ -56,8 +56,6 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
     if whole.volume_mm3() < 0.0:
         whole = whole.flipped()
         warnings.append(f"{name}: normals pointed inwards and were turned")
-    if side is None:
-        warnings.append(f"{name}: side not given, handedness is not checked (give --side)")
     return ImportedSurface(BoneModel(name, whole, side), tuple(warnings))
 
 
