@@ -30,6 +30,7 @@ _LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
 _FARTHEST_PX = 20_000.0
 # What is drawn simplified lies this near the surface: a vertex of it is not behind itself.
 _SKIN_MM = 1.0
+_DOT = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 @dataclass(frozen=True)
@@ -124,21 +125,21 @@ def draw_curves(image: Image, scene: Scene) -> None:
 
 def draw_defects(image: Image, scene: Scene) -> None:
     """Damaged cartilage of the stage's bone as dots, where the bone does not hide it."""
-    import cv2
-
     mesh, view = scene.mesh, scene.view
+    height, width = view.depth_mm.shape
     for defect in scene.plan.content.defects.values():
-        if defect.bone != scene.stage.bone or len(defect.vertices) == 0:
+        if defect.bone != scene.stage.bone:
             continue
         in_camera = scene.left_from_bone.apply(mesh.vertices_mm[defect.vertices])
-        normals = scene.left_from_bone.rotate(mesh.normals[defect.vertices])
-        faces = np.einsum("ij,ij->i", normals, in_camera) < 0.0
-        for pixel, depth_mm in zip(
-            scene.camera.project(in_camera[faces]), in_camera[faces, 2], strict=True
-        ):
-            if _is_drawable(pixel) and not _is_behind(view, pixel, depth_mm - _SKIN_MM):
-                u, v = (round(float(value)) for value in pixel)
-                cv2.circle(image, (u, v), 2, DEFECT_COLOUR, -1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pixels = np.round(scene.camera.project(in_camera)) - (view.box.x, view.box.y)
+        is_inside = ((pixels >= 2) & (pixels < (width - 2, height - 2))).all(axis=1)
+        u, v = pixels[is_inside].astype(np.intp).T
+        # NaN, where the bone is not drawn, compares as not seen.
+        is_seen = in_camera[is_inside, 2] < view.depth_mm[v, u] + _SKIN_MM
+        u, v = u[is_seen] + view.box.x, v[is_seen] + view.box.y
+        for down, right in _DOT:
+            image[v + down, u + right] = DEFECT_COLOUR
 
 
 def put_text(
