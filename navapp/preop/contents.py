@@ -1,13 +1,12 @@
 """A contents file: what a person writes down of the operation, in plan coordinates (LPS, mm)."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from navapp.config import checked
+from navapp.config import checked, toml_content
 from navapp.errors import ConfigurationError, PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
@@ -77,19 +76,7 @@ def read_contents(path: str | Path, bones: Mapping[str, BoneModel]) -> Planned:
 
 def _tables(path: Path) -> ContentsTables:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise PlanError(
-            f"contents file {path} cannot be read", subject=str(path), remedy=str(error)
-        ) from error
-    except tomllib.TOMLDecodeError as error:
-        raise PlanError(
-            f"contents file {path} is not valid TOML",
-            subject=str(path),
-            remedy=f"mend it: {error}",
-        ) from error
-    try:
-        return checked(ContentsTables, content, str(path))
+        return checked(ContentsTables, toml_content(path, "contents file"), str(path))
     except ConfigurationError as error:
         # It is an input like a surface is, and no configuration.
         raise PlanError(error.problem, subject=error.subject, remedy=error.remedy) from error
