@@ -50,6 +50,8 @@ class Condyles:
 def condyles_of(femur: TriangleMesh) -> Condyles | None:
     """The end of a femur; None when there is no notch between two condyles."""
     vertices = femur.vertices_mm[~on_flat_ends(femur)]
+    if len(vertices) == 0:  # a box: flat ends only
+        return None
     low = vertices[:, 2] < vertices[:, 2].min() + _CONDYLES_MM
     x, outward = vertices[low, 0], vertices[low] @ BEHIND_AND_BELOW
     edges = np.arange(x.min(), x.max() + _STRIP_MM, _STRIP_MM)
@@ -99,6 +101,8 @@ def _of_both_sides(condyles: Condyles, medial: float) -> dict[str, Landmark | No
 def _shaft_axis(femur: TriangleMesh) -> Iterator[tuple[str, Landmark]]:
     """Both ends of the axis through the middles of the shaft's slices, where there is a shaft."""
     vertices = femur.vertices_mm[~on_flat_ends(femur)]
+    if len(vertices) == 0:
+        return
     lowest, highest = vertices[:, 2].min(), vertices[:, 2].max()
     widest = np.ptp(vertices[vertices[:, 2] < lowest + _CONDYLES_MM, 0])
     middles = []

@@ -143,6 +143,8 @@ _ENDS = (("femur", -1.0), ("tibia", 1.0))
 def _is_broader_at(bone: TriangleMesh, sign: float) -> bool:
     level = sign * bone.vertices_mm[:, 2]
     span = np.ptp(level)
+    if span == 0.0:
+        return False
     ends = (level > level.max() - 0.3 * span, level < level.min() + 0.3 * span)
     near, far = (float(np.ptp(bone.vertices_mm[end, 0])) for end in ends)
     return near > far

@@ -54,6 +54,8 @@ def tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
     """The upper end; None when it is not there."""
     is_kept = ~on_flat_ends(tibia)
     vertices = tibia.vertices_mm[is_kept]
+    if len(vertices) == 0:  # a box: flat ends only
+        return None
     below = vertices[:, 2].max() - vertices[:, 2]
     middles = []
     for level in np.arange(*_RIM_MM, _SLICE_MM):

@@ -15,6 +15,7 @@ from navapp.values import (
     StageContent,
     SurgicalContent,
 )
+from tests.geometry.shapes import sphere
 from tests.preop.knees import bones_of, fibula_of, knees
 
 KNEE = knees()[0]
@@ -108,3 +109,25 @@ def test_a_given_side_that_contradicts_a_certain_estimate_is_warned_of(sideless)
     assert with_side(sideless, "right", fibula_of(KNEE))[1] == []
     # Without the fibula it is likely only: no reason to doubt who says so.
     assert with_side(sideless, "left")[1] == []
+
+
+BALL = sphere(60.0, 30)
+ODD = {
+    "ball": BALL,
+    "box": TriangleMesh(np.clip(BALL.vertices_mm, -25.0, 25.0), BALL.faces),
+    "plate": TriangleMesh(BALL.vertices_mm * (1.0, 1.0, 0.0), BALL.faces),
+    "rod": TriangleMesh(BALL.vertices_mm * (0.1, 0.1, 2.0), BALL.faces),
+    "one condyle": TriangleMesh(
+        np.maximum(KNEE.bones["femur"].vertices_mm, [0.0, -99.0, -99.0]), KNEE.bones["femur"].faces
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+@pytest.mark.parametrize("names", [("femur",), ("tibia",), ("patella",), ("femur", "tibia")])
+def test_a_plan_of_what_is_no_knee_is_made_all_the_same(name, names) -> None:
+    """Whoever gives such a surface sees it in the pictures; nothing may stumble over it."""
+    bones, said = with_side({bone: BoneModel(bone, ODD[name]) for bone in names}, None)
+    assert all("certain" not in sentence for sentence in said)
+    whole, _ = complete(Plan(bones), Planned())
+    assert set(whole.bones) == set(names)
