@@ -107,7 +107,7 @@ def draw_curves(image: Image, scene: Scene) -> None:
     view = scene.view
     risks = scene.plan.content.risks
     for name, points in scene.plan.curves.items():
-        if name in risks and risks[name].bone != scene.stage.bone:
+        if (risks[name].bone if name in risks else "femur") != scene.stage.bone:
             continue
         in_camera = scene.left_from_bone.apply(points)
         pixels = scene.camera.project(in_camera)

@@ -63,7 +63,8 @@ class Plan:
     Attributes:
         bones: name -> model.
         targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
-        curves: name -> (N, 3) polylines beside the femur (vessels, nerves), mm.
+        curves: name -> (N, 3) polylines (vessels, nerves), mm; they move with the bone of the risk
+            structure of the same name, or with the femur.
         content: what is to be cut, drilled, put in and kept away from.
         digest: hash of all of it.
         name: for people.
