@@ -256,6 +256,17 @@ class World:
             )
         return self._left_from_table @ table_from_body
 
+    @property
+    def drill_line(self) -> tuple[FloatArray, FloatArray]:
+        """Where the drill enters the femur and its unit direction into it, (3,) each."""
+        mirror = np.array([-1.0 if self._is_left else 1.0, 1.0, 1.0])
+        return self._site.entry_mm * mirror, self._site.entry_axis * mirror
+
+    @property
+    def worn_vertices(self) -> NDArray[np.int64]:
+        """Vertices of the femur's bone where its cartilage is mostly worn away, as a CT shows."""
+        return np.flatnonzero(self._site.worn > 0.5).astype(np.int64)
+
     def _sided(self, part: Part) -> Part:
         if not self._is_left:
             return part

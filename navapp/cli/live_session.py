@@ -73,6 +73,7 @@ def prepared(
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
         prior = prior or Prior()
+        stage = plan.stage(stage)
         if options.headless:
             check_start(prior, stage)
         undo.pop_all()

@@ -1,9 +1,11 @@
 """`navapp plan`: make a pre-operative plan, or show one."""
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.cli.plan_contents import add_arguments, completed, content_of, lines_of
 from navapp.cli.plan_draft import aspects_of, drafted, with_cartilage
 from navapp.errors import UsageError
 
@@ -19,6 +21,8 @@ examples:
   navapp plan --labels labels.nrrd --label femur=5 --label tibia=6 --side right --out plans/knee
   navapp plan --surface femur=femur.ply --surface tibia=tibia.ply --side right --out plans/knee
   navapp plan --surface femur=femur.ply --cartilage femur=2.0:0.6 --out plans/knee
+  navapp plan --surface femur=femur.ply --contents contents.toml --out plans/knee
+  navapp plan --surface femur=femur.ply --markups "drill femur 8mm.mrk.json" --out plans/knee
   navapp plan show plans/knee
 points are LPS in mm; look at summary.html in the plan's folder before it is used
 """
@@ -48,6 +52,7 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME=FILE.ply|MEAN_MM:SD_MM",
         help=_CARTILAGE_HELP,
     )
+    add_arguments(parser)
     parser.add_argument("--side", choices=("left", "right"), help="of the knee")
     parser.add_argument("--out", metavar="P", help="plan folder to write")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
@@ -92,8 +97,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
     check_writable(options.json)
     if options.what == "show":
-        made_from = (options.surface, options.cartilage, options.ct, options.labels, options.out)
-        if options.folder is None or any(made_from):
+        given = (
+            options.surface, options.cartilage, options.ct, options.labels, options.out,
+            options.contents, options.markups,
+        )  # fmt: skip
+        if options.folder is None or any(given):
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")
         plan, origin = read_plan(options.folder), read_origin(options.folder)
     else:
@@ -108,7 +116,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 def _made(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[Plan, PlanOrigin]":
     """The plan, written."""
-    from navapp.preop import check_place, write_plan
+    from navapp.preop import check_place, with_side, write_plan
     from navapp.values import Plan
 
     sources = [options.ct is not None, options.labels is not None, bool(options.surface)]
@@ -120,13 +128,15 @@ def _made(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[Plan,
     if options.out is None:
         raise UsageError("--out is missing", remedy="name the plan folder to write")
     check_place(options.out)
-    draft = drafted(options, diagnostics)
-    draft = with_cartilage(draft, options.cartilage)
-    aspects = aspects_of(draft.bones, diagnostics)
+    draft = with_cartilage(drafted(options, diagnostics), options.cartilage)
+    bones, about_side = with_side(draft.bones, draft.side, draft.fibula)
     name = str(options.out).rstrip("/").rsplit("/", 1)[-1]
-    plan = Plan(draft.bones, aspects=aspects, name=name)
-    write_plan(options.out, plan, draft.origin, draft.slices)
-    return plan, draft.origin
+    plan, about_content = completed(Plan(bones, name=name), options)
+    plan = replace(plan, aspects=aspects_of(bones, diagnostics))
+    warnings = (*draft.origin.warnings, *about_side, *about_content)
+    origin = replace(draft.origin, warnings=warnings)
+    write_plan(options.out, plan, origin, draft.slices)
+    return plan, origin
 
 
 def _content(plan: "Plan", origin: "PlanOrigin") -> dict[str, Any]:
@@ -141,6 +151,7 @@ def _content(plan: "Plan", origin: "PlanOrigin") -> dict[str, Any]:
             }
             for name, bone in plan.bones.items()
         },
+        "content": content_of(plan),
         "ct": origin.ct,
         "warnings": list(origin.warnings),
         "hash": plan.digest,
@@ -176,5 +187,5 @@ def _summary(plan: "Plan", origin: "PlanOrigin") -> str:
                 f"    cartilage: mean {found.mean_mm:.1f} mm, at most {found.max_mm:.1f} mm, "
                 f"sd {found.sd_mm:.1f} mm, on {100.0 * found.share:.0f} % of the vertices"
             )
-    lines += [f"  target {name}" for name in plan.targets]
+    lines += lines_of(plan)
     return "\n".join(lines)

@@ -173,4 +173,4 @@ def _from_surfaces(options: argparse.Namespace) -> "Draft":
         imported = import_surface(name, path, options.side)
         warnings += imported.warnings
         bones[name] = imported.bone
-    return Draft(bones, PlanOrigin(warnings=tuple(warnings)))
+    return Draft(bones, PlanOrigin(warnings=tuple(warnings)), side=options.side)

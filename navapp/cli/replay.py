@@ -174,7 +174,9 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     if rig_path is None:
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
     plan = read_plan(plan_path)
-    first = stage_by_name(stage) if options.bone is None else _stage_of(options.bone, plan)
+    first = (
+        plan.stage(stage_by_name(stage)) if options.bone is None else _stage_of(options.bone, plan)
+    )
     others = tuple(_stage_of(name, plan) for name in dict.fromkeys(options.also))
     if first.bone in {other.bone for other in others}:
         raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
@@ -200,7 +202,7 @@ def _stage_of(bone: str, plan: "Plan") -> "StageSpec":
 
     if bone not in plan.bones:
         raise UsageError(f"the plan has no bone '{bone}'", remedy=f"it has {', '.join(plan.bones)}")
-    return stage_of(bone)
+    return stage_of(bone, plan)
 
 
 def _controller(

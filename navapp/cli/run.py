@@ -126,7 +126,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
     if simulation is None:
         return {}
     answers = [(result.stage, result.tracked)]
-    answers += [(stage_of(name), tracked) for name, tracked in result.others.items()]
+    answers += [(stage_of(name, plan), tracked) for name, tracked in result.others.items()]
     errors_mm: dict[str, float | None] = {}
     for stage, tracked in answers:
         pose = None if tracked is None else tracked.left_from_bone

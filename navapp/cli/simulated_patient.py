@@ -1,5 +1,6 @@
 """What the simulated patient brings along when nothing else is given: a plan and a prior."""
 
+from navapp.cli.simulated_contents import built_in_content
 from navapp.devices import Simulation
 from navapp.geometry.mesh import TriangleMesh
 from navapp.values import BoneModel, Plan, Prior
@@ -12,7 +13,13 @@ def built_in_plan(simulation: Simulation) -> Plan:
         name: BoneModel(name, TriangleMesh(mesh.vertices_mm, mesh.faces), simulation.side)
         for name, mesh in simulation.bones.items()
     }
-    return Plan(bones, simulation.targets, simulation.curves, name="sim:plan")
+    return Plan(
+        bones,
+        simulation.targets,
+        simulation.curves,
+        name="sim:plan",
+        content=built_in_content(simulation),
+    )
 
 
 def nominal_prior(simulation: Simulation) -> Prior:

@@ -1,7 +1,7 @@
 """The TOML configuration; what is wrong with it is told with the nearest known key."""
 
 from navapp.config.checking import checked, parse
-from navapp.config.files import FILE_NAME, find_file, load
+from navapp.config.files import FILE_NAME, find_file, load, toml_content
 from navapp.config.sections import (
     CalibrationSection,
     Configuration,
@@ -30,4 +30,5 @@ __all__ = [
     "load",
     "one_table",
     "parse",
+    "toml_content",
 ]

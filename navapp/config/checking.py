@@ -41,14 +41,18 @@ def _tuples(value: Any) -> Any:
 
 
 def _one_sentence(model: type[BaseModel], error: ValidationError, name: str) -> ConfigurationError:
-    """The first problem, with the key's path and, for a typing error, the nearest known key."""
-    problem = error.errors()[0]
+    """The first problem, with the key's path and, for a typing error, the nearest known key.
+
+    A key that is misspelt is also one that is missing: its own name comes first.
+    """
+    problems = error.errors()
+    problem = next((one for one in problems if one["type"] == "extra_forbidden"), problems[0])
     path = [str(part) for part in problem["loc"]]
     key = ".".join(path)
     if problem["type"] != "extra_forbidden":
-        return ConfigurationError(
-            f"{name}: {key}: {problem['msg'].lower()}", subject=key, remedy="correct the value"
-        )
+        what = problem["msg"].lower().removeprefix("value error, ")
+        remedy = "add it" if problem["type"] == "missing" else "correct the value"
+        return ConfigurationError(f"{name}: {key}: {what}", subject=key, remedy=remedy)
     return _unknown_key(model, path, name)
 
 

@@ -3,6 +3,7 @@
 import os
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from navapp.config.checking import parse
 from navapp.config.sections import Configuration
@@ -44,16 +45,22 @@ def load(path: Path | None) -> Configuration:
     """
     if path is None:
         return Configuration()
+    return parse(toml_content(path, "configuration file"), str(path))
+
+
+def toml_content(path: Path, what: str) -> dict[str, Any]:
+    """What a TOML file holds; `what` it is, for messages.
+
+    Raises:
+        ConfigurationError: it cannot be read, or is broken.
+    """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigurationError(
-            f"configuration file {path} cannot be read", subject=str(path), remedy=str(error)
+            f"{what} {path} cannot be read", subject=str(path), remedy=str(error)
         ) from error
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError(
-            f"configuration file {path} is not valid TOML",
-            subject=str(path),
-            remedy=f"mend it: {error}",
+            f"{what} {path} is not valid TOML", subject=str(path), remedy=f"mend it: {error}"
         ) from error
-    return parse(content, str(path))

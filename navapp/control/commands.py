@@ -139,11 +139,11 @@ class Commands:
     def _on_enter_stage(self, command: EnterStage) -> None:
         session = self._session
         try:
-            stage = stage_by_number(command.number)
+            stage = session.pursuit.plan.stage(stage_by_number(command.number))
         except UsageError as error:
             self._refuse("stage", str(error))
             return
-        if stage is session.stage:
+        if stage.number == session.stage.number:
             return
         is_other_bone = stage.bone != session.stage.bone
         session.enter(stage)

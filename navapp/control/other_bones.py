@@ -67,7 +67,7 @@ class OtherBones:
         if is_odd or not names:
             return {}
         name = names[turn % len(names)]
-        own, known = stage_of(name), _well_known(active)
+        own, known = stage_of(name, self._pursuit.plan), _well_known(active)
         if self._pursuit.is_accepted(own):
             tracked = self._pursuit.glance(own, frame, self._moved(name, known))
         else:

@@ -89,6 +89,11 @@ class Pursuit:
         self.track_number = 0
 
     @property
+    def plan(self) -> Plan:
+        """Of the session."""
+        return self._plan
+
+    @property
     def candidate(self) -> Candidate | None:
         """The pose under review."""
         return self._candidates[0] if self._candidates else None

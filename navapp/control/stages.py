@@ -6,7 +6,7 @@ Source: the paper, section 4 (opening, drilling, implant, patella, spacer).
 """
 
 from navapp.errors import UsageError
-from navapp.values import StageSpec
+from navapp.values import Plan, StageSpec
 
 STAGES: tuple[StageSpec, ...] = (
     StageSpec(
@@ -16,7 +16,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_mm=2.0,
         tolerance_deg=2.0,
         targets=("femur/medial_condyle", "femur/lateral_condyle", "femur/notch"),
-        layers=("bone", "curves", "targets"),
+        layers=("bone", "defects", "curves", "targets"),
         gates=("bone exposed", "registration accepted"),
     ),
     StageSpec(
@@ -78,13 +78,16 @@ def stage_by_number(number: int) -> StageSpec:
     raise UsageError(f"there is no stage {number}", remedy=f"choose 1 to {len(STAGES)}")
 
 
-def stage_of(bone: str) -> StageSpec:
+def stage_of(bone: str, plan: Plan | None = None) -> StageSpec:
     """The first stage that follows a bone: its goal is the bone's, whatever stage is in force.
+
+    A plan may give its stages bones and targets of its own.
 
     Raises:
         UsageError: none does.
     """
-    for stage in STAGES:
+    planned = () if plan is None else tuple(plan.stage(stage) for stage in STAGES)
+    for stage in (*planned, *STAGES):
         if stage.bone == bone:
             return stage
     known = ", ".join(sorted({stage.bone for stage in STAGES}))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.targets.boards import Board
 from drivers.clock import Clock, ManualClock, SystemClock
@@ -30,6 +31,8 @@ class Simulation:
         side: of the knee.
         targets: `bone/name` -> point, mm, bone coordinates.
         curves: vessels and nerves beside the femur.
+        drill_entry_mm, drill_direction: where the room's drill enters the femur, and whereto.
+        worn_vertices: of the femur, where its cartilage is worn.
         nominal_left_from_bone: how the knee was laid on the table; rough starts.
         approach_axis, approach_half_angle_deg: of the approach cone.
         oracle: the truth, for evaluation after the run only.
@@ -40,6 +43,9 @@ class Simulation:
     side: Literal["left", "right"]
     targets: Mapping[str, FloatArray]
     curves: Mapping[str, FloatArray]
+    drill_entry_mm: FloatArray
+    drill_direction: FloatArray
+    worn_vertices: NDArray[np.int64]
     nominal_left_from_bone: Mapping[str, RigidTransform]
     approach_axis: FloatArray
     approach_half_angle_deg: float
@@ -109,6 +115,7 @@ def with_board(world: World, board: Board | None, settings: SimulationSection) -
 def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
     """What a room tells apart from its devices."""
     anatomy = world.anatomy
+    entry_mm, direction = world.drill_line
     joint_z_mm = float(anatomy.bones["femur"].vertices_mm[:, 2].min())
     return Simulation(
         bones=dict(anatomy.bones),
@@ -119,6 +126,9 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
             name: np.asarray(points)[np.asarray(points)[:, 2] > joint_z_mm]
             for name, points in anatomy.curves.items()
         },
+        drill_entry_mm=entry_mm,
+        drill_direction=direction,
+        worn_vertices=world.worn_vertices,
         nominal_left_from_bone={
             "femur": world.nominal_left_from_femur,
             "tibia": world.nominal_left_from_tibia,

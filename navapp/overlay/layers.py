@@ -22,11 +22,15 @@ Image = NDArray[np.uint8]
 GUIDE_COLOUR = (120, 230, 60)
 CANDIDATE_COLOUR = (40, 180, 255)
 TARGET_COLOUR = (255, 240, 80)
+DEFECT_COLOUR = (60, 60, 235)
 CURVE_COLOURS = {"artery": (60, 60, 235), "vein": (220, 90, 60), "nerve": (60, 220, 250)}
 
 # Of the bone's colour over a part that faces the camera, and how much more over a steep one.
 _LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
 _FARTHEST_PX = 20_000.0
+# What is drawn simplified lies this near the surface: a vertex of it is not behind itself.
+_SKIN_MM = 1.0
+_DOT = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 @dataclass(frozen=True)
@@ -84,14 +88,16 @@ def draw_targets(image: Image, scene: Scene) -> None:
         points = scene.plan.targets.get(name)
         if points is None or not name.startswith(f"{scene.stage.bone}/"):
             continue
-        for u, v in scene.camera.project(scene.left_from_bone.apply(points.reshape(-1, 3))):
+        pixels = scene.camera.project(scene.left_from_bone.apply(points.reshape(-1, 3)))
+        for number, (u, v) in enumerate(pixels):
             if not _is_drawable(np.array([u, v])):
                 continue
             centre = (round(float(u)), round(float(v)))
             cv2.drawMarker(image, centre, (0, 0, 0), cv2.MARKER_CROSS, 19, 4)
             cv2.drawMarker(image, centre, TARGET_COLOUR, cv2.MARKER_CROSS, 17, 2)
-            text = name.split("/", 1)[1].replace("_", " ")
-            put_text(image, text, _label_place(text, centre, scene), 0.45, TARGET_COLOUR)
+            if number == 0:  # a name for all of its points
+                text = name.split("/", 1)[1].replace("_", " ")
+                put_text(image, text, _label_place(text, centre, scene), 0.45, TARGET_COLOUR)
 
 
 def draw_curves(image: Image, scene: Scene) -> None:
@@ -99,7 +105,10 @@ def draw_curves(image: Image, scene: Scene) -> None:
     import cv2
 
     view = scene.view
+    risks = scene.plan.content.risks
     for name, points in scene.plan.curves.items():
+        if (risks[name].bone if name in risks else "femur") != scene.stage.bone:
+            continue
         in_camera = scene.left_from_bone.apply(points)
         pixels = scene.camera.project(in_camera)
         colour = next((c for key, c in CURVE_COLOURS.items() if key in name), TARGET_COLOUR)
@@ -112,6 +121,25 @@ def draw_curves(image: Image, scene: Scene) -> None:
                 continue
             start, end = (tuple(int(value) for value in np.round(p)) for p in segment)
             cv2.line(image, start, end, colour, 1 if is_hidden else 2)
+
+
+def draw_defects(image: Image, scene: Scene) -> None:
+    """Damaged cartilage of the stage's bone as dots, where the bone does not hide it."""
+    mesh, view = scene.mesh, scene.view
+    height, width = view.depth_mm.shape
+    for defect in scene.plan.content.defects.values():
+        if defect.bone != scene.stage.bone:
+            continue
+        in_camera = scene.left_from_bone.apply(mesh.vertices_mm[defect.vertices])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            pixels = np.round(scene.camera.project(in_camera)) - (view.box.x, view.box.y)
+        is_inside = ((pixels >= 2) & (pixels < (width - 2, height - 2))).all(axis=1)
+        u, v = pixels[is_inside].astype(np.intp).T
+        # NaN, where the bone is not drawn, compares as not seen.
+        is_seen = in_camera[is_inside, 2] < view.depth_mm[v, u] + _SKIN_MM
+        u, v = u[is_seen] + view.box.x, v[is_seen] + view.box.y
+        for down, right in _DOT:
+            image[v + down, u + right] = DEFECT_COLOUR
 
 
 def put_text(
@@ -153,5 +181,10 @@ def _is_behind(view: RenderedView, pixel: NDArray[np.float64], depth_mm: float) 
 Layer = Callable[[Image, Scene], None]
 
 LAYERS: Mapping[str, Layer] = MappingProxyType(
-    {"bone": draw_bone, "targets": draw_targets, "curves": draw_curves}
+    {
+        "bone": draw_bone,
+        "defects": draw_defects,
+        "targets": draw_targets,
+        "curves": draw_curves,
+    }
 )

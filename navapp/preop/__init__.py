@@ -3,6 +3,7 @@
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.aspects import AspectSettings, build_aspects
 from navapp.preop.cartilage import even_cartilage, figures_of, import_cartilage
+from navapp.preop.completing import complete, with_side
 from navapp.preop.plan_files import check_place, read_origin, read_plan, write_plan
 from navapp.preop.plan_origin import PlanOrigin
 from navapp.preop.surfaces import ImportedSurface, import_surface
@@ -13,6 +14,7 @@ __all__ = [
     "PlanOrigin",
     "build_aspects",
     "check_place",
+    "complete",
     "even_cartilage",
     "figures_of",
     "import_cartilage",
@@ -20,6 +22,7 @@ __all__ = [
     "read_aspects",
     "read_origin",
     "read_plan",
+    "with_side",
     "write_aspects",
     "write_plan",
 ]

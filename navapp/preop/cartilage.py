@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
+from navapp.preop.cut_ends import on_flat_ends, on_open_borders
 from navapp.preop.surfaces import MIN_FACES, ImportedSurface, in_lps
 from navapp.values import BoneModel
 
@@ -28,9 +28,6 @@ _REACH_MM = 6.0
 _COINCIDES_MM = 0.05
 # Two segmentations cross where there is no cartilage; deeper, or more often, one of them is wrong.
 _DIPS_MM, _DIPS_SHARE = 0.5, 0.02
-# A flat end of a bone is where the CT or the export cut it off.
-_FLAT_MM = 0.05
-_SMALLEST_END_MM2 = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +68,7 @@ def even_cartilage(bone: BoneModel, mean_mm: float, sd_mm: float) -> BoneModel:
     """
     if not (0.0 <= mean_mm <= LARGEST_MM and 0.0 <= sd_mm <= LARGEST_MM):
         raise ValueError(f"cartilage of {mean_mm} +- {sd_mm} mm is not possible")
-    is_covered = ~(_on_open_borders(bone.mesh) | _on_flat_ends(bone.mesh))
+    is_covered = ~(on_open_borders(bone.mesh) | on_flat_ends(bone.mesh))
     return replace(
         bone,
         cartilage_mm=np.where(is_covered, mean_mm, 0.0),
@@ -100,7 +97,7 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
             remedy="export the cartilage's outer surface, not its points",
         )
     mesh = in_lps(mesh, header, path, warnings)
-    if not _on_open_borders(mesh).any() and mesh.volume_mm3() < 0.0:
+    if not on_open_borders(mesh).any() and mesh.volume_mm3() < 0.0:
         mesh = mesh.flipped()
         warnings.append(f"{bone.name}: normals of the cartilage pointed inwards and were turned")
     _check_place(bone, mesh, path)
@@ -174,27 +171,3 @@ def _check_outside(bone: BoneModel, distance_mm: FloatArray, path: Path) -> None
             subject=str(path),
             remedy="export the cartilage's outer surface with outward normals, or leave it out",
         )
-
-
-def _on_flat_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(V,) vertices of flat ends across an axis of the plan: no bone ends in a plane."""
-    corners = mesh.vertices_mm[mesh.faces]
-    areas = 0.5 * np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
-    is_end = np.zeros(len(mesh.vertices_mm), dtype=bool)
-    for place in mesh.vertices_mm.T:
-        for end_mm in (place.min(), place.max()):
-            is_near = np.abs(place - end_mm) < _FLAT_MM
-            if areas[is_near[mesh.faces].all(axis=1)].sum() > _SMALLEST_END_MM2:
-                is_end |= is_near
-    return is_end
-
-
-def _on_open_borders(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(V,) vertices on an edge of one triangle only."""
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
-    is_border = np.zeros(len(mesh.vertices_mm), dtype=bool)
-    is_border[unique[counts == 1]] = True
-    return is_border

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from navapp.errors import PlanError, UsageError
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.ct_surface import BoneSurface, surface_of_labels, surfaces_of
 from navapp.preop.plan_origin import PlanOrigin
@@ -43,13 +44,15 @@ class Draft:
     Attributes:
         bones: name -> model, those that are followed.
         origin: facts for people.
-        beside: bones that are not followed (the fibula), which tell the side.
+        fibula: which is not followed and tells the side; None where it is not known.
+        side: as the user or the CT's laterality tag says; None to be estimated.
         slices: bone -> PNG of three slices of the volume with the surface's contour.
     """
 
     bones: Mapping[str, BoneModel]
     origin: PlanOrigin
-    beside: Mapping[str, BoneModel] = field(default_factory=dict)
+    fibula: TriangleMesh | None = None
+    side: Side | None = None
     slices: Mapping[str, bytes] = field(default_factory=dict)
 
 
@@ -78,7 +81,7 @@ def draft_from_ct(
         {name: float(bone.is_measured.mean()) for name, bone in surfaces.bones.items()},
         (*read.warnings, *found.warnings),
     )
-    side = settings.side
+    side = settings.side or read.source.side
     slices = {name: draw_slices(found.ct, surface.mesh) for name, surface in surfaces.bones.items()}
     return _draft(surfaces.bones, side, origin, slices)
 
@@ -118,16 +121,13 @@ def _draft(
     origin: PlanOrigin,
     slices: Mapping[str, bytes],
 ) -> Draft:
-    models = {
-        name: BoneModel(name, surface.mesh, side, is_removed=surface.is_cut)
-        for name, surface in surfaces.items()
+    bones = {
+        name: BoneModel(name, surfaces[name].mesh, side, is_removed=surfaces[name].is_cut)
+        for name in FOLLOWED
+        if name in surfaces
     }
-    return Draft(
-        {name: models[name] for name in FOLLOWED if name in models},
-        origin,
-        {name: model for name, model in models.items() if name not in FOLLOWED},
-        slices,
-    )
+    fibula = surfaces["fibula"].mesh if "fibula" in surfaces else None
+    return Draft(bones, origin, fibula, side, slices)
 
 
 def _within(ct: CtVolume, region_mm: tuple[float, ...]) -> CtVolume:

@@ -16,10 +16,11 @@ from navapp.errors import InputError, PlanError
 from navapp.geometry.transform import FloatArray
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.bone_files import read_bone, write_bone
+from navapp.preop.content_files import content_from_json, content_to_json
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
 from navapp.preop.preview import draw_preview
 from navapp.preop.summary import summary_page
-from navapp.values import AspectGraph, BoneModel, Plan
+from navapp.values import AspectGraph, BoneModel, Plan, SurgicalContent
 
 _FILE = "plan.json"
 NO_SLICES: Mapping[str, bytes] = MappingProxyType({})
@@ -99,8 +100,9 @@ def read_plan(folder: str | Path) -> Plan:
             bones,
             {name: _points(points) for name, points in content["targets"].items()},
             {name: _points(points) for name, points in content["curves"].items()},
-            _read_aspects(folder, content["bones"]),
             name=folder.name,
+            content=_surgical(content, folder),
+            aspects=_read_aspects(folder, content["bones"]),
         )
     except (
         OSError,
@@ -189,6 +191,7 @@ def _write_content(
         "bones": bones,
         "targets": {name: points.tolist() for name, points in plan.targets.items()},
         "curves": {name: points.tolist() for name, points in plan.curves.items()},
+        "content": content_to_json(plan.content, folder),
         "origin": origin_to_json(origin),
         "hash": plan.digest,
     }
@@ -251,6 +254,13 @@ def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
         cartilage_sd_mm,
         is_removed,
         version=int(entry["version"]),
+    )
+
+
+def _surgical(content: dict[str, Any], folder: Path) -> SurgicalContent:
+    """Plans from before there was any have none."""
+    return (
+        content_from_json(content["content"], folder) if "content" in content else SurgicalContent()
     )
 
 

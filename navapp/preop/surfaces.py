@@ -58,9 +58,9 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
         whole = whole.flipped()
         warnings.append(f"{name}: normals pointed inwards and were turned")
     if not is_closed(whole):
-        warnings.append(f"{name}: the surface is open or has stray triangles; no edge is looked for there")
-    if side is None:
-        warnings.append(f"{name}: side not given, handedness is not checked (give --side)")
+        warnings.append(
+            f"{name}: the surface is open or has stray triangles; no edge is looked for there"
+        )
     return ImportedSurface(BoneModel(name, whole, side), tuple(warnings))
 
 

@@ -4,6 +4,22 @@ Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectificati
 """
 
 from navapp.values.bones import AspectGraph, BoneModel, Side, visible_vertices
+from navapp.values.contents import (
+    ANKLE_CENTRE,
+    HIP_CENTRE,
+    Box,
+    Cylinder,
+    Defect,
+    DrillAxis,
+    Landmark,
+    Part,
+    ResectionPlane,
+    RiskStructure,
+    Shape,
+    Sphere,
+    StageContent,
+    SurgicalContent,
+)
 from navapp.values.measured import DisparityMap, Origin, RowCheck, SurfaceCloud
 from navapp.values.pictures import OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
@@ -18,22 +34,36 @@ from navapp.values.verdicts import (
 )
 
 __all__ = [
+    "ANKLE_CENTRE",
+    "HIP_CENTRE",
     "AspectGraph",
     "BoneModel",
+    "Box",
+    "Cylinder",
+    "Defect",
     "DisparityMap",
+    "DrillAxis",
+    "Landmark",
     "LineTimings",
     "Origin",
     "OverlayMode",
     "OverlayPicture",
+    "Part",
     "Plan",
     "PoseEstimate",
     "Prior",
     "Reason",
+    "ResectionPlane",
+    "RiskStructure",
     "RowCheck",
+    "Shape",
     "Side",
+    "Sphere",
+    "StageContent",
     "StageSpec",
     "Status",
     "SurfaceCloud",
+    "SurgicalContent",
     "TrackedFrame",
     "Verdict",
     "predicted_tre_mm",

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.bones import AspectGraph, BoneModel
+from navapp.values.contents import SurgicalContent
+from navapp.values.digests import add_value
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,40 +41,6 @@ class Prior:
         return self.approach_axis if bone == "femur" else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plan:
-    """A pre-operative plan.
-
-    Attributes:
-        bones: name -> model.
-        targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
-        curves: name -> (N, 3) polylines beside the femur (vessels, nerves), mm.
-        aspects: bone -> its edges from all around, where they were built beforehand.
-        digest: hash of the content.
-        name: for people.
-    """
-
-    bones: Mapping[str, BoneModel]
-    targets: Mapping[str, FloatArray] = field(default_factory=dict)
-    curves: Mapping[str, FloatArray] = field(default_factory=dict)
-    aspects: Mapping[str, AspectGraph] = field(default_factory=dict)
-    digest: str = ""
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
-        object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
-        object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
-        object.__setattr__(self, "aspects", MappingProxyType(dict(self.aspects)))
-        if not self.digest:
-            object.__setattr__(self, "digest", _digest(self))
-
-    def targets_of(self, names: tuple[str, ...]) -> FloatArray:
-        """(N, 3) target points of those names that the plan has; may be empty."""
-        found = [self.targets[name].reshape(-1, 3) for name in names if name in self.targets]
-        return np.concatenate(found) if found else np.empty((0, 3))
-
-
 @dataclass(frozen=True, slots=True)
 class StageSpec:
     """One surgical stage, as a row of the table in `navapp.control.stages`."""
@@ -86,6 +54,79 @@ class StageSpec:
     layers: tuple[str, ...]
     gates: tuple[str, ...]
     measurements: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """A pre-operative plan.
+
+    Attributes:
+        bones: name -> model.
+        targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
+        curves: name -> (N, 3) polylines (vessels, nerves), mm; they move with the bone of the risk
+            structure of the same name, or with the femur.
+        aspects: bone -> its edges from all around, where they were built beforehand; not in the
+            digest, because they follow from the bones.
+        content: what is to be cut, drilled, put in and kept away from.
+        digest: hash of all of it.
+        name: for people.
+
+    Raises:
+        ValueError: a risk structure has neither a surface nor a curve, a defect names a vertex that
+            its bone does not have, or a stage names what the plan does not have.
+    """
+
+    bones: Mapping[str, BoneModel]
+    targets: Mapping[str, FloatArray] = field(default_factory=dict)
+    curves: Mapping[str, FloatArray] = field(default_factory=dict)
+    digest: str = ""
+    name: str = ""
+    content: SurgicalContent = field(default_factory=SurgicalContent)
+    aspects: Mapping[str, AspectGraph] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
+        object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
+        object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
+        object.__setattr__(self, "aspects", MappingProxyType(dict(self.aspects)))
+        _check_content(self)
+        if not self.digest:
+            object.__setattr__(self, "digest", _digest(self))
+
+    def targets_of(self, names: tuple[str, ...]) -> FloatArray:
+        """(N, 3) target points of those names that the plan has; may be empty."""
+        found = [self.targets[name].reshape(-1, 3) for name in names if name in self.targets]
+        return np.concatenate(found) if found else np.empty((0, 3))
+
+    def stage(self, spec: StageSpec) -> StageSpec:
+        """A stage as this plan has it: with its bone and, when it names any, its targets."""
+        planned = self.content.stages.get(spec.name)
+        if planned is None:
+            return spec
+        return replace(spec, bone=planned.bone, targets=planned.targets or spec.targets)
+
+
+def _check_content(plan: Plan) -> None:
+    content = plan.content
+    for name, risk in content.risks.items():
+        if risk.mesh is None and name not in plan.curves:
+            raise ValueError(f"the risk structure '{name}' has neither a surface nor a curve")
+    for name, defect in content.defects.items():
+        bone = plan.bones.get(defect.bone)
+        n = 0 if bone is None else len(bone.mesh.vertices_mm)
+        if len(defect.vertices) and defect.vertices[-1] >= n:
+            raise ValueError(f"the defect '{name}' names a vertex that the {defect.bone} lacks")
+    for stage, planned in content.stages.items():
+        for kind, known in (
+            ("targets", plan.targets),
+            ("planes", content.planes),
+            ("drills", content.drills),
+            ("parts", content.parts),
+            ("risks", content.risks),
+        ):
+            missing = [name for name in getattr(planned, kind) if name not in known]
+            if missing:
+                raise ValueError(f"stage {stage}: the {kind} have no '{missing[0]}'")
 
 
 def _digest(plan: Plan) -> str:
@@ -108,4 +149,7 @@ def _digest(plan: Plan) -> str:
     for kind, points_by_name in (("target", plan.targets), ("curve", plan.curves)):
         for name in sorted(points_by_name):
             add(f"{kind} {name}", np.asarray(points_by_name[name], dtype=np.float64))
+    # Plans from before there was any keep their hash.
+    if not plan.content.is_empty:
+        add_value(digest, "content", plan.content)
     return digest.hexdigest()[:12]

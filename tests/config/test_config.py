@@ -356,7 +356,7 @@ def test_every_fault_of_the_simulated_camera_can_be_scripted():
         ({"duration_s": 0.0}, "faults.1.duration_s"),
         ({"duration_s": float("nan")}, "faults.1.duration_s"),
         ({"duration_s": "1"}, "faults.1.duration_s"),
-        ({"delay_s": 0.1}, "faults.1: value error, delay_s belongs to a delay, not to drop"),
+        ({"delay_s": 0.1}, "faults.1: delay_s belongs to a delay, not to drop"),
         ({"kind": "delay", "delay_s": -0.1}, "faults.1.delay_s"),
         ({"kind": "turn"}, "turn_deg belongs to a turn, and a turn needs it"),
         ({"turn_deg": [0.0, 0.1, 0.0]}, "turn_deg belongs to a turn, and a turn needs it"),

@@ -5,7 +5,7 @@ import numpy as np
 from navapp.geometry.camera import Camera
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.overlay.layers import Scene
-from navapp.values import BoneModel, Plan, StageSpec
+from navapp.values import BoneModel, Plan, StageSpec, SurgicalContent
 from tests.registration.shapes import grid_mesh
 
 WIDTH, HEIGHT = 640, 480
@@ -22,12 +22,14 @@ BEHIND = np.column_stack([np.linspace(-80, 80, 33), np.full(33, 5.0), np.full(33
 
 
 def scene(
-    *layers: str, is_candidate: bool = False, pose: RigidTransform = POSE, targets=None, curves=None
-) -> Scene:
+    *layers: str, is_candidate: bool = False, pose: RigidTransform = POSE, targets=None,
+    curves=None, content=None,
+) -> Scene:  # fmt: skip
     plan = Plan(
         {"femur": BoneModel("femur", MESH)},
         targets or {"femur/notch": TARGET, "tibia/plateau": TARGET + 20.0},
         curves or {"popliteal artery": BEHIND},
+        content=content or SurgicalContent(),
     )
     stage = StageSpec(
         1, "opening", "femur", 2.0, 2.0, ("femur/notch", "tibia/plateau", "femur/unknown"),

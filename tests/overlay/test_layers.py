@@ -3,7 +3,16 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render
-from navapp.overlay.layers import CURVE_COLOURS, GUIDE_COLOUR, LAYERS, TARGET_COLOUR
+from navapp.overlay.layers import (
+    CURVE_COLOURS,
+    DEFECT_COLOUR,
+    GUIDE_COLOUR,
+    LAYERS,
+    TARGET_COLOUR,
+    Scene,
+)
+from navapp.values import BoneModel, Defect, Plan, RiskStructure, SurgicalContent
+from tests.geometry.shapes import sphere
 from tests.overlay.scenes import BEHIND, CAMERA, HEIGHT, MESH, POSE, TARGET, WIDTH, scene, video
 
 
@@ -100,3 +109,58 @@ def test_a_curve_before_the_bone_is_not_dashed() -> None:
     pixels = CAMERA.project(POSE.apply(before))
     middles = np.round(0.5 * (pixels[1:] + pixels[:-1])).astype(int)
     assert is_colour(image, CURVE_COLOURS["nerve"])[middles[:, 1], middles[:, 0]].all()
+
+
+def test_a_target_of_many_points_is_named_once(monkeypatch) -> None:
+    said = []
+    monkeypatch.setattr("navapp.overlay.layers.put_text", lambda _, text, *rest: said.append(text))
+    image = black()
+    points = TARGET + np.array([[0.0, 0, 0], [12, 0, 0], [0, 12, 0]])
+    LAYERS["targets"](image, scene("targets", targets={"femur/notch": points}))
+    assert said == ["notch"]
+    for u, v in CAMERA.project(POSE.apply(points)):
+        assert is_colour(image, TARGET_COLOUR)[round(v), round(u)]
+
+
+def test_a_curve_that_moves_with_another_bone_is_not_drawn_with_this_one() -> None:
+    image = black()
+    of_tibia = SurgicalContent(risks={"popliteal artery": RiskStructure("tibia", 5.0)})
+    LAYERS["curves"](image, scene("curves", content=of_tibia))
+    assert not image.any()
+    of_femur = SurgicalContent(risks={"popliteal artery": RiskStructure("femur", 5.0)})
+    LAYERS["curves"](image, scene("curves", content=of_femur))
+    assert image.any()
+
+
+def test_damaged_cartilage_is_shown_where_it_is_and_where_it_can_be_seen() -> None:
+    near = np.flatnonzero(np.linalg.norm(MESH.vertices_mm - TARGET, axis=1) < 12.0)
+    content = SurgicalContent(defects={"worn": Defect("femur", near)})
+    image = black()
+    LAYERS["defects"](image, scene("defects", content=content))
+    dots = is_colour(image, DEFECT_COLOUR)
+    pixels = np.round(CAMERA.project(POSE.apply(MESH.vertices_mm[near]))).astype(int)
+    assert dots[pixels[:, 1], pixels[:, 0]].all()
+    assert dots.sum() <= 5 * len(near)
+    other = SurgicalContent(defects={"worn": Defect("tibia", np.empty(0, dtype=np.int64))})
+    image = black()
+    LAYERS["defects"](image, scene("defects", content=other))
+    assert not image.any()
+
+
+def test_damaged_cartilage_behind_the_bone_is_not_shown() -> None:
+    """A ball's far half is hidden by its near one."""
+    ball = sphere(20.0, 24)
+    pose = RigidTransform.from_parts("left", "femur", np.eye(3), (0.0, 0.0, 400.0))
+    whole = SurgicalContent(defects={"all": Defect("femur", np.arange(len(ball.vertices_mm)))})
+    of_bowl = scene("defects")
+    plan = Plan({"femur": BoneModel("femur", ball)}, content=whole)
+    image = black()
+    LAYERS["defects"](image, Scene(plan, of_bowl.stage, ball, pose, CAMERA, False))
+    assert image.any()
+    alone = SurgicalContent(
+        defects={"far": Defect("femur", np.flatnonzero(ball.vertices_mm[:, 2] > 8.0))}
+    )
+    image = black()
+    plan = Plan({"femur": BoneModel("femur", ball)}, content=alone)
+    LAYERS["defects"](image, Scene(plan, of_bowl.stage, ball, pose, CAMERA, False))
+    assert not image.any()

@@ -128,12 +128,6 @@ def test_triangles_that_share_no_vertices_are_refused(imported):
         imported(loose)
 
 
-def test_a_missing_side_is_said(imported):
-    surface = imported(BONE, side=None)
-    assert surface.bone.side is None
-    assert "--side" in surface.warnings[0]
-
-
 def test_a_missing_or_damaged_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"none\.ply"):
         import_surface("femur", tmp_path / "none.ply")

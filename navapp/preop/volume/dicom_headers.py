@@ -11,6 +11,7 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray
 from navapp.preop.volume.dicom_identity import NAMING_TAGS, naming_values
+from navapp.values import Side
 
 _SLICE_TAGS = (
     "SOPClassUID", "SeriesInstanceUID", "FrameOfReferenceUID", "Modality", "SeriesDescription",
@@ -55,7 +56,7 @@ class SliceHeader:
     thickness_mm: float | None
     tilt_deg: float | None
     padding_hu: tuple[float, float] | None
-    side: str | None
+    side: Side | None
 
     @property
     def normal(self) -> FloatArray:
@@ -190,9 +191,10 @@ def _padding(header: Any) -> tuple[float, float] | None:
     return min(ends), max(ends)
 
 
-def _side(header: Any) -> str | None:
+def _side(header: Any) -> Side | None:
     letter = header.get("ImageLaterality") or header.get("Laterality")
-    return {"L": "left", "R": "right"}.get(str(letter).strip().upper())
+    sides: dict[str, Side] = {"L": "left", "R": "right"}
+    return sides.get(str(letter).strip().upper())
 
 
 def _floats(values: Any, count: int) -> FloatArray:

@@ -25,6 +25,7 @@ from navapp.preop.volume.dicom_stack import (
 )
 from navapp.preop.volume.hounsfield import AIR_HU, HuArray, compact, without_padding
 from navapp.preop.volume.itk_package import codecs_heard, read_image, voxels_of
+from navapp.values import Side
 
 _HasComplained = Callable[[], bool]
 
@@ -46,7 +47,7 @@ class DicomVolume:
     volume: CtVolume
     info: SeriesInfo
     thickness_tag_mm: float | None
-    side: str | None
+    side: Side | None
     warnings: tuple[str, ...]
 
 

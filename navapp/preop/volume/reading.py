@@ -9,6 +9,7 @@ from navapp.preop.volume.dicom_series import read_series
 from navapp.preop.volume.hounsfield import compact, without_padding
 from navapp.preop.volume.volume_checks import content_warnings, refusal_of
 from navapp.preop.volume.volume_files import read_file, whole_numbers
+from navapp.values import Side
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +28,7 @@ class CtSource:
     description: str
     n_slices: int
     thickness_tag_mm: float | None = None
-    side: str | None = None
+    side: Side | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

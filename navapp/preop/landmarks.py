@@ -1,0 +1,22 @@
+"""Landmarks of a plan's bones from their surfaces alone, each with its standard deviation."""
+
+from collections.abc import Mapping
+
+from navapp.preop.femur_landmarks import femur_landmarks
+from navapp.preop.tibia_landmarks import patella_landmarks, tibia_landmarks
+from navapp.values import BoneModel, Landmark
+
+
+def estimate_landmarks(bones: Mapping[str, BoneModel]) -> dict[str, Landmark]:
+    """What the surfaces allow, keyed `bone/name`; what they do not allow is left out.
+
+    The plan's z is taken for the leg's long axis: outermost points are those along the plan's axes.
+    """
+    found: dict[str, Landmark] = {}
+    if "femur" in bones:
+        found |= femur_landmarks(bones["femur"].mesh, bones["femur"].side)
+    if "tibia" in bones:
+        found |= tibia_landmarks(bones["tibia"].mesh, bones["tibia"].side)
+    if "patella" in bones:
+        found |= patella_landmarks(bones["patella"].mesh)
+    return found

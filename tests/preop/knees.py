@@ -1,0 +1,42 @@
+"""Simulated knees as bones of a plan: the landmarks of the simulator judge ours."""
+
+from functools import cache
+
+import numpy as np
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.values import BoneModel
+from sim_devices.anatomy import KneeAnatomy, KneeSpec, make_knee
+from tests.geometry.shapes import sphere
+
+SEEDS = range(1, 11)
+
+
+@cache
+def knees() -> tuple[KneeAnatomy, ...]:
+    """Ten people, both knees of each: women and men, young, middle and old."""
+    return tuple(
+        make_knee(
+            KneeSpec(seed, side, ("female", "male")[seed % 2], ("young", "middle", "old")[seed % 3])
+        )
+        for seed in SEEDS
+        for side in ("right", "left")
+    )
+
+
+def bones_of(knee: KneeAnatomy) -> dict[str, BoneModel]:
+    return {name: BoneModel(name, mesh, knee.spec.side) for name, mesh in knee.bones.items()}
+
+
+def fibula_of(knee: KneeAnatomy) -> TriangleMesh:
+    """Outward and behind the tibia, below its plateau, where a fibula's head is."""
+    outward = -1.0 if knee.spec.side == "right" else 1.0
+    head = knee.bones["tibia"].centroid_mm + np.array([30.0 * outward, 20.0, 0.0])
+    ball = sphere(9.0, 10)
+    return TriangleMesh(ball.vertices_mm * np.array([1.0, 1.0, 4.0]) + head, ball.faces)
+
+
+def turned(mesh: TriangleMesh, signs: tuple[int, int, int]) -> TriangleMesh:
+    """With axes reversed: two of them turn the bone round, one or three mirror it."""
+    faces = mesh.faces if np.prod(signs) > 0 else mesh.faces[:, ::-1]
+    return TriangleMesh(mesh.vertices_mm * np.array(signs, dtype=float), faces)
