@@ -19,3 +19,20 @@ def board_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def good_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten pairs that give an accepted rig; nobody writes into this folder."""
     return photograph(tmp_path_factory.mktemp("good"), good_poses())
+
+
+"""What tests of the command line share."""
+
+from functools import partial
+
+import pytest
+
+import navapp.preop
+from navapp.preop import AspectSettings
+
+
+@pytest.fixture
+def few_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bones are looked at from few sides: a plan is made in a fraction of the time."""
+    coarse = partial(navapp.preop.build_aspects, settings=AspectSettings(step_deg=45.0))
+    monkeypatch.setattr(navapp.preop, "build_aspects", coarse)

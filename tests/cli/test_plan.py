@@ -12,6 +12,8 @@ from navapp.geometry.ply import write_ply
 from navapp.preop import read_plan
 from tests.geometry.shapes import sphere
 
+pytestmark = pytest.mark.usefixtures("few_views")
+
 BONE = sphere(40.0, 20)
 
 
