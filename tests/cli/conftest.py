@@ -1,10 +1,13 @@
-"""Pictures of a board, taken once; tests copy what they change."""
+"""What is made once, or faster: pictures of a board, plans."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+import navapp.preop
+from navapp.preop import AspectSettings
 from tests.calibration.photographed import KEYS, good_poses, photograph
 
 
@@ -19,16 +22,6 @@ def board_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def good_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten pairs that give an accepted rig; nobody writes into this folder."""
     return photograph(tmp_path_factory.mktemp("good"), good_poses())
-
-
-"""What tests of the command line share."""
-
-from functools import partial
-
-import pytest
-
-import navapp.preop
-from navapp.preop import AspectSettings
 
 
 @pytest.fixture
