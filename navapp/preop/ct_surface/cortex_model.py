@@ -18,7 +18,7 @@ from navapp.geometry.transform import FloatArray
 
 # The profile's samples, mm along the outward normal.
 INWARD_MM, OUTWARD_MM, STEP_MM = 5.0, 3.0, 0.25
-_THICKNESSES_MM = (0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.5, 1.8, 2.2, 2.7, 3.3, 4.0, 6.0)
+_LEAST_MM, _MOST_MM, _THICKNESS_STEP_MM = 0.3, 6.0, 0.3
 _OFFSET_STEP_MM = 0.1
 # Soft tissue is about as dense as it is elsewhere: in a narrow gap little of it is seen.
 _SOFT_SD_HU = 80.0
@@ -57,7 +57,7 @@ class Edges:
 
     Attributes:
         offset_mm: (N,) of the edge along the outward normal.
-        thickness_mm: (N,) of the plate, on a grid.
+        thickness_mm: (N,) of the plate.
         misfit_hu2: (N,) sum of squares that is left.
         sharpness: (N,) second derivative of the misfit by the offset, HU2 per mm2: weight.
         is_at_end: (N,) the best offset is the first or last that was tried.
@@ -123,7 +123,7 @@ def _model(
     positions = sample_positions_mm()[:n_used]
     n_steps = round(reach_mm / _OFFSET_STEP_MM)
     offsets = _OFFSET_STEP_MM * np.arange(-n_steps, n_steps + 1, dtype=np.float64)
-    thickness = np.array(_THICKNESSES_MM)
+    thickness = np.arange(_LEAST_MM, _MOST_MM + 0.5 * _THICKNESS_STEP_MM, _THICKNESS_STEP_MM)
     inside = ndtr((offsets[:, None, None] - positions) / blur_mm)
     inner_mm = float(np.hypot(blur_mm, fading_mm))
     below = ndtr((offsets[:, None, None] - thickness[:, None] - positions) / inner_mm)
@@ -155,14 +155,31 @@ def _fitted(model: _Model, profiles_hu: FloatArray, scan: Scan) -> tuple[FloatAr
     is_at_end = (best == 0) | (best == len(model.offsets_mm) - 1)
     middle = np.clip(best, 1, len(model.offsets_mm) - 2)
     rows = np.arange(len(values))
-    before, here, after = (by_offset[rows, middle + step] for step in (-1, 0, 1))
-    bend = np.maximum(before - 2.0 * here + after, 1e-9)
-    step = np.clip(0.5 * (before - after) / bend, -1.0, 1.0)
-    thickness = np.array(_THICKNESSES_MM)[misfit[rows, middle].argmin(axis=1)]
+    # A thickness off the grid would move the edge: half of what one end is off, the other is.
+    beside = [_lowest(misfit[rows, middle + step]) for step in (-1, 0, 1)]
+    step, least = _vertex(*(value for value, _ in beside))
+    before, here, after = (value for value, _ in beside)
     return (
         model.offsets_mm[middle] + step * _OFFSET_STEP_MM,
-        thickness,
-        by_offset[rows, best],
-        bend / _OFFSET_STEP_MM**2,
+        _LEAST_MM + _THICKNESS_STEP_MM * beside[1][1],
+        np.maximum(least, 0.0),
+        np.maximum(before - 2.0 * here + after, 1e-9) / _OFFSET_STEP_MM**2,
         is_at_end,
     )
+
+
+def _lowest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(N,) how low each of N rows gets between its samples, and where, in steps."""
+    rows = np.arange(len(values))
+    best = np.clip(values.argmin(axis=1), 1, values.shape[1] - 2)
+    step, least = _vertex(*(values[rows, best + beside] for beside in (-1, 0, 1)))
+    return least, best + step
+
+
+def _vertex(
+    before: FloatArray, here: FloatArray, after: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(N,) where parabolas through three values are lowest, at most a step away, and how low."""
+    slope, bend = 0.5 * (before - after), before - 2.0 * here + after
+    step = np.clip(slope / np.maximum(bend, 1e-9), -1.0, 1.0)
+    return step, here - slope * step + 0.5 * bend * step**2

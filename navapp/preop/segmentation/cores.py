@@ -10,7 +10,7 @@ from navapp.preop.segmentation.masks import BoolArray, LabelArray, components, d
 from navapp.preop.segmentation.plates import Plates
 
 # How curved a valley must be to part two bones, HU per mm2: the first that tells bones apart
-# serves. A plate of cortex (1,000 HU over soft tissue, 1 mm) has about 1,000 at its feet.
+# serves. A plate of cortex (1,000 HU over soft tissue, 1 mm) has about 200 at its feet.
 _VALLEYS = (150.0, 100.0, 70.0, 50.0, 35.0)
 # A ridge is a plate; valleys count beside one only, because marrow ends without a gap as well.
 _RIDGE, _BESIDE_MM = -150.0, 2.5

@@ -60,6 +60,8 @@ def _up_to_plates(
     for axis in range(3):
         for step in (-1, 1):
             beside = np.roll(inner, step, axis)
+            # What has come in over the volume's end.
+            np.moveaxis(beside, axis, 0)[0 if step > 0 else -1] = 0
             reached = plate & (grown == 0) & (beside > 0)
             grown[reached] = beside[reached]
     # Where a plate has a hole the core reaches what is behind: that is nearer to another one.

@@ -47,15 +47,29 @@ def largest(mask: BoolArray, spacing_mm: FloatArray) -> BoolArray:
 
 
 def closed(mask: BoolArray, spacing_mm: FloatArray, radius_mm: float) -> BoolArray:
-    """The mask with gaps closed that are narrower than twice a radius, and its holes filled."""
+    """The mask with gaps closed that are narrower than twice a radius, and its holes filled.
+
+    Where the mask ends at the volume's end, as a cut shaft does, what it encloses there in that
+    plane is a hole as well.
+    """
     margin = np.ceil(radius_mm / spacing_mm).astype(int) + 2
     room = [(int(n), int(n)) for n in margin[::-1]]
     grown = depth_mm(np.pad(mask, room), spacing_mm) >= -radius_mm
     shut = depth_mm(grown, spacing_mm) > radius_mm
     shut |= np.pad(mask, room)
-    filled = simple_itk().BinaryFillhole(as_image(shut, spacing_mm))
-    inner = tuple(slice(n, -n) for n, _ in room)
-    result: BoolArray = voxels_of(filled).astype(bool)[inner]
+    inner = shut[tuple(slice(n, -n) for n, _ in room)]
+    for axis in range(3):
+        for end in (0, -1):
+            plane = np.moveaxis(inner, axis, 0)[end]
+            plane[:] = _without_holes(plane)
+    return _without_holes(inner)
+
+
+def _without_holes(mask: BoolArray) -> BoolArray:
+    """A mask of two or three axes; a hole is what cannot be left but through the mask."""
+    room = np.pad(mask, 1)
+    filled = simple_itk().BinaryFillhole(simple_itk().GetImageFromArray(room.astype(np.uint8)))
+    result: BoolArray = voxels_of(filled).astype(bool)[(slice(1, -1),) * mask.ndim]
     return result
 
 

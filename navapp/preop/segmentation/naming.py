@@ -106,8 +106,8 @@ def name_parts(parts: list[Part]) -> Named:
 
 
 def _is_above(femur: Part, tibia: Part) -> bool:
-    """Whether one bone stands on the other."""
-    if femur is tibia or femur.centre_mm[2] <= tibia.centre_mm[2]:
+    """Whether one bone stands on the other; a patella lies before it, as low as its end or not."""
+    if femur is tibia or femur.lower_mm[2] <= tibia.centre_mm[2]:
         return False
     gap_mm = femur.lower_mm[2] - tibia.upper_mm[2]
     middles = 0.5 * (femur.lower_mm + femur.upper_mm - tibia.lower_mm - tibia.upper_mm)[:2]

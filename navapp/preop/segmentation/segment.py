@@ -32,7 +32,7 @@ class Segmentation:
         ct: the box.
         bones: (D, H, W) number of the bone that each voxel of the box is part of; 0 for none.
         names: name -> number; parts without a name are bones as well (a fabella).
-        warnings: what was not found.
+        warnings: what was not found, and what is not whole.
     """
 
     ct: CtVolume
@@ -67,8 +67,23 @@ def segment(
     tell("growing bones up to the joint")
     bones = grow(cores, hu, plates, solid, ct.spacing_mm, threshold_hu)
     missing = [name for name in BONES if name not in named.bones]
-    warnings = tuple(f"{name}: not found in the CT" for name in missing)
-    return Segmentation(ct, bones, named.bones, warnings)
+    warnings = [f"{name}: not found in the CT" for name in missing]
+    warnings += [
+        f"{name}: cut off at the side of the picture: what lies beyond is missing in its surface"
+        for name, number in named.bones.items()
+        if _is_cut_at_side(bones == number, ct)
+    ]
+    return Segmentation(ct, bones, named.bones, tuple(warnings))
+
+
+def _is_cut_at_side(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
+    """Whether a bone reaches an end of the volume other than its top and bottom.
+
+    The first and last slice cut any shaft; which axis that is depends on how a file was written.
+    """
+    upright = 2 - int(np.abs(ct.lps_from_index[2, :3] / ct.spacing_mm).argmax())
+    sides = (np.moveaxis(bone, axis, 0)[[0, -1]] for axis in range(3) if axis != upright)
+    return any(bool(side.any()) for side in sides)
 
 
 def _around_solids(
