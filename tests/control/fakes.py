@@ -11,7 +11,13 @@ import numpy as np
 from drivers.clock import Clock, ManualClock
 from drivers.fixed_mirror import FixedMirror
 from drivers.frames import StereoFrame
-from drivers.interfaces import CameraInfo, DeviceSet, MirrorMount, ProjectorControl
+from drivers.interfaces import (
+    CameraInfo,
+    DeviceSet,
+    MirrorMount,
+    ProjectorControl,
+    StereoCamera,
+)
 from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
 from navapp.control.controller import SessionController, SessionOptions
@@ -188,7 +194,8 @@ class Bench:
         plan: Plan | None = None,
         options: SessionOptions | None = None,
         can_reopen: bool = True,
-        camera: FakeCamera | None = None,
+        camera: StereoCamera | None = None,
+        clock: Clock | None = None,
         projector: ProjectorControl | None = None,
         mirror: MirrorMount | None = None,
         hooks: SessionHooks | None = None,
@@ -198,9 +205,10 @@ class Bench:
         self.script = Script()
         line = type("ScriptedLine", (FakeLine,), {"script": self.script})
         monkeypatch.setattr("navapp.control.pursuit.Line", line)
-        self.clock = ManualClock(10**9)
+        self.clock = clock or ManualClock(10**9)
         self.camera = camera or FakeCamera(self.clock)
-        self.camera._clock = self.clock
+        if isinstance(self.camera, FakeCamera):
+            self.camera._clock = self.clock
         self.display = make_display(self.clock, WIDTH, HEIGHT)
         self.events: list[Event] = []
         self.results: list[FrameResult] = []
@@ -228,7 +236,7 @@ class Bench:
             ),
         )  # fmt: skip
 
-    def _reopen(self) -> FakeCamera:
+    def _reopen(self) -> StereoCamera:
         self.camera.open()
         return self.camera
 
