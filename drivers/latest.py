@@ -1,7 +1,6 @@
 """The newest frame, never a queue."""
 
 import threading
-from collections.abc import Callable
 from typing import Generic, TypeVar
 
 from drivers.frames import StereoFrame
@@ -61,6 +60,9 @@ class ReaderThread:
 
     The thread owns the camera while it runs: it opens nothing, but closes the camera at its end.
     A time-out is not the end; any other error of the camera is kept for the reader of the slot.
+
+    Attributes:
+        silence: what the camera said when it gave no frame in time; empty since it gave one.
     """
 
     def __init__(
@@ -68,13 +70,12 @@ class ReaderThread:
         camera: StereoCamera,
         slot: LatestSlot[StereoFrame],
         timeout_s: float = 0.5,
-        on_timeout: Callable[[], None] | None = None,
     ) -> None:
         self._camera = camera
         self._slot = slot
         self._timeout_s = timeout_s
-        self._on_timeout = on_timeout
         self._name = ""
+        self.silence = ""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="camera-reader", daemon=True)
 
@@ -95,9 +96,9 @@ class ReaderThread:
             while not self._stopping.is_set():
                 try:
                     self._slot.put(self._camera.read(self._timeout_s))
-                except DeviceTimeout:
-                    if self._on_timeout is not None:
-                        self._on_timeout()
+                    self.silence = ""
+                except DeviceTimeout as error:
+                    self.silence = str(error)
         except NavappError as error:
             self._slot.fail(error)
         except Exception as error:  # noqa: BLE001 (a driver's bug must end as a lost device, not as a silent thread)

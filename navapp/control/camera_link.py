@@ -52,6 +52,13 @@ class CameraLink:
         return self._source is not None and waited_ns > _SILENT_AFTER_NS
 
     @property
+    def silence(self) -> str:
+        """Why it is silent, as far as it says; empty when it is not."""
+        if self._source is None or not self.is_silent:
+            return ""
+        return self._source.silence or "sends no picture"
+
+    @property
     def n_dropped(self) -> int:
         """Frames that were replaced by newer ones before they were taken."""
         return 0 if self._source is None else self._source.n_dropped

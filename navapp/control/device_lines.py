@@ -13,8 +13,10 @@ _FINDINGS = {
 }
 
 
-def camera_line(info: CameraInfo, trouble: str) -> DeviceLine:
-    """The stereo camera."""
+def camera_line(info: CameraInfo, trouble: str, silence: str) -> DeviceLine:
+    """The stereo camera: why it is lost, or why it is silent, else what it sends."""
+    if silence and not trouble:
+        return DeviceLine("camera", info.name, DeviceHealth.TROUBLE, silence)
     rate = "" if info.measured_rate_hz is None else f" {info.measured_rate_hz:.0f} Hz"
     health = DeviceHealth.LOST if trouble else DeviceHealth.OK
     return DeviceLine("camera", info.name, health, trouble or f"{info.width}x{info.height}{rate}")

@@ -87,7 +87,7 @@ class SnapshotMaker:
 
     def _device_lines(self, reports: tuple[Report, ...]) -> tuple[DeviceLine, ...]:
         lines = (
-            camera_line(self.camera.camera.info, self.camera.trouble),
+            camera_line(self.camera.camera.info, self.camera.trouble, self.camera.silence),
             display_line(self.display.display.info, self.display.trouble),
             *(report.line for report in reports),
         )

@@ -16,6 +16,11 @@ class FrameSource(Protocol):
         """Frames that were replaced by newer ones before they were taken."""
         ...
 
+    @property
+    def silence(self) -> str:
+        """What the camera said when it gave no frame in time; empty since it gave one."""
+        ...
+
     def take(self, timeout_s: float) -> StereoFrame | None:
         """The newest frame, or None when none came in time."""
         ...
@@ -31,13 +36,17 @@ class SteppedSource:
     def __init__(self, camera: StereoCamera) -> None:
         self._camera = camera
         self.n_dropped = 0
+        self.silence = ""
 
     def take(self, timeout_s: float) -> StereoFrame | None:
         """The next frame."""
         try:
-            return self._camera.read(timeout_s)
-        except DeviceTimeout:
+            frame = self._camera.read(timeout_s)
+        except DeviceTimeout as error:
+            self.silence = str(error)
             return None
+        self.silence = ""
+        return frame
 
     def close(self) -> None:
         """Close the camera."""
@@ -56,6 +65,11 @@ class LiveSource:
     def n_dropped(self) -> int:
         """Frames that nobody took."""
         return self._slot.n_dropped
+
+    @property
+    def silence(self) -> str:
+        """As the thread heard it."""
+        return self._reader.silence
 
     def take(self, timeout_s: float) -> StereoFrame | None:
         """The newest frame since the last call."""

@@ -124,6 +124,8 @@ def test_usb_cameras_out_of_step_are_silent_and_dark_and_come_back(usb) -> None:
     bench.until(lambda: Reason.CAMERA_SILENT in bench.snapshot.reasons, LOST_S)
     assert bench.state == "navigating"
     assert bench.is_dark
+    assert bench.line("camera").health is DeviceHealth.TROUBLE
+    assert "ms apart: synchronise the cameras" in bench.line("camera").detail
     usb.usb.right.offset_s = 0.0
     usb.comes_back()
 

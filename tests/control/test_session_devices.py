@@ -100,8 +100,11 @@ def test_a_silent_camera_turns_everything_dark(bench: Bench) -> None:
     assert bench.is_dark
     assert Reason.CAMERA_SILENT in bench.snapshot.reasons
     assert Reason.POSE_TOO_OLD in bench.snapshot.reasons
+    assert bench.line("camera").health is DeviceHealth.TROUBLE
+    assert bench.line("camera").detail == "no frame"
     bench.camera.is_silent = False
     assert bench.frames(1).is_navigable
+    assert bench.line("camera").health is DeviceHealth.OK
 
 
 def test_guides_leave_the_display_when_their_pose_is_too_old(monkeypatch) -> None:
