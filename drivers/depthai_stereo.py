@@ -1,8 +1,8 @@
 """The mono pair of an OAK camera: exposed on one signal, sent as one message."""
 
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from datetime import timedelta
 from typing import Any
@@ -95,7 +95,7 @@ class DepthaiStereo:
         """Boot it, which takes seconds.
 
         Raises:
-            DeviceNotFound: no package, no camera, or it does not boot.
+            DeviceNotFound: no package, no camera, or it does not boot. DeviceLost: gone again.
             WrongDevice: another one than at the first opening.
             DeviceError, UnsupportedControl: it refuses size, rate or an infrared lamp.
         """
@@ -149,7 +149,8 @@ class DepthaiStereo:
         parts = self._running()
         controls = {**self._settings.controls, control: value}
         if control in ("exposure_ms", "iso"):
-            parts.send_exposure(controls["exposure_ms"], controls["iso"])
+            with self._lost_if_it_fails():
+                parts.send_exposure(controls["exposure_ms"], controls["iso"])
             has = self._settled(control, value)
         else:
             has = self._light(parts, control, value)
@@ -213,7 +214,9 @@ class DepthaiStereo:
         self._meter = FrameMeter()
 
     def _light(self, parts: DepthaiParts, lamp: str, brightness: float) -> float:
-        if not parts.set_infrared(lamp, brightness):
+        with self._lost_if_it_fails():
+            is_taken = parts.set_infrared(lamp, brightness)
+        if not is_taken:
             raise UnsupportedControl(
                 f"OAK camera {parts.device_id} has no lamp {lamp}",
                 subject=lamp,
@@ -233,8 +236,14 @@ class DepthaiStereo:
     def _group(self, timeout_s: float) -> Any:
         """The next message of both eyes."""
         parts = self._running()
-        try:
+        with self._lost_if_it_fails():
             return parts.queue.get(timedelta(seconds=timeout_s))
+
+    @contextmanager
+    def _lost_if_it_fails(self) -> Iterator[None]:
+        """DepthAI has no one error for a link that is gone."""
+        try:
+            yield
         except Exception as error:
             self._is_lost = True
             raise DeviceLost(

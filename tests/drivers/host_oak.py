@@ -86,15 +86,25 @@ class HostOak:
                 _Telling(self, queue),
                 self.handler,
                 self.send_exposure,
-                lambda lamp, brightness: lamp in self.lamps,
+                self.set_infrared,
                 undo.pop_all().close,
             )
 
     def send_exposure(self, exposure_ms: float, iso: float) -> None:
+        self.require_link()
         if self.is_deaf:
             return
         # Sensors expose in whole lines.
         self.exposure_ms, self.iso = round(exposure_ms / 0.03) * 0.03, iso
+
+    def set_infrared(self, lamp: str, brightness: float) -> bool:
+        self.require_link()
+        return lamp in self.lamps
+
+    def require_link(self) -> None:
+        """DepthAI's queues and calls fail so when nobody is at the other end any more."""
+        if not self.is_plugged:
+            raise dai.MessageQueue.QueueException("closed")
 
     def unplug(self) -> None:
         """A lost link closes the queue under the reader."""

@@ -135,6 +135,30 @@ def test_an_unplugged_camera_is_lost_and_comes_back(oak, camera):
     assert after.captured_ns > before.captured_ns
 
 
+@pytest.mark.parametrize("control", ["exposure_ms", "ir_dots"])
+def test_a_control_of_an_unplugged_camera_says_that_it_is_lost(oak, camera, control):
+    camera.open()
+    oak.unplug()
+    with pytest.raises(DeviceLost, match=f"{OAK_ID} is gone"):
+        camera.set(control, 0.5)
+
+
+def test_a_camera_unplugged_while_it_is_opened_is_lost_and_released(oak):
+    lit = replace(SETTINGS, controls={**SETTINGS.controls, "ir_dots": 0.5})
+    camera = DepthaiStereo(lit, SystemClock(), open_device=oak.open_parts)
+    set_infrared = oak.set_infrared
+
+    def pulled(lamp, brightness):
+        oak.is_plugged = False
+        return set_infrared(lamp, brightness)
+
+    oak.set_infrared = pulled
+    with pytest.raises(DeviceLost, match=f"{OAK_ID} is gone"):
+        camera.open()
+    with pytest.raises(DeviceLost, match="is not open"):
+        camera.read(0.0)
+
+
 def test_a_camera_that_starts_anew_after_closing_is_waited_for(oak, camera):
     camera.open()
     camera.close()
