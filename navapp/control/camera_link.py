@@ -7,7 +7,7 @@ from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
 from navapp.control.pauses import Pauses
 from navapp.control.sources import FrameSource, open_source
-from navapp.errors import DeviceError
+from navapp.errors import DeviceError, NavappError
 
 # A camera that is plugged in again starts for some seconds, and each attempt costs the bus a reset.
 _PAUSES_S = (1.0, 4.0)
@@ -102,8 +102,9 @@ class CameraLink:
             return False
         try:
             self.camera = self._reopen()
-        except DeviceError as error:
-            self.trouble = str(error)
+        except Exception as error:  # noqa: BLE001 (a bug must be told, not end the session)
+            is_told = isinstance(error, NavappError)
+            self.trouble = str(error) if is_told else f"opening the camera failed: {error!r}"
             # From the end of the attempt: one that takes long must not follow upon itself.
             self._pause()
             return False

@@ -25,7 +25,7 @@ from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
 from navapp.control.results import FrameResult
 from navapp.control.session import SessionHooks
 from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Snapshot
-from navapp.errors import DeviceError, DeviceLost, DeviceTimeout, EndOfSequence
+from navapp.errors import DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
@@ -148,7 +148,7 @@ class FakeCamera:
         self.is_open = False
         self.is_silent = False
         self.error: Exception | None = None
-        self.opening_error: DeviceError | None = None
+        self.opening_error: Exception | None = None
 
     @property
     def info(self) -> CameraInfo:

@@ -85,6 +85,22 @@ def test_attempts_to_reopen_pause_for_longer_and_longer(bench: Bench) -> None:
     assert pauses_s == pytest.approx([1.0, 2.0, 4.0, 4.0, 4.0, 4.0], abs=0.3)
 
 
+def test_a_bug_in_opening_a_camera_again_is_told_and_does_not_end_the_attempts(
+    bench: Bench,
+) -> None:
+    navigating(bench)
+    bench.camera.error = DeviceLost("gone")
+    bench.frames(1)
+    bench.camera.opening_error = RuntimeError("a bug")
+    for _ in range(20):
+        assert bench.frames(1).state.value == "fault"
+    assert "opening the camera failed: RuntimeError('a bug')" in bench.line("camera").detail
+    assert bench.is_dark
+    bench.camera.error = bench.camera.opening_error = None
+    bench.do(Reconnect())
+    assert bench.frames(2).is_navigable
+
+
 def test_a_camera_that_nobody_can_reopen_ends_the_session(monkeypatch) -> None:
     bench = Bench(monkeypatch, can_reopen=False)
     bench.frames(1)
