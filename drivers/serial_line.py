@@ -9,8 +9,8 @@ from navapp.errors import DeviceLost, DeviceProtocolError, DeviceTimeout
 _LONGEST_PACKET = 1024
 # A line is quiet when nothing comes for this long: 20 characters at 9600 baud.
 _QUIET_S = 0.02
-# Whoever sends more than this unasked never stops.
-_MOST_DISCARDED = 65_536
+# Whoever sends unasked for this long, some 40 events at 9600 baud, never stops.
+_LONGEST_DISCARD_S = 2.0
 
 
 class SerialLine:
@@ -111,12 +111,11 @@ class SerialLine:
         Raises:
             DeviceLost: not open, or gone. DeviceProtocolError: it is never quiet.
         """
-        n_discarded = 0
+        deadline_ns = self.deadline_ns(_LONGEST_DISCARD_S)
         self._received.clear()
         while self._receive(_QUIET_S):
-            n_discarded += len(self._received)
             self._received.clear()
-            if n_discarded > _MOST_DISCARDED:
+            if self._clock.now_ns() >= deadline_ns:
                 raise DeviceProtocolError(
                     f"the {self._subject} never stops sending", subject=self._subject
                 )

@@ -138,20 +138,23 @@ def test_a_packet_without_end_is_refused_and_forgotten(line, peer) -> None:
     assert line.next(soon(line)) == b"y"
 
 
-def test_a_line_that_never_stops_is_refused(line, peer) -> None:
+@pytest.mark.parametrize(("n_bytes", "pause_s"), [(1000, 0.0), (1, 0.005)], ids=["fast", "slow"])
+def test_a_line_that_never_stops_is_refused_soon(line, peer, n_bytes, pause_s) -> None:
     os.set_blocking(peer.end, False)
     stopping = threading.Event()
 
     def babble() -> None:
-        while not stopping.is_set():
+        while not stopping.wait(pause_s):
             with suppress(BlockingIOError):
-                os.write(peer.end, b"x" * 1000)
+                os.write(peer.end, b"x" * n_bytes)
 
     thread = threading.Thread(target=babble)
     thread.start()
+    begin_s = time.monotonic()
     try:
         with pytest.raises(DeviceProtocolError, match="never stops sending"):
             line.discard()
+        assert time.monotonic() - begin_s < 2.0 + 3.0 * SOON_S
     finally:
         stopping.set()
         thread.join()
