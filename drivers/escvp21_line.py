@@ -131,6 +131,9 @@ class EscVp21Line:
 
         Events are skipped, and so is what cannot be understood, unless nothing better comes.
         """
+        if not self.line.remaining_s(deadline_ns):
+            # The line may hold more than can be read: answers to other questions, without end.
+            raise self.line.silence()
         damaged = ""
         for _ in range(_MOST_UNASKED):
             packet = self.line.next(deadline_ns)

@@ -9,6 +9,7 @@ from drivers.clock import ManualClock
 from drivers.escvp21_projector import SILENT, EscVp21Projector
 from drivers.interfaces import CommandResult, PowerState
 from navapp.errors import (
+    DeviceError,
     DeviceLost,
     DeviceNotFound,
     DeviceProtocolError,
@@ -372,6 +373,21 @@ def test_events_without_end_are_no_answer() -> None:
     rig.wire.spoiler = lambda message: [(1000, event)] * 70
     status = rig.driver.status()
     assert (status.power, status.faults) == (PowerState.FAULT, (SILENT,))
+
+
+@pytest.mark.parametrize(
+    "use", [lambda driver: driver.status(), lambda driver: driver.set_mute(True, 3.0)]
+)
+def test_answers_to_nobodys_question_without_end_hold_nobody_up(use) -> None:
+    """They follow each other as fast as 9600 baud can carry them."""
+    rig = lit()
+    stranger = b"LAMP=1\r:"
+    babble = wire.first(1, lambda message: [(8_000_000, stranger)] * 20_000)
+    rig.wire.spoiler = lambda message: wire.whole(message) if b"SNO" in message else babble(message)
+    begin_s = rig.now_s
+    with pytest.raises(DeviceError):
+        use(rig.driver)
+    assert rig.now_s - begin_s < 20.0
 
 
 def test_a_full_reading_takes_a_second_and_a_half() -> None:
