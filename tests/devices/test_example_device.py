@@ -56,6 +56,23 @@ def test_its_own_tests_run_the_whole_contract(site, tmp_path):
     assert int(passed[1]) >= len(CAMERA_CHECKS) + 2
 
 
+def test_the_contract_runs_on_the_camera_of_a_configuration(site, tmp_path):
+    """As it does on hardware: `pytest --hardware=FILE tests/contracts`."""
+    path = tmp_path / "connected.toml"
+    path.write_text('[camera]\nbackend = "example"\n', encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    done = subprocess.run(
+        [*command, f"--hardware={path}", "tests/contracts/test_camera_on_hardware.py"],
+        cwd=SOURCE.parents[1],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-4000:]
+    assert f"{len(CAMERA_CHECKS)} passed" in done.stdout
+    assert "skipped: 0 tests" in done.stdout
+
+
 @pytest.fixture
 def configuration(site, tmp_path):
     """What `navapp devices` says to write, a rig and a setting of its own."""

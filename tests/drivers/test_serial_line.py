@@ -2,12 +2,14 @@
 
 import os
 import socket
+import termios
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 
 import pytest
+import serial
 
 from drivers.clock import SystemClock
 from drivers.serial_line import SerialLine
@@ -104,6 +106,31 @@ def test_a_line_whose_other_end_is_gone_is_lost_and_closed(line, peer, use) -> N
         line.open()
 
 
+FAILURES = (
+    serial.SerialException("device reports readiness to read but returned no data"),
+    OSError(5, "Input/output error"),
+    termios.error(5, "Input/output error"),
+    TypeError("argument must be an int, or have a fileno() method"),
+    serial.PortNotOpenError(),
+    ValueError("unknown"),
+)
+
+
+@pytest.mark.parametrize("failure", FAILURES, ids=lambda failure: type(failure).__name__)
+@pytest.mark.parametrize("call", ["read", "in_waiting", "write"])
+def test_whatever_pyserial_raises_is_a_lost_line(line, peer, monkeypatch, call, failure) -> None:
+    """Which of them comes depends on the call, the platform and the moment."""
+
+    def fail(*_: object) -> None:
+        raise failure
+
+    os.write(peer.end, b"half")
+    monkeypatch.setattr(serial.Serial, call, property(fail) if call == "in_waiting" else fail)
+    with pytest.raises(DeviceLost, match=r"is gone .*check the cable"):
+        line.send(b"\r") if call == "write" else line.next(soon(line))
+    assert not line.is_open
+
+
 def test_a_blocked_read_ends_when_the_other_end_goes(line, peer) -> None:
     thread = later(peer.hang_up)
     begin_s = time.monotonic()
@@ -181,8 +208,6 @@ def test_a_port_that_cannot_be_opened_says_why(name, words) -> None:
 
 
 def test_a_port_without_permission_names_the_group(monkeypatch) -> None:
-    import serial
-
     def refuse(self) -> None:
         raise serial.SerialException(13, "Permission denied")
 
