@@ -96,9 +96,9 @@ class ProjectorCare:
             line = DeviceLine("projector", name, DeviceHealth.TROUBLE, f"picture {changes}")
             return Report(line, Reason.PROJECTOR_ALTERS)
         is_on = status.power is PowerState.ON
-        if status.faults or not is_on:
-            told = ", ".join((*(() if is_on else (status.power.value,)), *status.faults))
-            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, told)
+        dark = () if is_on else (status.power.value,)
+        if told := (*dark, *(("muted",) if status.is_muted else ()), *status.faults):
+            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, ", ".join(told))
             return Report(line, self.reason if status.power is PowerState.FAULT else None)
         return Report(DeviceLine("projector", name, DeviceHealth.OK, status.power.value))
 

@@ -240,6 +240,12 @@ def test_a_lamp_that_is_not_on_is_told(power) -> None:
     assert both == f"{power.value}, filter"
 
 
+def test_a_hidden_picture_is_told() -> None:
+    report = ProjectorCare(Projector(is_muted=True, faults=("filter",))).report()
+    assert (report.line.health, report.line.detail) == (DeviceHealth.TROUBLE, "muted, filter")
+    assert report.reason is None, "nobody sees guides that are hidden"
+
+
 def test_a_fault_of_the_lamp_forbids_guides_and_a_clogged_filter_does_not() -> None:
     care = ProjectorCare(Projector(power=PowerState.FAULT, faults=("lamp",)))
     assert care.report().reason is Reason.PROJECTOR_LOST
