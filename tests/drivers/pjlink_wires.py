@@ -8,11 +8,15 @@ from sim_devices.firmware import pjlink
 
 
 class Wire:
-    """One connection; `spoil` turns every reply into what arrives of it, None: nothing."""
+    """One connection; `spoil` turns every reply into what arrives of it.
+
+    None: nothing, and what is waited for in vain takes its time; empty: the end of the stream.
+    """
 
     def __init__(
         self, firmware: pjlink.PjlinkProjector, spoil: Callable[[bytes], bytes | None]
     ) -> None:
+        self.clock = firmware.clock
         self.session = firmware.connection()
         self.spoil = spoil
         self.sent = b""
@@ -25,8 +29,9 @@ class Wire:
     def receive(self, timeout_s: float) -> bytes:
         assert timeout_s > 0.0
         if self.arriving is None:
+            self.clock.wait_until_ns(self.clock.now_ns() + round(timeout_s * 1e9))
             raise TimeoutError
-        data, self.arriving = self.arriving, b""
+        data, self.arriving = self.arriving, None
         return data
 
     def close(self) -> None:
