@@ -1,7 +1,8 @@
-"""Start one firmware behind a pseudo-terminal, for a person with a terminal program.
+"""Start one firmware, for a person with a terminal program: behind a pseudo-terminal or a socket.
 
 python -m sim_devices.firmware escvp21
 python -m sim_devices.firmware zaber --speed 10 --path /tmp/stage
+python -m sim_devices.firmware pjlink --port 4352 --password secret
 """
 
 import argparse
@@ -11,18 +12,24 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from drivers.clock import Clock
+from sim_devices.firmware import pjlink_server
 from sim_devices.firmware.escvp21 import ProjectorFirmware
 from sim_devices.firmware.fast_clock import FastClock
 from sim_devices.firmware.pseudo_terminal import PseudoTerminal
 from sim_devices.firmware.wire import Firmware, Wire
 from sim_devices.firmware.zaber import StageFirmware
 
+_ON_A_SOCKET = "pjlink"  # with arguments of its own
 Deeds = Mapping[str, Callable[[], object]]
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run until the input ends; lines of it are things that happen to the device."""
-    options = _parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    if given[:1] == [_ON_A_SOCKET]:
+        pjlink_server.main(given[1:])
+        return 0
+    options = _parser().parse_args(given)
     clock = FastClock(options.speed)
     firmware, deeds = _MAKERS[options.kind](clock)
     with tempfile.TemporaryDirectory() as folder:
@@ -83,7 +90,7 @@ _MAKERS: dict[str, Callable[[Clock], tuple[Firmware, Deeds]]] = {
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m sim_devices.firmware", description=__doc__)
-    parser.add_argument("kind", choices=list(_MAKERS))
+    parser.add_argument("kind", choices=[*_MAKERS, _ON_A_SOCKET])
     parser.add_argument("--speed", type=float, default=1.0, help="how much faster time passes")
     parser.add_argument("--path", type=Path, help="where the link to the terminal is made")
     return parser

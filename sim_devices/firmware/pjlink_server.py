@@ -1,6 +1,6 @@
 """The simulated PJLink projector on a loopback socket, with what goes wrong on the way.
 
-`python -m sim_devices.firmware.pjlink_server` runs one for a person with a terminal program.
+`python -m sim_devices.firmware pjlink` runs one for a person with a terminal program.
 """
 
 import argparse
@@ -9,7 +9,6 @@ import random
 import select
 import signal
 import socket
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -118,7 +117,7 @@ class PjlinkServer:
 def main(arguments: Sequence[str]) -> None:
     """Run a projector until interrupted."""
     parser = argparse.ArgumentParser(
-        prog="python -m sim_devices.firmware.pjlink_server",
+        prog="python -m sim_devices.firmware pjlink",
         description="a simulated PJLink projector for a terminal program",
     )
     parser.add_argument("--port", type=int, default=4352, help="on 127.0.0.1; 0: any free one")
@@ -138,7 +137,3 @@ def main(arguments: Sequence[str]) -> None:
 
 def _is_ready(stream: socket.socket) -> bool:
     return bool(select.select([stream], [], [], _TICK_S)[0])
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

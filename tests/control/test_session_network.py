@@ -61,6 +61,12 @@ FAULTS: dict[str, tuple[Callable[[Room], object], Callable[[Room], object], Reas
         Reason.PROJECTOR_LOST,
         "it has hung up",
     ),
+    "on a line that cuts everything": (
+        lambda room: setattr(room.server.trouble, "cut", 1.0),
+        lambda room: setattr(room.server.trouble, "cut", 0.0),
+        Reason.PROJECTOR_LOST,
+        "it has hung up",
+    ),
     "failed": (
         lambda room: setattr(room.firmware, "is_failed", True),
         lambda room: setattr(room.firmware, "is_failed", False),

@@ -106,7 +106,7 @@ def test_trouble_comes_as_often_as_asked_for() -> None:
 
 
 def test_the_command_for_a_person() -> None:
-    command = [sys.executable, "-m", "sim_devices.firmware.pjlink_server", "--port", "0"]
+    command = [sys.executable, "-m", "sim_devices.firmware", "pjlink", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout is not None
         words = running.stdout.readline().replace(";", "").split()
