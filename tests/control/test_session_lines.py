@@ -115,6 +115,19 @@ def test_the_operator_brings_a_turned_mirror_back(with_mirror) -> None:
     assert room.terminal.wire.firmware.true_deg == pytest.approx(45.0, abs=0.01)
 
 
+def test_a_mirror_that_stalls_on_its_way_back_is_told_and_stays_dark(with_mirror) -> None:
+    room = with_mirror
+    room.happens(lambda stage: stage.turn_by_hand(5.0))
+    room.until(lambda: room.is_dark_because(Reason.MIRROR_AWAY), MIRROR_DARK_S)
+    room.happens(lambda stage: setattr(stage, "stalls_at", 0.5))
+    room.bench.do(Reconnect())
+    room.until(lambda: "stalled and stopped (FS)" in room.line("mirror").detail, 10.0)
+    assert room.is_dark_because(Reason.MIRROR_AWAY)
+    assert room.bench.state == "navigating"
+    room.bench.do(Reconnect())
+    room.until(lambda: room.bench.shows_guides, 10.0)
+
+
 @pytest.fixture
 def with_projector(monkeypatch, tmp_path) -> Iterator[Room]:
     """Navigating with a projector whose lamp is on."""

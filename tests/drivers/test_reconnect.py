@@ -1,11 +1,5 @@
 """A thousand times unplugged and plugged in again: nothing is left."""
 
-import gc
-import os
-import threading
-from pathlib import Path
-
-import psutil
 import pytest
 
 from drivers.clock import SystemClock
@@ -13,24 +7,17 @@ from drivers.depthai_settings import DepthaiSettings
 from drivers.depthai_stereo import DepthaiStereo
 from navapp.control.camera_link import CameraLink
 from navapp.errors import DeviceLost, DeviceNotFound
+from tests.drivers.firmware_rigs import ProjectorRig, StageRig
+from tests.drivers.footprints import (
+    N_CYCLES,
+    assert_nothing_is_left,
+    footprint,
+    needs_descriptors,
+)
 from tests.drivers.losing import fails_within
 from tests.drivers.usb_rigs import UsbRig
 
-N_CYCLES = 1000
-_MOST_GROWTH_MB = 8.0
-
-
-def footprint() -> tuple[int, int, int, float]:
-    """Threads, descriptors, objects, resident MB."""
-    gc.collect()
-    n_open = len(os.listdir("/proc/self/fd"))
-    resident_mb = psutil.Process().memory_info().rss / 2**20
-    return threading.active_count(), n_open, len(gc.get_objects()), resident_mb
-
-
-pytestmark = pytest.mark.skipif(
-    not Path("/proc/self/fd").is_dir(), reason="descriptors are not told here"
-)
+pytestmark = needs_descriptors
 
 
 @pytest.mark.slow
@@ -76,12 +63,21 @@ def test_a_thousand_unplugged_oak_cameras_leave_nothing():
     assert_nothing_is_left(settled)
 
 
-def assert_nothing_is_left(settled):
-    threads, n_open, n_objects, resident_mb = footprint()
-    assert threads <= settled[0]
-    assert n_open <= settled[1]
-    assert n_objects < settled[2] + N_CYCLES // 4  # half an object a cycle would be a leak
-    assert resident_mb < settled[3] + _MOST_GROWTH_MB
+@pytest.mark.parametrize("make", [ProjectorRig, StageRig])
+def test_a_thousand_pulled_plugs_of_projector_and_mirror_leave_nothing(make):
+    rig = make()
+    settled = (0, 0, 0, 0.0)
+    for cycle in range(N_CYCLES):
+        rig.driver.open()
+        rig.wire.is_connected = False
+        with pytest.raises(DeviceLost):
+            rig.driver.status() if make is ProjectorRig else rig.driver.position_deg()
+        with pytest.raises(DeviceNotFound):
+            rig.driver.open()
+        rig.wire.is_connected = True
+        if cycle == N_CYCLES // 2:
+            settled = footprint()
+    assert_nothing_is_left(settled)
 
 
 def test_a_session_goes_on_with_the_camera_that_was_unplugged(tmp_path):
