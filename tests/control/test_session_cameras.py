@@ -71,8 +71,8 @@ class UsbRoom(Room):
         super().__init__(monkeypatch, self.usb.stereo(replace(self.usb.settings, eye=eye)))
 
     def stall(self) -> None:
-        """As V4L2 has it: a grab fails after a second."""
-        self.usb.left.stall_s, self.usb.left.is_stalled = 1.0, True
+        """Grabs fail late, but three of them before three seconds of silence are over."""
+        self.usb.left.stall_s, self.usb.left.is_stalled = 0.5, True
 
     def widen(self) -> None:
         self.usb.right.shape = (HEIGHT, 2 * WIDTH)
@@ -95,7 +95,7 @@ def setting(name: str, value: object) -> Callable[[UsbRoom], None]:
 
 
 USB_FAULTS: dict[str, tuple[Callable[[UsbRoom], None], str]] = {
-    "stalled": (UsbRoom.stall, "camera L1 g"),
+    "stalled": (UsbRoom.stall, "camera L1 gives no more pictures"),
     "the same picture": (setting("is_frozen", True), "R1 has given no new picture for"),
     "damaged pictures": (setting("is_damaged", True), "R1 has given no new picture for"),
     "old pictures": (setting("late_s", 0.3), "R1 has given no new picture for"),
