@@ -158,9 +158,11 @@ class SessionController:
         return self._snapshot
 
     def close(self) -> None:
-        """End everything, the display first, then what moves; safe to call twice."""
-        self._display.close()
+        """End everything: dark first, then what moves; safe to call twice."""
+        self._display.darken()
         self._slow.close()
+        # Last of the three: an attempt to open a lost display may take many seconds.
+        self._display.close()
         self._session.is_over = True
         self._pursuit.drop()
         self._executor.close()

@@ -9,9 +9,11 @@ import pytest
 
 from drivers.clock import ManualClock
 from navapp.control import display_link
+from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
 from navapp.errors import DeviceNotFound
 from sim_devices.display import SimulatedDisplay
+from tests.control.fakes import Bench
 
 PICTURE = np.full((24, 40, 3), 9, np.uint8)
 
@@ -125,3 +127,24 @@ def test_after_the_end_it_is_not_opened_any_more(cable) -> None:
     assert not shown(link)
     assert cable.n_attempts == 1
     assert not link._reopening.is_under_way
+
+
+def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(
+    cable, monkeypatch
+) -> None:
+    bench = Bench(monkeypatch, make_display=lambda clock, width, height: cable)
+    bench.frames(1)
+    stopped = threading.Event()
+    monkeypatch.setattr(SlowDevices, "close", lambda devices: stopped.set())
+    cable.unplug()
+    cable.gate.clear()
+    n_attempts = cable.n_attempts
+    wait_until(lambda: bool(bench.frames(1)) and cable.n_attempts > n_attempts)
+    ending = threading.Thread(target=bench.controller.close)
+    ending.start()
+    try:
+        assert stopped.wait(2.0)
+        assert ending.is_alive()
+    finally:
+        cable.gate.set()
+        ending.join()
