@@ -17,7 +17,7 @@ from tests.control.fakes import HEIGHT, WIDTH, Bench, navigating
 from tests.drivers.usb_rigs import UsbRig
 
 # A picture may stay for half a second (`overlay_valid_ms`); the rest is for a busy machine.
-DARK_S = 0.5 + 1.0
+DARK_S = 0.5 + 2.5
 # Three seconds of silence make a camera lost.
 LOST_S = 3.0 + 4.0
 BACK_S = 20.0
@@ -107,6 +107,16 @@ USB_FAULTS: dict[str, tuple[Callable[[UsbRoom], None], str]] = {
 def test_a_usb_cameras_fault_is_told_and_dark_in_time(usb, deed, words) -> None:
     usb.is_dark_in_time_after(lambda: deed(usb))
     usb.is_lost_with(words)
+
+
+def test_a_usb_grab_that_never_returns_is_told_and_dark_in_time(usb) -> None:
+    capture = usb.usb.right.captures[-1]
+    try:
+        usb.is_dark_in_time_after(lambda: setattr(usb.usb.right, "is_hanging", True))
+        usb.is_lost_with("R1 has given no new picture for")
+    finally:
+        usb.usb.right.is_hanging = False
+        capture.released.set()
 
 
 def test_an_unplugged_usb_camera_is_told_and_dark_and_comes_back(usb) -> None:

@@ -6,6 +6,7 @@ import time
 from functools import partial
 
 import numpy as np
+import pytest
 
 from drivers.clock import Clock
 from drivers.window_display import WindowDisplay
@@ -30,7 +31,8 @@ class SeenWindow(WindowDisplay):
         return seen(self._server, 0, 0, WIDTH, HEIGHT)
 
 
-def test_a_lost_window_is_dark_at_once_told_and_opened_again(monkeypatch) -> None:
+@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_window_that_dies_or_freezes_is_dark_told_and_opened_again(monkeypatch, blow) -> None:
     with xvfb(WIDTH, HEIGHT) as server:
         monkeypatch.setenv("DISPLAY", server)
         # No picture expires by itself here.
@@ -40,7 +42,7 @@ def test_a_lost_window_is_dark_at_once_told_and_opened_again(monkeypatch) -> Non
             navigating(bench)
             bench.until(lambda: bench.shows_guides, 10.0)
             begin_s = time.monotonic()
-            os.kill(bench.display.process.pid, signal.SIGKILL)
+            os.kill(bench.display.process.pid, blow)
             wait_for(lambda: bench.is_dark, "darkness")
             assert time.monotonic() - begin_s < DARK_S
             bench.until(lambda: bench.line("display").health is DeviceHealth.TROUBLE, 5.0)
