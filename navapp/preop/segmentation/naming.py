@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.masks import LabelArray
 
 BONES = ("femur", "tibia", "patella", "fibula")
+NOT_SEEDED: Mapping[str, int] = MappingProxyType({})
 
 # A knee's bone ends: less than this of their inside is no femur or tibia.
 _LEAST_LONG_BONE_MM3 = 10_000.0
@@ -81,28 +83,69 @@ def _boxes(labels: LabelArray) -> list[tuple[slice, ...] | None]:
     return list(find_objects(labels))
 
 
-def name_parts(parts: list[Part]) -> Named:
-    """The bones of one knee among the parts; those that are not found are not named."""
+def name_parts(parts: list[Part], seeded: Mapping[str, int] = NOT_SEEDED) -> Named:
+    """The bones of one knee among the parts; those that are not found are not named.
+
+    Args:
+        parts: of the volume.
+        seeded: name -> number of the part that an operator named; the others are those of its knee.
+    """
+    bones = dict(seeded)
     large = sorted(
         (part for part in parts if part.volume_mm3 >= _LEAST_LONG_BONE_MM3),
         key=lambda part: -part.volume_mm3,
     )
-    pairs = [(a, b) for a in large for b in large if _is_above(a, b)]
+    pairs = _pairs(parts, large, seeded)
     if not pairs:
-        return Named({})
-    femur, tibia = max(pairs, key=lambda pair: pair[0].volume_mm3 + pair[1].volume_mm3)
-    bones = {"femur": femur.number, "tibia": tibia.number}
+        return Named(bones)
+    femur, tibia = max(pairs, key=lambda pair: _rank(pair, parts, seeded))
+    bones |= {"femur": femur.number, "tibia": tibia.number}
     rest = [part for part in parts if part.number not in bones.values()]
-    joint_mm = np.array([*femur.centre_mm[:2], 0.5 * (femur.lower_mm[2] + tibia.upper_mm[2])])
+    joint_mm = _joint_mm(femur, tibia)
     patella = _largest([part for part in rest if _is_patella(part, femur, joint_mm)])
-    if patella is not None:
+    if patella is not None and "patella" not in bones:
         bones["patella"] = patella.number
         rest.remove(patella)
     fibula = _largest([part for part in rest if _is_fibula(part, tibia)])
-    if fibula is not None:
+    if fibula is not None and "fibula" not in bones:
         bones["fibula"] = fibula.number
     others = [part for part in large if part.number not in bones.values()]
     return Named(bones, any(_is_of_other_leg(part, femur, tibia) for part in others))
+
+
+def _pairs(
+    parts: list[Part], large: list[Part], seeded: Mapping[str, int]
+) -> list[tuple[Part, Part]]:
+    """What may be femur and tibia of one leg, as seeds allow; two that are seeded are, anyhow."""
+
+    def candidates(name: str) -> list[Part]:
+        if name in seeded:
+            return [part for part in parts if part.number == seeded[name]]
+        return [part for part in large if part.number not in seeded.values()]
+
+    is_said = {"femur", "tibia"} <= set(seeded)
+    return [
+        (femur, tibia)
+        for femur in candidates("femur")
+        for tibia in candidates("tibia")
+        if is_said or _is_above(femur, tibia)
+    ]
+
+
+def _rank(
+    pair: tuple[Part, Part], parts: list[Part], seeded: Mapping[str, int]
+) -> tuple[int, float]:
+    """How many of the seeded parts are of a pair's leg, and how large it is."""
+    femur, tibia = pair
+    x_mm = _joint_mm(femur, tibia)[0]
+    chosen = [part for part in parts if part.number in seeded.values()]
+    n_beside = sum(abs(float(part.centre_mm[0] - x_mm)) < _BESIDE_MM for part in chosen)
+    return n_beside, femur.volume_mm3 + tibia.volume_mm3
+
+
+def _joint_mm(femur: Part, tibia: Part) -> FloatArray:
+    """(3,) below the middle of a femur, half way to its tibia."""
+    return np.array([*femur.centre_mm[:2], 0.5 * (femur.lower_mm[2] + tibia.upper_mm[2])])
 
 
 def _is_above(femur: Part, tibia: Part) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.masks import LabelArray
-from navapp.preop.segmentation.naming import Named
+from navapp.preop.segmentation.naming import Named, Part, name_parts
 from navapp.preop.volume import CtVolume
 
 # A core is a bone without its cortex: a point that was clicked on the surface is this far from it.
@@ -14,23 +14,21 @@ _REACH_MM = 12.0
 
 
 def with_seeds(
-    named: Named, cores: LabelArray, ct: CtVolume, seeds: Mapping[str, FloatArray]
+    parts: list[Part], cores: LabelArray, ct: CtVolume, seeds: Mapping[str, FloatArray]
 ) -> Named:
-    """Names by seeds first; what was found by place keeps its name unless a seed takes either.
+    """Names by seeds first; what has no seed is named by its place in the seeded knee.
 
-    A seed that is near no core, or near the core of another seed, names nothing.
+    A seed that is near no core, or near the core of another seed, names nothing, and its name is
+    given to nothing else: better not named than named against what the operator said.
     """
     by_seed: dict[str, int] = {}
     for name, point_mm in seeds.items():
         core = _nearest_core(cores, ct, point_mm)
         if core and core not in by_seed.values():
             by_seed[name] = core
-    by_place = {
-        name: core
-        for name, core in named.bones.items()
-        if name not in seeds and core not in by_seed.values()
-    }
-    return Named({**by_place, **by_seed}, named.has_two_knees)
+    named = name_parts(parts, by_seed)
+    bones = {name: n for name, n in named.bones.items() if name in by_seed or name not in seeds}
+    return Named(bones, named.has_two_knees)
 
 
 def _nearest_core(cores: LabelArray, ct: CtVolume, point_mm: FloatArray) -> int:

@@ -12,7 +12,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.cores import find_cores
 from navapp.preop.segmentation.growth import grow
 from navapp.preop.segmentation.masks import LabelArray, bounds
-from navapp.preop.segmentation.naming import BONES, Named, name_parts, parts_of
+from navapp.preop.segmentation.naming import BONES, Named, parts_of
 from navapp.preop.segmentation.plates import Plates, find_plates
 from navapp.preop.segmentation.seeds import with_seeds
 from navapp.preop.segmentation.solids import find_solids
@@ -107,7 +107,7 @@ def _named_cores(
     """The coarsest cores among which all three bones of the joint are found, else the best."""
     best: tuple[LabelArray, Named] | None = None
     for cores in find_cores(plates, solid, ct.spacing_mm):
-        named = with_seeds(name_parts(parts_of(cores, ct.lps_from_index)), cores, ct, seeds)
+        named = with_seeds(parts_of(cores, ct.lps_from_index), cores, ct, seeds)
         if best is None or len(named.bones) > len(best[1].bones):
             best = cores, named
         if named.is_whole and set(seeds) <= set(named.bones):

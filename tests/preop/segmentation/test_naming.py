@@ -119,3 +119,29 @@ def test_parts_are_measured_in_the_patients_axes(hand):
         np.testing.assert_allclose(found.upper_mm, points[mask].max(axis=0))
         assert found.volume_mm3 == pytest.approx(mask.sum() * 1.8)
     np.testing.assert_allclose(first.centre_mm, [46.0, -24.0, 694.0], atol=0.4)
+
+
+SEEDED = [{"femur": 5}, {"tibia": 6}, {"patella": 7}, {"fibula": 8}, {"femur": 5, "tibia": 6}]
+
+
+@pytest.mark.parametrize("seeded", SEEDED)
+def test_the_bones_are_those_of_the_seeded_knee(seeded):
+    """Beside a larger knee, which would be chosen without a seed."""
+    one = [(middle, 1.05 * np.array(half)) for middle, half in (FEMUR, TIBIA, PATELLA, FIBULA)]
+    other = [moved(mirrored(place), [130.0, 0.0, 0.0]) for place in (FEMUR, TIBIA, PATELLA, FIBULA)]
+    whole = {"femur": 5, "tibia": 6, "patella": 7, "fibula": 8}
+    assert name_parts(parts(*one, *other)).bones["femur"] == 1
+    assert name_parts(parts(*one, *other), seeded).bones == whole
+
+
+def test_seeds_win_over_places_and_the_others_keep_their_names():
+    places = parts(FEMUR, TIBIA, PATELLA, FIBULA)
+    swapped = name_parts(places, {"femur": 2, "tibia": 1})
+    assert {swapped.bones[name] for name in ("femur", "tibia")} == {1, 2}
+    assert swapped.bones["femur"] == 2
+    by_seed = name_parts(places, {"tibia": 4})
+    assert by_seed.bones == {"femur": 1, "tibia": 4, "patella": 3}
+
+
+def test_a_seeded_bone_without_another_of_its_knee_is_alone():
+    assert name_parts(parts(PATELLA, FABELLA), {"femur": 1}).bones == {"femur": 1}

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from navapp.preop.segmentation.naming import Named
+from navapp.preop.segmentation.naming import parts_of
 from navapp.preop.segmentation.seeds import with_seeds
 from navapp.preop.volume import CtVolume
 from tests.preop.ct_phantoms import OBLIQUE, lattice, leaning_axes, points_of
@@ -21,33 +21,22 @@ def cores(request):
     return np.where(near.any(axis=-1), 1 + near.argmax(axis=-1), 0).astype(np.int32), ct
 
 
+def named_bones(cores, seeds):
+    labels, ct = cores
+    return with_seeds(parts_of(labels, ct.lps_from_index), labels, ct, seeds).bones
+
+
 def test_a_seed_in_or_near_a_core_names_it(cores):
     seeds = {"femur": MIDDLES_MM[1], "tibia": MIDDLES_MM[0] + [0.0, -15.0, 0.0]}
-    assert with_seeds(Named({}), *cores, seeds).bones == {"femur": 2, "tibia": 1}
+    assert named_bones(cores, seeds) == {"femur": 2, "tibia": 1}
 
 
 def test_a_seed_out_of_reach_names_nothing(cores):
     for away_mm in (18.0, 60.0, 1000.0):
         seeds = {"tibia": MIDDLES_MM[0] + [0.0, -away_mm, 0.0]}
-        assert with_seeds(Named({}), *cores, seeds).bones == {}
-
-
-def test_seeds_win_over_places_and_the_others_keep_their_names(cores):
-    by_place = Named({"femur": 1, "tibia": 2, "patella": 3}, has_two_knees=True)
-    named = with_seeds(by_place, *cores, {"femur": MIDDLES_MM[1]})
-    assert named.bones == {"femur": 2, "patella": 3}
-    assert named.has_two_knees
-    swapped = {"femur": MIDDLES_MM[1], "tibia": MIDDLES_MM[0]}
-    assert with_seeds(by_place, *cores, swapped).bones == {"femur": 2, "tibia": 1, "patella": 3}
+        assert named_bones(cores, seeds) == {}
 
 
 def test_of_two_seeds_in_one_core_the_first_names_it(cores):
     seeds = {"tibia": MIDDLES_MM[0], "femur": MIDDLES_MM[0] + 1.0}
-    assert with_seeds(Named({}), *cores, seeds).bones == {"tibia": 1}
-
-
-def test_a_seed_that_names_nothing_takes_its_name_from_its_place_too(cores):
-    """Better not named than named against what the operator said."""
-    by_place = Named({"femur": 1, "tibia": 2})
-    named = with_seeds(by_place, *cores, {"femur": MIDDLES_MM[0] + 100.0})
-    assert named.bones == {"tibia": 2}
+    assert named_bones(cores, seeds) == {"tibia": 1}

@@ -129,6 +129,22 @@ def test_two_knees_are_refused_until_one_is_chosen():
     np.testing.assert_allclose(middle, chosen, atol=1.0)
 
 
+@pytest.mark.parametrize("seeded", ["femur", "tibia"])
+def test_a_seed_in_one_bone_chooses_its_knee(seeded):
+    """The other knee is larger; no bone of it may become part of the plan."""
+    one = {name: KNEE_MM[name] for name in ("femur", "tibia")}
+    by = np.array([80.0, 0.0, 1.0])
+    other = {name: np.array(edges) + by for name, edges in one.items()}
+    other["tibia"][1] += [2.0, 0.0, 0.0]
+    ct = ct_of_bones([*one.values(), *other.values()], (160, 66, 88), (40.0, 0.0, 0.0))
+    for middle_x_mm in (0.0, by[0]):
+        named = segment(ct, seeds={seeded: MIDDLES_MM[seeded] + [middle_x_mm, 0.0, 0.0]})
+        for name in ("femur", "tibia"):
+            voxels = np.argwhere(named.bones == named.names[name])[:, ::-1]
+            middle = named.ct.points_lps_mm(voxels).mean(axis=0)
+            assert abs(middle[0] - middle_x_mm) < 5.0
+
+
 @pytest.mark.parametrize("shift_mm", [(24.0, 0.0, 0.0), (0.0, -24.0, 0.0)])
 def test_a_bone_cut_off_at_the_side_is_told(shift_mm):
     ct = ct_of_bones([KNEE_MM["femur"], KNEE_MM["tibia"]], (70, 80, 90), shift_mm=shift_mm)
