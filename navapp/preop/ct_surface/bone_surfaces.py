@@ -17,6 +17,7 @@ from navapp.preop.ct_surface.refinement import refine_surface
 from navapp.preop.ct_surface.scan_estimate import UNKNOWN_SCAN, estimate_scan
 from navapp.preop.segmentation import Segmentation
 from navapp.preop.volume import CtVolume, LabelVolume
+from navapp.preop.volume.hounsfield import AIR_HU
 
 # How far a surface may be off in each round: a voxel of any threshold first.
 _REACHES_MM = (1.5, 0.6, 0.6)
@@ -26,6 +27,8 @@ _N_PROFILES = 1000
 _WORKING_VERTICES, _WORKING_WITHIN_MM = 7000, 0.1
 # The flat end of a cut shaft: its rim is rounded by smoothing.
 _CUT_VOXELS = 0.75
+# No bone lies beside air, so that what is padding so near its surface cuts it.
+_PADDING_VOXELS = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +113,13 @@ def _scan(
 
 
 def _is_cut(mesh: TriangleMesh, volume: CtVolume | LabelVolume) -> NDArray[np.bool_]:
+    """(V,) where the volume ends, or its padding begins: a CT that was resampled to other axes."""
     indices = volume.indices_of(mesh.vertices_mm)
     last = np.array(volume.size) - 1
-    is_beyond = (indices < _CUT_VOXELS) | (indices > last - _CUT_VOXELS)
-    return np.asarray(is_beyond.any(axis=1))
+    is_beyond = ((indices < _CUT_VOXELS) | (indices > last - _CUT_VOXELS)).any(axis=1)
+    if isinstance(volume, CtVolume):
+        ahead_mm = _PADDING_VOXELS * float(volume.spacing_mm.max())
+        outside = volume.indices_of(mesh.vertices_mm + ahead_mm * mesh.normals)
+        i, j, k = np.clip(np.rint(outside), 0, last).astype(np.intp).T
+        is_beyond |= volume.hu[k, j, i] <= AIR_HU
+    return np.asarray(is_beyond)

@@ -11,17 +11,20 @@ from navapp.errors import PlanError
 from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.cores import find_cores
 from navapp.preop.segmentation.growth import grow
-from navapp.preop.segmentation.masks import LabelArray, bounds
+from navapp.preop.segmentation.masks import LabelArray, bounds, depth_mm
 from navapp.preop.segmentation.naming import BONES, Named, parts_of
 from navapp.preop.segmentation.plates import Plates, find_plates
 from navapp.preop.segmentation.seeds import with_seeds
 from navapp.preop.segmentation.solids import find_solids
 from navapp.preop.volume import CtVolume
+from navapp.preop.volume.hounsfield import AIR_HU
 
 DEFAULT_THRESHOLD_HU = 200.0
 NO_SEEDS: Mapping[str, FloatArray] = MappingProxyType({})
 # Around the bones: what the curvature of plates and the profiles need to see.
 _MARGIN_MM = 8.0
+# Padding this near is where a bone was cut; single dark voxels are noise, or beside metal.
+_BESIDE_VOXELS, _LEAST_PADDING = 1.5, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +76,11 @@ def segment(
         for name, number in named.bones.items()
         if _is_cut_at_side(bones == number, ct)
     ]
+    warnings += [
+        f"{name}: cut off by padding in the picture: what lies beyond is missing in its surface"
+        for name, number in named.bones.items()
+        if _is_cut_by_padding(bones == number, ct)
+    ]
     return Segmentation(ct, bones, named.bones, tuple(warnings))
 
 
@@ -84,6 +92,16 @@ def _is_cut_at_side(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
     upright = 2 - int(np.abs(ct.lps_from_index[2, :3] / ct.spacing_mm).argmax())
     sides = (np.moveaxis(bone, axis, 0)[[0, -1]] for axis in range(3) if axis != upright)
     return any(bool(side.any()) for side in sides)
+
+
+def _is_cut_by_padding(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
+    """Whether the picture ends beside a bone: skin and flesh lie between any bone and air."""
+    box = bounds(bone, np.full(3, 2, dtype=np.intp))
+    is_padding = ct.hu[box] <= AIR_HU
+    if not is_padding.any():
+        return False
+    beside = depth_mm(bone[box], ct.spacing_mm) > -_BESIDE_VOXELS * float(ct.spacing_mm.max())
+    return int((beside & is_padding).sum()) > _LEAST_PADDING
 
 
 def _around_solids(

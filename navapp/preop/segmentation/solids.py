@@ -5,12 +5,15 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.masks import BoolArray, as_image, bounds, components, depth_mm
+from navapp.preop.volume.hounsfield import AIR_HU as PADDING_HU
 from navapp.preop.volume.itk_package import simple_itk
 
 # A channel narrower than twice this leads no tissue into a bone: pores, vessels, thin cortex.
 _PORE_MM = 1.0
 # Less dense than any fat or marrow: air, foam.
 _AIR_HU = -400.0
+# Padding is broad; noise in air gets as low in single voxels.
+_BROAD_MM = 3.0
 # A part of a person lies in flesh; a table and its padding lie in air.
 _SHELL_MM = (2.0, 6.0)
 _MOST_AIR = 0.5
@@ -21,17 +24,31 @@ def find_solids(hu: NDArray[np.float32], spacing_mm: FloatArray, threshold_hu: f
     """(D, H, W) bones with all that they enclose, and joint gaps too narrow to be reached.
 
     What lies below the threshold is outside when a ball of one millimetre gets there from the
-    largest such part or from air; the marrow of a bone that the volume cuts is not, because the
-    cortex around it is whole. Parts that lie in air (the table) and small debris are left out.
+    largest such part or from air; the marrow of a bone that the volume or its padding cuts is not,
+    because the cortex around it is whole. Parts that lie in air (the table) and small debris are
+    left out.
 
     Args:
         hu: (D, H, W).
         spacing_mm: (3,) of i, j, k.
         threshold_hu: what is denser may be bone (the paper's threshold segmentation).
     """
-    solid = ~_outside(hu, spacing_mm, hu < threshold_hu)
+    padding = _padding(hu, spacing_mm)
+    solid = ~_outside(hu, spacing_mm, (hu < threshold_hu) & ~padding) & ~padding
     parts = components(solid, spacing_mm, _LEAST_MM3)
     return _in_flesh(parts, hu, spacing_mm)
+
+
+def _padding(hu: NDArray[np.float32], spacing_mm: FloatArray) -> BoolArray:
+    """(D, H, W) where the picture ends before the volume does."""
+    is_lowest: BoolArray = hu <= PADDING_HU
+    if not is_lowest.any():
+        return is_lowest
+    broad = depth_mm(is_lowest, spacing_mm) > _BROAD_MM
+    if not broad.any():
+        return broad
+    around: BoolArray = depth_mm(broad, spacing_mm) >= -(_BROAD_MM + float(np.max(spacing_mm)))
+    return around & is_lowest
 
 
 def _outside(hu: NDArray[np.float32], spacing_mm: FloatArray, is_low: BoolArray) -> BoolArray:

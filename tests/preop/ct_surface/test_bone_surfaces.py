@@ -4,7 +4,8 @@ import pytest
 from navapp.geometry.simplify import is_closed, is_within
 from navapp.preop.ct_surface import bone_surfaces, surface_of_labels, surfaces_of
 from navapp.preop.segmentation import segment
-from navapp.preop.volume import LabelVolume
+from navapp.preop.volume import CtVolume, LabelVolume
+from navapp.preop.volume.hounsfield import AIR_HU as PADDING_HU
 from tests.preop.ct_phantoms import (
     MARROW_HU,
     SOFT_HU,
@@ -21,6 +22,7 @@ PLACE_MM = np.array([40.0, -15.0, 900.0])
 BALL_MM, BALL_RADIUS_MM = PLACE_MM + np.array([14.0, 0.0, 0.0]), 12.0
 SHAFT_MM, SHAFT_RADIUS_MM = PLACE_MM - [12.0, 0.0, 0.0], 9.0
 SEEDS = {"patella": BALL_MM, "femur": SHAFT_MM}
+CUT_MM = 12.0
 
 
 def scanned(axes, n_j=54):
@@ -132,6 +134,23 @@ def test_the_working_model_is_near_the_fine_one(scan, monkeypatch):
     assert is_within(fine.mesh, coarse.mesh, 0.1)
     assert is_closed(coarse.mesh)
     assert coarse.is_measured.mean() > 0.95
+
+
+def test_a_shaft_that_padding_cuts_is_cut_there(straight):
+    """As in a CT that was resampled to other axes: its last slice leans in the volume."""
+    ct, _ = straight
+    points = points_of(ct.size, ct.lps_from_index) - SHAFT_MM
+    slope = np.array([-0.3, 0.2, 1.0]) / np.linalg.norm([-0.3, 0.2, 1.0])
+    hu = np.where(points @ slope > CUT_MM, np.int16(PADDING_HU), ct.hu)
+    found = segment(CtVolume(hu, ct.lps_from_index, ct.spacing_mm), seeds=SEEDS)
+    assert any(said.startswith("femur: cut off by padding") for said in found.warnings)
+    shaft = surfaces_of(found).bones["femur"]
+    above_mm = (shaft.mesh.vertices_mm - SHAFT_MM) @ slope - CUT_MM
+    middle_mm = np.hypot(*(shaft.mesh.vertices_mm - SHAFT_MM)[:, :2].T)
+    on_cap = (above_mm > -0.5) & (middle_mm < 0.8 * SHAFT_RADIUS_MM)
+    assert on_cap.sum() > 20
+    assert shaft.is_cut[on_cap].mean() > 0.9
+    assert not shaft.is_cut[(above_mm < -3.0) & (shaft.mesh.vertices_mm[:, 2] > 890.0)].any()
 
 
 @pytest.mark.parametrize("axes", [np.eye(3), leaning_axes()])

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from navapp.preop.segmentation.masks import components
+from navapp.preop.segmentation.masks import components, depth_mm
 from navapp.preop.segmentation.solids import find_solids
+from navapp.preop.volume.hounsfield import AIR_HU as PADDING_HU
 from tests.preop.ct_phantoms import (
     AIR_HU,
     MARROW_HU,
@@ -47,6 +48,17 @@ def test_a_shaft_that_the_volume_cuts_keeps_its_marrow(threshold_hu):
     r = np.hypot(POINTS[..., 0], POINTS[..., 1])
     assert solid[r < 11.4].all()
     assert not solid[r > 13.2].any()
+
+
+def test_a_shaft_that_ends_in_padding_keeps_its_marrow():
+    hu = noisy(SOFT_HU + hollow_cylinder(POINTS, 12.0, 2.0, inside_hu=MARROW_HU))
+    is_padding = POINTS @ [0.3, 0.2, 1.0] > 6.0
+    hu[is_padding] = PADDING_HU
+    solid = find_solids(hu, SPACING_MM, 200.0)
+    r = np.hypot(POINTS[..., 0], POINTS[..., 1])
+    assert solid[(r < 11.4) & ~is_padding].all()
+    # A sheet of voxels may stay where flesh ends obliquely, too thin for any core.
+    assert depth_mm(solid & ((r > 13.2) | is_padding), SPACING_MM).max() < 1.0
 
 
 def test_a_table_in_air_and_debris_are_left_out():
