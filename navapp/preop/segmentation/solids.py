@@ -12,8 +12,6 @@ from navapp.preop.volume.itk_package import simple_itk
 _PORE_MM = 1.0
 # Less dense than any fat or marrow: air, foam.
 _AIR_HU = -400.0
-# Padding is broad; noise in air gets as low in single voxels.
-_BROAD_MM = 3.0
 # A part of a person lies in flesh; a table and its padding lie in air.
 _SHELL_MM = (2.0, 6.0)
 _MOST_AIR = 0.5
@@ -40,14 +38,17 @@ def find_solids(hu: NDArray[np.float32], spacing_mm: FloatArray, threshold_hu: f
 
 
 def _padding(hu: NDArray[np.float32], spacing_mm: FloatArray) -> BoolArray:
-    """(D, H, W) where the picture ends before the volume does."""
+    """(D, H, W) where the picture ends before the volume does.
+
+    Noise in air gets as low in single voxels; what holds no ball of a pore leads nothing anywhere.
+    """
     is_lowest: BoolArray = hu <= PADDING_HU
     if not is_lowest.any():
         return is_lowest
-    broad = depth_mm(is_lowest, spacing_mm) > _BROAD_MM
+    broad = depth_mm(is_lowest, spacing_mm) > _PORE_MM
     if not broad.any():
         return broad
-    around: BoolArray = depth_mm(broad, spacing_mm) >= -(_BROAD_MM + float(np.max(spacing_mm)))
+    around: BoolArray = depth_mm(broad, spacing_mm) >= -(_PORE_MM + float(np.max(spacing_mm)))
     return around & is_lowest
 
 
