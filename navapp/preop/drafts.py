@@ -96,6 +96,8 @@ def draft_from_labels(
         PlanError: a label too small for a bone.
     """
     surfaces, slices = {}, {}
+    # Not the product of the spacings: axes may lean.
+    voxel_mm3 = abs(float(np.linalg.det(volume.lps_from_index[:3, :3])))
     for name, value in values.items():
         mask = volume.labels == value
         if not mask.any():
@@ -104,7 +106,7 @@ def draft_from_labels(
                 f"--label {name}={value}: the segmentation holds no such value",
                 remedy=f"it holds {there}",
             )
-        if float(mask.sum() * np.prod(volume.spacing_mm)) < _LEAST_LABEL_MM3:
+        if mask.sum() * voxel_mm3 < _LEAST_LABEL_MM3:
             raise PlanError(
                 f"label {value} for the {name} fills less than a cubic centimetre",
                 remedy="give the value of the whole bone",

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -78,6 +79,11 @@ def check_place(folder: str | Path) -> None:
             subject=str(folder),
             remedy="choose a new folder for --out",
         )
+    there = next(
+        place for place in (folder.absolute().parent, *folder.absolute().parents) if place.exists()
+    )
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        raise _not_written(folder, PermissionError(0, "its place is not a folder to write to"))
 
 
 def read_plan(folder: str | Path) -> Plan:

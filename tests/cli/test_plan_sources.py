@@ -150,3 +150,10 @@ def test_a_place_that_is_taken_is_refused_before_the_work(labels, tmp_path, caps
     assert run(arguments) == 3
     assert "exists and is not a plan" in capsys.readouterr().err
     assert (tmp_path / "letter.txt").read_text() == "mine"
+
+
+def test_a_place_under_a_file_is_refused_before_the_work(labels, tmp_path, capsys) -> None:
+    (tmp_path / "letter.txt").write_text("mine")
+    out = tmp_path / "letter.txt" / "plan"
+    assert run(["plan", "--labels", "nowhere", "--label", "femur=5", "--out", str(out)]) == 3
+    assert "cannot be written" in capsys.readouterr().err

@@ -17,6 +17,8 @@ _RIDGE, _BESIDE_MM = -150.0, 2.5
 # What is left of a bone's inside is eroded by this, so that no thread connects two of them.
 _THREAD_MM = 1.5
 _LEAST_MM3 = 500.0
+# The smallest of more are left out: voxels are numbered by bytes.
+_MOST_CORES = 200
 
 
 def find_cores(plates: Plates, solid: BoolArray, spacing_mm: FloatArray) -> Iterator[LabelArray]:
@@ -30,7 +32,9 @@ def find_cores(plates: Plates, solid: BoolArray, spacing_mm: FloatArray) -> Iter
     for valley in _VALLEYS:
         inside = solid & ~(near_plate & (plates.valley > valley))
         deep = depth_mm(inside, spacing_mm) > _THREAD_MM
-        yield components(deep, spacing_mm, _LEAST_MM3)
+        cores = components(deep, spacing_mm, _LEAST_MM3)
+        cores[cores > _MOST_CORES] = 0
+        yield cores
 
 
 def is_ridge(plates: Plates) -> NDArray[np.bool_]:
