@@ -47,7 +47,8 @@ def install(
         entries: of the group `navapp.devices`: name -> `module:function`.
         modules: file -> source.
     """
-    described = folder / f"{package}-1.0.dist-info"
+    # As installers escape it: up to the first hyphen stands the package's name.
+    described = folder / f"{package.replace('-', '_')}-1.0.dist-info"
     described.mkdir(parents=True)
     metadata = f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n"
     (described / "METADATA").write_text(metadata, encoding="utf-8")
