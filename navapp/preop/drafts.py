@@ -11,7 +11,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.ct_surface import BoneSurface, surface_of_labels, surfaces_of
 from navapp.preop.plan_origin import PlanOrigin
 from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU, NO_SEEDS, segment
-from navapp.preop.slices import draw_slices
+from navapp.preop.slices import Picture, draw_slices
 from navapp.preop.volume import CtVolume, LabelVolume, ReadCt
 from navapp.values import BoneModel, Side
 
@@ -46,14 +46,14 @@ class Draft:
         origin: facts for people.
         fibula: which is not followed and tells the side; None where it is not known.
         side: as the user or the CT's laterality tag says; None to be estimated.
-        slices: bone -> PNG of three slices of the volume with the surface's contour.
+        slices: bone -> (h, w, 3) BGR, three slices of the volume with the surface's contour.
     """
 
     bones: Mapping[str, BoneModel]
     origin: PlanOrigin
     fibula: TriangleMesh | None = None
     side: Side | None = None
-    slices: Mapping[str, bytes] = field(default_factory=dict)
+    slices: Mapping[str, Picture] = field(default_factory=dict)
 
 
 def draft_from_ct(
@@ -121,7 +121,7 @@ def _draft(
     surfaces: Mapping[str, BoneSurface],
     side: Side | None,
     origin: PlanOrigin,
-    slices: Mapping[str, bytes],
+    slices: Mapping[str, Picture],
 ) -> Draft:
     bones = {
         name: BoneModel(name, surfaces[name].mesh, side, is_removed=surfaces[name].is_cut)

@@ -20,11 +20,12 @@ from navapp.preop.bone_files import read_bone, write_bone
 from navapp.preop.content_files import content_from_json, content_to_json
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
 from navapp.preop.preview import draw_preview
+from navapp.preop.slices import Picture
 from navapp.preop.summary import summary_page
 from navapp.values import AspectGraph, BoneModel, Plan, SurgicalContent
 
 _FILE = "plan.json"
-NO_SLICES: Mapping[str, bytes] = MappingProxyType({})
+NO_SLICES: Mapping[str, Picture] = MappingProxyType({})
 _CONVENTIONS = {"format": 1, "space": "LPS", "unit": "mm"}
 
 
@@ -32,7 +33,7 @@ def write_plan(
     folder: str | Path,
     plan: Plan,
     origin: PlanOrigin | None = None,
-    slices: Mapping[str, bytes] = NO_SLICES,
+    slices: Mapping[str, Picture] = NO_SLICES,
 ) -> None:
     """Write a plan folder whole: it appears complete or not at all.
 
@@ -42,7 +43,7 @@ def write_plan(
         folder: of the plan.
         plan: what is written.
         origin: where its surfaces come from; None for nothing known.
-        slices: bone -> PNG of its contour in the volume, for its picture.
+        slices: bone -> (h, w, 3) BGR of its contour in the volume, for its picture.
 
     Raises:
         PlanError: the place is taken by something that is not a plan, or cannot be written.
@@ -177,7 +178,7 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _write_content(
-    folder: Path, plan: Plan, origin: PlanOrigin, slices: Mapping[str, bytes]
+    folder: Path, plan: Plan, origin: PlanOrigin, slices: Mapping[str, Picture]
 ) -> None:
     bones: dict[str, Any] = {}
     for name, bone in plan.bones.items():

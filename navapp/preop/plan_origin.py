@@ -1,7 +1,7 @@
 """Where a plan's surfaces come from: what a person needs in order to trust them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 OriginKind = Literal["CT", "labels", "surfaces"]
@@ -49,17 +49,7 @@ class PlanOrigin:
 
 def origin_to_json(origin: PlanOrigin) -> dict[str, Any]:
     """What goes into plan.json."""
-    return {
-        "kind": origin.kind,
-        "description": origin.description,
-        "spacing_mm": list(origin.spacing_mm),
-        "size": list(origin.size),
-        "threshold_hu": origin.threshold_hu,
-        "cortex_hu": origin.cortex_hu,
-        "blur_mm": list(origin.blur_mm),
-        "measured": dict(origin.measured),
-        "warnings": list(origin.warnings),
-    }
+    return asdict(origin)
 
 
 def origin_from_json(content: Mapping[str, Any]) -> PlanOrigin:

@@ -1,6 +1,7 @@
 """A picture of a bone from three sides, for whoever looks into a plan folder."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
@@ -18,12 +19,12 @@ _VIEWS = (
 )
 
 
-def draw_preview(mesh: TriangleMesh, slices: bytes | None = None) -> bytes:
+def draw_preview(mesh: TriangleMesh, slices: NDArray[np.uint8] | None = None) -> bytes:
     """PNG with three shaded views side by side.
 
     Args:
         mesh: LPS mm.
-        slices: PNG to put above them.
+        slices: (h, w, 3) BGR to put above them.
     """
     import cv2
 
@@ -34,10 +35,9 @@ def draw_preview(mesh: TriangleMesh, slices: bytes | None = None) -> bytes:
         pictures.append(picture)
     picture = np.hstack(pictures)
     if slices is not None:
-        above = np.asarray(cv2.imdecode(np.frombuffer(slices, np.uint8), cv2.IMREAD_COLOR))
-        width = max(above.shape[1], picture.shape[1])
+        width = max(slices.shape[1], picture.shape[1])
         picture = np.vstack([
-            np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in (above, picture)
+            np.pad(row, ((0, 0), (0, width - row.shape[1]), (0, 0))) for row in (slices, picture)
         ])  # fmt: skip
     _, encoded = cv2.imencode(".png", picture)
     return encoded.tobytes()

@@ -7,6 +7,8 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.volume import CtVolume, LabelVolume
 
+Picture = NDArray[np.uint8]
+
 _HEIGHT_PX = 360
 # From fat to dense cortex.
 _BLACK_HU, _WHITE_HU = -200.0, 1400.0
@@ -16,24 +18,20 @@ _MARGIN_MM = 12.0
 _SHIFT = 4
 
 
-def draw_slices(volume: CtVolume | LabelVolume, mesh: TriangleMesh) -> bytes:
-    """PNG of the three slices through a surface's middle, its contour drawn in.
+def draw_slices(volume: CtVolume | LabelVolume, mesh: TriangleMesh) -> Picture:
+    """(h, w, 3) BGR: the three slices through a surface's middle, its contour drawn in.
 
     Args:
         volume: CT in HU, or labels.
         mesh: LPS mm.
     """
-    import cv2
-
     indices = volume.indices_of(mesh.vertices_mm)
-    pictures = [_slice(volume, mesh, indices, axis) for axis in (2, 1, 0)]
-    _, encoded = cv2.imencode(".png", np.hstack(pictures))
-    return encoded.tobytes()
+    return np.hstack([_slice(volume, mesh, indices, axis) for axis in (2, 1, 0)])
 
 
 def _slice(
     volume: CtVolume | LabelVolume, mesh: TriangleMesh, indices: FloatArray, axis: int
-) -> NDArray[np.uint8]:
+) -> Picture:
     """One slice across an index axis (0 for i), at the height of most of the surface."""
     import cv2
 

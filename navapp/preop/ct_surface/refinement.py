@@ -31,12 +31,10 @@ class Refined:
     Attributes:
         mesh: LPS mm.
         is_measured: (V,) the profile there was explained; elsewhere neighbours say where it is.
-        thickness_mm: (V,) of the cortex.
     """
 
     mesh: TriangleMesh
     is_measured: NDArray[np.bool_]
-    thickness_mm: FloatArray
 
 
 def refine_surface(
@@ -60,14 +58,14 @@ def refine_surface(
         reach_mm: how far off the mesh may be.
     """
     neighbours = neighbours_of(mesh.faces, len(mesh.vertices_mm))
-    offset, weight, thickness = _measured(mesh, ct, is_other, density, scan, reach_mm)
+    offset, weight = _measured(mesh, ct, is_other, density, scan, reach_mm)
     weight[is_cut] = 0.0
     is_measured = weight > 0.0
     even = _evened(offset, weight, neighbours)
     even += np.where(is_measured, blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
     even[is_cut] = 0.0
     mesh = TriangleMesh(mesh.vertices_mm + even[:, None] * mesh.normals, mesh.faces)
-    return Refined(mesh, is_measured, thickness)
+    return Refined(mesh, is_measured)
 
 
 def _measured(
@@ -77,14 +75,14 @@ def _measured(
     density: Callable[[FloatArray], FloatArray],
     scan: Scan,
     reach_mm: float,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Offset, weight and thickness of each vertex."""
+) -> tuple[FloatArray, FloatArray]:
+    """Offset and weight of each vertex."""
     positions = sample_positions_mm()
     profiles = along(mesh.vertices_mm, mesh.normals, positions, density)
     blur = scan.blur_mm(axial_share(ct, mesh.normals))
     blur_class = np.digitize(blur, np.linspace(blur.min(), blur.max(), _BLUR_CLASSES + 1)[1:-1])
     until_class = _until_class(mesh, ct, is_other)
-    offset, weight, thickness = (np.zeros(len(blur)) for _ in range(3))
+    offset, weight = (np.zeros(len(blur)) for _ in range(2))
     for a in np.unique(blur_class):
         for b in np.unique(until_class):
             some = (blur_class == a) & (until_class == b)
@@ -94,10 +92,10 @@ def _measured(
                 profiles[some], _UNTIL_MM[b], float(blur[some].mean()), scan, reach_mm
             )
             is_bad = edges.is_at_end | (edges.misfit_hu2 > _WORST_RMS_HU**2 * len(positions))
-            offset[some], thickness[some] = edges.offset_mm, edges.thickness_mm
+            offset[some] = edges.offset_mm
             weight[some] = np.where(is_bad, 0.0, edges.sharpness)
     typical = float(np.median(weight[weight > 0.0])) if (weight > 0.0).any() else 1.0
-    return offset, np.minimum(weight / typical, _MOST_WEIGHT), thickness
+    return offset, np.minimum(weight / typical, _MOST_WEIGHT)
 
 
 def _until_class(mesh: TriangleMesh, ct: CtVolume, is_other: NDArray[np.bool_]) -> NDArray[np.intp]:
