@@ -73,6 +73,13 @@ def paired_half_edges(faces: IntArray) -> NDArray[np.int64]:
     return np.column_stack([order[first], other])
 
 
+def face_pairs(faces: IntArray) -> tuple[IntArray, NDArray[np.int64]]:
+    """(E, 2) edges, and (E, 2) the triangles on both sides of each; -1 where there is none."""
+    halves = paired_half_edges(faces)
+    edges = np.sort(half_edges(faces)[halves[:, 0]], axis=1)
+    return edges, np.where(halves >= 0, halves % max(len(faces), 1), -1)
+
+
 def _planes(corners: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
     a, b, c = (corners[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)

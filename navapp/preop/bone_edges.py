@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import half_edges, paired_half_edges
+from navapp.geometry.mesh_edges import face_pairs
 from navapp.geometry.transform import FloatArray
+from navapp.preop.cut_ends import on_flat_caps, on_open_borders
 
-# A flat piece at least so large is the cap of a cut shaft: no bone is as flat.
-_CAP_MM2 = 150.0
-_FLAT_COSINE, _FLAT_MM = 0.9995, 0.4
-# So far around it the mesh is not trusted either.
+# So far around the end of a mesh it is not trusted either.
 _AROUND_MM = 3.0
 # A crease bends at least as sharply, and so much more across than along.
 _SHARPEST_RADIUS_MM = 7.0
@@ -33,10 +31,7 @@ def no_anatomy(mesh: TriangleMesh) -> NDArray[np.bool_]:
     """(V,) vertices at open borders and on flat caps, with what lies close to them."""
     from scipy.spatial import cKDTree
 
-    is_end = np.zeros(len(mesh.vertices_mm), dtype=bool)
-    pairs, faces_of_pair = _face_pairs(mesh.faces)
-    is_end[pairs[faces_of_pair[:, 1] < 0].ravel()] = True
-    is_end[mesh.faces[_is_cap(mesh, faces_of_pair)].ravel()] = True
+    is_end: NDArray[np.bool_] = on_open_borders(mesh) | on_flat_caps(mesh)
     if not is_end.any():
         return is_end
     distance, _ = cKDTree(mesh.vertices_mm[is_end]).query(mesh.vertices_mm)
@@ -50,7 +45,7 @@ def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
         mesh: of a bone.
         is_wanted: (V,) where creases are looked for.
     """
-    edges, _ = _face_pairs(mesh.faces)
+    edges, _ = face_pairs(mesh.faces)
     normals = _smoothed(mesh, edges)
     offset = mesh.vertices_mm[edges[:, 1]] - mesh.vertices_mm[edges[:, 0]]
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
@@ -92,35 +87,3 @@ def _smoothed(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
         normals = np.asarray(around @ normals)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return normals
-
-
-def _face_pairs(faces: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """(E, 2) edges, and (E, 2) the faces on both sides of each; -1 where there is none."""
-    halves = paired_half_edges(faces)
-    edges = np.sort(half_edges(faces)[halves[:, 0]], axis=1)
-    return edges, np.where(halves >= 0, halves % len(faces), -1)
-
-
-def _is_cap(mesh: TriangleMesh, faces_of_pair: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(F,) triangles of large flat pieces."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    corners = mesh.vertices_mm[mesh.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * np.linalg.norm(across, axis=1)
-    normals = across / np.maximum(2.0 * area, 1e-12)[:, None]
-    inner = faces_of_pair[faces_of_pair[:, 1] >= 0]
-    is_flat = np.einsum("ij,ij->i", normals[inner[:, 0]], normals[inner[:, 1]]) > _FLAT_COSINE
-    joined = inner[is_flat]
-    n = len(mesh.faces)
-    graph = coo_matrix((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(n, n))
-    _, piece = connected_components(graph, directed=False)
-    is_cap = np.zeros(n, dtype=bool)
-    for large in np.flatnonzero(np.bincount(piece, area) > _CAP_MM2):
-        inside = piece == large
-        normal = (normals[inside] * area[inside, None]).sum(axis=0)
-        normal /= np.linalg.norm(normal)
-        off = corners[inside].reshape(-1, 3) @ normal
-        is_cap |= inside & bool(np.ptp(off) < _FLAT_MM)
-    return is_cap

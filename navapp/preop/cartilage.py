@@ -12,7 +12,7 @@ from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_flat_ends, on_open_borders
+from navapp.preop.cut_ends import ends_of, on_open_borders
 from navapp.preop.surfaces import MIN_FACES, ImportedSurface, in_lps
 from navapp.values import BoneModel
 
@@ -61,14 +61,14 @@ def figures_of(bone: BoneModel) -> CartilageFigures | None:
 
 
 def even_cartilage(bone: BoneModel, mean_mm: float, sd_mm: float) -> BoneModel:
-    """The bone with one thickness everywhere but at flat ends and open borders.
+    """The bone with one thickness everywhere but where its surface ends.
 
     Raises:
         ValueError: a value outside 0 to 10 mm.
     """
     if not (0.0 <= mean_mm <= LARGEST_MM and 0.0 <= sd_mm <= LARGEST_MM):
         raise ValueError(f"cartilage of {mean_mm} +- {sd_mm} mm is not possible")
-    is_covered = ~(on_open_borders(bone.mesh) | on_flat_ends(bone.mesh))
+    is_covered = ~ends_of(bone)
     return replace(
         bone,
         cartilage_mm=np.where(is_covered, mean_mm, 0.0),

@@ -8,6 +8,7 @@ import numpy as np
 from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
+from navapp.preop.cut_ends import anatomy_of
 from navapp.preop.landmarks import estimate_landmarks
 from navapp.preop.planned import Planned
 from navapp.preop.side import SideEstimate, estimate_side
@@ -33,7 +34,8 @@ def with_side(
         Bones, and what has to be said: that the side is an estimate or unknown, or that the given
         one contradicts a certain estimate.
     """
-    meshes = {name: bone.mesh for name, bone in bones.items()}
+    meshes = {name: anatomy_of(bone) for name, bone in bones.items()}
+    meshes = {name: mesh for name, mesh in meshes.items() if len(mesh.faces)}
     estimate = estimate_side(meshes if fibula is None else {**meshes, "fibula": fibula})
     side = given or estimate.side
     return {name: replace(bone, side=side) for name, bone in bones.items()}, _said(estimate, given)

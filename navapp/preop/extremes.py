@@ -14,15 +14,21 @@ WORST_SD_MM = 8.0
 
 
 def extreme(
-    vertices_mm: FloatArray, among: NDArray[np.bool_], direction: FloatArray
+    vertices_mm: FloatArray,
+    is_border: NDArray[np.bool_],
+    among: NDArray[np.bool_],
+    direction: FloatArray,
 ) -> Landmark | None:
     """The vertex in the middle of what is outermost; None when it is not defined.
+
+    What is outermost where the surface was cut off may go on beyond the cut: it is none.
 
     The standard deviation follows from the flatness of the extremum: a surface of radius R that is
     good to e leaves a spot of radius sqrt(2 R e).
 
     Args:
         vertices_mm: (V, 3).
+        is_border: (V,) where the surface is open.
         among: (V,) those that count.
         direction: (3,) unit.
     """
@@ -30,7 +36,10 @@ def extreme(
     if len(candidates) == 0:
         return None
     level = candidates @ direction
-    spot = candidates[level > level.max() - SURFACE_NOISE_MM]
+    is_spot = level > level.max() - SURFACE_NOISE_MM
+    if is_border[among][is_spot].any():
+        return None
+    spot = candidates[is_spot]
     middle = spot.mean(axis=0)
     point = spot[int(np.argmin(((spot - middle) ** 2).sum(axis=1)))]
     # A single vertex is as uncertain as its neighbours are far; the surface's noise at the least.

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_flat_ends
+from navapp.preop.cut_ends import on_open_borders, whole_until_mm
 from navapp.preop.extremes import WORST_SD_MM, extreme
 from navapp.values import Landmark, Side
 
@@ -30,12 +31,14 @@ class Condyles:
     """The end of a femur, parted at its notch.
 
     Attributes:
-        vertices_mm: (V, 3) of the bone, caps of cut shafts left out.
+        vertices_mm: (V, 3) of the bone.
+        is_border: (V,) where its surface is open.
         is_condyle: (V,) low enough.
         notch_x_mm: the plane that parts them.
     """
 
     vertices_mm: FloatArray
+    is_border: NDArray[np.bool_]
     is_condyle: NDArray[np.bool_]
     notch_x_mm: float
 
@@ -48,9 +51,13 @@ class Condyles:
 
 
 def condyles_of(femur: TriangleMesh) -> Condyles | None:
-    """The end of a femur; None when there is no notch between two condyles."""
-    vertices = femur.vertices_mm[~on_flat_ends(femur)]
-    if len(vertices) == 0:  # a box: flat ends only
+    """The end of a femur; None when there is no notch between two condyles.
+
+    Args:
+        femur: without caps (`anatomy_of`), open where it was cut.
+    """
+    vertices = femur.vertices_mm
+    if len(vertices) == 0:
         return None
     low = vertices[:, 2] < vertices[:, 2].min() + _CONDYLES_MM
     x, outward = vertices[low, 0], vertices[low] @ BEHIND_AND_BELOW
@@ -64,17 +71,28 @@ def condyles_of(femur: TriangleMesh) -> Condyles | None:
     depth_mm = min(profile[:notch].max(), profile[notch + 1 :].max()) - profile[notch]
     if depth_mm < _LEAST_NOTCH_MM:
         return None
-    return Condyles(vertices, low, float(edges[notch]) + 0.5 * _STRIP_MM)
+    return Condyles(vertices, on_open_borders(femur), low, float(edges[notch]) + 0.5 * _STRIP_MM)
+
+
+def shaft_top_mm(femur: TriangleMesh) -> float:
+    """The height of the shaft's end, or of the lowest point of its cut."""
+    height = femur.vertices_mm[:, 2]
+    return whole_until_mm(height, on_open_borders(femur), height.min() + _CONDYLES_MM)
 
 
 def femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
-    """What its surface allows: keyed `femur/name`; medial and lateral need the side."""
+    """What its surface allows: keyed `femur/name`; medial and lateral need the side.
+
+    Args:
+        femur: without caps (`anatomy_of`), open where it was cut.
+        side: None when it is not known.
+    """
     found: dict[str, Landmark | None] = dict(_shaft_axis(femur))
     condyles = condyles_of(femur)
     if condyles is not None:
         vertices = condyles.vertices_mm
         middle = np.abs(vertices[:, 0] - condyles.notch_x_mm) < 2.0 * _STRIP_MM
-        centre = extreme(vertices, middle & condyles.is_condyle, DOWN)
+        centre = extreme(vertices, condyles.is_border, middle & condyles.is_condyle, DOWN)
         if centre is not None and centre.sd_mm is not None:
             # The plane that parts the condyles is known to a strip.
             centre = replace(centre, sd_mm=float(np.hypot(centre.sd_mm, _STRIP_MM)))
@@ -89,21 +107,22 @@ def _of_both_sides(condyles: Condyles, medial: float) -> dict[str, Landmark | No
     vertices = condyles.vertices_mm
     above = vertices[:, 2] - vertices[:, 2].min()
     is_broad = (above > _EPICONDYLES_MM[0]) & (above < _EPICONDYLES_MM[1])
+    outermost = partial(extreme, vertices, condyles.is_border)
     found = {}
     for name, sign in (("medial", medial), ("lateral", -medial)):
         condyle = condyles.of_side(sign)
-        found[f"{name}_condyle"] = extreme(vertices, condyle, DOWN)
-        found[f"{name}_posterior_condyle"] = extreme(vertices, condyle, BACK)
-        found[f"{name}_epicondyle"] = extreme(vertices, is_broad, sign * ACROSS)
+        found[f"{name}_condyle"] = outermost(condyle, DOWN)
+        found[f"{name}_posterior_condyle"] = outermost(condyle, BACK)
+        found[f"{name}_epicondyle"] = outermost(is_broad, sign * ACROSS)
     return found
 
 
 def _shaft_axis(femur: TriangleMesh) -> Iterator[tuple[str, Landmark]]:
     """Both ends of the axis through the middles of the shaft's slices, where there is a shaft."""
-    vertices = femur.vertices_mm[~on_flat_ends(femur)]
+    vertices = femur.vertices_mm
     if len(vertices) == 0:
         return
-    lowest, highest = vertices[:, 2].min(), vertices[:, 2].max()
+    lowest, highest = vertices[:, 2].min(), shaft_top_mm(femur)
     widest = np.ptp(vertices[vertices[:, 2] < lowest + _CONDYLES_MM, 0])
     middles = []
     for level in np.arange(highest - _SLICE_MM, lowest + _CONDYLES_MM, -_SLICE_MM):

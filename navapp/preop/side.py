@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.preop.femur_landmarks import BACK, DOWN, condyles_of
+from navapp.preop.femur_landmarks import BACK, DOWN, condyles_of, shaft_top_mm
 from navapp.preop.tibia_landmarks import tibial_end, tubercle_of
 from navapp.values import Side
 
@@ -32,7 +32,7 @@ class SideEstimate:
 
 
 def estimate_side(bones: Mapping[str, TriangleMesh]) -> SideEstimate:
-    """From what there is of femur, tibia, patella and fibula.
+    """From what there is of femur, tibia, patella and fibula, without caps of cut shafts.
 
     Certain is only what the fibula says, where the other bones show that the knee is upright and
     faces forward (a knee turned round looks like the other one), and none of them disagrees. What
@@ -82,10 +82,10 @@ def _femur_lean_deg(femur: TriangleMesh) -> float:
         vertices[condyles.of_side(sign)][np.argmax(vertices[condyles.of_side(sign)] @ DOWN)]
         for sign in (1.0, -1.0)
     )
-    top = vertices[:, 2].max()
+    top = shaft_top_mm(femur)
     if top - vertices[:, 2].min() < _SHAFT_FROM_MM + 2.0 * _SLICE_MM:
         return 0.0
-    slice_x = vertices[vertices[:, 2] > top - 2.0 * _SLICE_MM, 0]
+    slice_x = vertices[np.abs(vertices[:, 2] - top + _SLICE_MM) < _SLICE_MM, 0]
     middle = 0.5 * (left + right)
     rise = top - _SLICE_MM - middle[2]
     lean = np.arctan2(0.5 * (slice_x.min() + slice_x.max()) - middle[0], rise)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_flat_ends
+from navapp.preop.cut_ends import anatomy_of
 from navapp.preop.femur_landmarks import condyles_of
 from navapp.preop.tibia_landmarks import tibial_end
 from navapp.values import BoneModel, StageContent
@@ -38,13 +38,12 @@ def default_targets(bones: Mapping[str, BoneModel]) -> dict[str, FloatArray]:
     """Points keyed `bone/name`, of the regions that the surfaces show; the same every time."""
     found: dict[str, FloatArray] = {}
     if "femur" in bones:
-        found |= _of_femur(bones["femur"].mesh)
+        found |= _of_femur(anatomy_of(bones["femur"]))
     if "tibia" in bones:
-        found |= _of_tibia(bones["tibia"].mesh)
+        found |= _of_tibia(anatomy_of(bones["tibia"]))
     if "patella" in bones:
-        mesh = bones["patella"].mesh
-        is_back = (mesh.normals[:, 1] > _LOOKS_BACK) & ~on_flat_ends(mesh)
-        found["patella/back"] = _spread(mesh.vertices_mm, is_back)
+        mesh = anatomy_of(bones["patella"])
+        found["patella/back"] = _spread(mesh.vertices_mm, mesh.normals[:, 1] > _LOOKS_BACK)
     return {name: points for name, points in found.items() if len(points)}
 
 

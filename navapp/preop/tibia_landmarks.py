@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_flat_ends
+from navapp.preop.cut_ends import on_open_borders, whole_until_mm
 from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
 from navapp.values import Landmark, Side
 
@@ -25,13 +25,15 @@ class TibialEnd:
     """The upper end of a tibia.
 
     Attributes:
-        vertices_mm, normals: (V, 3), caps of cut shafts left out.
+        vertices_mm, normals: (V, 3).
+        is_border: (V,) where its surface is open.
         middle_mm: (2,) x and y of the middle of its rim.
         middle_sd_mm: how far the slices of the rim disagree on it.
     """
 
     vertices_mm: FloatArray
     normals: FloatArray
+    is_border: NDArray[np.bool_]
     middle_mm: FloatArray
     middle_sd_mm: float
 
@@ -51,10 +53,13 @@ class TibialEnd:
 
 
 def tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
-    """The upper end; None when it is not there."""
-    is_kept = ~on_flat_ends(tibia)
-    vertices = tibia.vertices_mm[is_kept]
-    if len(vertices) == 0:  # a box: flat ends only
+    """The upper end; None when it is not there.
+
+    Args:
+        tibia: without caps (`anatomy_of`), open where it was cut.
+    """
+    vertices = tibia.vertices_mm
+    if len(vertices) == 0:
         return None
     below = vertices[:, 2].max() - vertices[:, 2]
     middles = []
@@ -65,23 +70,29 @@ def tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
         middles.append(0.5 * (piece.min(axis=0) + piece.max(axis=0)))
     centres = np.array(middles)
     sd_mm = float(np.hypot(np.linalg.norm(centres.std(axis=0)), SURFACE_NOISE_MM))
-    return TibialEnd(vertices, tibia.normals[is_kept], centres.mean(axis=0), sd_mm)
+    return TibialEnd(vertices, tibia.normals, on_open_borders(tibia), centres.mean(axis=0), sd_mm)
 
 
 def tubercle_of(end: TibialEnd) -> Landmark | None:
     """The foremost point below the plateau; None when it is foremost only where the search ends."""
     below = end.below_top_mm
-    is_level = (below > _TUBERCLE_MM[0]) & (below < _TUBERCLE_MM[1])
-    found = extreme(end.vertices_mm, is_level, np.array([0.0, -1.0, 0.0]))
+    whole_mm = whole_until_mm(below, end.is_border, _TUBERCLE_MM[0])
+    is_level = (below > _TUBERCLE_MM[0]) & (below < min(_TUBERCLE_MM[1], whole_mm))
+    found = extreme(end.vertices_mm, end.is_border, is_level, np.array([0.0, -1.0, 0.0]))
     if found is None:
         return None
     depth_mm = float(end.vertices_mm[:, 2].max() - found.point_mm[2])
-    is_at_end = min(depth_mm - _TUBERCLE_MM[0], below.max() - depth_mm) < _SLICE_MM
+    is_at_end = min(depth_mm - _TUBERCLE_MM[0], whole_mm - depth_mm) < _SLICE_MM
     return None if is_at_end else found
 
 
 def tibia_landmarks(tibia: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
-    """What its surface allows: keyed `tibia/name`; medial and lateral need the side."""
+    """What its surface allows: keyed `tibia/name`; medial and lateral need the side.
+
+    Args:
+        tibia: without caps (`anatomy_of`), open where it was cut.
+        side: None when it is not known.
+    """
     end = tibial_end(tibia)
     if end is None or end.middle_sd_mm > WORST_SD_MM or not end.is_plateau.any():
         return {}
@@ -117,8 +128,12 @@ def _plateau(end: TibialEnd, sign: float) -> Landmark | None:
 
 
 def patella_landmarks(patella: TriangleMesh) -> dict[str, Landmark]:
-    """Its centre of volume; nothing when the CT cut it off."""
-    if on_flat_ends(patella).any() or patella.volume_mm3() <= 0.0:
+    """Its centre of volume; nothing when its surface is open, as where the CT cut it off.
+
+    Args:
+        patella: without caps (`anatomy_of`).
+    """
+    if on_open_borders(patella).any() or patella.volume_mm3() <= 0.0:
         return {}
     corners = patella.vertices_mm[patella.faces] - patella.centroid_mm
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))

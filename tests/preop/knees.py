@@ -36,6 +36,22 @@ def fibula_of(knee: KneeAnatomy) -> TriangleMesh:
     return TriangleMesh(ball.vertices_mm * np.array([1.0, 1.0, 4.0]) + head, ball.faces)
 
 
+def obliquely_cut(knee: KneeAnatomy, is_capped: bool) -> dict[str, BoneModel]:
+    """Shafts cut 25 deg off their axis; closed with a flat cap, or marked as removed."""
+    bones = bones_of(knee)
+    for name, sign in (("femur", 1.0), ("tibia", -1.0)):
+        mesh = knee.bones[name]
+        across = np.array([np.sin(np.radians(25.0)), 0.0, sign * np.cos(np.radians(25.0))])
+        beyond = np.maximum(mesh.vertices_mm @ across - 88.0, 0.0)
+        squeezed = TriangleMesh(mesh.vertices_mm - beyond[:, None] * across, mesh.faces)
+        bones[name] = (
+            BoneModel(name, squeezed, knee.spec.side)
+            if is_capped
+            else BoneModel(name, mesh, knee.spec.side, is_removed=beyond > 0.0)
+        )
+    return bones
+
+
 def turned(mesh: TriangleMesh, signs: tuple[int, int, int]) -> TriangleMesh:
     """With axes reversed: two of them turn the bone round, one or three mirror it."""
     faces = mesh.faces if np.prod(signs) > 0 else mesh.faces[:, ::-1]
