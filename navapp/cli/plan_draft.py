@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from navapp.preop.drafts import CtSettings, Draft
     from navapp.values import AspectGraph, BoneModel
 
-_SEEDED = ("femur", "tibia", "patella", "fibula")
 _CT_ONLY = ("series", "threshold", "seed", "region")
 _NO_CARTILAGE = (
     "no cartilage is known (--cartilage); a camera sees 1 to 3 mm of it where it is not worn, and "
@@ -121,10 +120,12 @@ def _settings(options: argparse.Namespace) -> "CtSettings":
 
 
 def _seeds(entries: list[str]) -> "dict[str, FloatArray]":
+    from navapp.preop.segmentation import BONES
+
     seeds = {}
     for entry in entries:
         name, _, text = entry.partition("=")
-        if name not in _SEEDED:
+        if name not in BONES:
             raise UsageError(
                 f"--seed {entry}: '{name}' is no bone of the knee",
                 remedy="use femur, tibia, patella or fibula, like femur=-70,-10,30",

@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from navapp.errors import UsageError
+from navapp.values import FOLLOWED_BONES
 
 if TYPE_CHECKING:
     from navapp.preop import ImportedSurface
     from navapp.values import BoneModel
-
-BONES = ("femur", "tibia", "patella")
 
 
 def by_bone(option: str, entries: list[str], value: str, example: str) -> dict[str, str]:
@@ -19,7 +18,7 @@ def by_bone(option: str, entries: list[str], value: str, example: str) -> dict[s
         name, equals, text = entry.partition("=")
         if not equals or not name or not text:
             raise UsageError(f"{option} {entry} is not NAME={value}", remedy=example)
-        if name not in BONES:
+        if name not in FOLLOWED_BONES:
             raise UsageError(
                 f"{option}: '{name}' is no bone of the knee that is followed",
                 remedy="use femur, tibia or patella",

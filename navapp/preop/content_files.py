@@ -1,6 +1,5 @@
 """Surgical content inside a plan folder: plain JSON, and one PLY file for every surface in it."""
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -8,10 +7,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply, write_ply
 from navapp.geometry.transform import RigidTransform
+from navapp.preop.intact import damaged, sha256_of
 from navapp.values import (
     Box,
     Cylinder,
@@ -44,7 +43,7 @@ def content_to_json(content: SurgicalContent, folder: Path) -> dict[str, Any]:
         if isinstance(value, TriangleMesh):
             written.append(folder / f"content_{len(written) + 1}.ply")
             write_ply(written[-1], value)
-            return {"file": written[-1].name, "sha256": _sha256(written[-1])}
+            return {"file": written[-1].name, "sha256": sha256_of(written[-1])}
         if isinstance(value, RigidTransform):
             return {
                 "target": value.target,
@@ -104,14 +103,6 @@ def _risk(entry: Mapping[str, Any], folder: Path) -> RiskStructure:
 
 def _surface(entry: Mapping[str, Any], folder: Path) -> TriangleMesh:
     path = folder / entry["file"]
-    if not path.is_file() or _sha256(path) != entry["sha256"]:
-        raise PlanError(
-            f"plan {folder} is damaged: {entry['file']} is missing, changed or cut short",
-            subject=str(folder),
-            remedy="make it again with `navapp plan`",
-        )
+    if not path.is_file() or sha256_of(path) != entry["sha256"]:
+        raise damaged(folder, f"{entry['file']} is missing, changed or cut short")
     return read_ply(path)[0]
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

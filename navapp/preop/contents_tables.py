@@ -7,9 +7,11 @@ from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from navapp.config import Section
 from navapp.values import (
+    FOLLOWED_BONES,
     Box,
     Cylinder,
     DrillAxis,
+    FollowedBone,
     Landmark,
     ResectionPlane,
     Sphere,
@@ -18,7 +20,6 @@ from navapp.values import (
 
 Millimetres = Annotated[float, Field(gt=0.0)]
 PointMm = tuple[float, float, float]
-Bone = Literal["femur", "tibia", "patella"]
 Name = Annotated[str, StringConstraints(min_length=1)]
 
 
@@ -30,7 +31,7 @@ def _with_length(value: PointMm) -> PointMm:
 
 def _of_a_bone(value: str) -> str:
     bone, slash, name = value.partition("/")
-    if bone not in ("femur", "tibia", "patella") or not slash or not name:
+    if bone not in FOLLOWED_BONES or not slash or not name:
         raise ValueError("write bone/name, with femur, tibia or patella as the bone")
     return value
 
@@ -43,7 +44,7 @@ class PlaneTable(Section):
     """A resection plane; the normal looks out of the bone that stays."""
 
     name: Name
-    bone: Bone
+    bone: FollowedBone
     point_mm: PointMm
     normal: Direction
     extent_mm: tuple[Millimetres, Millimetres] = (80.0, 60.0)
@@ -59,7 +60,7 @@ class DrillTable(Section):
     """A drill axis; the direction looks into the bone."""
 
     name: Name
-    bone: Bone
+    bone: FollowedBone
     entry_mm: PointMm
     direction: Direction
     depth_mm: Millimetres
@@ -109,7 +110,7 @@ class PartTable(Section):
     """An implant or a spacer: a primitive or a surface file, and its place in bone coordinates."""
 
     name: Name
-    bone: Bone
+    bone: FollowedBone
     shape: ShapeTable | None = None
     file: Name | None = None
     position_mm: PointMm
@@ -127,7 +128,7 @@ class RiskTable(Section):
     """A vessel or a nerve, as a polyline or a surface file."""
 
     name: Name
-    bone: Bone
+    bone: FollowedBone
     safety_mm: Annotated[float, Field(ge=0.0)]
     curve_mm: Annotated[tuple[PointMm, ...], Field(min_length=2)] | None = None
     file: Name | None = None
@@ -182,7 +183,7 @@ class DefectTable(Section):
     """Damaged cartilage: all of the surface within an outline, or near some points."""
 
     name: Name
-    bone: Bone
+    bone: FollowedBone
     outline_mm: Annotated[tuple[PointMm, ...], Field(min_length=3)] | None = None
     points_mm: Annotated[tuple[PointMm, ...], Field(min_length=1)] | None = None
 
@@ -196,7 +197,7 @@ class DefectTable(Section):
 class StageTable(Section):
     """The bone of a stage, and the names of what belongs to it."""
 
-    bone: Bone
+    bone: FollowedBone
     targets: tuple[BoneName, ...] = ()
     planes: tuple[str, ...] = ()
     drills: tuple[str, ...] = ()

@@ -1,9 +1,10 @@
 """Drafts of plans: bones out of a CT or a ready segmentation, with all there is to say of them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.errors import PlanError, UsageError
 from navapp.geometry.mesh import TriangleMesh
@@ -13,10 +14,8 @@ from navapp.preop.plan_origin import PlanOrigin
 from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU, NO_SEEDS, segment
 from navapp.preop.slices import Picture, draw_slices
 from navapp.preop.volume import CtVolume, LabelVolume, ReadCt
-from navapp.values import BoneModel, Side
+from navapp.values import FOLLOWED_BONES, BoneModel, Side
 
-# Bones that are followed; the fibula is found to keep it apart, and to tell the side.
-FOLLOWED = ("femur", "tibia", "patella")
 _LEAST_LABEL_MM3 = 1000.0
 
 
@@ -96,6 +95,7 @@ def draft_from_labels(
         PlanError: a label too small for a bone.
     """
     surfaces, slices = {}, {}
+    warnings: list[str] = []
     # Not the product of the spacings: axes may lean.
     voxel_mm3 = abs(float(np.linalg.det(volume.lps_from_index[:3, :3])))
     for name, value in values.items():
@@ -111,9 +111,15 @@ def draft_from_labels(
                 f"label {value} for the {name} fills less than a cubic centimetre",
                 remedy="give the value of the whole bone",
             )
+        warnings += _separate_pieces(name, mask)
         surfaces[name] = surface_of_labels(mask, volume)
         slices[name] = draw_slices(volume, surfaces[name].mesh)
-    origin = PlanOrigin("labels", "", tuple(float(step) for step in volume.spacing_mm), volume.size)
+    origin = PlanOrigin(
+        "labels",
+        spacing_mm=tuple(float(step) for step in volume.spacing_mm),
+        size=volume.size,
+        warnings=tuple(warnings),
+    )
     return _draft(surfaces, side, origin, slices)
 
 
@@ -125,11 +131,26 @@ def _draft(
 ) -> Draft:
     bones = {
         name: BoneModel(name, surfaces[name].mesh, side, is_removed=surfaces[name].is_cut)
-        for name in FOLLOWED
+        for name in FOLLOWED_BONES
         if name in surfaces
     }
     fibula = surfaces["fibula"].mesh if "fibula" in surfaces else None
     return Draft(bones, origin, fibula, side, slices)
+
+
+def _separate_pieces(name: str, mask: NDArray[np.bool_]) -> Iterator[str]:
+    """That a label is not in one piece, of which the largest is taken."""
+    from scipy.ndimage import label
+
+    # Also those that touch at a corner are one.
+    pieces, n = label(mask, np.ones((3, 3, 3)))
+    if n > 1:
+        sizes = np.bincount(pieces.ravel())[1:]
+        share = 1.0 - sizes.max() / sizes.sum()
+        yield (
+            f"{name}: its label is in {n} separate pieces; the largest is taken, without "
+            f"{100.0 * share:.2g} % of the voxels"
+        )
 
 
 def _within(ct: CtVolume, region_mm: tuple[float, ...]) -> CtVolume:

@@ -18,6 +18,7 @@ from navapp.preop.defects import paint_near, paint_within
 from navapp.preop.markup_files import Markup, read_markup_file
 from navapp.preop.planned import Planned
 from navapp.values import (
+    FOLLOWED_BONES,
     BoneModel,
     Defect,
     DrillAxis,
@@ -27,7 +28,6 @@ from navapp.values import (
     SurgicalContent,
 )
 
-_BONES = ("femur", "tibia", "patella")
 _RISKS = ("nerve", "artery", "vein", "risk")
 _LENGTH = re.compile(r"(?:^| )(\d+(?:\.\d+)?) ?mm$")
 # Where a plane's points and its stored middle and normal may differ by rounding.
@@ -80,7 +80,7 @@ def _named(markup: Markup, file: Path) -> _Named:
     length = _LENGTH.search(text)
     words = (text[: length.start()] if length else text).split(" ")
     word, rest = words[0], words[1:]
-    bone = rest.pop(0) if rest and rest[0] in _BONES else "femur"
+    bone = rest.pop(0) if rest and rest[0] in FOLLOWED_BONES else "femur"
     # Of a vessel, its kind is part of its name: it says the colour.
     name = "_".join([word, *rest] if word in _RISKS else rest) or bone
     return _Named(markup, word, bone, name, float(length[1]) if length else None, file)

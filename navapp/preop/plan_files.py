@@ -18,6 +18,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.bone_files import read_bone, write_bone
 from navapp.preop.content_files import content_from_json, content_to_json
+from navapp.preop.intact import damaged, sha256_of
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
 from navapp.preop.preview import draw_preview
 from navapp.preop.slices import Picture
@@ -122,7 +123,7 @@ def read_plan(folder: str | Path) -> Plan:
     ) as error:
         if isinstance(error, PlanError):
             raise
-        raise _damaged(folder, str(error)) from error
+        raise damaged(folder, str(error)) from error
     if not bones:
         raise PlanError(
             f"plan {folder} is empty: it has no bone",
@@ -130,7 +131,7 @@ def read_plan(folder: str | Path) -> Plan:
             remedy="make it again with `navapp plan`",
         )
     if plan.digest != content.get("hash"):
-        raise _damaged(folder, "its content does not match its hash")
+        raise damaged(folder, "its content does not match its hash")
     return plan
 
 
@@ -145,7 +146,7 @@ def read_origin(folder: str | Path) -> PlanOrigin:
         content = _read_content(folder)
         return origin_from_json(content["origin"]) if "origin" in content else PlanOrigin()
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise _damaged(folder, str(error)) from error
+        raise damaged(folder, str(error)) from error
 
 
 def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGraph]:
@@ -154,8 +155,8 @@ def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGra
         if entry.get("aspects_sha256") is None:
             continue
         path = folder / f"aspects_{name}.npz"
-        if not path.is_file() or _sha256(path) != entry["aspects_sha256"]:
-            raise _damaged(folder, f"{path.name} is missing or was changed")
+        if not path.is_file() or sha256_of(path) != entry["aspects_sha256"]:
+            raise damaged(folder, f"{path.name} is missing or was changed")
         aspects[name] = read_aspects(path)
     return aspects
 
@@ -169,7 +170,7 @@ def _read_content(folder: Path) -> dict[str, Any]:
             remedy="make it again with `navapp plan`",
         )
     if "file_hash" in content and content["file_hash"] != _hash_of(content):
-        raise _damaged(folder, f"{_FILE} was edited")
+        raise damaged(folder, f"{_FILE} was edited")
     return content
 
 
@@ -187,7 +188,7 @@ def _write_content(
         (folder / f"preview_{name}.png").write_bytes(draw_preview(bone.mesh, slices.get(name)))
         bones[name] = {
             "file": file,
-            "sha256": _sha256(folder / file),
+            "sha256": sha256_of(folder / file),
             "side": bone.side,
             "version": bone.version,
             "removed": np.flatnonzero(bone.is_removed).tolist(),
@@ -213,7 +214,7 @@ def _write_aspects(folder: Path, plan: Plan, name: str) -> str | None:
         return None
     path = folder / f"aspects_{name}.npz"
     write_aspects(path, plan.aspects[name])
-    return _sha256(path)
+    return sha256_of(path)
 
 
 def _hash_of(content: Mapping[str, Any]) -> str:
@@ -247,9 +248,9 @@ def _put_in_place(temporary: Path, folder: Path) -> None:
 def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
     path = folder / entry["file"]
     if not path.is_file():
-        raise _damaged(folder, f"{entry['file']} is missing")
-    if _sha256(path) != entry["sha256"]:
-        raise _damaged(folder, f"{entry['file']} was changed or cut short")
+        raise damaged(folder, f"{entry['file']} is missing")
+    if sha256_of(path) != entry["sha256"]:
+        raise damaged(folder, f"{entry['file']} was changed or cut short")
     mesh, cartilage_mm, cartilage_sd_mm = read_bone(path)
     is_removed = np.zeros(len(mesh.vertices_mm), dtype=bool)
     is_removed[np.array(entry["removed"], dtype=np.intp)] = True
@@ -280,16 +281,4 @@ def _not_written(folder: Path, error: OSError) -> PlanError:
         f"plan folder {folder} cannot be written ({error.strerror})",
         subject=str(folder),
         remedy="choose a folder that you may write to, with space left",
-    )
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _damaged(folder: Path, why: str) -> PlanError:
-    return PlanError(
-        f"plan {folder} is damaged: {why}",
-        subject=str(folder),
-        remedy="make it again with `navapp plan`",
     )

@@ -3,7 +3,14 @@
 Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectification, OpenCV axes.
 """
 
-from navapp.values.bones import AspectGraph, BoneModel, Side, visible_vertices
+from navapp.values.bones import (
+    FOLLOWED_BONES,
+    AspectGraph,
+    BoneModel,
+    FollowedBone,
+    Side,
+    visible_vertices,
+)
 from navapp.values.contents import (
     ANKLE_CENTRE,
     HIP_CENTRE,
@@ -35,6 +42,7 @@ from navapp.values.verdicts import (
 
 __all__ = [
     "ANKLE_CENTRE",
+    "FOLLOWED_BONES",
     "HIP_CENTRE",
     "AspectGraph",
     "BoneModel",
@@ -43,6 +51,7 @@ __all__ = [
     "Defect",
     "DisparityMap",
     "DrillAxis",
+    "FollowedBone",
     "Landmark",
     "LineTimings",
     "Origin",

@@ -1,7 +1,7 @@
 """Bones of a plan: surface, cartilage, and what of them is an edge to the eye."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from navapp.geometry.mesh import TriangleMesh, vertex_normals
 from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 Side = Literal["left", "right"]
+# Those that can be followed; the fibula only tells the side.
+FollowedBone = Literal["femur", "tibia", "patella"]
+FOLLOWED_BONES: tuple[str, ...] = get_args(FollowedBone)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

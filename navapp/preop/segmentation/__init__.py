@@ -1,5 +1,6 @@
 """From the density of a CT to named bones."""
 
+from navapp.preop.segmentation.naming import BONES
 from navapp.preop.segmentation.segment import (
     DEFAULT_THRESHOLD_HU,
     NO_SEEDS,
@@ -7,4 +8,4 @@ from navapp.preop.segmentation.segment import (
     segment,
 )
 
-__all__ = ["DEFAULT_THRESHOLD_HU", "NO_SEEDS", "Segmentation", "segment"]
+__all__ = ["BONES", "DEFAULT_THRESHOLD_HU", "NO_SEEDS", "Segmentation", "segment"]

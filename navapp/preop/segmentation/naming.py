@@ -8,8 +8,10 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.masks import LabelArray
+from navapp.values import FOLLOWED_BONES
 
-BONES = ("femur", "tibia", "patella", "fibula")
+# The fibula is found to keep it apart, and to tell the side.
+BONES = (*FOLLOWED_BONES, "fibula")
 NOT_SEEDED: Mapping[str, int] = MappingProxyType({})
 
 # A knee's bone ends: less than this of their inside is no femur or tibia.
@@ -55,7 +57,7 @@ class Named:
     @property
     def is_whole(self) -> bool:
         """Whether the three bones of the joint were told apart."""
-        return {"femur", "tibia", "patella"} <= set(self.bones)
+        return set(FOLLOWED_BONES) <= set(self.bones)
 
 
 def parts_of(labels: LabelArray, lps_from_index: FloatArray) -> list[Part]:

@@ -1,0 +1,20 @@
+"""What tells that a plan's folder is as it was written."""
+
+import hashlib
+from pathlib import Path
+
+from navapp.errors import PlanError
+
+
+def sha256_of(path: Path) -> str:
+    """Hexadecimal digest of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def damaged(folder: Path, why: str) -> PlanError:
+    """What is raised of a folder that is not."""
+    return PlanError(
+        f"plan {folder} is damaged: {why}",
+        subject=str(folder),
+        remedy="make it again with `navapp plan`",
+    )
