@@ -132,6 +132,12 @@ def test_cartilage_that_cannot_be_is_refused(name, value):
         BoneModel("femur", cube(), **{name: values})
 
 
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+def test_a_surface_whose_error_cannot_be_is_refused(value):
+    with pytest.raises(ValueError, match="surface_sd_mm must be finite and not negative"):
+        BoneModel("femur", cube(), surface_sd_mm=value)
+
+
 def test_a_bone_cannot_be_changed_from_outside():
     thickness = np.ones(8)
     bone = BoneModel("femur", cube(), cartilage_mm=thickness)
@@ -144,7 +150,15 @@ def test_a_bone_cannot_be_changed_from_outside():
 def make_plan(**changes):
     bone_changes = {
         key: changes.pop(key)
-        for key in ("mesh", "side", "cartilage_mm", "cartilage_sd_mm", "is_removed", "version")
+        for key in (
+            "mesh",
+            "side",
+            "cartilage_mm",
+            "cartilage_sd_mm",
+            "is_removed",
+            "surface_sd_mm",
+            "version",
+        )
         if key in changes
     }
     bone = BoneModel(**{"name": "femur", "mesh": cube(40.0), "side": "left", **bone_changes})
@@ -173,6 +187,7 @@ CHANGES = [
     {"version": 1},
     {"cartilage_mm": one()},
     {"cartilage_sd_mm": one()},
+    {"surface_sd_mm": 0.03},
     {"is_removed": one() > 0},
     {"bones": {"tibia": BoneModel("tibia", cube(40.0), "left")}},
     {"targets": {}},

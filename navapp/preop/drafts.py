@@ -82,7 +82,7 @@ def draft_from_ct(
     )
     side = settings.side or read.source.side
     slices = {name: draw_slices(found.ct, surface.mesh) for name, surface in surfaces.bones.items()}
-    return _draft(surfaces.bones, side, origin, slices)
+    return _draft(surfaces.bones, side, origin, slices, surfaces.pose_sd_mm)
 
 
 def draft_from_labels(
@@ -128,9 +128,16 @@ def _draft(
     side: Side | None,
     origin: PlanOrigin,
     slices: Mapping[str, Picture],
+    surface_sd_mm: float = 0.0,
 ) -> Draft:
     bones = {
-        name: BoneModel(name, surfaces[name].mesh, side, is_removed=surfaces[name].is_cut)
+        name: BoneModel(
+            name,
+            surfaces[name].mesh,
+            side,
+            is_removed=surfaces[name].is_cut,
+            surface_sd_mm=surface_sd_mm,
+        )
         for name in FOLLOWED_BONES
         if name in surfaces
     }

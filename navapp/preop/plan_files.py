@@ -192,6 +192,7 @@ def _write_content(
             "side": bone.side,
             "version": bone.version,
             "removed": np.flatnonzero(bone.is_removed).tolist(),
+            "surface_sd_mm": bone.surface_sd_mm,
             "aspects_sha256": _write_aspects(folder, plan, name),
         }
     content = {
@@ -262,6 +263,7 @@ def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
         cartilage_sd_mm,
         is_removed,
         version=int(entry["version"]),
+        surface_sd_mm=float(entry.get("surface_sd_mm", 0.0)),
     )
 
 

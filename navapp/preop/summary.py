@@ -74,7 +74,7 @@ def _origin_rows(origin: PlanOrigin) -> list[tuple[str, str]]:
 
 def _bones(plan: Plan, origin: PlanOrigin) -> str:
     head = "<tr><th>bone</th><th>side</th><th>volume</th><th>size</th><th>vertices</th>"
-    head += "<th>edge measured</th><th>cut end</th></tr>"
+    head += "<th>edge measured</th><th>moves a pose (sd)</th><th>cut end</th></tr>"
     rows = []
     for name, bone in plan.bones.items():
         share = origin.measured.get(name)
@@ -85,6 +85,7 @@ def _bones(plan: Plan, origin: PlanOrigin) -> str:
             " x ".join(f"{extent:.0f}" for extent in bone.mesh.size_mm) + " mm",
             str(len(bone.mesh.vertices_mm)),
             "-" if share is None else f"{100.0 * share:.0f} %",
+            f"{bone.surface_sd_mm:.2f} mm" if bone.surface_sd_mm else "unknown",
             "yes" if np.any(bone.is_removed) else "no",
         )
         rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")

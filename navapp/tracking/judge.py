@@ -153,7 +153,7 @@ class Judge:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
         is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
-        by_plan_mm = _COMMON_ERROR * cartilage_mm
+        by_plan_mm = _COMMON_ERROR * math.hypot(cartilage_mm, model.bone.surface_sd_mm)
         by_view_mm = self._bound_mm(model, estimate, goal.targets_mm, is_seen)
         bound_mm = math.hypot(by_view_mm, by_plan_mm, self._by_rig_mm(model, estimate))
         doubts = self._doubts(estimate, agreement)

@@ -28,9 +28,12 @@ class BoneModel:
         cartilage_sd_mm: (V,) its standard deviation.
         is_removed: (V,) parts that a stage has cut away.
         version: counts the changes by stages.
+        surface_sd_mm: standard deviation of the pose error that errors of the surface cause; 0
+            when nothing is known of them.
 
     Raises:
-        ValueError: not one value per vertex, or cartilage that is negative or not finite.
+        ValueError: not one value per vertex, or a cartilage or deviation that is negative or not
+            finite.
     """
 
     name: str
@@ -40,9 +43,12 @@ class BoneModel:
     cartilage_sd_mm: FloatArray = field(default_factory=lambda: np.empty(0))
     is_removed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
     version: int = 0
+    surface_sd_mm: float = 0.0
 
     def __post_init__(self) -> None:
         n = len(self.mesh.vertices_mm)
+        if not (np.isfinite(self.surface_sd_mm) and self.surface_sd_mm >= 0.0):
+            raise ValueError(f"{self.name}: surface_sd_mm must be finite and not negative")
         for name, kind in (
             ("cartilage_mm", float),
             ("cartilage_sd_mm", float),

@@ -146,6 +146,9 @@ def _digest(plan: Plan) -> str:
         add("cartilage", bone.cartilage_mm)
         add("its deviation", bone.cartilage_sd_mm)
         add("removed", bone.is_removed)
+        # Plans from before it was known keep their hash.
+        if bone.surface_sd_mm:
+            digest.update(f"surface {bone.surface_sd_mm!r}".encode())
     for kind, points_by_name in (("target", plan.targets), ("curve", plan.curves)):
         for name in sorted(points_by_name):
             add(f"{kind} {name}", np.asarray(points_by_name[name], dtype=np.float64))

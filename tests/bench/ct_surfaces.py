@@ -74,12 +74,16 @@ def cases(seeds: range) -> Iterator[Case]:
         yield simulated(seed)
 
 
-def simulated(seed: int) -> Case:
+def simulated(
+    seed: int,
+    spacing_mm: tuple[float, float, float] = (0.5, 0.5, 0.8),
+    psf_sigma_mm: float = 0.5,
+) -> Case:
     """The CT of a simulated knee."""
     knee = make_knee(
         KneeSpec(seed, "left" if seed % 2 else "right", "male" if seed % 3 == 0 else "female")
     )
-    ct = make_ct(knee, seed=seed)
+    ct = make_ct(knee, spacing_mm, seed, psf_sigma_mm)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = ct.direction * ct.spacing_mm, ct.origin_mm
     volume = CtVolume(ct.hounsfield, matrix, ct.spacing_mm)

@@ -25,6 +25,7 @@ def make_plan(radius_mm=30.0, **changes):
         rng.uniform(0, 0.3, n),
         changes.pop("is_removed", np.empty(0, dtype=bool)),
         version=2,
+        surface_sd_mm=changes.pop("surface_sd_mm", 0.03),
     )
     content = {
         "bones": {"femur": femur, "tibia": BoneModel("tibia", sphere(25.0, 8), "right")},
@@ -52,6 +53,7 @@ def test_a_plan_reads_back_exactly(tmp_path):
         assert other.cartilage_mm.tobytes() == bone.cartilage_mm.tobytes()
         assert other.cartilage_sd_mm.tobytes() == bone.cartilage_sd_mm.tobytes()
         assert (other.side, other.version, other.name) == (bone.side, bone.version, name)
+        assert other.surface_sd_mm == bone.surface_sd_mm
     for name, points in plan.targets.items():
         assert again.targets[name].shape == (len(points), 3)
         np.testing.assert_array_equal(again.targets[name], points)

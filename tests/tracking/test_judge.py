@@ -160,6 +160,12 @@ def test_what_the_plans_cartilage_costs_is_not_held_against_the_view() -> None:
     assert verdict.predicted_tre_mm > 2.0 * 0.35
 
 
+def test_what_the_plans_surface_may_be_off_is_in_the_bound() -> None:
+    model = RegistrationModel(replace(BONE, surface_sd_mm=0.2))
+    known, plain = (verdict_on(model=one).predicted_tre_mm for one in (model, MODEL))
+    assert known == pytest.approx(np.hypot(plain, 2.0 * 0.2))
+
+
 def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL) -> Verdict:
     estimate = estimate_at(scene_of(MAP), model, TRUE, STEREO_SETTINGS)
     estimate = replace(estimate, size_mm=size_mm, size_sigma_mm=sigma_mm)

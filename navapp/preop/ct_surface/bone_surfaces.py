@@ -25,6 +25,9 @@ _REACHES_MM = (1.5, 0.6, 0.6)
 _N_PROFILES = 1000
 # The model that is worked with: what a camera can tell needs no more.
 _WORKING_VERTICES, _WORKING_WITHIN_MM = 7000, 0.1
+# What the surface's errors do to a pose, in edges of the longest kind of a voxel: simulated CTs of
+# other protocols (docs/preop.md).
+_POSE_SD_VOXELS = 0.08
 # The flat end of a cut shaft: its rim is rounded by smoothing.
 _CUT_VOXELS = 0.75
 # No bone lies beside air, so that what is padding so near its surface cuts it.
@@ -48,10 +51,17 @@ class BoneSurface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtSurfaces:
-    """Surfaces by name, and what the scanner was found to do."""
+    """Surfaces by name, and what the scanner was found to do.
+
+    Attributes:
+        bones: by name.
+        scan: density of cortex, and blur.
+        pose_sd_mm: standard deviation of the error that the surfaces' own errors cause in a pose.
+    """
 
     bones: Mapping[str, BoneSurface]
     scan: Scan
+    pose_sd_mm: float
 
 
 def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: None) -> CtSurfaces:
@@ -74,7 +84,8 @@ def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: 
                 bone.mesh, bone.is_cut, found.ct, is_other, density, scan, reach_mm
             )
             bones[name] = BoneSurface(refined.mesh, bone.is_cut, refined.is_measured)
-    return CtSurfaces({name: _working(bone, found.ct) for name, bone in bones.items()}, scan)
+    working = {name: _working(bone, found.ct) for name, bone in bones.items()}
+    return CtSurfaces(working, scan, _POSE_SD_VOXELS * float(found.ct.spacing_mm.max()))
 
 
 def surface_of_labels(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
