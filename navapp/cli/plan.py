@@ -99,7 +99,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.what == "show":
         given = (
             options.surface, options.cartilage, options.ct, options.labels, options.out,
-            options.contents, options.markups,
+            options.contents, options.markups, options.side, options.series, options.threshold,
+            options.seed, options.region, options.label,
         )  # fmt: skip
         if options.folder is None or any(given):
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")

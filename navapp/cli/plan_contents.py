@@ -3,12 +3,11 @@
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from navapp.values import ANKLE_CENTRE, HIP_CENTRE
+
 if TYPE_CHECKING:
     from navapp.geometry.transform import FloatArray
     from navapp.values import Landmark, Plan
-
-# Of the mechanical axes: told when they are absent, too.
-_CENTRES = ("femur/hip_centre", "tibia/ankle_centre")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +64,7 @@ def content_of(plan: "Plan") -> dict[str, Any]:
             name: {"point_mm": one.point_mm.tolist(), "sd_mm": one.sd_mm, "source": one.source}
             for name, one in content.landmarks.items()
         },
-        "absent": [name for name in _CENTRES if name not in content.landmarks],
+        "absent": [name for name in (HIP_CENTRE, ANKLE_CENTRE) if name not in content.landmarks],
         "defects": {name: len(one.vertices) for name, one in content.defects.items()},
         "targets": {name: len(p.reshape(-1, 3)) for name, p in plan.targets.items()},
         "stages": {
@@ -99,7 +98,11 @@ def lines_of(plan: "Plan") -> list[str]:
             for name, one in content.stages.items()
         ),
         *(f"  landmark {name}: {_place(one)}" for name, one in content.landmarks.items()),
-        *(f"  landmark {name}: absent" for name in _CENTRES if name not in content.landmarks),
+        *(
+            f"  landmark {name}: absent"
+            for name in (HIP_CENTRE, ANKLE_CENTRE)
+            if name not in content.landmarks
+        ),
     ]
 
 

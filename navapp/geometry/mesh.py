@@ -59,12 +59,23 @@ class TriangleMesh:
 
     def volume_mm3(self) -> float:
         """Signed volume (positive when the normals point outwards), from signed tetrahedra."""
+        return float(self.face_volumes_mm3().sum())
+
+    def face_volumes_mm3(self) -> FloatArray:
+        """(F,) signed volumes of the tetrahedra on the triangles, tips at the centroid."""
         if len(self.faces) == 0:
-            return 0.0
+            return np.empty(0)
         corners = (self.vertices_mm - self.centroid_mm)[self.faces]
-        return float(
-            np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+        volumes: FloatArray = (
+            np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
         )
+        return volumes
+
+    def face_areas_mm2(self) -> FloatArray:
+        """(F,) areas of the triangles."""
+        a, b, c = (self.vertices_mm[self.faces[:, corner]] for corner in range(3))
+        areas: FloatArray = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return areas
 
     def transformed(self, target_from_source: RigidTransform) -> "TriangleMesh":
         """The mesh in the target frame."""
@@ -78,23 +89,27 @@ class TriangleMesh:
         """The same surface with the other side outside."""
         return TriangleMesh(self.vertices_mm, self.faces[:, ::-1], -self.normals)
 
-    def largest_component(self) -> "TriangleMesh":
-        """The connected piece with the most triangles, without unused vertices."""
+    def component_of_faces(self) -> IntArray:
+        """(F,) number of the connected piece of each triangle."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 
-        if len(self.faces) == 0:
-            return TriangleMesh(np.empty((0, 3)), self.faces)
         n = len(self.vertices_mm)
         rows = np.concatenate([self.faces[:, 0], self.faces[:, 1]])
         columns = np.concatenate([self.faces[:, 1], self.faces[:, 2]])
         graph = coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(n, n))
         _, label_of_vertex = connected_components(graph, directed=False)
-        label_of_face = label_of_vertex[self.faces[:, 0]]
-        largest = int(np.bincount(label_of_face).argmax())
-        kept = self.faces[label_of_face == largest]
+        component: IntArray = label_of_vertex[self.faces[:, 0]].astype(np.int32)
+        return component
+
+    def largest_component(self) -> "TriangleMesh":
+        """The connected piece with the most triangles, without unused vertices."""
+        if len(self.faces) == 0:
+            return TriangleMesh(np.empty((0, 3)), self.faces)
+        component = self.component_of_faces()
+        kept = self.faces[component == int(np.bincount(component).argmax())]
         used = np.unique(kept)
-        new_index = np.full(n, -1, dtype=np.int32)
+        new_index = np.full(len(self.vertices_mm), -1, dtype=np.int32)
         new_index[used] = np.arange(len(used), dtype=np.int32)
         return TriangleMesh(self.vertices_mm[used], new_index[kept])
 

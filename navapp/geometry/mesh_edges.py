@@ -73,6 +73,14 @@ def paired_half_edges(faces: IntArray) -> NDArray[np.int64]:
     return np.column_stack([order[first], other])
 
 
+def open_border(n_vertices: int, faces: IntArray) -> NDArray[np.bool_]:
+    """(V,) vertices on an edge of one triangle only: there the model ends, not the bone."""
+    halves = paired_half_edges(faces)
+    is_border = np.zeros(n_vertices, dtype=bool)
+    is_border[half_edges(faces)[halves[halves[:, 1] < 0, 0]].ravel()] = True
+    return is_border
+
+
 def face_pairs(faces: IntArray) -> tuple[IntArray, NDArray[np.int64]]:
     """(E, 2) edges, and (E, 2) the triangles on both sides of each; -1 where there is none."""
     halves = paired_half_edges(faces)

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from navapp.errors import PlanError
 from navapp.geometry.bands import run_both
 from navapp.geometry.camera import Camera
 from navapp.geometry.directions import ViewCone, seen_from
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render
 from navapp.preop.aspects_kernels import contour_segments, spread_out
-from navapp.preop.bone_edges import Crease, creases, no_anatomy
+from navapp.preop.bone_edges import Crease, creases, near_ends
 from navapp.values import AspectGraph, BoneModel
 
 # Two views of which so much agrees are one: pairs of edges as near and as parallel as this.
@@ -78,6 +79,12 @@ def build_aspects(
     kept = _merged(directions, [view for view in views if view is not None], settings)
     on_progress(1.0)
     seen = [view for view in (views[k] for k in kept) if view is not None]
+    if not seen:
+        raise PlanError(
+            f"no edge of the {bone.name} can be seen: its surface is all cut ends",
+            subject=bone.name,
+            remedy="give a surface of the whole bone end",
+        )
     sizes = [len(points_mm) for points_mm, _ in seen]
     return AspectGraph(
         bone.name,
@@ -96,7 +103,7 @@ class _Look:
         surface_mm = self._mesh.vertices_mm
         self._settings = settings
         self._middle_mm = 0.5 * (surface_mm.min(axis=0) + surface_mm.max(axis=0))
-        is_anatomy = ~no_anatomy(self._mesh)
+        is_anatomy = ~near_ends(self._mesh)
         self._faces = np.ascontiguousarray(
             self._mesh.faces[is_anatomy[self._mesh.faces].all(axis=1)]
         )

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import face_pairs
+from navapp.geometry.mesh_edges import face_pairs, open_border
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_flat_caps, on_open_borders
+from navapp.preop.cut_ends import on_flat_caps
 
 # So far around the end of a mesh it is not trusted either.
 _AROUND_MM = 3.0
@@ -27,11 +27,11 @@ class Crease:
     normals: FloatArray
 
 
-def no_anatomy(mesh: TriangleMesh) -> NDArray[np.bool_]:
+def near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
     """(V,) vertices at open borders and on flat caps, with what lies close to them."""
     from scipy.spatial import cKDTree
 
-    is_end: NDArray[np.bool_] = on_open_borders(mesh) | on_flat_caps(mesh)
+    is_end: NDArray[np.bool_] = on_flat_caps(mesh) | open_border(len(mesh.vertices_mm), mesh.faces)
     if not is_end.any():
         return is_end
     distance, _ = cKDTree(mesh.vertices_mm[is_end]).query(mesh.vertices_mm)

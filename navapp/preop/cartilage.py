@@ -10,9 +10,10 @@ import numpy as np
 
 from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import ends_of, on_open_borders
+from navapp.preop.cut_ends import ends_of
 from navapp.preop.surfaces import MIN_FACES, ImportedSurface, in_lps
 from navapp.values import BoneModel
 
@@ -97,7 +98,7 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
             remedy="export the cartilage's outer surface, not its points",
         )
     mesh = in_lps(mesh, header, path, warnings)
-    if not on_open_borders(mesh).any() and mesh.volume_mm3() < 0.0:
+    if not open_border(len(mesh.vertices_mm), mesh.faces).any() and mesh.volume_mm3() < 0.0:
         mesh = mesh.flipped()
         warnings.append(f"{bone.name}: normals of the cartilage pointed inwards and were turned")
     _check_place(bone, mesh, path)

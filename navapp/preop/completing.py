@@ -8,7 +8,6 @@ import numpy as np
 from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import anatomy_of
 from navapp.preop.landmarks import estimate_landmarks
 from navapp.preop.planned import Planned
 from navapp.preop.side import SideEstimate, estimate_side
@@ -34,9 +33,7 @@ def with_side(
         Bones, and what has to be said: that the side is an estimate or unknown, or that the given
         one contradicts a certain estimate.
     """
-    meshes = {name: anatomy_of(bone) for name, bone in bones.items()}
-    meshes = {name: mesh for name, mesh in meshes.items() if len(mesh.faces)}
-    estimate = estimate_side(meshes if fibula is None else {**meshes, "fibula": fibula})
+    estimate = estimate_side(bones, fibula)
     side = given or estimate.side
     return {name: replace(bone, side=side) for name, bone in bones.items()}, _said(estimate, given)
 

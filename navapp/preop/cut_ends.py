@@ -1,28 +1,35 @@
-"""Where a bone's surface ends without the bone ending: flat caps of cut shafts, open borders."""
+"""Where a bone's surface ends without the bone ending: flat caps of cut bones, open borders."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import face_pairs
+from navapp.geometry.mesh_edges import half_edges, open_border, paired_half_edges
 from navapp.geometry.transform import FloatArray
 from navapp.values import BoneModel
 
-# Shafts of femur and tibia are 20 mm across at least, and cut across: less 45 deg. Smoothing takes
-# some of a cap's rim.
-_CAP_MM2, _CAP_WIDTH_MM, _ACROSS = 250.0, 12.0, 0.7
-# The roughness of caps; between a round surface (a half) and a plane (all) of twice the layer.
+# Shafts of femur and tibia are 20 mm across at least. Smoothing takes some of a cap's rim.
+_CAP_MM2, _CAP_WIDTH_MM = 250.0, 12.0
+# From the highest to the lowest point of a cap's roughness; between a round surface (a half) and a
+# plane (all) of twice the layer.
 _LAYER_MM, _CAP_SHARE = 0.4, 0.7
+# A shaft is cut across the leg's axis (the plan's z), less 45 deg: whatever is flat there is a cap.
+# Elsewhere a joint's facet may be as flat, which turns gently where a cut turns by a right angle:
+# mean cosine between the cap's normal and those within a few layers below it.
+_ACROSS, _RIM_LAYERS, _RIM_COSINE = 0.7, 6.0, 0.65
 # Facets of the hull that are one: half a degree, a twentieth of a millimetre. The hull of a rough
 # cap has several.
 _SAME_FACET = np.array([0.01, 0.01, 0.01, 0.05])
 _FACET_SHARE = 0.1
+# Open borders that are shorter are holes in a surface, not its end: 12 mm across.
+_SHORTEST_CUT_MM = 40.0
 
 
 def ends_of(bone: BoneModel) -> NDArray[np.bool_]:
     """(V,) vertices at which its surface ends, or that are cut away: no anatomy."""
+    mesh = bone.mesh
     is_end: NDArray[np.bool_] = (
-        bone.is_removed | on_flat_caps(bone.mesh) | on_open_borders(bone.mesh)
+        bone.is_removed | on_flat_caps(mesh) | open_border(len(mesh.vertices_mm), mesh.faces)
     )
     return is_end
 
@@ -43,32 +50,36 @@ def anatomy_of(bone: BoneModel) -> TriangleMesh:
 
 
 def on_flat_caps(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(V,) vertices of flat ends, however oblique the cut across the leg (the plan's z) was.
+    """(V,) vertices of flat ends, however oblique the cut was.
 
     A layer below a plane that touches a round surface holds twice the area when it is twice as
-    thick, however it is curved; on a cap it holds little more.
+    thick, however it is curved; on a cap it holds little more. A cap rougher than the layer is not
+    found.
     """
     is_cap = np.zeros(len(mesh.vertices_mm), dtype=bool)
-    if len(mesh.faces) == 0:
-        return is_cap
-    area = _areas_mm2(mesh.vertices_mm, mesh.faces)
-    for normal in _cap_directions(mesh):
+    areas = mesh.face_areas_mm2()
+    for normal in _hull_directions(mesh):
         height = mesh.vertices_mm @ normal
         depth = height.max() - height
-        of_face = depth[mesh.faces].max(axis=1)
-        layer, twice = of_face < _LAYER_MM, of_face < 2.0 * _LAYER_MM
-        is_flat = area[layer].sum() > max(_CAP_MM2, _CAP_SHARE * area[twice].sum())
-        if is_flat and _width_mm(mesh.vertices_mm[mesh.faces[layer]], area[layer]) > _CAP_WIDTH_MM:
+        if _is_cap(mesh, areas, normal, depth):
             is_cap |= depth < _LAYER_MM
     return is_cap
 
 
-def on_open_borders(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(V,) vertices on an edge of one triangle only."""
-    edges, faces = face_pairs(mesh.faces)
-    is_border = np.zeros(len(mesh.vertices_mm), dtype=bool)
-    is_border[edges[faces[:, 1] < 0]] = True
-    return is_border
+def on_cut_borders(mesh: TriangleMesh) -> NDArray[np.bool_]:
+    """(V,) vertices on long open borders: where a cut was, not a stray hole."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    halves = paired_half_edges(mesh.faces)
+    edges = half_edges(mesh.faces)[halves[halves[:, 1] < 0, 0]]
+    n = len(mesh.vertices_mm)
+    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
+    _, loop = connected_components(graph, directed=False)
+    ends = mesh.vertices_mm[edges]
+    length_mm = np.bincount(loop[edges[:, 0]], np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1), n)
+    is_cut: NDArray[np.bool_] = length_mm[loop] > _SHORTEST_CUT_MM
+    return is_cut
 
 
 def whole_until_mm(along_mm: FloatArray, is_border: NDArray[np.bool_], from_mm: float) -> float:
@@ -76,36 +87,47 @@ def whole_until_mm(along_mm: FloatArray, is_border: NDArray[np.bool_], from_mm: 
 
     Args:
         along_mm: (V,) of each vertex.
-        is_border: (V,) on open borders.
+        is_border: (V,) on cut borders.
         from_mm: borders before it do not count.
     """
     cut_mm = along_mm[is_border & (along_mm > from_mm)]
     return float(cut_mm.min() if len(cut_mm) else along_mm.max())
 
 
-def _cap_directions(mesh: TriangleMesh) -> FloatArray:
+def _hull_directions(mesh: TriangleMesh) -> FloatArray:
     """(N, 3) outward normals of the hull's large facets: a cut has the whole bone behind it."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         hull = ConvexHull(mesh.vertices_mm)
-    except QhullError:  # flat, or hardly a surface
-        return np.array([[0.0, 0.0, 1.0]])
-    area = _areas_mm2(mesh.vertices_mm, hull.simplices)
+    except (QhullError, ValueError):  # flat, or hardly a surface
+        return np.empty((0, 3))
+    area = TriangleMesh(mesh.vertices_mm, hull.simplices).face_areas_mm2()
     _, group = np.unique(np.rint(hull.equations / _SAME_FACET), axis=0, return_inverse=True)
     group = group.ravel()
     total = np.bincount(group, area)
     summed = [np.bincount(group, area * hull.equations[:, k]) for k in range(3)]
     large = np.column_stack(summed)[total > _FACET_SHARE * _CAP_MM2]
     normals: FloatArray = large / np.linalg.norm(large, axis=1, keepdims=True)
-    return normals[np.abs(normals[:, 2]) > _ACROSS]
+    return normals
 
 
-def _areas_mm2(vertices_mm: FloatArray, faces: NDArray[np.int32]) -> FloatArray:
-    corners = vertices_mm[faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area: FloatArray = 0.5 * np.linalg.norm(across, axis=1)
-    return area
+def _is_cap(mesh: TriangleMesh, areas: FloatArray, normal: FloatArray, depth: FloatArray) -> bool:
+    """Whether what lies below a plane that touches the bone is a cut end."""
+    near = np.flatnonzero((depth < _RIM_LAYERS * _LAYER_MM)[mesh.faces].all(axis=1))
+    of_face = depth[mesh.faces[near]].max(axis=1)
+    layer, twice = near[of_face < _LAYER_MM], near[of_face < 2.0 * _LAYER_MM]
+    flat_mm2 = areas[layer].sum()
+    if flat_mm2 <= max(_CAP_MM2, _CAP_SHARE * areas[twice].sum()):
+        return False
+    corners = mesh.vertices_mm[mesh.faces[layer]]
+    if _width_mm(corners, areas[layer]) <= _CAP_WIDTH_MM:
+        return False
+    if abs(normal[2]) > _ACROSS:
+        return True
+    rim = near[of_face >= 2.0 * _LAYER_MM]
+    cosines = mesh.normals[mesh.faces[rim]].mean(axis=1) @ normal
+    return len(rim) == 0 or bool(np.average(cosines, weights=areas[rim] + 1e-12) < _RIM_COSINE)
 
 
 def _width_mm(corners_mm: FloatArray, weight: FloatArray) -> float:

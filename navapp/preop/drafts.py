@@ -1,10 +1,9 @@
 """Drafts of plans: bones out of a CT or a ready segmentation, with all there is to say of them."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.errors import PlanError, UsageError
 from navapp.geometry.mesh import TriangleMesh
@@ -111,8 +110,12 @@ def draft_from_labels(
                 f"label {value} for the {name} fills less than a cubic centimetre",
                 remedy="give the value of the whole bone",
             )
-        warnings += _separate_pieces(name, mask)
         surfaces[name] = surface_of_labels(mask, volume)
+        if surfaces[name].left_out > 0.0:
+            warnings.append(
+                f"{name}: its label is in separate pieces; the largest is taken, without "
+                f"{100.0 * surfaces[name].left_out:.2g} % of the volume"
+            )
         slices[name] = draw_slices(volume, surfaces[name].mesh)
     origin = PlanOrigin(
         "labels",
@@ -143,21 +146,6 @@ def _draft(
     }
     fibula = surfaces["fibula"].mesh if "fibula" in surfaces else None
     return Draft(bones, origin, fibula, side, slices)
-
-
-def _separate_pieces(name: str, mask: NDArray[np.bool_]) -> Iterator[str]:
-    """That a label is not in one piece, of which the largest is taken."""
-    from scipy.ndimage import label
-
-    # Also those that touch at a corner are one.
-    pieces, n = label(mask, np.ones((3, 3, 3)))
-    if n > 1:
-        sizes = np.bincount(pieces.ravel())[1:]
-        share = 1.0 - sizes.max() / sizes.sum()
-        yield (
-            f"{name}: its label is in {n} separate pieces; the largest is taken, without "
-            f"{100.0 * share:.2g} % of the voxels"
-        )
 
 
 def _within(ct: CtVolume, region_mm: tuple[float, ...]) -> CtVolume:

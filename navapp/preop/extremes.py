@@ -28,7 +28,7 @@ def extreme(
 
     Args:
         vertices_mm: (V, 3).
-        is_border: (V,) where the surface is open.
+        is_border: (V,) where the surface was cut.
         among: (V,) those that count.
         direction: (3,) unit.
     """

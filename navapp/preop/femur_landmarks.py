@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_open_borders, whole_until_mm
-from navapp.preop.extremes import WORST_SD_MM, extreme
+from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
+from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
 from navapp.values import Landmark, Side
 
 # Levels above the lowest point of a femur, whose condyles are 75 to 95 mm wide.
@@ -32,7 +32,7 @@ class Condyles:
 
     Attributes:
         vertices_mm: (V, 3) of the bone.
-        is_border: (V,) where its surface is open.
+        is_border: (V,) where its surface was cut.
         is_condyle: (V,) low enough.
         notch_x_mm: the plane that parts them.
     """
@@ -65,19 +65,21 @@ def condyles_of(femur: TriangleMesh) -> Condyles | None:
     strip = np.digitize(x, edges) - 1
     profile = np.full(len(edges), -np.inf)
     np.maximum.at(profile, strip, outward)
-    share = (edges - x.min()) / np.ptp(x)
+    share = (edges - x.min()) / max(np.ptp(x), _STRIP_MM)
     inner = np.flatnonzero((share > 0.25) & (share < 0.75))
+    if len(inner) == 0:  # a slice of a bone
+        return None
     notch = int(inner[np.argmin(profile[inner])])
     depth_mm = min(profile[:notch].max(), profile[notch + 1 :].max()) - profile[notch]
     if depth_mm < _LEAST_NOTCH_MM:
         return None
-    return Condyles(vertices, on_open_borders(femur), low, float(edges[notch]) + 0.5 * _STRIP_MM)
+    return Condyles(vertices, on_cut_borders(femur), low, float(edges[notch]) + 0.5 * _STRIP_MM)
 
 
 def shaft_top_mm(femur: TriangleMesh) -> float:
     """The height of the shaft's end, or of the lowest point of its cut."""
     height = femur.vertices_mm[:, 2]
-    return whole_until_mm(height, on_open_borders(femur), height.min() + _CONDYLES_MM)
+    return whole_until_mm(height, on_cut_borders(femur), height.min() + _CONDYLES_MM)
 
 
 def femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
@@ -138,7 +140,7 @@ def _shaft_axis(femur: TriangleMesh) -> Iterator[tuple[str, Landmark]]:
     line, *_ = np.linalg.lstsq(design, centres, rcond=None)
     residual = centres - design @ line
     # Slices bow together: the fit is as good as its worst direction, not as many slices.
-    sd_mm = float(2.0 * np.sqrt((residual[:, :2] ** 2).sum(axis=1).mean()) + 0.3)
+    sd_mm = float(2.0 * np.sqrt((residual[:, :2] ** 2).sum(axis=1).mean()) + SURFACE_NOISE_MM)
     if sd_mm > WORST_SD_MM:
         return
     for name, height in (("shaft_distal", along.min()), ("shaft_proximal", along.max())):

@@ -12,7 +12,7 @@ def sha256_of(path: Path) -> str:
 
 
 def damaged(folder: Path, why: str) -> PlanError:
-    """What is raised of a folder that is not."""
+    """What is raised of a plan's folder that was changed, or cannot be read."""
     return PlanError(
         f"plan {folder} is damaged: {why}",
         subject=str(folder),

@@ -1,12 +1,12 @@
 """A picture of a bone from three sides, for whoever looks into a plan folder."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render
+from navapp.preop.slices import Picture
 
 _SIZE_PX = 360
 _DISTANCE = 6.0
@@ -19,7 +19,7 @@ _VIEWS = (
 )
 
 
-def draw_preview(mesh: TriangleMesh, slices: NDArray[np.uint8] | None = None) -> bytes:
+def draw_preview(mesh: TriangleMesh, slices: Picture | None = None) -> bytes:
     """PNG with three shaded views side by side.
 
     Args:

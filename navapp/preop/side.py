@@ -7,9 +7,10 @@ from typing import Literal
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
+from navapp.preop.cut_ends import anatomy_of
 from navapp.preop.femur_landmarks import BACK, DOWN, condyles_of, shaft_top_mm
-from navapp.preop.tibia_landmarks import tibial_end, tubercle_of
-from navapp.values import Side
+from navapp.preop.tibia_landmarks import RIM_MM, tibial_end, tubercle_of
+from navapp.values import BoneModel, Side
 
 Certainty = Literal["certain", "likely", "unknown"]
 
@@ -20,6 +21,8 @@ _CLEAR_LEAN_DEG, _CLEAR_RIDGE_MM, _CLEAR_TUBERCLE_MM = 1.5, 1.5, 2.0
 _CLEAR_FIBULA_MM = 15.0
 # The shaft's lean is looked at above the condyles.
 _SHAFT_FROM_MM, _SLICE_MM = 50.0, 2.5
+# Fewer vertices than this are no slice.
+_LEAST_POINTS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,22 +34,28 @@ class SideEstimate:
     reasons: tuple[str, ...]
 
 
-def estimate_side(bones: Mapping[str, TriangleMesh]) -> SideEstimate:
-    """From what there is of femur, tibia, patella and fibula, without caps of cut shafts.
+def estimate_side(
+    bones: Mapping[str, BoneModel], fibula: TriangleMesh | None = None
+) -> SideEstimate:
+    """From what there is of femur, tibia, patella and fibula.
 
     Certain is only what the fibula says, where the other bones show that the knee is upright and
     faces forward (a knee turned round looks like the other one), and none of them disagrees. What
     shapes alone say is likely at best; when they disagree it is unknown.
     """
-    if not _is_upright(bones):
+    own = {name: anatomy_of(bone) for name, bone in bones.items()}
+    own = {name: mesh for name, mesh in own.items() if len(mesh.faces)}
+    if fibula is not None:
+        own["fibula"] = fibula
+    if not _is_upright(own):
         return SideEstimate(None, "unknown", ("the bones are not upright in the plan's axes",))
-    votes = [(cue, value) for cue, value, least in _cues(bones) if abs(value) > least]
+    votes = [(cue, value) for cue, value, least in _cues(own) if abs(value) > least]
     reasons = tuple(f"{cue} ({_side(value)})" for cue, value in votes)
     sides = {_side(value) for _, value in votes}
     if len(sides) != 1:
         why = "the bones' shapes disagree" if sides else "no shape is clear enough"
         return SideEstimate(None, "unknown", (why, *reasons))
-    is_certain = any(cue == "fibula" for cue, _ in votes) and _faces_forward(bones)
+    is_certain = any(cue == "fibula" for cue, _ in votes) and _faces_forward(own)
     return SideEstimate(sides.pop(), "certain" if is_certain else "likely", reasons)
 
 
@@ -87,6 +96,8 @@ def _femur_lean_deg(femur: TriangleMesh) -> float:
         return 0.0
     slice_x = vertices[np.abs(vertices[:, 2] - top + _SLICE_MM) < _SLICE_MM, 0]
     middle = 0.5 * (left + right)
+    if len(slice_x) < _LEAST_POINTS:
+        return 0.0
     rise = top - _SLICE_MM - middle[2]
     lean = np.arctan2(0.5 * (slice_x.min() + slice_x.max()) - middle[0], rise)
     return float(np.degrees(lean + np.arctan2(left[2] - right[2], left[0] - right[0])))
@@ -101,7 +112,7 @@ def _tubercle_mm(tibia: TriangleMesh) -> float:
     tubercle = None if end is None else tubercle_of(end)
     if end is None or tubercle is None:
         return 0.0
-    is_rim = (end.below_top_mm > 8.0) & (end.below_top_mm < 18.0)
+    is_rim = (end.below_top_mm > RIM_MM[0]) & (end.below_top_mm < RIM_MM[1])
     behind = []
     for sign in (1.0, -1.0):
         half = end.vertices_mm[is_rim & (sign * (end.vertices_mm[:, 0] - end.middle_mm[0]) > 5.0)]
@@ -119,7 +130,7 @@ def _ridge_mm(patella: TriangleMesh) -> float:
     """
     level = np.abs(patella.vertices_mm[:, 2] - patella.centroid_mm[2]) < 6.0
     slab = patella.vertices_mm[level, :2]
-    if len(slab) < 8:
+    if len(slab) < _LEAST_POINTS:
         return 0.0
     low, high = slab[np.argmin(slab[:, 0])], slab[np.argmax(slab[:, 0])]
     across = (high - low) / np.linalg.norm(high - low)

@@ -10,7 +10,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import anatomy_of
 from navapp.preop.femur_landmarks import condyles_of
-from navapp.preop.tibia_landmarks import tibial_end
+from navapp.preop.tibia_landmarks import EMINENCE_HALF_MM, tibial_end
 from navapp.values import BoneModel, StageContent
 
 # Points a region: 12 on 20 x 30 mm stand 7 mm apart.
@@ -22,8 +22,6 @@ _LOOKS_THERE = 0.7
 _BESIDE_NOTCH_MM, _TROCHLEA_HALF_MM, _TROCHLEA_LEVELS_MM = 10.0, 20.0, (8.0, 35.0)
 # What the patella glides on looks back.
 _LOOKS_BACK = 0.5
-# Beside the eminence.
-_BESIDE_MIDDLE_MM = 9.0
 
 _BONE_OF_STAGE = {
     "opening": "femur",
@@ -99,7 +97,7 @@ def _of_tibia(mesh: TriangleMesh) -> dict[str, FloatArray]:
         return {}
     across = end.vertices_mm[:, 0] - end.middle_mm[0]
     halves = [
-        _spread(end.vertices_mm, end.is_plateau & (sign * across > _BESIDE_MIDDLE_MM))
+        _spread(end.vertices_mm, end.is_plateau & (sign * across > EMINENCE_HALF_MM))
         for sign in (1.0, -1.0)
     ]
     return {"tibia/plateau": np.concatenate(halves)}

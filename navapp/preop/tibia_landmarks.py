@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_open_borders, whole_until_mm
+from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
 from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
 from navapp.values import Landmark, Side
 
 # Levels below the top of the eminence at which a tibia is as broad as its plateau.
-_RIM_MM = (8.0, 18.0)
+RIM_MM = (8.0, 18.0)
 _SLICE_MM = 2.5
 # The plateau looks up; its middle, where the eminence stands, belongs to neither side.
-_LOOKS_UP, _EMINENCE_HALF_MM, _PLATEAU_MM = 0.85, 9.0, 18.0
+_LOOKS_UP, EMINENCE_HALF_MM, _PLATEAU_MM = 0.85, 9.0, 18.0
 # Levels of the tubercle, which lies two to five centimetres below the plateau.
 _TUBERCLE_MM = (25.0, 55.0)
 
@@ -26,7 +26,7 @@ class TibialEnd:
 
     Attributes:
         vertices_mm, normals: (V, 3).
-        is_border: (V,) where its surface is open.
+        is_border: (V,) where its surface was cut.
         middle_mm: (2,) x and y of the middle of its rim.
         middle_sd_mm: how far the slices of the rim disagree on it.
     """
@@ -63,14 +63,14 @@ def tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
         return None
     below = vertices[:, 2].max() - vertices[:, 2]
     middles = []
-    for level in np.arange(*_RIM_MM, _SLICE_MM):
+    for level in np.arange(*RIM_MM, _SLICE_MM):
         piece = vertices[np.abs(below - level) < 0.5 * _SLICE_MM, :2]
         if len(piece) < 8:
             return None
         middles.append(0.5 * (piece.min(axis=0) + piece.max(axis=0)))
     centres = np.array(middles)
     sd_mm = float(np.hypot(np.linalg.norm(centres.std(axis=0)), SURFACE_NOISE_MM))
-    return TibialEnd(vertices, tibia.normals, on_open_borders(tibia), centres.mean(axis=0), sd_mm)
+    return TibialEnd(vertices, tibia.normals, on_cut_borders(tibia), centres.mean(axis=0), sd_mm)
 
 
 def tubercle_of(end: TibialEnd) -> Landmark | None:
@@ -115,7 +115,7 @@ def tibia_landmarks(tibia: TriangleMesh, side: Side | None) -> dict[str, Landmar
 def _plateau(end: TibialEnd, sign: float) -> Landmark | None:
     """The middle of the joint's surface on one side."""
     across = sign * (end.vertices_mm[:, 0] - end.middle_mm[0])
-    surface = end.vertices_mm[end.is_plateau & (across > _EMINENCE_HALF_MM)]
+    surface = end.vertices_mm[end.is_plateau & (across > EMINENCE_HALF_MM)]
     if len(surface) < 20:
         return None
     middle = np.median(surface, axis=0)
@@ -128,12 +128,12 @@ def _plateau(end: TibialEnd, sign: float) -> Landmark | None:
 
 
 def patella_landmarks(patella: TriangleMesh) -> dict[str, Landmark]:
-    """Its centre of volume; nothing when its surface is open, as where the CT cut it off.
+    """Its centre of volume; nothing when it was cut.
 
     Args:
         patella: without caps (`anatomy_of`).
     """
-    if on_open_borders(patella).any() or patella.volume_mm3() <= 0.0:
+    if on_cut_borders(patella).any() or patella.volume_mm3() <= 0.0:
         return {}
     corners = patella.vertices_mm[patella.faces] - patella.centroid_mm
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
-from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
+from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table
 from navapp.values import BoneModel
 
 _FINEST_VOXEL_MM = 2.0
@@ -26,7 +27,7 @@ class RegistrationModel:
         points_mm: (V, 3) the surface that the camera sees: bone moved out by its mean cartilage.
         normals: (V, 3) of that surface, unit, outward.
         sigma_mm: (V,) of that surface along the normal (model and cartilage).
-        is_usable: (V,) False for parts that a stage removed.
+        is_usable: (V,) False for parts that are cut away.
         seen_mesh: those points and the triangles that are left: what a camera should see.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
     """

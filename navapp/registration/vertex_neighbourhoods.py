@@ -1,11 +1,10 @@
-"""What lies around each model point: neighbours, open borders, and how the surface bends."""
+"""What lies around each model point: neighbours, and how the surface bends."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.mesh_edges import half_edges, paired_half_edges
 from navapp.geometry.transform import FloatArray
 
 _MAX_NEIGHBOURS = 12
@@ -43,14 +42,6 @@ def neighbour_table(
     kept = rank < _MAX_NEIGHBOURS
     table[pairs[kept, 0], rank[kept]] = pairs[kept, 1]
     return table
-
-
-def open_border(n_points: int, faces: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """(V,) vertices on an edge of one triangle only: there the model ends, not the bone."""
-    halves = paired_half_edges(faces)
-    is_border = np.zeros(n_points, dtype=bool)
-    is_border[half_edges(faces)[halves[halves[:, 1] < 0, 0]].ravel()] = True
-    return is_border
 
 
 def curvature(

@@ -26,7 +26,7 @@ class BoneModel:
         side: of the patient; None when unknown.
         cartilage_mm: (V,) mean thickness of what the camera sees above the bone.
         cartilage_sd_mm: (V,) its standard deviation.
-        is_removed: (V,) parts that a stage has cut away.
+        is_removed: (V,) what is not there to be seen: cut away by a stage, or by the end of a CT.
         version: counts the changes by stages.
         surface_sd_mm: standard deviation of the pose error that errors of the surface cause; 0
             when nothing is known of them.

@@ -32,7 +32,7 @@ def main() -> None:
     print("\n| bones | right | unknown | wrong |\n|---|---|---|---|")
     for names in _SETS:
         told = [
-            (knee.spec.side, estimate_side({name: knee.bones[name] for name in names}).side)
+            (knee.spec.side, estimate_side({name: bones_of(knee)[name] for name in names}).side)
             for knee in knees()
         ]
         right, unknown = sum(a == b for a, b in told), sum(b is None for _, b in told)

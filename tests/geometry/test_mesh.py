@@ -130,3 +130,9 @@ def test_a_mesh_cannot_be_changed_from_outside():
     for array in (mesh.vertices_mm, mesh.faces, mesh.normals):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+def test_areas_and_volumes_of_triangles_add_up() -> None:
+    mesh = cube(2.0)
+    assert mesh.face_areas_mm2() == pytest.approx(np.full(12, 2.0))
+    assert mesh.face_volumes_mm3() == pytest.approx(np.full(12, 2.0 / 3.0))

@@ -6,7 +6,13 @@ import pytest
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
-from navapp.preop.cut_ends import anatomy_of, ends_of, on_flat_caps, on_open_borders, whole_until_mm
+from navapp.preop.cut_ends import (
+    anatomy_of,
+    ends_of,
+    on_cut_borders,
+    on_flat_caps,
+    whole_until_mm,
+)
 from navapp.values import BoneModel
 from tests.geometry.shapes import cube, sphere
 from tests.preop.knees import knees
@@ -19,6 +25,7 @@ CUT += [
     for bone in ("femur", "tibia")
 ]
 BALL = sphere(30.0, 30)
+SHEET = 40.0 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1.0, 0]])
 TILTED = np.array([0.36, -0.48, 0.8])
 
 
@@ -38,26 +45,47 @@ def test_a_flat_end_is_found_however_oblique_and_a_round_one_is_none(across) -> 
     assert (cut.vertices_mm[found] @ across > 19.5).all()
 
 
-def test_an_open_border_is_where_a_triangle_has_no_neighbour() -> None:
-    assert not on_open_borders(BALL).any()
-    opened = TriangleMesh(BALL.vertices_mm, BALL.faces[1:])
-    assert set(np.flatnonzero(on_open_borders(opened))) == set(BALL.faces[0].tolist())
+def test_a_long_border_is_a_cut_and_a_hole_is_none() -> None:
+    assert not on_cut_borders(BALL).any()
+    assert not on_cut_borders(TriangleMesh(BALL.vertices_mm, BALL.faces[1:])).any()
+    height = BALL.vertices_mm[:, 2]
+    bowl = TriangleMesh(BALL.vertices_mm, BALL.faces[(height < 15.0)[BALL.faces].all(axis=1)])
+    found = on_cut_borders(bowl)
+    assert found.any()
+    assert (height[found] > 11.0).all()
+    assert (height[found] < 15.0).all()
 
 
 def test_anatomy_is_what_is_neither_cap_nor_cut_away() -> None:
-    cut, _ = cut_ball(TILTED)
+    cut, was_taken = cut_ball(TILTED)
     low = cut.vertices_mm[:, 2] < -15.0
     bone = BoneModel("femur", cut, is_removed=low)
     own = anatomy_of(bone)
     kept = {tuple(vertex) for vertex in own.vertices_mm}
-    assert kept <= {tuple(vertex) for vertex in cut.vertices_mm[~low & ~on_flat_caps(cut)]}
-    assert len(kept) > 0.95 * (~(low | on_flat_caps(cut))).sum()
+    assert not kept & {tuple(vertex) for vertex in cut.vertices_mm[low | was_taken]}
+    assert len(kept) > 0.95 * (~(low | was_taken)).sum()
     np.testing.assert_allclose(np.linalg.norm(own.normals, axis=1), 1.0)
     # Open in both places, and there only.
-    border = own.vertices_mm[on_open_borders(own)]
+    border = own.vertices_mm[on_cut_borders(own)]
     assert {"cap", "cut"} == {"cap" if point @ TILTED > 15.0 else "cut" for point in border}
     assert ((border @ TILTED > 15.0) | (border[:, 2] < -10.0)).all()
-    assert (ends_of(bone) == (low | on_flat_caps(cut))).all()
+    assert ends_of(bone)[low | was_taken].mean() > 0.95
+    assert not ends_of(bone)[
+        (cut.vertices_mm[:, 2] > -14.0) & (cut.vertices_mm @ TILTED < 19.0)
+    ].any()
+
+
+@pytest.mark.parametrize("name", ["femur", "patella"])
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (-0.8, 0.6, 0.0)])
+def test_a_bone_cut_from_its_side_has_a_cap_there(name, direction) -> None:
+    """By the edge of a picture that does not hold all of it."""
+    across = np.array(direction)
+    for knee in knees()[:6:2]:
+        mesh = knee.bones[name]
+        height = mesh.vertices_mm @ across
+        beyond = np.maximum(height - height.max() + 0.25 * np.ptp(height), 0.0)
+        cut = TriangleMesh(mesh.vertices_mm - beyond[:, None] * across, mesh.faces)
+        assert on_flat_caps(cut)[beyond > 0.0].mean() > 0.9
 
 
 def test_nothing_of_a_box_is_anatomy() -> None:
@@ -65,7 +93,7 @@ def test_nothing_of_a_box_is_anatomy() -> None:
     assert len(anatomy_of(BoneModel("femur", cube(20.0))).faces) == 0
 
 
-@pytest.mark.parametrize("points", [np.empty((0, 3)), np.eye(3), np.zeros((9, 3))])
+@pytest.mark.parametrize("points", [np.empty((0, 3)), np.eye(3), np.zeros((9, 3)), SHEET])
 def test_what_is_hardly_a_surface_has_no_caps(points) -> None:
     faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
     assert not on_flat_caps(TriangleMesh(points, faces)).any()

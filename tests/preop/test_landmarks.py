@@ -123,6 +123,31 @@ def test_an_oblique_cut_moves_no_landmark(found, is_capped) -> None:
     assert n_shafts >= 3
 
 
+def test_a_hole_in_a_shaft_is_no_cut() -> None:
+    mesh = knees()[0].bones["femur"]
+    middle = mesh.vertices_mm[mesh.faces].mean(axis=1)
+    hole = int(np.argmin(np.abs(middle[:, 2] - middle[:, 2].min() - 52.0)))
+    holed = TriangleMesh(mesh.vertices_mm, np.delete(mesh.faces, hole, axis=0))
+    ours, whole = (
+        femur_landmarks(anatomy_of(BoneModel("femur", one)), "right") for one in (holed, mesh)
+    )
+    assert set(ours) == set(whole)
+
+
+def test_a_patella_that_was_cut_has_no_centre() -> None:
+    for knee in knees()[:6:2]:
+        mesh = knee.bones["patella"]
+        for axis in range(3):
+            place = mesh.vertices_mm[:, axis]
+            is_off = place > place.max() - 0.3 * np.ptp(place)
+            removed = BoneModel("patella", mesh, is_removed=is_off)
+            assert patella_landmarks(anatomy_of(removed)) == {}
+        squeezed = np.array(mesh.vertices_mm)
+        squeezed[:, 0] = np.minimum(squeezed[:, 0], np.quantile(squeezed[:, 0], 0.7))
+        flat = BoneModel("patella", TriangleMesh(squeezed, mesh.faces))
+        assert patella_landmarks(anatomy_of(flat)) == {}
+
+
 def test_what_is_no_knee_has_no_landmarks_of_one() -> None:
     ball = sphere(40.0, 40)
     assert femur_landmarks(ball, "right") == {}

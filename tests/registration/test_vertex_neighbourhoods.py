@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table, open_border
+from navapp.geometry.mesh_edges import open_border
+from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table
 from tests.registration.shapes import ball_mesh, grid_mesh, tube_mesh
 
 NO_FACES = np.empty((0, 3), dtype=np.int32)

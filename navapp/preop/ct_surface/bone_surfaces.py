@@ -1,7 +1,7 @@
 """Bone surfaces of a segmented CT, where the cortex's edge is and not where a threshold puts it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from navapp.preop.ct_surface.refinement import refine_surface
 from navapp.preop.ct_surface.scan_estimate import UNKNOWN_SCAN, estimate_scan
 from navapp.preop.segmentation import Segmentation
 from navapp.preop.volume import CtVolume, LabelVolume
-from navapp.preop.volume.hounsfield import AIR_HU
+from navapp.preop.volume.hounsfield import PADDING_HU
 
 # How far a surface may be off in each round: a voxel of any threshold first.
 _REACHES_MM = (1.5, 0.6, 0.6)
@@ -42,11 +42,13 @@ class BoneSurface:
         mesh: LPS mm, closed, normals outward.
         is_cut: (V,) the flat end where the volume cuts the shaft: no anatomy.
         is_measured: (V,) the density there told the edge.
+        left_out: share of a label's volume that is in separate pieces.
     """
 
     mesh: TriangleMesh
     is_cut: NDArray[np.bool_]
     is_measured: NDArray[np.bool_]
+    left_out: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,9 +92,9 @@ def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: 
 
 def surface_of_labels(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
     """The surface of a ready segmentation: voxels are all that is known of it."""
-    mesh = surface_around(mask, volume)
+    mesh, left_out = surface_around(mask, volume)
     surface = BoneSurface(mesh, _is_cut(mesh, volume), np.zeros(len(mesh.vertices_mm), dtype=bool))
-    return _working(surface, volume)
+    return replace(_working(surface, volume), left_out=left_out)
 
 
 def _working(surface: BoneSurface, volume: CtVolume | LabelVolume) -> BoneSurface:
@@ -105,7 +107,7 @@ def _working(surface: BoneSurface, volume: CtVolume | LabelVolume) -> BoneSurfac
 
 
 def _first_surface(found: Segmentation, number: int) -> BoneSurface:
-    mesh = surface_around(found.bones == number, found.ct)
+    mesh, _ = surface_around(found.bones == number, found.ct)
     return BoneSurface(mesh, _is_cut(mesh, found.ct), np.zeros(len(mesh.vertices_mm), dtype=bool))
 
 
@@ -132,5 +134,5 @@ def _is_cut(mesh: TriangleMesh, volume: CtVolume | LabelVolume) -> NDArray[np.bo
         ahead_mm = _PADDING_VOXELS * float(volume.spacing_mm.max())
         outside = volume.indices_of(mesh.vertices_mm + ahead_mm * mesh.normals)
         i, j, k = np.clip(np.rint(outside), 0, last).astype(np.intp).T
-        is_beyond |= volume.hu[k, j, i] <= AIR_HU
+        is_beyond |= volume.hu[k, j, i] <= PADDING_HU
     return np.asarray(is_beyond)

@@ -15,12 +15,17 @@ _VERTICES_PER_MM2 = 1.0
 _WITHIN_MM = 0.3
 
 
-def surface_around(mask: NDArray[np.bool_], volume: CtVolume | LabelVolume) -> TriangleMesh:
-    """A closed surface around the voxels of a mask, LPS mm, normals outward.
+def surface_around(
+    mask: NDArray[np.bool_], volume: CtVolume | LabelVolume
+) -> tuple[TriangleMesh, float]:
+    """A closed surface around the largest piece of a mask, LPS mm, normals outward.
 
     Args:
         mask: (D, H, W) of the volume's voxels; where the volume ends the surface is closed flat.
         volume: says where the voxels are.
+
+    Returns:
+        The surface, and what share of the mask's volume is in other pieces.
     """
     import open3d
     from scipy.ndimage import gaussian_filter
@@ -35,13 +40,16 @@ def surface_around(mask: NDArray[np.bool_], volume: CtVolume | LabelVolume) -> T
     indices = found.vertex.positions.numpy().astype(np.float64) - _PADDING
     indices += [edge.start for edge in box[::-1]]
     faces = found.triangle.indices.numpy().astype(np.int32)
-    mesh = TriangleMesh(volume.points_lps_mm(indices), faces).largest_component()
+    pieces = TriangleMesh(volume.points_lps_mm(indices), faces)
+    mesh = pieces.largest_component()
     if mesh.volume_mm3() < 0.0:
-        mesh = mesh.flipped()
-    return simplified(mesh, int(_VERTICES_PER_MM2 * area_mm2(mesh)), _WITHIN_MM)
+        pieces, mesh = pieces.flipped(), mesh.flipped()
+    wanted = int(_VERTICES_PER_MM2 * mesh.face_areas_mm2().sum())
+    return simplified(mesh, wanted, _WITHIN_MM), _left_out(pieces)
 
 
-def area_mm2(mesh: TriangleMesh) -> float:
-    """Area of a surface."""
-    a, b, c = (mesh.vertices_mm[mesh.faces[:, corner]] for corner in range(3))
-    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+def _left_out(pieces: TriangleMesh) -> float:
+    """Share of the volume outside the largest piece; hollows in it are pieces turned inside out."""
+    volumes = np.bincount(pieces.component_of_faces(), pieces.face_volumes_mm3())
+    solid = volumes[volumes > 0.0]
+    return float(1.0 - solid.max() / solid.sum()) if len(solid) else 0.0

@@ -17,7 +17,7 @@ from navapp.preop.segmentation.plates import Plates, find_plates
 from navapp.preop.segmentation.seeds import with_seeds
 from navapp.preop.segmentation.solids import find_solids
 from navapp.preop.volume import CtVolume
-from navapp.preop.volume.hounsfield import AIR_HU
+from navapp.preop.volume.hounsfield import PADDING_HU
 
 DEFAULT_THRESHOLD_HU = 200.0
 NO_SEEDS: Mapping[str, FloatArray] = MappingProxyType({})
@@ -97,7 +97,7 @@ def _is_cut_at_side(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
 def _is_cut_by_padding(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
     """Whether the picture ends beside a bone: skin and flesh lie between any bone and air."""
     box = bounds(bone, np.full(3, 2, dtype=np.intp))
-    is_padding = ct.hu[box] <= AIR_HU
+    is_padding = ct.hu[box] <= PADDING_HU
     if not is_padding.any():
         return False
     beside = depth_mm(bone[box], ct.spacing_mm) > -_BESIDE_VOXELS * float(ct.spacing_mm.max())

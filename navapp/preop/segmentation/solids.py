@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.masks import BoolArray, as_image, bounds, components, depth_mm
-from navapp.preop.volume.hounsfield import AIR_HU as PADDING_HU
+from navapp.preop.volume.hounsfield import PADDING_HU
 from navapp.preop.volume.itk_package import simple_itk
 
 # A channel narrower than twice this leads no tissue into a bone: pores, vessels, thin cortex.

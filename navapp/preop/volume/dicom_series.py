@@ -23,7 +23,7 @@ from navapp.preop.volume.dicom_stack import (
     thickness_warnings,
     tilt_warnings,
 )
-from navapp.preop.volume.hounsfield import AIR_HU, HuArray, compact, without_padding
+from navapp.preop.volume.hounsfield import PADDING_HU, HuArray, compact, without_padding
 from navapp.preop.volume.itk_package import codecs_heard, read_image, voxels_of
 from navapp.values import Side
 
@@ -127,5 +127,5 @@ def _slice_hu(folder: Folder, header: SliceHeader, has_complained: _HasComplaine
     picture = without_padding(hu[0])
     if header.padding_hu is not None:
         lowest, highest = header.padding_hu
-        picture[(picture >= lowest) & (picture <= highest)] = AIR_HU
+        picture[(picture >= lowest) & (picture <= highest)] = PADDING_HU
     return compact(picture)

@@ -9,17 +9,17 @@ HuArray = NDArray[np.int16] | NDArray[np.float32]
 
 # The bottom of the 12-bit scale. Lower values are padding around the picture: nothing absorbs
 # less than air, at -1000 HU.
-AIR_HU = -1024
+PADDING_HU = -1024
 
 
 def without_padding(values: NDArray[Any]) -> NDArray[Any]:
     """A copy in which everything below air, and everything that is no number, is air."""
     if np.issubdtype(values.dtype, np.floating):
-        values = np.nan_to_num(values, nan=AIR_HU, posinf=AIR_HU, neginf=AIR_HU)
+        values = np.nan_to_num(values, nan=PADDING_HU, posinf=PADDING_HU, neginf=PADDING_HU)
     elif values.dtype != np.int16:
         # A type that cannot hold the bound is widened first.
         values = values.astype(np.int64)
-    floored: NDArray[Any] = np.maximum(values, AIR_HU)
+    floored: NDArray[Any] = np.maximum(values, PADDING_HU)
     return floored
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from navapp.preop.volume.ct_volume import CtVolume
-from navapp.preop.volume.hounsfield import AIR_HU
+from navapp.preop.volume.hounsfield import PADDING_HU
 
 # Half-way from air (-1000 HU) to fat (-100 HU); and a leg fills far more of any picture than this.
 _TISSUE_HU, _LEAST_TISSUE = -550, 1e-3
@@ -27,7 +27,7 @@ def refusal_of(volume: CtVolume) -> tuple[str, str] | None:
         return f"has voxels of {spacing} mm, which no CT has", "export it with lengths in mm"
     if float((volume.hu > _TISSUE_HU).mean()) < _LEAST_TISSUE:
         highest = float(volume.hu.max())
-        what = "padding" if highest <= AIR_HU else "air"
+        what = "padding" if highest <= PADDING_HU else "air"
         return (
             f"shows {what} only: its highest value is {highest:.0f} HU",
             "choose the series that shows the knee",

@@ -5,7 +5,7 @@ from navapp.geometry.simplify import is_closed, is_within
 from navapp.preop.ct_surface import bone_surfaces, surface_of_labels, surfaces_of
 from navapp.preop.segmentation import segment
 from navapp.preop.volume import CtVolume, LabelVolume
-from navapp.preop.volume.hounsfield import AIR_HU as PADDING_HU
+from navapp.preop.volume.hounsfield import PADDING_HU
 from tests.preop.ct_phantoms import (
     MARROW_HU,
     SOFT_HU,

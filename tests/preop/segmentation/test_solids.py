@@ -3,7 +3,7 @@ import pytest
 
 from navapp.preop.segmentation.masks import components, depth_mm
 from navapp.preop.segmentation.solids import find_solids
-from navapp.preop.volume.hounsfield import AIR_HU as PADDING_HU
+from navapp.preop.volume.hounsfield import PADDING_HU
 from tests.preop.ct_phantoms import (
     AIR_HU,
     MARROW_HU,
