@@ -1,6 +1,7 @@
 """Shared by all tests: the user's settings hidden, leaks found, skips counted."""
 
 import hashlib
+import itertools
 import os
 import threading
 from collections.abc import Iterator
@@ -22,13 +23,19 @@ MOST_SURFACES = 16
 DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
 
 
+@pytest.fixture(scope="session")
+def _homes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Names of folders that nothing has made yet, one for each test."""
+    homes = tmp_path_factory.mktemp("homes")
+    return (homes / str(n) for n in itertools.count())
+
+
 @pytest.fixture(autouse=True)
-def _own_settings(
-    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def _own_settings(_homes: Iterator[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """No configuration of the person who runs the tests is found."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    home = next(_homes)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(home / "config"))
+    monkeypatch.setenv("XDG_STATE_HOME", str(home / "state"))
     monkeypatch.delenv("NO_COLOR", raising=False)
 
 
@@ -61,16 +68,25 @@ def _surfaces_prepared_once() -> Iterator[None]:
 def _nothing_left_behind() -> Iterator[None]:
     """A test that leaves a thread of ours or a child process behind fails."""
     threads = set(threading.enumerate())
-    children = {child.pid for child in psutil.Process().children(recursive=True)}
+    children = {child.pid for child in _children()}
     yield
     left = [t for t in threading.enumerate() if t not in threads and not _lives_on(t)]
     for thread in left:
         thread.join(2.0)
     still = [t.name for t in left if t.is_alive()]
-    new = [c for c in psutil.Process().children(recursive=True) if c.pid not in children]
+    new = [child for child in _children() if child.pid not in children]
     _, alive = psutil.wait_procs(new, timeout=2.0)
     assert not still, f"threads left behind: {still}"
     assert not alive, f"processes left behind: {alive}"
+
+
+def _children() -> list[psutil.Process]:
+    # psutil reads every process of the machine: too much for the many tests that start none.
+    try:
+        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    except ChildProcessError:
+        return []
+    return psutil.Process().children(recursive=True)
 
 
 def _lives_on(thread: threading.Thread) -> bool:
@@ -88,9 +104,13 @@ def data() -> Path:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that share what is made once for their module run in one worker: it is made there."""
+    """Tests that share what is made once for their module run in one worker: it is made there.
+
+    Slow ones come first: what is left for the end is short, and no worker waits for another.
+    """
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     for item in items:
-        if not isinstance(item, pytest.Function):
+        if not isinstance(item, pytest.Function) or item.get_closest_marker("xdist_group"):
             continue
         used = item._fixtureinfo.name2fixturedefs.values()
         if any(definitions[-1].scope == "module" for definitions in used):

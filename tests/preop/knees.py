@@ -1,5 +1,6 @@
 """Simulated knees as bones of a plan: the landmarks of the simulator judge ours."""
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -12,16 +13,33 @@ from tests.geometry.shapes import sphere
 SEEDS = range(1, 11)
 
 
+SPECS = [
+    KneeSpec(seed, side, ("female", "male")[seed % 2], ("young", "middle", "old")[seed % 3])
+    for seed in SEEDS
+    for side in ("right", "left")
+]
+
+
+class Knees(Sequence[KneeAnatomy]):
+    """Made when they are looked at: one takes a second."""
+
+    def __len__(self) -> int:
+        return len(SPECS)
+
+    def __getitem__(self, index):
+        if isinstance(index, slice):
+            return [knee_of(spec) for spec in SPECS[index]]
+        return knee_of(SPECS[index])
+
+
 @cache
-def knees() -> tuple[KneeAnatomy, ...]:
+def knee_of(spec: KneeSpec) -> KneeAnatomy:
+    return make_knee(spec)
+
+
+def knees() -> Knees:
     """Ten people, both knees of each: women and men, young, middle and old."""
-    return tuple(
-        make_knee(
-            KneeSpec(seed, side, ("female", "male")[seed % 2], ("young", "middle", "old")[seed % 3])
-        )
-        for seed in SEEDS
-        for side in ("right", "left")
-    )
+    return Knees()
 
 
 def bones_of(knee: KneeAnatomy) -> dict[str, BoneModel]:

@@ -105,7 +105,7 @@ def test_corners_beyond_the_picture_are_no_answer_and_no_crash(monkeypatch):
 
 
 def test_no_board_is_no_answer():
-    noise = np.random.default_rng(1).integers(0, 255, (480, 640), dtype=np.uint8)
+    noise = np.random.default_rng(1).integers(0, 255, (240, 320), dtype=np.uint8)
     for board in BOARDS.values():
-        assert find_board(np.full((480, 640), 128, dtype=np.uint8), board) is None
+        assert find_board(np.full((240, 320), 128, dtype=np.uint8), board) is None
         assert find_board(noise, board) is None
