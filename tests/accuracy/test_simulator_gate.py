@@ -11,6 +11,9 @@ from navapp.values import Side, Status, visible_vertices
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
 
+# One worker follows each knee, once.
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("simulator gate")]
+
 KNEES = ((1, "right"), (2, "left"), (3, "right"))
 N_TRACKED = 5
 GOAL = Goal(np.empty((0, 3)), 2.0)
@@ -63,7 +66,6 @@ def run(seed: int, side: Side) -> tuple[Judged, ...]:
     return tuple(judged)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "side"), KNEES)
 def test_no_frame_that_is_called_ok_is_far_off(seed: int, side: str) -> None:
     judged = run(seed, side)
@@ -73,7 +75,6 @@ def test_no_frame_that_is_called_ok_is_far_off(seed: int, side: str) -> None:
     assert np.median(errors) <= MEDIAN_MM, judged
 
 
-@pytest.mark.slow
 def test_the_predicted_bound_covers_the_error() -> None:
     frames = [frame for knee in KNEES for frame in run(*knee)]
     covered = [frame.tre_mm <= frame.bound_mm for frame in frames]

@@ -1,6 +1,8 @@
 """The main job on recorded pictures with truth; skipped, and counted, without the data."""
 
 import json
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,20 @@ from navapp.values import BoneModel
 WORST_OK_MM = 0.2
 
 
+@pytest.fixture(scope="module")
+def plan_of(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The plan of a phantom, made once."""
+
+    @cache
+    def made(phantom: str) -> Path:
+        folder = tmp_path_factory.mktemp(phantom) / "plan"
+        surface = f"femur={data / phantom / 'femur.ply'}"
+        assert run(["--quiet", "plan", "--surface", surface, "--out", str(folder)]) == 0
+        return folder
+
+    return made
+
+
 @pytest.mark.data
 @pytest.mark.slow
 @pytest.mark.parametrize(
@@ -28,18 +44,16 @@ WORST_OK_MM = 0.2
     ],
 )
 def test_most_frames_of_a_recorded_operation_get_a_pose(
-    data: Path, tmp_path: Path, phantom: str, start: tuple[str, ...]
+    data: Path, plan_of: Callable[[str], Path], tmp_path: Path, phantom: str, start: tuple[str, ...]
 ) -> None:
     root = data / phantom
     known = json.loads((root / "patient" / "prior.json").read_text(encoding="utf-8"))
     prior = tmp_path / "prior.json"
     prior.write_text(json.dumps({key: known[key] for key in start}), encoding="utf-8")
-    plan, poses, overlay = tmp_path / "plan", tmp_path / "poses.json", tmp_path / "overlay"
-    surface = f"femur={root / 'femur.ply'}"
-    assert run(["--quiet", "plan", "--surface", surface, "--out", str(plan)]) == 0
+    poses, overlay = tmp_path / "poses.json", tmp_path / "overlay"
     arguments = [
         "--quiet", "replay", str(root / "patient"), "--rig", str(root / "rig.yml"),
-        "--plan", str(plan), "--prior", str(prior),
+        "--plan", str(plan_of(phantom)), "--prior", str(prior),
         "--overlay", str(overlay), "--json", str(poses),
     ]  # fmt: skip
     assert run(arguments) == 0

@@ -23,6 +23,8 @@ BALL_MM, BALL_RADIUS_MM = PLACE_MM + np.array([14.0, 0.0, 0.0]), 12.0
 SHAFT_MM, SHAFT_RADIUS_MM = PLACE_MM - [12.0, 0.0, 0.0], 9.0
 SEEDS = {"patella": BALL_MM, "femur": SHAFT_MM}
 CUT_MM = 12.0
+# One worker lays the surfaces of each scan, once.
+pytestmark = pytest.mark.xdist_group("bone surfaces")
 
 
 def scanned(axes, n_j=54):

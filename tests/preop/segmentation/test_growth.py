@@ -1,5 +1,7 @@
 """Cores and the bones grown from them, where one component is several bones."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -174,11 +176,10 @@ def test_cores_become_finer():
     hu, _ = boxes(points_of(size, lattice(size, SPACING_MM)), 1.3)
     hu = hu.astype(np.float32)
     solid = find_solids(hu, SPACING_MM, 200.0)
-    coarser = None
-    for cores in find_cores(find_plates(hu, SPACING_MM, solid), solid, SPACING_MM):
-        inside = cores > 0
-        assert not inside[~solid].any()
-        if coarser is not None:
-            assert not (inside & ~coarser).any()
-            assert inside.sum() <= coarser.sum()
-        coarser = inside
+    found = list(find_cores(find_plates(hu, SPACING_MM, solid), solid, SPACING_MM))
+    inside = [cores > 0 for cores in found]
+    assert len(inside) > 1
+    assert inside[-1].sum() < inside[0].sum()
+    for coarser, finer in itertools.pairwise(inside):
+        assert not coarser[~solid].any()
+        assert not (finer & ~coarser).any()

@@ -1,0 +1,12 @@
+"""Who looks at all the knees does so in one worker: they are made there."""
+
+import pytest
+
+from tests.preop.knees import knees
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if isinstance(item, pytest.Function) and getattr(item.module, "knees", None) is knees:
+            item.add_marker(pytest.mark.xdist_group("knees"))
