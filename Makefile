@@ -14,7 +14,7 @@ KERNEL_TESTS := tests/geometry/test_zbuffer.py \
     tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \
     tests/stereo tests/tracking/test_agreement.py tests/tracking/test_contour_kernels.py \
     tests/tracking/test_outline_kernels.py tests/overlay/test_tint.py tests/preop/test_aspects.py \
-    tests/calibration/targets
+    tests/calibration/targets/test_detection.py tests/calibration/targets/test_mark_kernels.py
 
 # The window's libraries: SDL draws into nothing without them. Then screens for the tests.
 SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
@@ -31,11 +31,13 @@ run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
 test: setup check  ## the whole test suite
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	# On two cores the third works while others wait for a window, a wire or a clock.
+	$(BIN)/python -m pytest -n 3 --dist loadgroup
 	# Compiled code does not check its indices: the kernels' tests run again with the check, and
-	# with a cache of their own, because the cache does not know about that switch.
-	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck \
-	    $(BIN)/python -m pytest -q -n 2 --dist loadgroup $(KERNEL_TESTS)
+	# with a cache of their own, because the cache does not know about that switch. Most of the
+	# time goes into compiling: quickly rather than well, and a kernel in one worker if possible.
+	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck \
+	    $(BIN)/python -m pytest -q -n 2 --dist loadfile $(KERNEL_TESTS)
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -92,9 +92,8 @@ def with_board(undo: ExitStack, faults: FaultScript) -> SimulatedRoom:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack, sign: float) -> None:
-    turn_deg = (0.0, sign * THIRD_OF_A_PIXEL_DEG, 0.0)
+def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack) -> None:
+    turn_deg = (0.0, -THIRD_OF_A_PIXEL_DEG, 0.0)
     room = navigating(with_board(undo, bumped(turn_deg, 8.0)))
     until_s(room, 8.0)
     assert room.controller.snapshot.is_navigable
@@ -106,7 +105,7 @@ def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack, sign
     assert not room.display.visible_image().any()
     assert "100 mm on the board are measured as" in room.controller.snapshot.rig_alarm
     found = room.controller.snapshot.length_check
-    assert found.ratio - 1.0 == pytest.approx(sign * 0.0013, abs=3e-4)
+    assert found.ratio - 1.0 == pytest.approx(-0.0013, abs=3e-4)
     # Nothing else has noticed: the rows agree, and the pose is called good.
     unnoticed = [r for r in room.results if r.state.value == "navigating"][-3:]
     assert all(r.tracked.verdict.status is Status.OK for r in unnoticed)

@@ -188,7 +188,7 @@ def test_nothing_found_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixt
     other = tmp_path / "other.toml"
     other.write_text("[camera.simulated]\nseed = 1\n", encoding="utf-8")
     plan = make_foreign_plan(tmp_path)
-    options = ["--quiet", "--config", str(other), "run", "--headless", "--frames", "4"]
+    options = ["--quiet", "--config", str(other), "run", "--headless", "--frames", "2"]
     assert run([*options, "--plan", str(plan)]) == 4
     assert "no frame was OK" in capsys.readouterr().err
 
