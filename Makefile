@@ -31,8 +31,7 @@ run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
 test: setup check  ## the whole test suite
-	# On two cores the third works while others wait for a window, a wire or a clock.
-	$(BIN)/python -m pytest -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
 	# Compiled code does not check its indices: the kernels' tests run again with the check, and
 	# with a cache of their own, because the cache does not know about that switch. Most of the
 	# time goes into compiling: quickly rather than well, and a kernel in one worker if possible.
