@@ -93,6 +93,15 @@ def test_two_different_slices_at_one_place(tmp_path):
     assert "two different slices at (-10.00, -20.00, 400.00)" in refusal(tmp_path)
 
 
+def test_one_slice_twice_beside_itself(tmp_path):
+    series = axial()
+    series.write(tmp_path)
+    series.positions_mm[:, 0] += 1.0
+    (tmp_path / "again").mkdir()
+    series.write(tmp_path / "again")
+    assert "two different slices at (" in refusal(tmp_path)
+
+
 def test_a_single_slice(tmp_path):
     axial(1).write(tmp_path)
     assert "a single slice" in refusal(tmp_path)
@@ -116,9 +125,10 @@ def test_two_series_under_one_uid(tmp_path, what):
     assert what in text
 
 
-def test_a_damaged_direction(tmp_path):
+@pytest.mark.parametrize("column", [(0.0, 0.5, 0.0), (0.6, 0.8, 0.0)], ids=["short", "aslant"])
+def test_a_damaged_direction(tmp_path, column):
     for file in axial().write(tmp_path):
-        change(file, ImageOrientationPatient=[1, 0, 0, 0, 0.5, 0])
+        change(file, ImageOrientationPatient=[1, 0, 0, *column])
     assert "damaged direction" in refusal(tmp_path)
 
 
