@@ -70,7 +70,7 @@ def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> N
 @pytest.mark.parametrize("seed", [2, 6])
 def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(seed: int) -> None:
     """Soft tissue continues its exact parts: they must not pull the search to themselves."""
-    case = known(seed)
+    case = patient(seed, 1)
     line = Line(case.world.rig, mapped(case))
     first = case.frames[0]
     prior = Prior({"femur": case.world.nominal_left_from_femur})

@@ -11,6 +11,14 @@ from navapp.preop import AspectSettings
 from tests.calibration.photographed import KEYS, good_poses, photograph
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Who works on the good pairs does so in one worker: they are photographed there."""
+    for item in items:
+        if "good_pairs" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.xdist_group("good pairs"))
+
+
 @pytest.fixture(scope="session")
 def board_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("board") / "board.json"
