@@ -19,8 +19,9 @@ from tests.bench.cartilage import (
     unknown,
 )
 
-# One worker takes the pictures of a patient, and follows each plan once.
-SEEDS = [pytest.param(seed, marks=pytest.mark.xdist_group(f"patient {seed}")) for seed in (3, 5)]
+# One worker takes the pictures of a patient, and follows each plan once. More patients are
+# followed by tests.bench.cartilage.
+SEEDS = [pytest.param(seed, marks=pytest.mark.xdist_group(f"patient {seed}")) for seed in (3,)]
 N_FRAMES = 2
 # Never shown beyond this.
 WRONG_MM = 1.0
@@ -67,7 +68,7 @@ def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 6])
+@pytest.mark.parametrize("seed", [2])
 def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(seed: int) -> None:
     """Soft tissue continues its exact parts: they must not pull the search to themselves."""
     case = patient(seed, 1)

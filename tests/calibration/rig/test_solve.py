@@ -107,11 +107,10 @@ def test_too_few_views_are_refused(world):
             solve_rig(BOARD, world[1][:n], SIZE)
 
 
-@pytest.mark.parametrize("aside_mm", [60.0, 200.0])
-def test_frontal_views_are_refused(world, aside_mm):
-    """Also at the picture's edges, where the line of sight meets the board aslant."""
+def test_frontal_views_are_refused(world):
+    """At the picture's edges, where the line of sight meets the board aslant."""
     rng = np.random.default_rng(2)
-    poses = [drawn_pose(rng, tilt_deg=3.0, aside_mm=aside_mm) for _ in range(16)]
+    poses = [drawn_pose(rng, tilt_deg=3.0, aside_mm=200.0) for _ in range(16)]
     drawn = [seen_pair(i, world[0], pose, rng) for i, pose in enumerate(poses)]
     pairs = [pair for pair in drawn if min(len(pair.left.ids), len(pair.right.ids)) > 12]
     assert len(pairs) >= 14
