@@ -8,7 +8,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-N_CYCLES = 400
+N_CYCLES = 1000
 _MOST_GROWTH_MB = 8.0
 
 Footprint = tuple[int, int, int, float]

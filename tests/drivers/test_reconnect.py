@@ -1,4 +1,4 @@
-"""Hundreds of times unplugged and plugged in again: nothing is left."""
+"""A thousand times unplugged and plugged in again: nothing is left."""
 
 import pytest
 
@@ -21,7 +21,7 @@ pytestmark = needs_descriptors
 
 
 @pytest.mark.slow
-def test_hundreds_of_unplugged_usb_cameras_leave_nothing(tmp_path):
+def test_a_thousand_unplugged_usb_cameras_leave_nothing(tmp_path):
     rig = UsbRig(tmp_path, rate_hz=1000.0, max_skew_ms=0.4, exposure_ms=0.5)
     settled = (0, 0, 0, 0.0)
     for cycle in range(N_CYCLES):
@@ -43,7 +43,7 @@ def test_hundreds_of_unplugged_usb_cameras_leave_nothing(tmp_path):
 
 
 @pytest.mark.slow
-def test_hundreds_of_unplugged_oak_cameras_leave_nothing():
+def test_a_thousand_unplugged_oak_cameras_leave_nothing():
     host_oak = pytest.importorskip("tests.drivers.host_oak", reason="needs the package depthai")
     oak = host_oak.HostOak()
     settings = DepthaiSettings("", host_oak.WIDTH, host_oak.HEIGHT, rate_hz=host_oak.RATE_HZ)
@@ -64,7 +64,7 @@ def test_hundreds_of_unplugged_oak_cameras_leave_nothing():
 
 
 @pytest.mark.parametrize("make", [ProjectorRig, StageRig])
-def test_hundreds_of_pulled_plugs_of_projector_and_mirror_leave_nothing(make):
+def test_a_thousand_pulled_plugs_of_projector_and_mirror_leave_nothing(make):
     rig = make()
     settled = (0, 0, 0, 0.0)
     for cycle in range(N_CYCLES):

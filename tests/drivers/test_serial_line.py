@@ -267,7 +267,7 @@ def test_a_socket_that_is_reset_is_lost(server) -> None:
 
 
 @needs_descriptors
-def test_hundreds_of_plugs_leave_nothing() -> None:
+def test_a_thousand_plugs_leave_nothing() -> None:
     def cycle() -> None:
         peer = Peer()
         line = SerialLine(SerialAddress(peer.name, 9600), SystemClock(), "device", b":")
