@@ -1,6 +1,6 @@
 """From a measured surface and a model to a pose with its covariance."""
 
-from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc
+from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc, fit_pose
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import InitialSettings, find_initial
 from navapp.registration.landmarks import Landmarks, register_landmarks
@@ -38,6 +38,7 @@ __all__ = [
     "fit_bimcc",
     "fit_bimcc_literal",
     "fit_icp",
+    "fit_pose",
     "is_same_pose",
     "register",
     "register_landmarks",

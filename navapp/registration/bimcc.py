@@ -5,8 +5,10 @@ kernel narrows; at rest, all points pair forward under a kernel as narrow as the
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.bimcc_kernels import (
@@ -116,12 +118,22 @@ def solve_bimcc(
     fit = _Fit(scene, model, scene_from_bone, settings or BimccSettings())
     if len(scene) < MIN_POINTS:
         return fit.too_few_points(len(scene))
-    far = fit.from_far()
-    if not far.has_finished:
-        fit.pair(far.sigma_mm)
-        return fit.solution(far.iterations, is_converged=False)
-    rest = fit.to_rest(far.sigma_mm)
-    return fit.solution(far.iterations + rest.iterations, is_converged=rest.has_finished)
+    iterations, is_converged = fit.run()
+    return fit.solution(iterations, is_converged=is_converged)
+
+
+def fit_pose(
+    scene: Scene,
+    model: RegistrationModel,
+    scene_from_bone: RigidTransform,
+    settings: BimccSettings,
+) -> RigidTransform | None:
+    """The pose of `fit_bimcc` without its figures; None when too few points pair."""
+    fit = _Fit(scene, model, scene_from_bone, settings)
+    if len(scene) < MIN_POINTS:
+        return None
+    fit.run()
+    return fit.pose if fit.reach().n_near >= MIN_POINTS else None
 
 
 def fit_coarsely(
@@ -168,6 +180,26 @@ def bone_from_scene(pose: RigidTransform) -> tuple[FloatArray, FloatArray]:
     return np.array(inverse.rotation), np.array(inverse.translation_mm)
 
 
+class _Reach(NamedTuple):
+    """Pairs within reach of the kernel.
+
+    Attributes:
+        sigma_mm: width of the kernel.
+        noise_mm2: variance that the points do not know of themselves.
+        distance: (n,) of each pair, mm.
+        deviation: (n,) its standard deviation, mm.
+        is_near: (n,) within reach.
+        n_near: how many are.
+    """
+
+    sigma_mm: float
+    noise_mm2: float
+    distance: FloatArray
+    deviation: FloatArray
+    is_near: NDArray[np.bool_]
+    n_near: int
+
+
 class _Fit:
     """Buffers and pose of one fit; the loops work in the bone's frame, where the model rests."""
 
@@ -196,6 +228,15 @@ class _Fit:
             self._start.source, self._start.target, self._rotation, self._shift
         )
         return inverse.inverse()
+
+    def run(self) -> tuple[int, bool]:
+        """From far, then to rest: so many steps, and whether the pose has settled."""
+        far = self.from_far()
+        if not far.has_finished:
+            self.pair(far.sigma_mm)
+            return far.iterations, False
+        rest = self.to_rest(far.sigma_mm)
+        return far.iterations + rest.iterations, rest.has_finished
 
     def from_far(self) -> LoopState:
         """Thinned, both ways; forward only when the start is near, not at all when it is there."""
@@ -231,8 +272,8 @@ class _Fit:
         measure_pairs(arrays, model, rotation, shift, camera, self._pairs, 0, self._n)
         self._sigma_mm = sigma_mm
 
-    def solution(self, iterations: int, *, is_converged: bool) -> Solution:
-        """The pose with the figures of its pairs, of those within reach of the kernel."""
+    def reach(self) -> _Reach:
+        """Which of the last pairs lie within reach of the kernel."""
         pairs, n, settings = self._pairs, self._n, self._settings
         sigma_mm, noise_mm2 = settings.narrowest_mm, 0.0
         if not self._scene.knows_noise:
@@ -240,7 +281,13 @@ class _Fit:
         distance = np.hypot(pairs.residual[:n], pairs.excess[:n])
         deviation = np.sqrt(pairs.variance[:n] + noise_mm2)
         is_near = distance < _REACH_SIGMAS * np.maximum(sigma_mm, settings.n_sigmas * deviation)
-        n_near = int(is_near.sum())
+        n_near = int(np.count_nonzero(is_near))
+        return _Reach(sigma_mm, noise_mm2, distance, deviation, is_near, n_near)
+
+    def solution(self, iterations: int, *, is_converged: bool) -> Solution:
+        """The pose with the figures of its pairs, of those within reach of the kernel."""
+        pairs, n, settings = self._pairs, self._n, self._settings
+        sigma_mm, noise_mm2, distance, deviation, is_near, n_near = self.reach()
         if n_near < MIN_POINTS:
             return self.too_few_points(n_near, iterations)
         sums = weigh(pairs, n, sigma_mm, settings.n_sigmas, noise_mm2)

@@ -7,8 +7,8 @@ import numpy as np
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import BimccSettings, RegistrationModel, fit_bimcc
-from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
+from navapp.registration import BimccSettings, RegistrationModel, fit_bimcc, fit_pose
+from navapp.tracking.surface_meter import Expected, Margins, Measurement, SurfaceMeter
 from navapp.values import LineTimings, PoseEstimate, Reason
 
 # On the model a kernel as narrow as the noise costs little, and keeps out tissue that lies flush
@@ -109,14 +109,18 @@ class Follower:
                 if expected is None:
                     break
                 timings = sum_timings(timings, LineTimings(stereo_ms=expected.render_ms))
-            measured = (self._meter.on_model if is_near else self._meter.sampled)(expected)
-            found = fitted(measured, self._model, pose, ON_MODEL)
-            timings = sum_timings(timings, found.timings)
-            is_elsewhere = not is_near and measured.answered_share < least_share
-            if is_elsewhere or Reason.TOO_FEW_POINTS in found.estimate.reasons:
+            if is_near:
+                found = fitted(self._meter.on_model(expected), self._model, pose, ON_MODEL)
+                timings = sum_timings(timings, found.timings)
+                has_enough = Reason.TOO_FEW_POINTS not in found.estimate.reasons
+                rested = found.pose if has_enough else None
+            else:
+                rested, spent = self._from_samples(expected, pose, least_share)
+                timings = sum_timings(timings, spent)
+            if rested is None:
                 break
-            moved_mm = moved_surface_mm(self._model, pose, found.pose)
-            pose = found.pose
+            moved_mm = moved_surface_mm(self._model, pose, rested)
+            pose = rested
             if is_near:
                 fit = replace(found, n_rounds=n_rounds, moved_mm=moved_mm)
             if moved_mm >= settings.settled_mm:
@@ -127,6 +131,18 @@ class Follower:
         if fit is not None and fit.moved_mm >= settings.near_mm:
             fit = replace(fit, estimate=fit.estimate.doubted(Reason.NOT_CONVERGED))
         return fit, timings
+
+    def _from_samples(
+        self, expected: Expected, pose: RigidTransform, least_share: float
+    ) -> tuple[RigidTransform | None, LineTimings]:
+        """Where samples say that the bone is, None elsewhere; nobody asks how exactly."""
+        measured = self._meter.sampled(expected)
+        if measured.answered_share < least_share:
+            return None, measured.timings
+        started = time.perf_counter_ns()
+        pose_there = fit_pose(measured.scene, self._model, pose, ON_MODEL)
+        estimate_ms = (time.perf_counter_ns() - started) / 1e6
+        return pose_there, replace(measured.timings, estimate_ms=estimate_ms)
 
 
 def fitted(

@@ -5,7 +5,7 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector, vector_from_rotation
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
-from navapp.registration.bimcc import BimccSettings, fit_coarsely
+from navapp.registration.bimcc import BimccSettings, fit_coarsely, fit_pose
 from navapp.values import BoneModel, PoseEstimate, Reason, predicted_tre_mm
 from tests.registration.shapes import (
     TRUE,
@@ -134,6 +134,17 @@ def test_estimating_at_a_pose_does_not_move_it() -> None:
     found = estimate_at(scene_of(seen_cloud(BONE, 900, 0.2)), MODEL, pose)
     assert found.camera_from_bone is pose
     assert found.iterations == 0
+
+
+@pytest.mark.parametrize(("n", "off_mm"), [(900, 0.0), (900, 6.0), (900, 400.0), (30, 0.0)])
+def test_without_the_figures_the_pose_is_the_same(n: int, off_mm: float) -> None:
+    cloud = seen_cloud(BONE, n, 0.2)
+    scene = Scene(cloud.points_mm + np.array([off_mm, 0.0, 0.0]), EYE)
+    whole, bare = fit_bimcc(scene, MODEL, TRUE), fit_pose(scene, MODEL, TRUE, BimccSettings())
+    assert (bare is None) == (n == 30 or off_mm == 400.0)
+    assert (bare is None) == (Reason.TOO_FEW_POINTS in whole.reasons)
+    if bare is not None:
+        np.testing.assert_array_equal(bare.matrix, whole.camera_from_bone.matrix)
 
 
 def test_an_approach_leads_near_or_nowhere() -> None:
