@@ -27,7 +27,7 @@ from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
 FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
-_SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, last_step_px=0.3)
+_SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, stops_at_rest=True, last_step_px=0.3)
 _SAMPLES_PX = 6
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
 # reach far into it see both, and most of what covers a bone lies in front of it.
@@ -215,7 +215,7 @@ class SurfaceMeter:
         return Measurement(found, cloud, answer.timings, share, MODEL_CORRELATION_PX, expected.view)
 
     def sampled(self, expected: Expected) -> Measurement:
-        """As `on_model`, only on samples, in more steps: it sees further, and is soon done.
+        """As `on_model`, only on samples, in more steps if it needs them: it sees further.
 
         What hides the bone counts as well: nothing is left out for the company that it keeps.
         """

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.zbuffer_kernels import known_range
-from navapp.stereo.subpixel.refine_kernels import N_QUALITIES, accept_rows, refine_rows
+from navapp.stereo.subpixel.refine_kernels import (
+    CORRELATION,
+    N_QUALITIES,
+    SIGMA,
+    STEP,
+    accept_rows,
+    refine_rows,
+)
 from navapp.values import DisparityMap
 
 # What the steps and the interpolation need on either side.
@@ -29,7 +36,9 @@ class RefineSettings:
 
     Attributes:
         radius_px: of the square window.
-        n_steps: Gauss-Newton steps.
+        n_steps: Gauss-Newton steps, at most.
+        stops_at_rest: no step follows one that moved most windows by no more than they are exact:
+            to find out where a surface is, not to measure it.
         min_filled: share of a window that must have support.
         min_correlation: of the two windows after the last step.
         last_step_px: a larger last step has not settled.
@@ -41,6 +50,7 @@ class RefineSettings:
 
     radius_px: int = 5
     n_steps: int = 2
+    stops_at_rest: bool = False
     min_filled: float = 0.6
     min_correlation: float = 0.6
     last_step_px: float = 0.1
@@ -131,16 +141,26 @@ def _steps(
     centre = left.sum() / max(left.size, 1)
     left -= centre
     right -= centre
-    radius = settings.radius_px
-    window = (radius, stride_px, settings.min_filled * (2 * radius + 1) ** 2)
-    offset, refined = np.zeros_like(support), np.empty_like(support)
+    radius, offset, refined = settings.radius_px, np.zeros_like(support), np.empty_like(support)
+    least = settings.min_filled * (2 * radius + 1) ** 2
     height, width = (-(-length // stride_px) for length in support.shape)
     quality = np.empty((height, width, N_QUALITIES), dtype=np.float32)
     for _ in range(settings.n_steps):
-        fixed = (left, right, support, offset, box.x - columns.start, window)
+        fixed = (left, right, support, offset, box.x - columns.start, (radius, stride_px, least))
         in_row_bands(box.height, partial(_band, fixed, refined, quality), 8 * stride_px)
         offset, refined = refined, offset
+        if settings.stops_at_rest and _is_at_rest(quality, settings):
+            break
     return offset, quality
+
+
+def _is_at_rest(quality: NDArray[np.float32], settings: RefineSettings) -> bool:
+    """Whether most windows that tell anything moved by no more than their claimed sigma."""
+    sigma, correlation = quality[..., SIGMA], quality[..., CORRELATION]
+    tells = (sigma <= settings.max_sigma_px) & (correlation >= settings.min_correlation)
+    step, sigma = quality[tells, STEP], sigma[tells]
+    is_small = step**2 <= sigma**2 + np.float32(settings.systematic_px**2)
+    return bool(2 * np.count_nonzero(is_small) >= len(step))
 
 
 def _reached(support: NDArray[np.float32], first_column: int, picture_width: int) -> slice:

@@ -156,6 +156,24 @@ def test_with_a_stride_the_same_windows_answer_the_same(stride: int) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-4)
 
 
+@pytest.mark.parametrize(("off_px", "n_steps"), [(0.0, 1), (0.05, 1), (0.4, 2), (0.9, 3)])
+def test_samples_at_rest_take_no_further_step(
+    off_px: float, n_steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[int] = []
+
+    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
+        steps.append(first)
+        band(fixed, refined, quality, first, last)
+
+    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+    settings = RefineSettings(n_steps=3, stops_at_rest=True, last_step_px=0.3)
+    found = refine_samples(pair_with(SLANT), in_box(SLANT + off_px), settings, 6)
+    # The picture's rows are shared by two bands.
+    assert len(steps) == 2 * n_steps
+    assert abs(np.nanmedian(found.disparity_px - in_box(SLANT)[::6, ::6])) < 0.03
+
+
 @pytest.mark.parametrize("stride", [2, 4, 6, 7])
 def test_every_thread_begins_at_a_row_of_samples(
     stride: int, monkeypatch: pytest.MonkeyPatch
