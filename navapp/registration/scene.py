@@ -71,9 +71,15 @@ class Scene:
 
     @cached_property
     def arrays(self) -> SceneArrays:
-        """What the compiled loops read, in an order of its own: thinning must not see rows."""
+        """What the compiled loops read, in an order of its own: thinning must not see rows.
+
+        Among those that it keeps, and among the others, neighbours stay neighbours: the model near
+        them is soon found.
+        """
         n = len(self.points_mm)
-        order = np.random.default_rng(n).permutation(n)
+        order, is_thinned = np.random.default_rng(n).permutation(n), np.arange(n) % self.every == 0
+        for part in (is_thinned, ~is_thinned):
+            order[part] = np.sort(order[part])
         sigma = np.zeros(n) if self.sigma_ray_mm is None else self.sigma_ray_mm
         return SceneArrays(
             np.ascontiguousarray(self.points_mm[order], dtype=np.float64),

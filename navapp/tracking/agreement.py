@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.masks import where
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
@@ -100,7 +101,7 @@ def compare(
     is_hidden, is_behind = (np.zeros(classes.shape, dtype=np.bool_) for _ in range(2))
     for kind in (NEARER, COARSELY_NEARER):
         mark_large(classes, kind, _LEAST_REGION_PX2, is_hidden)
-    inner = np.where(_without_rim(view.mask), classes, np.uint8(0))
+    inner = where(_without_rim(view.mask), classes, np.uint8(0))
     for kind in (FURTHER, COARSELY_FURTHER):
         mark_large(inner, kind, _LEAST_REGION_PX2, is_behind)
     room = classes[::_SPREAD_STRIDE_PX, ::_SPREAD_STRIDE_PX].size

@@ -139,7 +139,9 @@ class AspectGraph:
 
 def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
     """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
-    positions = left_from_bone.apply(mesh.vertices_mm)
-    towards = np.einsum("ij,ij->i", left_from_bone.rotate(mesh.normals), positions)
-    facing: NDArray[np.bool_] = towards < -0.2 * np.linalg.norm(positions, axis=1)
+    # In the bone's frame, nothing but the camera has to be moved.
+    positions = mesh.vertices_mm - left_from_bone.inverse().translation_mm
+    towards = np.einsum("ij,ij->i", mesh.normals, positions)
+    away_mm = np.sqrt(np.einsum("ij,ij->i", positions, positions))
+    facing: NDArray[np.bool_] = towards < -0.2 * away_mm
     return facing

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.masks import where
 from navapp.geometry.transform import FloatArray
 
 
@@ -53,9 +54,9 @@ class DisparityMap:
         """The map, unknown beside a mask (h, w)."""
         unknown = np.float32(np.nan)
         return DisparityMap(
-            np.where(stays, self.disparity_px, unknown),
-            np.where(stays, self.sigma_px, unknown),
-            np.where(stays, self.origin, np.uint8(Origin.UNKNOWN)),
+            where(stays, self.disparity_px, unknown),
+            where(stays, self.sigma_px, unknown),
+            where(stays, self.origin, np.uint8(Origin.UNKNOWN)),
             self.x,
             self.y,
         )

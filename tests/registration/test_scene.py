@@ -90,3 +90,13 @@ def test_any_layout_of_the_points_is_read() -> None:
     np.testing.assert_allclose(
         np.sort(scene.arrays.points, axis=0), np.sort(POINTS, axis=0), rtol=1e-6
     )
+
+
+def test_of_the_points_that_thinning_keeps_and_of_the_others_neighbours_stay_neighbours() -> None:
+    numbered = Scene(POINTS, sigma_ray_mm=np.arange(500.0), thinned_to=100)
+    order = numbered.arrays.sigma_ray
+    kept, others = order[:: numbered.every], np.delete(order, slice(None, None, numbered.every))
+    assert (np.diff(kept) > 0.0).all()
+    assert (np.diff(others) > 0.0).all()
+    # They are no rows: steps between them are of all sizes.
+    assert len(np.unique(np.diff(kept))) > 5

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands, run_both
 from navapp.geometry.box import Box
+from navapp.geometry.masks import where
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.byte_lane_kernels import lanes_for
 from navapp.stereo.matching.census_kernels import census_rows
@@ -152,8 +153,8 @@ def match_census(
     )
     # Smooth paths agree by chance too, but in specks.
     is_matched = speckle_free(left_px, settings.speckle_px, settings.max_difference_px)
-    np.copyto(left_px, np.nan, where=~is_matched)
-    np.copyto(confidence, 0.0, where=~is_matched)
+    left_px = where(is_matched, left_px, np.float32(np.nan))
+    confidence = where(is_matched, confidence, np.float32(0.0))
     agreement = agreement_share(is_matched, is_judged)
     return _result(search, settings, left_px, right_px, confidence, agreement)
 
@@ -269,8 +270,8 @@ def matched_map(search: Search, disparity_px: NDArray[np.float32], sigma_px: flo
     is_matched = np.isfinite(whole)
     return DisparityMap(
         whole,
-        np.where(is_matched, np.float32(sigma_px), np.float32(np.nan)),
-        np.where(is_matched, np.uint8(Origin.MATCHED), np.uint8(Origin.UNKNOWN)),
+        where(is_matched, np.full_like(whole, sigma_px), np.float32(np.nan)),
+        where(is_matched, np.full(whole.shape, Origin.MATCHED, np.uint8), Origin.UNKNOWN),
         search.box.x,
         search.box.y,
     )

@@ -84,11 +84,20 @@ def plan_search(pair: RectifiedPair, band_px: tuple[float, float]) -> Search:
 
 def crop(image: NDArray[T], box: Box, margin_px: tuple[int, int]) -> NDArray[T]:
     """A box with a margin (columns, rows) around it; the picture's edge is repeated outside."""
-    margin_x, margin_y = margin_px
-    rows = np.arange(box.y - margin_y, box.y + box.height + margin_y)
-    columns = np.arange(box.x - margin_x, box.x + box.width + margin_x)
+    import cv2
+
     height, width = image.shape
-    return image[np.ix_(np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1))]
+    rows, above, below = _inside(box.y - margin_px[1], box.height + 2 * margin_px[1], height)
+    columns, before, after = _inside(box.x - margin_px[0], box.width + 2 * margin_px[0], width)
+    part, edge = image[rows, columns], cv2.BORDER_REPLICATE
+    return np.asarray(cv2.copyMakeBorder(part, above, below, before, after, edge))
+
+
+def _inside(first: int, count: int, size: int) -> tuple[slice, int, int]:
+    """What of a range lies inside, at least the edge, and how many are missing on either side."""
+    begin, end = (min(max(place, 0), size - 1) for place in (first, first + count - 1))
+    before = min(max(begin - first, 0), count - 1)
+    return slice(begin, end + 1), before, count - before - (end + 1 - begin)
 
 
 def contrast_grey(image: Image, radius_px: tuple[int, int]) -> NDArray[np.uint8]:

@@ -9,6 +9,7 @@ out: a support is never a measurement.
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.masks import where
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel.highlights import without_highlights
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
@@ -85,13 +86,12 @@ def calmed(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
     known = np.isfinite(coarse_px)
     counts = known.astype(np.float32)
     window = (_CALM_PX, _CALM_PX)
-    total = cv2.boxFilter(np.where(known, coarse_px, np.float32(0.0)), -1, window, normalize=False)
+    total = cv2.boxFilter(where(known, coarse_px, np.float32(0.0)), -1, window, normalize=False)
     mean = total / np.maximum(cv2.boxFilter(counts, -1, window, normalize=False), np.float32(1.0))
     around = cv2.dilate(known.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
     with np.errstate(invalid="ignore"):
         is_off = np.abs(mean - coarse_px) > _COARSE_STEP_PX
-    calm = np.where(is_off, coarse_px, mean)
-    return np.where(around, calm, np.float32(np.nan)).astype(np.float32, copy=False)
+    return where(around, where(is_off, coarse_px, mean), np.float32(np.nan))
 
 
 def _weights(samples: DisparityMap) -> NDArray[np.float32]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.masks import where
 from navapp.geometry.rectification import Image, RectifiedPair
 
 # What windows and the steps at the ends of a search ask for beside a box.
@@ -85,7 +86,7 @@ def doubled_disparity(half_px: NDArray[np.float32], box: Box) -> NDArray[np.floa
     # OpenCV's enlargement puts the half's pixel k at 2 k + 0.5, as it should be.
     between = cv2.resize(half_px, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
     between = between[_inside(box)]
-    finest = np.where(np.isfinite(between), between, doubled(half_px, box))
+    finest = where(np.isfinite(between), between, doubled(half_px, box))
     return np.asarray(np.float32(2.0) * finest, dtype=np.float32)
 
 

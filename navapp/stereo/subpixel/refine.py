@@ -135,12 +135,11 @@ def _steps(
     box = pair.box
     rows = slice(box.y, box.y + box.height)
     columns = _reached(support, box.x, pair.right.shape[1])
-    left = pair.left[rows, box.x : box.x + box.width].astype(np.float32)
-    right = pair.right[rows, columns].astype(np.float32)
+    seen = pair.left[rows, box.x : box.x + box.width]
     # About the middle, the products of float32 keep their digits.
-    centre = left.sum() / max(left.size, 1)
-    left -= centre
-    right -= centre
+    centre = np.float32(seen.mean() if seen.size else 0.0)
+    left = np.subtract(seen, centre, dtype=np.float32)
+    right = np.subtract(pair.right[rows, columns], centre, dtype=np.float32)
     radius, offset, refined = settings.radius_px, np.zeros_like(support), np.empty_like(support)
     least = settings.min_filled * (2 * radius + 1) ** 2
     height, width = (-(-length // stride_px) for length in support.shape)
