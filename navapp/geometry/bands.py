@@ -79,13 +79,16 @@ def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
         raise error
 
 
-def in_row_bands(height: int, job: Callable[[int, int], object], every: int = 8) -> None:
+def in_row_bands(
+    height: int, job: Callable[[int, int], object], every: int = 8, middle: int | None = None
+) -> None:
     """Run `job(first_row, last_row)` for the upper and the lower half of the rows.
 
     Args:
         height: number of rows.
         job: of some rows.
         every: the lower half begins at a multiple of this: a job for every n-th row meets its rows.
+        middle: row before which half of the work lies; by default half of the rows.
     """
-    middle = height // (2 * every) * every
+    middle = (height // 2 if middle is None else middle) // every * every
     run_both(lambda: job(0, middle), lambda: job(middle, height))

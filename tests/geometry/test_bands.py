@@ -47,11 +47,15 @@ def test_bands_cover_every_row_once(height):
 
 
 @pytest.mark.parametrize("every", [1, 6, 8, 48])
-def test_the_lower_half_begins_at_a_multiple(every):
-    first_rows = []
-    in_row_bands(200, lambda first, last: first_rows.append(first), every)
-    assert max(first_rows) > 0
-    assert all(first % every == 0 for first in first_rows)
+@pytest.mark.parametrize("middle", [None, 60, 199])
+def test_the_lower_half_begins_at_a_multiple(every, middle):
+    bands = []
+    in_row_bands(200, lambda first, last: bands.append((first, last)), every, middle)
+    (first, begin), (again, last) = sorted(bands)
+    assert (first, last) == (0, 200)
+    assert begin == again
+    assert begin % every == 0
+    assert 0 <= (100 if middle is None else middle) - begin < every
 
 
 def test_a_job_beside_runs_on_its_own_and_its_error_is_told():

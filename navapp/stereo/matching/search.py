@@ -1,7 +1,7 @@
 """What a matcher has to search: pixels, disparities and the right columns that they reach."""
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,8 +89,9 @@ def crop(image: NDArray[T], box: Box, margin_px: tuple[int, int]) -> NDArray[T]:
     height, width = image.shape
     rows, above, below = _inside(box.y - margin_px[1], box.height + 2 * margin_px[1], height)
     columns, before, after = _inside(box.x - margin_px[0], box.width + 2 * margin_px[0], width)
-    part, edge = image[rows, columns], cv2.BORDER_REPLICATE
-    return np.asarray(cv2.copyMakeBorder(part, above, below, before, after, edge))
+    part: Any = image[rows, columns]
+    grown: Any = cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE)
+    return np.asarray(grown, dtype=image.dtype)
 
 
 def _inside(first: int, count: int, size: int) -> tuple[slice, int, int]:

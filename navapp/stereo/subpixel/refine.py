@@ -28,6 +28,8 @@ from navapp.values import DisparityMap
 
 # What the steps and the interpolation need on either side.
 _SPARE_COLUMNS = 8
+# Of the support, to see where it lies.
+_SAMPLE_PX = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +148,19 @@ def _steps(
     quality = np.empty((height, width, N_QUALITIES), dtype=np.float32)
     for _ in range(settings.n_steps):
         fixed = (left, right, support, offset, box.x - columns.start, (radius, stride_px, least))
-        in_row_bands(box.height, partial(_band, fixed, refined, quality), 8 * stride_px)
+        band = partial(_band, fixed, refined, quality)
+        in_row_bands(box.height, band, 8 * stride_px, _middle(support))
         offset, refined = refined, offset
         if settings.stops_at_rest and _is_at_rest(quality, settings):
             break
     return offset, quality
+
+
+def _middle(support: NDArray[np.float32]) -> int:
+    """Row before which half of the support lies."""
+    some = np.isfinite(support[::_SAMPLE_PX, ::_SAMPLE_PX])
+    known = np.cumsum(np.count_nonzero(some, axis=1))
+    return _SAMPLE_PX * int(np.searchsorted(known, known[-1] // 2)) if some.size else 0
 
 
 def _is_at_rest(quality: NDArray[np.float32], settings: RefineSettings) -> bool:

@@ -194,6 +194,24 @@ def test_every_thread_begins_at_a_row_of_samples(
     assert all(first % stride == 0 for first in first_rows)
 
 
+def test_two_threads_share_the_support_not_the_rows(monkeypatch: pytest.MonkeyPatch) -> None:
+    bands: list[tuple[int, int]] = []
+
+    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
+        bands.append((first, last))
+        band(fixed, refined, quality, first, last)
+
+    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+    support = in_box(SLANT)
+    support[:20] = np.nan
+    refine(pair_with(SLANT), support, RefineSettings(n_steps=1))
+    # Whole blocks of eight rows.
+    assert sorted(bands) == [(0, 24), (24, 44)]
+    bands.clear()
+    nothing = refine(pair_with(SLANT), np.full_like(support, np.nan), RefineSettings(n_steps=1))
+    assert nothing.matched_share == 0.0
+
+
 def test_a_window_over_two_surfaces_is_rough() -> None:
     step = np.where(np.arange(WIDTH)[None] < 90, 0.0, 1.6) + np.zeros((HEIGHT, 1))
     pair, support = pair_with(SLANT + step), in_box(SLANT + 0.8)
