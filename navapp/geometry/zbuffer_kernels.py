@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from navapp.geometry.float_lane_kernels import (
     LANES,
     lane_numbers,
+    larger,
     load,
     smaller,
     spread,
@@ -76,14 +77,18 @@ def bounds_of_points(
 @njit(cache=True, nogil=True)
 def known_range(values: NDArray[np.float32]) -> tuple[float, float]:
     """Least and largest of (h, w) numbers that are known; of none, infinity and its negative."""
-    least, largest = np.float32(np.inf), np.float32(-np.inf)
-    for y in range(values.shape[0]):
-        for x in range(values.shape[1]):
-            value = values[y, x]
-            # Comparisons with NaN are false.
-            least = value if value < least else least
-            largest = value if value > largest else largest
-    return float(least), float(largest)
+    flat, ends = values.ravel(), np.empty(2 * LANES, dtype=np.float32)
+    least, largest = spread(np.float32(np.inf)), spread(np.float32(-np.inf))
+    whole = flat.size // LANES * LANES
+    for at in range(0, whole, LANES):
+        # Comparisons with NaN are false, and the second is kept.
+        least, largest = smaller(load(flat, at), least), larger(load(flat, at), largest)
+    store(ends, 0, least)
+    store(ends, LANES, largest)
+    low, high = ends[:LANES].min(), ends[LANES:].max()
+    for value in flat[whole:]:
+        low, high = value if value < low else low, value if value > high else high
+    return float(low), float(high)
 
 
 @njit(cache=True, nogil=True)

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
+from navapp.tracking.agreement import Agreement
 from navapp.tracking.contours import ContourMeter
 from navapp.tracking.correlated_residuals import with_correlated_residuals
 from navapp.tracking.follower import Fit, sum_timings
@@ -70,12 +72,14 @@ class FitJudge:
         # What the pictures say of their cameras does not ask for the pose.
         with beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm))) as health:
             coarse_px = self.coarse_px(pair, fit, coarse)
-            fit = self._contours.joined(pair, fit, coarse_px)
+            # Nor does the model where it was seen: the outline hardly moves it.
+            with beside(partial(self._as_seen, fit, coarse_px)) as as_seen:
+                fit = self._contours.joined(pair, fit, coarse_px)
+                agreement = as_seen.result() if fit.moved_mm < _SAME_VIEW_MM else None
             if fit.measured.view is not None:
                 fit = replace(fit, estimate=with_correlated_residuals(fit.estimate))
-            view = fit.measured.view if fit.moved_mm < _SAME_VIEW_MM else None
             verdict = self._judge.judge(
-                self._model, fit.estimate, found, goal, predicted, coarse_px, view
+                self._model, fit.estimate, found, goal, predicted, coarse_px, agreement
             )
             verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
             rows = row_check(health.result(), geometry, depth_mm)
@@ -84,6 +88,13 @@ class FitJudge:
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
         return TrackedFrame(self._model.bone.name, estimate, verdict, timings, rows)
+
+    def _as_seen(self, fit: Fit, coarse_px: NDArray[np.float32] | None) -> Agreement | None:
+        """How the model agrees where it was matched; None of a fit that has moved it since."""
+        seen = fit.measured
+        if seen.view is None or fit.moved_mm >= _SAME_VIEW_MM:
+            return None
+        return self._judge.agreement(self._model, fit.pose, seen.disparity, coarse_px, seen.view)
 
     def lost(self, reason: Reason, timings: LineTimings | None = None) -> TrackedFrame:
         """The answer when there is no fit to judge."""

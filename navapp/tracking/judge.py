@@ -132,7 +132,7 @@ class Judge:
         goal: Goal,
         predicted: RigidTransform | None = None,
         coarse_px: NDArray[np.float32] | None = None,
-        view: RenderedView | None = None,
+        agreement: Agreement | None = None,
     ) -> Verdict:
         """Status, reasons and predicted error of a pose.
 
@@ -144,11 +144,13 @@ class Judge:
             predicted: pose expected by the motion model, for the jump test.
             coarse_px: (h, w) coarse disparity of whatever is in that box: what hides the bone, and
                 what is seen through the model.
-            view: the model in that box at the pose, or next to it; rendered when absent.
+            agreement: of the model with the disparity, at the pose or next to it; compared when
+                absent.
         """
         if not np.isfinite(estimate.covariance).all():
             return Verdict(Status.LOST, None, estimate.reasons or (Reason.DEGENERATE,))
-        agreement = self.agreement(model, estimate.camera_from_bone, measured, coarse_px, view)
+        if agreement is None:
+            agreement = self.agreement(model, estimate.camera_from_bone, measured, coarse_px)
         if agreement.n_visible == 0:
             return Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,))
         is_seen = visible_vertices(model.bone.mesh, estimate.camera_from_bone)

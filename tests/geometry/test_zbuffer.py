@@ -348,3 +348,10 @@ def test_the_range_is_that_of_what_is_known():
     values = np.array([[np.nan, 3.0, -1.0], [7.0, np.nan, 2.0]], dtype=np.float32)
     assert known_range(values) == (-1.0, 7.0)
     assert known_range(np.full((2, 3), np.nan, np.float32)) == (np.inf, -np.inf)
+    rng = np.random.default_rng(1)
+    for shape in ((5, 8), (7, 13), (40, 3), (0, 4)):
+        values = rng.normal(size=shape).astype(np.float32)
+        values[rng.random(shape) < 0.3] = np.nan
+        known = values[np.isfinite(values)]
+        ends = (known.min(), known.max()) if known.size else (np.inf, -np.inf)
+        assert known_range(values) == ends
