@@ -186,7 +186,8 @@ def choose_rows(
     left_px, right_px, uniqueness, lowest_px, count = choice
     _, width, n = kept.shape
     right_width = right_px.shape[1]
-    surplus, sums = np.empty(n, dtype=kept.dtype), np.empty(n, dtype=np.uint16)
+    surplus, sums = np.empty(n, dtype=kept.dtype), np.empty((width, n), dtype=np.uint16)
+    offers = np.empty(width, dtype=np.uint32)
     numbers = np.arange(n).astype(np.uint16)
     # As wide as the mirrored codes: partners outside fall into the margin.
     right_best = np.empty(right_width + 2 * n, dtype=np.uint32)
@@ -198,10 +199,14 @@ def choose_rows(
             census_cost(left, mirrored, outside, beyond, (y, x, u), no_partner, cost)
             step = step_to(grey, jumps, (y, x), direction)
             extend_paths(costs, lowest, cost, step, p1, surplus, 0)
-            add_up(surplus, kept, (y * width + x) * n, cost, sums)
+            add_up(surplus, kept, (y * width + x) * n, cost, sums[x])
             first = n + min(max(right_width - 1 - u, -n), right_width)
-            best = offer(sums, numbers, right_best, first)
-            left_px[y, x], uniqueness[y, x] = choose_left(sums, numbers, best, (lowest_px, count))
+            offers[x] = offer(sums[x], numbers, right_best, first)
+        # Apart from the paths, where each pixel waits for the one before.
+        for x in range(width):
+            left_px[y, x], uniqueness[y, x] = choose_left(
+                sums[x], numbers, offers[x], (lowest_px, count)
+            )
         for u in range(right_width):
             best = right_best[n + right_width - 1 - u]
             number = np.int64(best & _NUMBER_MASK)
