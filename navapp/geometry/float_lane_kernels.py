@@ -175,6 +175,20 @@ def where_positive(_: Any, test: Any, chosen: Any, other: Any) -> Any:
     return _LANES_TYPE(test, chosen, other), generate
 
 
+@intrinsic
+def all_positive(_: Any, lanes: Any) -> Any:
+    """Whether every lane is above 0."""
+
+    def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
+        is_positive = builder.fcmp_ordered(">", values[0], ir.Constant(_VECTOR, [0.0] * LANES))
+        bits = ir.IntType(LANES)
+        return builder.icmp_unsigned(
+            "==", builder.bitcast(is_positive, bits), ir.Constant(bits, 2**LANES - 1)
+        )
+
+    return types.boolean(lanes), generate
+
+
 def _operator(symbol: Callable[[Any, Any], Any], name: str) -> None:
     """Let lanes understand an operator."""
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.float_lane_kernels import (
     LANES,
+    all_positive,
     larger,
     load,
     load_grey,
@@ -15,6 +16,7 @@ from navapp.geometry.float_lane_kernels import (
     spread,
     store,
     store_grey,
+    where_positive,
     whole,
 )
 
@@ -109,6 +111,30 @@ def value_down(picture: NDArray[np.uint8], place: np.float32, x: int) -> np.floa
 
 
 @njit(cache=True, nogil=True)
+def block_down(grey: NDArray[np.uint8], width: int, place: Any, row: int, first: int) -> Any:
+    """Values of `LANES` columns of a flat picture from `first` on, at places just below a row."""
+    w0, w1, w2, w3, w4, w5 = lanes_at(place - whole(place))
+    at = (row - _BEFORE) * width + first
+    value = w0 * load_grey(grey, at) + w1 * load_grey(grey, at + width)
+    at += 2 * width
+    value = value + w2 * load_grey(grey, at) + w3 * load_grey(grey, at + width)
+    at += 2 * width
+    return value + w4 * load_grey(grey, at) + w5 * load_grey(grey, at + width)
+
+
+@njit(cache=True, nogil=True)
+def is_in_two_rows(rows: NDArray[np.float32], first: int, height: int) -> bool:
+    """Whether `LANES` places lie between three rows of a picture, with room around them."""
+    low = np.floor(min(rows[first], rows[first + LANES - 1]))
+    if not (low >= np.float32(_BEFORE) and low + np.float32(_AFTER + 1) < np.float32(height)):
+        return False
+    one, lower = spread(np.float32(1.0)), whole(load(rows, first)) - spread(np.float32(low))
+    # Nothing but 0 and 1 will do.
+    wrong = lower * (lower - one)
+    return bool(all_positive(one - wrong * wrong))
+
+
+@njit(cache=True, nogil=True)
 def cross_row(
     picture: NDArray[np.uint8],
     rows: NDArray[np.float32],
@@ -131,15 +157,13 @@ def cross_row(
         row = int(np.floor(rows[first]))
         # A cut block is never in a row.
         if in_row[first // LANES] and row >= _BEFORE and row + _AFTER < height:
-            place = load(rows, first)
-            w0, w1, w2, w3, w4, w5 = lanes_at(place - whole(place))
-            at = (row - _BEFORE) * width + first
-            value = w0 * load_grey(grey, at) + w1 * load_grey(grey, at + width)
-            at += 2 * width
-            value = value + w2 * load_grey(grey, at) + w3 * load_grey(grey, at + width)
-            at += 2 * width
-            value = value + w4 * load_grey(grey, at) + w5 * load_grey(grey, at + width)
-            store(crossed, _BEFORE + first, value)
+            store(crossed, _BEFORE + first, block_down(grey, width, load(rows, first), row, first))
+        elif first + LANES <= width and is_in_two_rows(rows, first, height):
+            row, place = int(min(rows[first], rows[first + LANES - 1])), load(rows, first)
+            upper = block_down(grey, width, place, row, first)
+            lower = block_down(grey, width, place, row + 1, first)
+            is_lower = whole(place) - spread(np.float32(row))
+            store(crossed, _BEFORE + first, where_positive(is_lower, lower, upper))
         else:
             for x in range(first, min(first + LANES, width)):
                 crossed[_BEFORE + x] = value_down(picture, rows[x], x)

@@ -10,6 +10,7 @@ from numba.core.errors import TypingError
 from navapp.geometry import float_lane_kernels
 from navapp.geometry.float_lane_kernels import (
     LANES,
+    all_positive,
     lanes_for,
     load,
     spread,
@@ -43,6 +44,19 @@ def test_two_become_one(operate) -> None:
     # Nothing else is written.
     assert not out[:5].any()
     assert not out[5 + LANES :].any()
+
+
+def test_all_lanes_have_to_be_above_zero() -> None:
+    @njit
+    def run(a):
+        return all_positive(load(a, 0))
+
+    assert run(np.full(LANES, 0.1, dtype=np.float32))
+    for wrong in (0.0, -1.0, np.nan):
+        for lane in range(LANES):
+            values = np.ones(LANES, dtype=np.float32)
+            values[lane] = wrong
+            assert not run(values)
 
 
 def test_lanes_are_chosen_where_the_test_is_above_zero() -> None:

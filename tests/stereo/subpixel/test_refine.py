@@ -37,6 +37,18 @@ def in_box(values: np.ndarray) -> np.ndarray:
     return values[rows, columns].astype(np.float32)
 
 
+def bands_of(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """Rows, first and after the last, of every band of every step from now on."""
+    bands: list[tuple[int, int]] = []
+
+    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
+        bands.append((first, last))
+        band(fixed, refined, quality, first, last)
+
+    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+    return bands
+
+
 SLANT = 24.0 + 0.08 * np.arange(WIDTH)[None] + 0.05 * np.arange(HEIGHT)[:, None]
 
 
@@ -160,17 +172,11 @@ def test_with_a_stride_the_same_windows_answer_the_same(stride: int) -> None:
 def test_samples_at_rest_take_no_further_step(
     off_px: float, n_steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    steps: list[int] = []
-
-    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
-        steps.append(first)
-        band(fixed, refined, quality, first, last)
-
-    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+    bands = bands_of(monkeypatch)
     settings = RefineSettings(n_steps=3, stops_at_rest=True, last_step_px=0.3)
     found = refine_samples(pair_with(SLANT), in_box(SLANT + off_px), settings, 6)
     # The picture's rows are shared by two bands.
-    assert len(steps) == 2 * n_steps
+    assert len(bands) == 2 * n_steps
     assert abs(np.nanmedian(found.disparity_px - in_box(SLANT)[::6, ::6])) < 0.03
 
 
@@ -179,29 +185,17 @@ def test_every_thread_begins_at_a_row_of_samples(
     stride: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What lies between rows of samples is told by the one above, which another may not know."""
-    first_rows: set[int] = set()
-
-    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
-        first_rows.add(first)
-        band(fixed, refined, quality, first, last)
-
-    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+    bands = bands_of(monkeypatch)
     height = 20 * stride
     grey = np.full((height, WIDTH), 100, dtype=np.uint8)
     pair = RectifiedPair(grey, grey, geometry(), Box(60, 0, 70, height))
     refine_samples(pair, np.full((height, 70), 2.0, np.float32), RefineSettings(n_steps=1), stride)
-    assert len(first_rows) == 2
-    assert all(first % stride == 0 for first in first_rows)
+    assert len(bands) == 2
+    assert all(first % stride == 0 for first, _ in bands)
 
 
 def test_two_threads_share_the_support_not_the_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    bands: list[tuple[int, int]] = []
-
-    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
-        bands.append((first, last))
-        band(fixed, refined, quality, first, last)
-
-    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+    bands = bands_of(monkeypatch)
     support = in_box(SLANT)
     support[:20] = np.nan
     refine(pair_with(SLANT), support, RefineSettings(n_steps=1))
