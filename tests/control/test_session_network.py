@@ -1,5 +1,6 @@
 """A session with a projector over the network: every fault is told, and dark in time."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import partial
@@ -54,7 +55,13 @@ def room(monkeypatch) -> Iterator[Room]:
 
 
 FAULTS: dict[str, tuple[Callable[[Room], object], Callable[[Room], object], Reason, str]] = {
-    "unplugged": (Room.unplug, Room.plug, Reason.PROJECTOR_LOST, "no projector answers at"),
+    "unplugged": (
+        Room.unplug,
+        Room.plug,
+        Reason.PROJECTOR_LOST,
+        # A question may be on its way when the plug is pulled.
+        "no projector answers at|it has hung up",
+    ),
     "without mains": (
         lambda room: setattr(room.firmware, "is_powered", False),
         lambda room: setattr(room.firmware, "is_powered", True),
@@ -94,10 +101,10 @@ def test_a_fault_is_told_and_dark_in_time_and_passes(room, deed, repair, reason,
     deed(room)
     bench.until(lambda: room.is_dark_because(reason), 5.0)
     assert bench.state == "navigating"
-    assert words in bench.line("projector").detail
+    assert re.search(words, bench.line("projector").detail)
     alarm = next(event for event in reversed(bench.events) if event.level is EventLevel.ALARM)
     assert f"dark: {reason.value}" in alarm.text
-    assert words in alarm.text
+    assert re.search(words, alarm.text)
     bench.frames(3)
     assert bench.is_dark
     repair(room)
