@@ -102,7 +102,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             options.contents, options.markups, options.side, options.series, options.threshold,
             options.seed, options.region, options.label,
         )  # fmt: skip
-        if options.folder is None or any(given):
+        if options.folder is None or any(one not in (None, []) for one in given):
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")
         plan, origin = read_plan(options.folder), read_origin(options.folder)
     else:

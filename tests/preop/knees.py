@@ -55,18 +55,16 @@ def fibula_of(knee: KneeAnatomy) -> TriangleMesh:
 
 
 def obliquely_cut(knee: KneeAnatomy, is_capped: bool) -> dict[str, BoneModel]:
-    """Shafts cut 25 deg off their axis; closed with a flat cap, or marked as removed."""
+    """Shafts cut 25 deg off their axis; closed flat, or with a dome that is marked as removed."""
     bones = bones_of(knee)
     for name, sign in (("femur", 1.0), ("tibia", -1.0)):
         mesh = knee.bones[name]
         across = np.array([np.sin(np.radians(25.0)), 0.0, sign * np.cos(np.radians(25.0))])
         beyond = np.maximum(mesh.vertices_mm @ across - 88.0, 0.0)
-        squeezed = TriangleMesh(mesh.vertices_mm - beyond[:, None] * across, mesh.faces)
-        bones[name] = (
-            BoneModel(name, squeezed, knee.spec.side)
-            if is_capped
-            else BoneModel(name, mesh, knee.spec.side, is_removed=beyond > 0.0)
-        )
+        squeezed = mesh.vertices_mm - (1.0 if is_capped else 0.5) * beyond[:, None] * across
+        cut = TriangleMesh(squeezed, mesh.faces)
+        is_removed = (beyond > 0.0) & (not is_capped)
+        bones[name] = BoneModel(name, cut, knee.spec.side, is_removed=is_removed)
     return bones
 
 

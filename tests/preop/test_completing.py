@@ -16,7 +16,7 @@ from navapp.values import (
     SurgicalContent,
 )
 from tests.geometry.shapes import sphere
-from tests.preop.knees import bones_of, fibula_of, knees, obliquely_cut
+from tests.preop.knees import bones_of, fibula_of, knees
 
 KNEE = knees()[0]
 Z = np.array([0.0, 0.0, 1.0])
@@ -93,14 +93,6 @@ def test_a_side_that_is_not_given_is_estimated_and_said(sideless) -> None:
     assert "--side" in said[0]
     _, said = with_side(sideless, None, fibula_of(KNEE))
     assert "which is certain" in said[0]
-
-
-@pytest.mark.parametrize("is_capped", [False, True])
-def test_an_oblique_cut_does_not_hide_the_side(is_capped) -> None:
-    for knee in knees()[:8]:
-        bones, said = with_side(obliquely_cut(knee, is_capped), None, fibula_of(knee))
-        assert {bone.side for bone in bones.values()} == {knee.spec.side}, said
-        assert "certain" in said[0]
 
 
 def test_a_side_that_cannot_be_told_stays_unknown() -> None:

@@ -11,7 +11,7 @@ from navapp.geometry.simplify import simplified
 from navapp.preop.side import SideEstimate, estimate_side
 from navapp.values import BoneModel
 from tests.geometry.shapes import sphere
-from tests.preop.knees import fibula_of, knees, turned
+from tests.preop.knees import fibula_of, knees, obliquely_cut, turned
 
 BONES = Path(os.environ.get("NAVAPP_DATA", "../shared/data")) / "bones"
 SETS = [("femur",), ("tibia",), ("patella",), ("femur", "tibia"), ("femur", "tibia", "patella")]
@@ -107,6 +107,14 @@ def test_a_whole_real_knee_is_certain() -> None:
         spun = {n: type(m)(m.vertices_mm @ turn.T, m.faces) for n, m in bones.items()}
         estimate = estimated(spun)
         assert (estimate.side, estimate.certainty) != ("left", "certain"), np.degrees(angle)
+
+
+@pytest.mark.parametrize("is_capped", [False, True])
+def test_an_oblique_cut_does_not_lean_a_femur(is_capped) -> None:
+    """Slices across what is left of the cut's end would lean by degrees, some to the other side."""
+    for knee in knees()[:8]:
+        cut = {"femur": obliquely_cut(knee, is_capped)["femur"]}
+        assert estimate_side(cut).side == estimated({"femur": knee.bones["femur"]}).side
 
 
 def test_slices_of_a_bone_and_coarse_ones_are_survived() -> None:
