@@ -1,9 +1,10 @@
-"""Edges over which a mesh bends outward."""
+"""Edges over which a mesh bends outward, and those where it ends."""
 
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import half_edges, paired_half_edges, ridge_edges
+from navapp.geometry.mesh_edges import half_edges, open_border, paired_half_edges, ridge_edges
+from tests.registration.shapes import ball_mesh, grid_mesh, tube_mesh
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 # Two triangles a side, counter-clockwise from outside.
@@ -58,3 +59,18 @@ def test_an_edge_of_three_triangles_keeps_two() -> None:
     halves = paired_half_edges(faces)
     assert len(halves) == 7
     assert (halves[:, 1] >= 0).sum() == 1
+
+
+def test_a_border_is_where_the_surface_ends() -> None:
+    mesh = grid_mesh(lambda x, y: 0.0 * x, 10.0)
+    is_rim = np.abs(mesh.vertices_mm[:, :2]).max(axis=1) > 9.9
+    np.testing.assert_array_equal(open_border(len(is_rim), mesh.faces), is_rim)
+    tube = tube_mesh(20.0, 30.0)
+    is_end = np.abs(tube.vertices_mm[:, 1]) > 29.9
+    np.testing.assert_array_equal(open_border(len(is_end), tube.faces), is_end)
+
+
+def test_a_closed_surface_and_a_cloud_have_no_border() -> None:
+    mesh = ball_mesh(20.0, 200)
+    assert not open_border(200, mesh.faces).any()
+    assert not open_border(200, np.empty((0, 3), dtype=np.int32)).any()

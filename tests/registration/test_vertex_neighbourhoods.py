@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from navapp.geometry.mesh_edges import open_border
 from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table
 from tests.registration.shapes import ball_mesh, grid_mesh, tube_mesh
 
@@ -64,21 +63,6 @@ def test_a_vertex_that_no_face_touches_is_joined_to_the_mesh() -> None:
     alone = len(points) - 1
     assert (table[alone] >= 0).sum() == 8
     assert alone in table[table[alone, 0]]
-
-
-def test_a_border_is_where_the_surface_ends() -> None:
-    mesh = grid_mesh(lambda x, y: 0.0 * x, 10.0)
-    is_rim = np.abs(mesh.vertices_mm[:, :2]).max(axis=1) > 9.9
-    np.testing.assert_array_equal(open_border(len(is_rim), mesh.faces), is_rim)
-    tube = tube_mesh(20.0, 30.0)
-    is_end = np.abs(tube.vertices_mm[:, 1]) > 29.9
-    np.testing.assert_array_equal(open_border(len(is_end), tube.faces), is_end)
-
-
-def test_a_closed_surface_and_a_cloud_have_no_border() -> None:
-    mesh = ball_mesh(20.0, 200)
-    assert not open_border(200, mesh.faces).any()
-    assert not open_border(200, NO_FACES).any()
 
 
 def test_a_ball_bends_by_one_over_its_radius_in_all_tangents() -> None:
