@@ -22,6 +22,7 @@ from drivers.pjlink_messages import (
 from navapp.errors import DeviceLost, DeviceNotFound, DeviceProtocolError, DeviceTimeout
 
 _CONNECT_S, _REPLY_S = 3.0, 5.0
+_HUNG_UP = "it has hung up"
 
 
 class Connection(Protocol):
@@ -104,7 +105,7 @@ class PjlinkLine:
         try:
             self._connection.send(line.encode())
         except OSError as error:
-            raise _lost(str(error)) from error
+            raise _lost(_cause(error)) from error
         return parsed_reply(self._line(), command)
 
     def close(self) -> None:
@@ -144,9 +145,9 @@ class PjlinkLine:
         except TimeoutError as error:
             raise _silent() from error
         except OSError as error:
-            raise _lost(str(error)) from error
+            raise _lost(_cause(error)) from error
         if not data:
-            raise _lost("it has hung up")
+            raise _lost(_HUNG_UP)
         return data
 
 
@@ -156,6 +157,11 @@ def _silent() -> DeviceTimeout:
         subject="projector",
         remedy="end other programs that control it: most projectors serve one at a time",
     )
+
+
+def _cause(error: OSError) -> str:
+    """Whether a stream ends quietly, is reset or is a broken pipe is a matter of microseconds."""
+    return _HUNG_UP if isinstance(error, ConnectionError) else str(error)
 
 
 def _lost(why: str) -> DeviceLost:
