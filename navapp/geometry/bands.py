@@ -17,7 +17,7 @@ def _mark() -> None:
 
 
 def pool() -> ThreadPoolExecutor:
-    """The one helper, made at first use; its jobs must not wait for other jobs of it."""
+    """The one helper, made at first use; its jobs may wait for none that was begun after them."""
     with _lock:
         if not _pools:
             _pools.append(ThreadPoolExecutor(1, initializer=_mark))
@@ -37,15 +37,22 @@ class Job(Generic[_Answer]):
         is_alone = getattr(_here, "is_alone", False)
         self._begun: Future[_Answer] | None = None if is_alone else pool().submit(work)
         self._taken: list[_Answer] = []
+        self._asking = threading.Lock()
 
     def result(self) -> _Answer:
-        """The answer, or what went wrong, raised."""
-        if not self._taken:
-            if self._begun is None or self._begun.cancel():
-                self._taken.append(self._work())
-            else:
-                self._taken.append(self._begun.result())
-        return self._taken[0]
+        """The answer, or what went wrong, raised; whoever asks at the same time waits for it."""
+        with self._asking:
+            if not self._taken:
+                if self._begun is None or self._begun.cancel():
+                    self._taken.append(self._work())
+                else:
+                    self._taken.append(self._begun.result())
+            return self._taken[0]
+
+    def drop(self) -> None:
+        """Nobody wants the answer: it is over, or never begun, and its errors are nobody's."""
+        if self._begun is not None and not self._begun.cancel():
+            self._begun.exception()
 
     def __enter__(self) -> Self:
         return self
@@ -53,8 +60,8 @@ class Job(Generic[_Answer]):
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
             self.result()
-        elif self._begun is not None and not self._begun.cancel():
-            self._begun.exception()
+        else:
+            self.drop()
 
 
 def beside(work: Callable[[], _Answer]) -> Job[_Answer]:

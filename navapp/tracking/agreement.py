@@ -64,6 +64,11 @@ class Agreement:
         """Share of what nothing hides that was measured and agrees."""
         return self.coverage / max(1.0 - self.hidden_share, 1e-9)
 
+    @property
+    def lies_open(self) -> bool:
+        """More of the bone is seen where it should be than something hides."""
+        return self.coverage > self.hidden_share
+
 
 NO_AGREEMENT = Agreement(0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

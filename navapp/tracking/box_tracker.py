@@ -33,18 +33,23 @@ class BoxState:
     """What is remembered of one bone's box from picture to picture; bounded.
 
     Attributes:
-        picture: the newest one, grey and reduced.
+        newest: (H, W) or (H, W, 3) picture of the left camera; never written to.
         box: in that picture, px of the reduced one; None when it is not known.
         memory: what it looked like in accepted frames; None before the first.
         n_accepted: accepted frames so far that were learned from or might have been.
         least_hidden: smallest share of the bone that was hidden in an accepted frame.
     """
 
-    picture: Grey
+    newest: Image
     box: PictureBox | None
     memory: BoxMemory | None = None
     n_accepted: int = 0
     least_hidden: float = 1.0
+
+    @property
+    def picture(self) -> Grey:
+        """The newest one, grey and reduced: made when it is asked for, which few frames do."""
+        return reduced(self.newest)
 
     @property
     def picture_box(self) -> PictureBox | None:
@@ -63,10 +68,9 @@ def placed(
         box: of the pose, in that picture.
         hidden_share: of the bone, when the judge accepted the pose; None otherwise.
     """
-    picture = reduced(left)
-    state = BoxState(picture, None) if state is None else state
+    state = BoxState(left, None) if state is None else state
     small = None if box is None else box.resized(1.0 / _REDUCTION)
-    state = replace(state, picture=picture, box=small)
+    state = replace(state, newest=left, box=small)
     if small is None or hidden_share is None:
         return state
     least_hidden = min(state.least_hidden, hidden_share)
@@ -74,21 +78,21 @@ def placed(
         return state
     memory = state.memory
     if memory is None or state.n_accepted % _LEARN_EVERY == 0:
-        memory = taught(memory, picture, small)
-    return BoxState(picture, small, memory, state.n_accepted + 1, least_hidden)
+        memory = taught(memory, state.picture, small)
+    return BoxState(left, small, memory, state.n_accepted + 1, least_hidden)
 
 
 def followed(state: BoxState, left: Image) -> BoxState:
     """After a frame without a pose: the box where it moved, or where it is found again, or None."""
-    picture = reduced(left)
     memory = state.memory
     if memory is None:
-        return replace(state, picture=picture, box=None)
+        return replace(state, newest=left, box=None)
+    picture = reduced(left)
     carried = _carried(state, memory, picture)
     if carried is None or carried.likeness.similarity < SURE:
         found = [one for one in detected(memory, picture) if _is_enough(one, _FOUND)]
         carried = _likelier(carried, polished(memory, picture, found[0].box) if found else None)
-    return replace(state, picture=picture, box=None if carried is None else carried.box)
+    return replace(state, newest=left, box=None if carried is None else carried.box)
 
 
 def reduced(left: Image) -> Grey:
@@ -102,9 +106,12 @@ def reduced(left: Image) -> Grey:
 
 def _carried(state: BoxState, memory: BoxMemory, picture: Grey) -> Detection | None:
     """What the flow says, if it still looks like the bone."""
-    if state.box is None or state.picture.shape != picture.shape:
+    if state.box is None:
         return None
-    box = median_flow(state.picture, picture, state.box)
+    before = state.picture
+    if before.shape != picture.shape:
+        return None
+    box = median_flow(before, picture, state.box)
     if box is None:
         return None
     carried = polished(memory, picture, box)

@@ -3,20 +3,18 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import beside
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
-from navapp.tracking.agreement import Agreement
 from navapp.tracking.contours import ContourMeter
 from navapp.tracking.correlated_residuals import with_correlated_residuals
+from navapp.tracking.cross_checks import CrossCheck, CrossChecks
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge, within_tolerance
 from navapp.tracking.pair_doubts import row_check, with_pair_doubts
@@ -53,6 +51,7 @@ class FitJudge:
         timings: LineTimings,
         predicted: RigidTransform | None = None,
         coarse: CoarseMap | None = None,
+        checks: CrossChecks | None = None,
     ) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
 
@@ -63,38 +62,57 @@ class FitJudge:
             timings: of what came before the fit.
             predicted: pose expected by the motion model, in the rectified camera.
             coarse: whatever lies around the bone; matched anew where it does not reach.
+            checks: of that pair, if any were begun.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
         found, geometry = fit.measured.disparity, pair.geometry
         depth_mm = float(fit.pose.apply(self._model.centre_mm)[2])
-        # What the pictures say of their cameras does not ask for the pose.
-        with beside(lambda: measure_health(pair, found, geometry.disparity_px(depth_mm))) as health:
-            coarse_px = self.coarse_px(pair, fit, coarse)
-            # Nor does the model where it was seen: the outline hardly moves it.
-            with beside(partial(self._as_seen, fit, coarse_px)) as as_seen:
-                fit = self._contours.joined(pair, fit, coarse_px)
-                agreement = as_seen.result() if fit.moved_mm < _SAME_VIEW_MM else None
-            if fit.measured.view is not None:
-                fit = replace(fit, estimate=with_correlated_residuals(fit.estimate))
-            verdict = self._judge.judge(
-                self._model, fit.estimate, found, goal, predicted, coarse_px, agreement
-            )
-            verdict = with_pair_doubts(verdict, health.result(), geometry, depth_mm)
-            rows = row_check(health.result(), geometry, depth_mm)
-            verdict = within_tolerance(verdict, goal)
+        coarse = self._reaching(pair, fit.measured, fit.pose, coarse)
+        coarse_px = None if coarse is None else coarse.over(found.box)
+        with checks or self.checking(pair, lambda: coarse) as checks:
+            check = checks.begin(fit.measured, fit.pose)
+            fit = self._contours.joined(pair, fit, coarse_px)
+            health, agreement = check.result()
+        if agreement is not None:
+            shown = with_correlated_residuals(fit.estimate, lies_open=agreement.lies_open)
+            fit = replace(fit, estimate=shown)
+        # Where the fit has moved the model, it no longer looks as it was matched.
+        agreement = agreement if fit.moved_mm < _SAME_VIEW_MM else None
+        verdict = self._judge.judge(
+            self._model, fit.estimate, found, goal, predicted, coarse_px, agreement
+        )
+        verdict = with_pair_doubts(verdict, health, geometry, depth_mm)
+        verdict = within_tolerance(verdict, goal)
+        rows = row_check(health, geometry, depth_mm)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
         return TrackedFrame(self._model.bone.name, estimate, verdict, timings, rows)
 
-    def _as_seen(self, fit: Fit, coarse_px: NDArray[np.float32] | None) -> Agreement | None:
-        """How the model agrees where it was matched; None of a fit that has moved it since."""
-        seen = fit.measured
-        if seen.view is None or fit.moved_mm >= _SAME_VIEW_MM:
-            return None
-        return self._judge.agreement(self._model, fit.pose, seen.disparity, coarse_px, seen.view)
+    def checking(self, pair: RectifiedPair, coarse: Callable[[], CoarseMap | None]) -> CrossChecks:
+        """Checks of what is measured in a pair.
+
+        Args:
+            pair: pictures.
+            coarse: whatever lies around the bone; asked for when a check needs it.
+        """
+
+        def check(measured: Measurement, pose: RigidTransform) -> CrossCheck:
+            depth_mm = float(pose.apply(self._model.centre_mm)[2])
+            health = measure_health(pair, measured.disparity, pair.geometry.disparity_px(depth_mm))
+            if measured.view is None:
+                return CrossCheck(health, None)
+            around = self._reaching(pair, measured, pose, coarse())
+            found = measured.disparity
+            coarse_px = None if around is None else around.over(found.box)
+            return CrossCheck(
+                health,
+                self._judge.agreement(self._model, pose, found, coarse_px, measured.view),
+            )
+
+        return CrossChecks(check)
 
     def lost(self, reason: Reason, timings: LineTimings | None = None) -> TrackedFrame:
         """The answer when there is no fit to judge."""
@@ -131,22 +149,23 @@ class FitJudge:
             on_progress,
         )
 
-    def coarse_px(
-        self, pair: RectifiedPair, fit: Fit, coarse: CoarseMap | None = None
-    ) -> NDArray[np.float32] | None:
-        """(h, w) coarse disparity over the box of a fit; None out of view or depth.
-
-        Args:
-            pair: that it was fitted in.
-            fit: of the bone.
-            coarse: known already; matched anew when it does not reach over all of the box.
-        """
-        box = fit.measured.disparity.box
-        known_px = None if coarse is None else coarse.over(box)
-        if known_px is not None:
-            return known_px
-        coarse = self._meter.coarsely(pair, fit.pose, box)
+    def coarse_px(self, pair: RectifiedPair, fit: Fit) -> NDArray[np.float32] | None:
+        """(h, w) coarse disparity over the box of a fit; None out of view or depth."""
+        coarse = self._reaching(pair, fit.measured, fit.pose, None)
         return None if coarse is None else coarse.disparity_px
+
+    def _reaching(
+        self,
+        pair: RectifiedPair,
+        measured: Measurement,
+        pose: RigidTransform,
+        coarse: CoarseMap | None,
+    ) -> CoarseMap | None:
+        """A coarse map that reaches over all of a measurement's box; matched if need be."""
+        box = measured.disparity.box
+        if coarse is not None and coarse.over(box) is not None:
+            return coarse
+        return self._meter.coarsely(pair, pose, box)
 
     def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""

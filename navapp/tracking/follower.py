@@ -1,6 +1,7 @@
 """Following a pose onto the model itself: matching where it is expected, and fitting, in turns."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -14,6 +15,8 @@ from navapp.values import LineTimings, PoseEstimate, Reason
 # On the model a kernel as narrow as the noise costs little, and keeps out tissue that lies flush
 # with the bone.
 ON_MODEL = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
+
+OnMeasured = Callable[[Measurement, RigidTransform], object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,7 @@ class Follower:
         least_share: float = 0.0,
         *,
         is_near: bool = False,
+        on_measured: OnMeasured = lambda measured, pose: None,
     ) -> tuple[Fit | None, LineTimings]:
         """The pose where the model rests, near an expected one, and how long that took.
 
@@ -96,6 +100,8 @@ class Follower:
             pose: expected, in the rectified camera.
             least_share: when fewer of the samples answer, the bone is elsewhere.
             is_near: the pose is next to where it rests: samples see further than is good for it.
+            on_measured: told what was measured on all of the model, and at which pose, before it is
+                fitted to.
 
         Returns:
             No fit when the bone is elsewhere or out of view, or too few points answer.
@@ -110,7 +116,9 @@ class Follower:
                     break
                 timings = sum_timings(timings, LineTimings(stereo_ms=expected.render_ms))
             if is_near:
-                found = fitted(self._meter.on_model(expected), self._model, pose, ON_MODEL)
+                measured = self._meter.on_model(expected)
+                on_measured(measured, pose)
+                found = fitted(measured, self._model, pose, ON_MODEL)
                 timings = sum_timings(timings, found.timings)
                 has_enough = Reason.TOO_FEW_POINTS not in found.estimate.reasons
                 rested = found.pose if has_enough else None

@@ -163,10 +163,14 @@ class Line:
     ) -> TrackedFrame:
         """The answer near an expected pose; when its place is in doubt, that of a buried bone."""
         # What may hide the bone does not depend on where exactly it is.
-        with beside(lambda: self._meter.coarsely(pair, start)) as job:
-            fit = self.locator.locate(pair, start)
+        with (
+            beside(lambda: self._meter.coarsely(pair, start)) as job,
+            self._fit_judge.checking(pair, job.result) as checks,
+        ):
+            fit = self.locator.locate(pair, start, checks.begin)
             coarse = job.result()
-        answers = [self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse)]
+            first = self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse, checks)
+        answers = [first]
         if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
             return answers[0]
         for buried in self._buried.followed(pair, start, searches=searches):

@@ -12,6 +12,7 @@ from navapp.tracking.follower import (
     Fit,
     Follower,
     FollowerSettings,
+    OnMeasured,
     fitted,
     moved_surface_mm,
     sum_timings,
@@ -83,16 +84,28 @@ class Locator:
         """The paper's chain: one matching, one fit."""
         return self.settings.method == "icp"
 
-    def locate(self, pair: RectifiedPair, pose: RigidTransform) -> Fit | None:
+    def locate(
+        self,
+        pair: RectifiedPair,
+        pose: RigidTransform,
+        on_measured: OnMeasured = lambda measured, pose: None,
+    ) -> Fit | None:
         """The bone near an expected pose; None out of view.
 
         Matching on the model itself is exact but sees only what is close. When samples of it say
         that the bone is elsewhere, the surface is measured freely before it goes on. When the bone
         is half hidden, or moved, both are tried, and what explains more of the model stands.
+
+        Args:
+            pair: pictures.
+            pose: expected, in the rectified camera.
+            on_measured: told what is measured on the model next to that pose, before it is fitted.
         """
         if self.is_baseline:
             return self.search(pair, pose, self.settings.tracking)
-        stayed, timings = self._follower.follow(pair, pose, self.settings.hidden_share)
+        stayed, timings = self._follower.follow(
+            pair, pose, self.settings.hidden_share, on_measured=on_measured
+        )
         if stayed is not None and self._is_here(stayed, pose):
             return replace(stayed, timings=timings)
         found = self.search(pair, pose, self.settings.tracking)

@@ -74,15 +74,16 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             continue
         fit = parts.with_outline(pair, fit)
         targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
-        widened = with_correlated_residuals(fit.estimate)
+        lies_open = parts.lies_open(pair, fit)
+        shown = with_correlated_residuals(fit.estimate, lies_open=lies_open)
         bounds_mm = (
             predicted_tre_mm(one, parts.centre_mm, targets[:: max(1, len(targets) // 200)])
-            for one in (fit.estimate, widened)
+            for one in (fit.estimate, shown)
         )
         error_mm = mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
         ratio, is_misfit = (
             shown_ratio2(fit.estimate) ** 0.5,
-            Reason.SURFACE_MISFIT in widened.reasons,
+            Reason.SURFACE_MISFIT in shown.reasons,
         )
         yield Answer(ratio, is_misfit, error_mm, *bounds_mm)
 

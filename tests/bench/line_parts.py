@@ -39,3 +39,9 @@ class LineParts:
     def with_outline(self, pair: RectifiedPair, fit: Fit) -> Fit:
         """A fit of the surface, joined with the outline."""
         return self.contours.joined(pair, fit, self.judge.coarse_px(pair, fit))
+
+    def lies_open(self, pair: RectifiedPair, fit: Fit) -> bool:
+        """More of the model is seen than something hides."""
+        with self.judge.checking(pair, lambda: None) as checks:
+            agreement = checks.begin(fit.measured, fit.pose).result().agreement
+        return agreement is not None and agreement.lies_open

@@ -159,3 +159,40 @@ def test_an_error_of_what_it_does_itself_is_told_as_well():
 
     with pytest.raises(ValueError, match="inner"), beside(job) as outer:
         outer.result()
+
+
+def test_who_asks_while_another_does_the_job_waits_for_its_answer():
+    is_busy, let_go, done = threading.Event(), threading.Event(), []
+
+    def slow():
+        done.append(threading.current_thread().name)
+        is_busy.set()
+        let_go.wait(20.0)
+        return len(done)
+
+    with ExitStack() as stack:
+        held = stack.enter_context(beside(lambda: let_go.wait(20.0)))
+        while not held._begun.running():
+            let_go.wait(0.001)
+        job = stack.enter_context(beside(slow))
+        answers = []
+        askers = [threading.Thread(target=lambda: answers.append(job.result())) for _ in range(2)]
+        for asker in askers:
+            asker.start()
+        assert is_busy.wait(20.0)
+        let_go.set()
+        for asker in askers:
+            asker.join(20.0)
+    assert answers == [1, 1]
+
+
+def test_errors_of_a_dropped_job_are_nobodys():
+    begun = threading.Event()
+
+    def fails():
+        begun.set()
+        raise ValueError("job")
+
+    job = beside(fails)
+    assert begun.wait(20.0)
+    job.drop()

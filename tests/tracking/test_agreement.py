@@ -73,6 +73,13 @@ def test_what_something_nearer_hides_is_not_held_against_a_pose() -> None:
     assert aware.behind_share == 0.0
 
 
+def test_a_bone_lies_open_while_more_of_it_is_seen_than_hidden() -> None:
+    columns = np.arange(SEEN.shape[1])
+    for share, lies_open in ((0.35, True), (0.65, False)):
+        part = SEEN & (columns < np.quantile(np.nonzero(SEEN)[1], share))
+        assert agreement(silent_in(part), coarse(-20.0, part)).lies_open is lies_open
+
+
 def test_what_is_seen_through_the_model_is_told() -> None:
     part = half()
     found = agreement(silent_in(part), coarse(20.0, part))

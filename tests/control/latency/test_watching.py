@@ -7,9 +7,10 @@ import pytest
 
 from calibration.latency.code import pauses_ms
 from calibration.latency.judge import WORST_MS, judged_latency
+from calibration.latency.measure import Latency
 from navapp.control.latency.player import CodePlayer
-from navapp.control.latency.watching import watch
-from navapp.errors import DeviceLost, DeviceTimeout
+from navapp.control.latency.watching import Recording, watch
+from navapp.errors import DeviceLost, DeviceTimeout, ResultError
 from sim_devices.faults import Fault, FaultKind
 from tests.control.latency.rooms import MS, Breaking, Room
 
@@ -48,11 +49,24 @@ def test_the_truth_of_the_room_is_recovered(truth: dict[str, float]) -> None:
     assert recording.age_ms is None
 
 
+def recorded_and_judged(**truth: float) -> tuple[Recording, Latency]:
+    """In real time; again when the judge refuses what a busy machine did to a recording."""
+    for is_last in (False, False, True):
+        room = Room(is_stepped=False, **truth)
+        recording = watch(room.camera, player_of(room, 8.0), room.clock, nothing)
+        try:
+            found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+        except ResultError:
+            if is_last:
+                raise
+        else:
+            break
+    return recording, found
+
+
 @pytest.mark.slow
 def test_a_camera_that_runs_by_itself_is_read_while_a_thread_plays() -> None:
-    room = Room(is_stepped=False, rate_hz=43.0, delay_ms=55.0, unstamped_skew_ms=9.0)
-    recording = watch(room.camera, player_of(room, 8.0), room.clock, nothing)
-    found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+    recording, found = recorded_and_judged(rate_hz=43.0, delay_ms=55.0, unstamped_skew_ms=9.0)
     assert found.delay.value_ms == pytest.approx(55.0 + HALF_REFRESH_MS, abs=WORST_MS)
     assert found.late.value_ms == pytest.approx(9.0, abs=WORST_MS)
     assert recording.age_ms is not None
