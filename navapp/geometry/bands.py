@@ -50,7 +50,7 @@ class Job(Generic[_Answer]):
             return self._taken[0]
 
     def drop(self) -> None:
-        """Nobody wants the answer: it is over, or never begun, and its errors are nobody's."""
+        """Nobody wants the answer: never begun, or waited for, and its errors are nobody's."""
         if self._begun is not None and not self._begun.cancel():
             self._begun.exception()
 

@@ -65,7 +65,11 @@ def near(block: ResidualBlock, covariance: FloatArray) -> NDArray[np.bool_]:
 
 
 def join(
-    estimate: PoseEstimate, kernel_sigmas: float, block: ResidualBlock, centre_mm: FloatArray
+    estimate: PoseEstimate,
+    kernel_sigmas: float,
+    block: ResidualBlock,
+    centre_mm: FloatArray,
+    noise2: float = 1.0,
 ) -> PoseEstimate:
     """A pose that was fitted to a surface, moved to what it and a further block say together.
 
@@ -74,26 +78,28 @@ def join(
         kernel_sigmas: width of the kernel it was fitted with, in sigma.
         block: linearised at that pose.
         centre_mm: (3,) the model's centre at that pose, in the camera's frame.
+        noise2: variance that the surface's noise has, over the one that it claims.
 
     Returns:
-        The estimate as it was when the block says too little or pulls too far away; with the reason
+        The surface's pose when the block says too little or pulls too far away; with the reason
         that the cues disagree when too much of the block is further off than the estimate allows.
 
     Both blocks claim a noise and show one in their residuals. The pose is found with the noise they
     show, so that a block that claims too much of itself does not outweigh one that claims too
-    little; the covariance is that of this pose under the noise they claim.
+    little; the covariance is that of this pose under the noise that they have.
 
     Source: Gauss-Newton on the sum of squares, kernel weights as in `step_kernels.weigh`; variance
     components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
     """
+    alone = replace(estimate, covariance=noise2 * estimate.covariance)
     is_near = near(block, estimate.covariance)
     count_all, count_near = (float((1.0 / block.n_sharing[kept]).sum()) for kept in (..., is_near))
     if count_all < _FEWEST:
-        return estimate
+        return alone
     if count_all - count_near > _MOST_FAR * count_all + _BY_CHANCE:
-        return estimate.doubted(Reason.CUES_DISAGREE)
+        return alone.doubted(Reason.CUES_DISAGREE)
     if count_near < _FEWEST:
-        return estimate
+        return alone
     block = block.only(is_near)
     surface = np.zeros((7, 7))
     surface[:6, :6] = np.linalg.inv(estimate.covariance)
@@ -115,11 +121,12 @@ def join(
             np.linalg.solve(normal, weighted @ block.residual / scale), dtype=np.float64
         )
     if step @ surface @ step > _APART:
-        return estimate
+        return alone
     inverse = np.linalg.inv(normal)
     # A block that shows more noise than it claims is believed.
-    claimed = surface / surface_scale**2 + offset + information * max(scale, 1.0) / scale**2
-    covariance = (inverse @ claimed @ inverse)[:6, :6]
+    by_surface = noise2 * surface / surface_scale**2
+    by_block = information * max(scale, 1.0) / scale**2
+    covariance = (inverse @ (by_surface + offset + by_block) @ inverse)[:6, :6]
     pose = estimate.camera_from_bone.moved(step[:6], centre_mm)
     return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
 

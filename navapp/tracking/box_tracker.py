@@ -48,7 +48,7 @@ class BoxState:
 
     @property
     def picture(self) -> Grey:
-        """The newest one, grey and reduced: made when it is asked for, which few frames do."""
+        """The newest one, grey and reduced: a bone that is followed seldom asks for it."""
         return reduced(self.newest)
 
     @property

@@ -69,7 +69,13 @@ class ContourMeter:
             found.vertices_mm, found.edges, found.faces, found.opposite, found.planes
         )
 
-    def joined(self, pair: RectifiedPair, fit: Fit, coarse_px: NDArray[np.float32] | None) -> Fit:
+    def joined(
+        self,
+        pair: RectifiedPair,
+        fit: Fit,
+        coarse_px: NDArray[np.float32] | None,
+        noise2: float = 1.0,
+    ) -> Fit:
         """A fit to the model's surface, moved to what surface and outline say together.
 
         Any other fit stays as it is: from it the outline cannot be told from what lies around.
@@ -78,13 +84,14 @@ class ContourMeter:
             pair: that it was fitted in.
             fit: of the bone.
             coarse_px: (h, w) coarse disparity of whatever lies in its box.
+            noise2: variance that the surface's noise has, over the one that it claims.
         """
         estimate, view = fit.estimate, fit.measured.view
         if view is None or not np.isfinite(estimate.covariance).all():
             return fit
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
-        joined = join(estimate, ON_MODEL.n_sigmas, block, centre_mm)
+        joined = join(estimate, ON_MODEL.n_sigmas, block, centre_mm, noise2)
         moved_mm = moved_surface_mm(self._model, fit.pose, joined.camera_from_bone)
         return replace(fit, estimate=joined, moved_mm=fit.moved_mm + moved_mm)
 

@@ -34,24 +34,32 @@ def is_misfit(estimate: PoseEstimate) -> bool:
     return shown_ratio2(estimate) > _LARGEST_RATIO2
 
 
-def with_correlated_residuals(estimate: PoseEstimate, *, lies_open: bool = False) -> PoseEstimate:
-    """An estimate on the model whose covariance is what its residuals show, not what they claim.
+def noise_ratio2(*, lies_open: bool) -> float:
+    """Variance that the noise of a fit on the model has, over the one that it claims.
 
-    Of a bone that lies in the open, noise counts as what right poses show of the claim at most: an
-    a posteriori variance factor, but never less than theirs. Of one that is hidden for the most
-    part the claim stands: what lies flush with it may fit as well. What is beyond the noise goes
-    together over as many pixels as errors of a free measurement do, noise over a matching window:
-    with s^2 the ratio that is shown and s0^2 that of noise, what is beyond adds
-    max(0, s^2 - s0^2) (l_free / l_model)^2. When it is as large as the noise, the surface does not
-    fit.
+    Of a bone that lies in the open it is what right poses show at most, whatever this one shows:
+    few residuals may show less by chance. Of one that is hidden for the most part the claim stands:
+    what lies flush with it may fit as well.
+
+    Args:
+        lies_open: more of the model is seen than is hidden.
+    """
+    return _NOISE_RATIO**2 if lies_open else 1.0
+
+
+def with_correlated_residuals(estimate: PoseEstimate, noise2: float) -> PoseEstimate:
+    """An estimate on the model with what its residuals show beyond noise in its covariance.
+
+    That part goes together over as many pixels as errors of a free measurement do, noise over a
+    matching window: with e the ratio of its variance to the one that is claimed, the covariance
+    grows by 1 + e / n^2 (l_free / l_model)^2. When it is as large as the noise, the surface does
+    not fit.
 
     Args:
         estimate: of a fit on the model.
-        lies_open: more of the model is seen than is hidden.
+        noise2: n^2, see `noise_ratio2`: what its covariance was made with.
     """
-    noise_ratio2 = _NOISE_RATIO**2
-    excess = max(0.0, shown_ratio2(estimate) - noise_ratio2)
-    together = excess * (FREE_CORRELATION_PX / MODEL_CORRELATION_PX) ** 2
-    factor = (noise_ratio2 if lies_open else 1.0) + together
-    scaled = replace(estimate, covariance=factor * estimate.covariance)
-    return scaled.doubted(Reason.SURFACE_MISFIT) if is_misfit(estimate) else scaled
+    excess = max(0.0, shown_ratio2(estimate) - _NOISE_RATIO**2)
+    growth = 1.0 + excess / noise2 * (FREE_CORRELATION_PX / MODEL_CORRELATION_PX) ** 2
+    widened = replace(estimate, covariance=growth * estimate.covariance)
+    return widened.doubted(Reason.SURFACE_MISFIT) if is_misfit(estimate) else widened

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
 from navapp.geometry.bands import Job, beside
 from navapp.geometry.transform import RigidTransform
 from navapp.stereo import StereoHealth
@@ -20,14 +23,16 @@ class CrossCheck(NamedTuple):
     Attributes:
         health: of its pair of pictures.
         agreement: of the model where it was matched; None of a free measurement.
+        coarse_px: (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
     """
 
     health: StereoHealth
     agreement: Agreement | None
+    coarse_px: NDArray[np.float32] | None
 
 
 class CrossChecks:
-    """The check of the newest measurement; a context that leaves none behind."""
+    """Of what is measured in one pair of pictures; a context that leaves none running."""
 
     def __init__(self, check: Callable[[Measurement, RigidTransform], CrossCheck]) -> None:
         """Of one pair of pictures.
@@ -38,12 +43,16 @@ class CrossChecks:
         self._check = check
         self._begun: tuple[Measurement, Job[CrossCheck]] | None = None
 
-    def begin(self, measured: Measurement, pose: RigidTransform) -> Job[CrossCheck]:
-        """The check of a measurement, begun on the helper unless it has been."""
-        if self._begun is None or self._begun[0] is not measured:
-            self._drop()
-            self._begun = measured, beside(partial(self._check, measured, pose))
-        return self._begun[1]
+    def begin(self, measured: Measurement, pose: RigidTransform) -> None:
+        """Begin the check of a measurement on the helper."""
+        self._drop()
+        self._begun = measured, beside(partial(self._check, measured, pose))
+
+    def of(self, measured: Measurement, pose: RigidTransform) -> CrossCheck:
+        """The check of a measurement: the one that was begun, or a new one."""
+        if self._begun is not None and self._begun[0] is measured:
+            return self._begun[1].result()
+        return self._check(measured, pose)
 
     def __enter__(self) -> Self:
         return self

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates
 from navapp.stereo import measure_health
 from navapp.tracking.contours import ContourMeter
-from navapp.tracking.correlated_residuals import with_correlated_residuals
+from navapp.tracking.correlated_residuals import noise_ratio2, with_correlated_residuals
 from navapp.tracking.cross_checks import CrossCheck, CrossChecks
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal, Judge, within_tolerance
@@ -67,25 +68,21 @@ class FitJudge:
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
-        found, geometry = fit.measured.disparity, pair.geometry
         depth_mm = float(fit.pose.apply(self._model.centre_mm)[2])
-        coarse = self._reaching(pair, fit.measured, fit.pose, coarse)
-        coarse_px = None if coarse is None else coarse.over(found.box)
-        with checks or self.checking(pair, lambda: coarse) as checks:
-            check = checks.begin(fit.measured, fit.pose)
-            fit = self._contours.joined(pair, fit, coarse_px)
-            health, agreement = check.result()
+        checks = checks or self.checking(pair, lambda: coarse)
+        health, agreement, coarse_px = checks.of(fit.measured, fit.pose)
         if agreement is not None:
-            shown = with_correlated_residuals(fit.estimate, lies_open=agreement.lies_open)
-            fit = replace(fit, estimate=shown)
-        # Where the fit has moved the model, it no longer looks as it was matched.
-        agreement = agreement if fit.moved_mm < _SAME_VIEW_MM else None
+            noise2 = noise_ratio2(lies_open=agreement.lies_open)
+            fit = self._contours.joined(pair, fit, coarse_px, noise2)
+            fit = replace(fit, estimate=with_correlated_residuals(fit.estimate, noise2))
+        # A model that the fit has moved no longer looks as it was matched.
         verdict = self._judge.judge(
-            self._model, fit.estimate, found, goal, predicted, coarse_px, agreement
-        )
-        verdict = with_pair_doubts(verdict, health, geometry, depth_mm)
+            self._model, fit.estimate, fit.measured.disparity, goal, predicted, coarse_px,
+            agreement if fit.moved_mm < _SAME_VIEW_MM else None,
+        )  # fmt: skip
+        verdict = with_pair_doubts(verdict, health, pair.geometry, depth_mm)
         verdict = within_tolerance(verdict, goal)
-        rows = row_check(health, geometry, depth_mm)
+        rows = row_check(health, pair.geometry, depth_mm)
         judge_ms = (time.perf_counter_ns() - started) / 1e6
         timings = replace(sum_timings(timings, fit.timings), judge_ms=timings.judge_ms + judge_ms)
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
@@ -96,21 +93,19 @@ class FitJudge:
 
         Args:
             pair: pictures.
-            coarse: whatever lies around the bone; asked for when a check needs it.
+            coarse: whatever lies around the bone, when a check asks for it; matched anew where it
+                does not reach.
         """
 
         def check(measured: Measurement, pose: RigidTransform) -> CrossCheck:
+            found, view = measured.disparity, measured.view
             depth_mm = float(pose.apply(self._model.centre_mm)[2])
-            health = measure_health(pair, measured.disparity, pair.geometry.disparity_px(depth_mm))
-            if measured.view is None:
-                return CrossCheck(health, None)
-            around = self._reaching(pair, measured, pose, coarse())
-            found = measured.disparity
-            coarse_px = None if around is None else around.over(found.box)
-            return CrossCheck(
-                health,
-                self._judge.agreement(self._model, pose, found, coarse_px, measured.view),
-            )
+            health = measure_health(pair, found, pair.geometry.disparity_px(depth_mm))
+            coarse_px = self._coarse_px(pair, found.box, pose, coarse())
+            if view is None:
+                return CrossCheck(health, None, coarse_px)
+            agreement = self._judge.agreement(self._model, pose, found, coarse_px, view)
+            return CrossCheck(health, agreement, coarse_px)
 
         return CrossChecks(check)
 
@@ -149,23 +144,15 @@ class FitJudge:
             on_progress,
         )
 
-    def coarse_px(self, pair: RectifiedPair, fit: Fit) -> NDArray[np.float32] | None:
-        """(h, w) coarse disparity over the box of a fit; None out of view or depth."""
-        coarse = self._reaching(pair, fit.measured, fit.pose, None)
+    def _coarse_px(
+        self, pair: RectifiedPair, box: Box, pose: RigidTransform, coarse: CoarseMap | None
+    ) -> NDArray[np.float32] | None:
+        """(h, w) of a coarse map over a box; matched where the map does not reach."""
+        known_px = None if coarse is None else coarse.over(box)
+        if known_px is not None:
+            return known_px
+        coarse = self._meter.coarsely(pair, pose, box)
         return None if coarse is None else coarse.disparity_px
-
-    def _reaching(
-        self,
-        pair: RectifiedPair,
-        measured: Measurement,
-        pose: RigidTransform,
-        coarse: CoarseMap | None,
-    ) -> CoarseMap | None:
-        """A coarse map that reaches over all of a measurement's box; matched if need be."""
-        box = measured.disparity.box
-        if coarse is not None and coarse.over(box) is not None:
-            return coarse
-        return self._meter.coarsely(pair, pose, box)
 
     def _unrectified(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""

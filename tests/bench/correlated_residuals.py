@@ -15,7 +15,11 @@ import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
-from navapp.tracking.correlated_residuals import shown_ratio2, with_correlated_residuals
+from navapp.tracking.correlated_residuals import (
+    noise_ratio2,
+    shown_ratio2,
+    with_correlated_residuals,
+)
 from navapp.values import BoneModel, Reason, predicted_tre_mm, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -72,10 +76,10 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
         fit = parts.locator.locate(pair, true.moved(off, true.apply(parts.centre_mm)))
         if fit is None or fit.measured.view is None:
             continue
+        noise2 = noise_ratio2(lies_open=parts.lies_open(pair, fit))
+        shown = with_correlated_residuals(parts.with_outline(pair, fit, noise2).estimate, noise2)
         fit = parts.with_outline(pair, fit)
         targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
-        lies_open = parts.lies_open(pair, fit)
-        shown = with_correlated_residuals(fit.estimate, lies_open=lies_open)
         bounds_mm = (
             predicted_tre_mm(one, parts.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit.estimate, shown)

@@ -1,5 +1,8 @@
 """The parts of a line, each on its own, joined as `Line` joins them."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
@@ -36,12 +39,16 @@ class LineParts:
         """The pictures rectified around a pose in the rectified left camera."""
         return self.meter.rectified(left, right, around, margins)[0]
 
-    def with_outline(self, pair: RectifiedPair, fit: Fit) -> Fit:
+    def coarse_px(self, pair: RectifiedPair, fit: Fit) -> NDArray[np.float32] | None:
+        """(h, w) coarse disparity of whatever lies in a fit's box; None out of view or depth."""
+        coarse = self.meter.coarsely(pair, fit.pose, fit.measured.disparity.box)
+        return None if coarse is None else coarse.disparity_px
+
+    def with_outline(self, pair: RectifiedPair, fit: Fit, noise2: float = 1.0) -> Fit:
         """A fit of the surface, joined with the outline."""
-        return self.contours.joined(pair, fit, self.judge.coarse_px(pair, fit))
+        return self.contours.joined(pair, fit, self.coarse_px(pair, fit), noise2)
 
     def lies_open(self, pair: RectifiedPair, fit: Fit) -> bool:
         """More of the model is seen than something hides."""
-        with self.judge.checking(pair, lambda: None) as checks:
-            agreement = checks.begin(fit.measured, fit.pose).result().agreement
+        agreement = self.judge.checking(pair, lambda: None).of(fit.measured, fit.pose).agreement
         return agreement is not None and agreement.lies_open

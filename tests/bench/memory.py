@@ -77,7 +77,7 @@ def followed(recording: Recording, n_frames: int) -> Iterator[tuple[int, bool]]:
         place = min(number % period, period - number % period)
         frame = recording.frames[place]
         right = dark if number % period == period - 1 else frame.right
-        tracked, state = line.track(frame.left, right, number * _FRAME_NS, state, _GOAL)
+        tracked, state = line.track(frame.left.copy(), right, number * _FRAME_NS, state, _GOAL)
         is_ok = tracked.verdict.status is Status.OK
         if is_ok and tracked.left_from_bone is not None:
             recording.overlay(place, tracked.left_from_bone)

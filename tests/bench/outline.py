@@ -152,7 +152,7 @@ def near_shares(case: Case, parts: LineParts, seed: int) -> Iterator[float]:
     pair, fit = located(case, parts, seed)
     if fit is None:
         return
-    measured, coarse_px = fit.measured, parts.judge.coarse_px(pair, fit)
+    measured, coarse_px = fit.measured, parts.coarse_px(pair, fit)
     block = parts.contours.block(pair, fit.pose, measured.view, measured.disparity, coarse_px)
     weight = 1.0 / block.n_sharing
     if weight.sum() >= FEWEST:

@@ -119,11 +119,26 @@ def test_a_surface_without_residuals_is_survived() -> None:
     assert np.isfinite(joined.covariance).all()
 
 
-def test_a_block_that_says_too_little_changes_nothing() -> None:
+@pytest.mark.parametrize("noise2", [1.0, 0.4])
+def test_a_block_that_says_too_little_changes_nothing(noise2: float) -> None:
     few = block_of(drawn(1), n=5)
-    assert join(SURFACE, WIDE, few, CENTRE_MM) is SURFACE
     sharing = replace(block_of(drawn(1), n=400), n_sharing=np.full(400, 100.0))
-    assert join(SURFACE, WIDE, sharing, CENTRE_MM) is SURFACE
+    for block in (few, sharing):
+        joined = join(SURFACE, WIDE, block, CENTRE_MM, noise2)
+        assert joined.camera_from_bone is SURFACE.camera_from_bone
+        np.testing.assert_allclose(joined.covariance, noise2 * SURFACE.covariance)
+
+
+def test_the_surfaces_noise_is_the_surfaces_alone() -> None:
+    """Half of the information each: that of the block stays what it claims."""
+    block = block_of(np.zeros(6))
+    rows = np.column_stack([block.jacobian, np.ones(len(block.residual))]) / SIGMA
+    normal = rows.T @ rows + np.diag([0.0] * 6 + [COMMON_SD**-2])
+    alike = estimate_of(np.linalg.inv(normal)[:6, :6])
+    whole, quiet = (join(alike, WIDE, block, CENTRE_MM, noise2) for noise2 in (1.0, 0.4))
+    assert quiet.camera_from_bone.matrix == pytest.approx(whole.camera_from_bone.matrix)
+    ratio = np.trace(quiet.covariance[:3, :3]) / np.trace(whole.covariance[:3, :3])
+    assert ratio == pytest.approx(0.7, abs=0.05)
 
 
 def test_more_noise_than_claimed_is_believed() -> None:

@@ -1,5 +1,8 @@
 """Checks that run while a pose is fitted."""
 
+import threading
+import time
+
 import numpy as np
 import pytest
 
@@ -31,30 +34,55 @@ class Checked:
     def __call__(self, measured: Measurement, pose: RigidTransform) -> CrossCheck:
         assert pose is POSE
         self.asked.append(measured)
-        return CrossCheck(StereoHealth(LIGHT, LIGHT, n_points=len(self.asked)), None)
+        return CrossCheck(StereoHealth(LIGHT, LIGHT, n_points=len(self.asked)), None, None)
 
 
-def test_a_measurement_is_checked_once() -> None:
+def test_a_measurement_whose_check_was_begun_is_checked_once() -> None:
     checked, measured = Checked(), measurement()
     with CrossChecks(checked) as checks:
         checks.begin(measured, POSE)
-        assert checks.begin(measured, POSE).result().health.n_points == 1
+        assert checks.of(measured, POSE).health.n_points == 1
     assert checked.asked == [measured]
 
 
-def test_the_newest_measurement_is_the_one_that_is_told() -> None:
+def test_another_measurement_has_a_check_of_its_own() -> None:
+    checked, begun, other = Checked(), measurement(), measurement()
+    with CrossChecks(checked) as checks:
+        checks.begin(begun, POSE)
+        checks.of(other, POSE)
+    assert other in checked.asked
+
+
+def test_the_newest_measurement_is_the_one_that_is_kept() -> None:
     checked, old, new = Checked(), measurement(), measurement()
     with CrossChecks(checked) as checks:
         checks.begin(old, POSE)
-        checks.begin(new, POSE).result()
-    assert checked.asked[-1] is new
+        checks.begin(new, POSE)
+        checks.of(new, POSE)
+    assert checked.asked.count(new) == 1
 
 
-def test_a_check_that_fails_is_told_to_who_asks_and_to_nobody_else() -> None:
+def test_no_check_outlives_its_pair() -> None:
+    is_busy, ended = threading.Event(), []
+
+    def slow(measured: Measurement, pose: RigidTransform) -> CrossCheck:
+        is_busy.set()
+        time.sleep(0.05)
+        ended.append(measured)
+        raise ValueError("check")
+
+    with CrossChecks(slow) as checks:
+        checks.begin(measurement(), POSE)
+        assert is_busy.wait(20.0)
+    assert len(ended) == 1
+
+
+def test_a_check_that_fails_is_told_to_who_asks() -> None:
     def fails(measured: Measurement, pose: RigidTransform) -> CrossCheck:
         raise ValueError("check")
 
+    measured = measurement()
     with CrossChecks(fails) as checks:
-        checks.begin(measurement(), POSE)
-    with CrossChecks(fails) as checks, pytest.raises(ValueError, match="check"):
-        checks.begin(measurement(), POSE).result()
+        checks.begin(measured, POSE)
+        with pytest.raises(ValueError, match="check"):
+            checks.of(measured, POSE)

@@ -132,3 +132,13 @@ def test_a_bone_that_never_rests_has_not_settled() -> None:
     assert Reason.NOT_CONVERGED in fit.estimate.reasons
     fit, _ = follower(FakeMeter()).follow(PAIR, NEAR)
     assert Reason.NOT_CONVERGED not in fit.estimate.reasons
+
+
+def test_what_is_measured_on_the_model_is_told_before_it_is_fitted() -> None:
+    meter, told = FakeMeter(), []
+    fit, _ = follower(meter, RESTLESS).follow(
+        PAIR, NEAR, on_measured=lambda measured, pose: told.append((measured, pose))
+    )
+    assert len(told) == meter.asked.count("on_model") > 1
+    assert told[-1][0] is fit.measured
+    assert told[-1][1] is not fit.pose

@@ -386,3 +386,9 @@ def test_a_dark_pair_gives_no_pose_of_its_own() -> None:
     fit = locator.locate(dark, true)
     assert asked.count("freely") == 1
     assert Reason.TOO_FEW_POINTS in fit.estimate.reasons
+
+
+def test_what_is_measured_next_to_the_expected_pose_is_told() -> None:
+    told = []
+    fit = locator_of(FakeMeter()).locate(PAIR, TRUE, lambda measured, pose: told.append(measured))
+    assert told[-1] is fit.measured

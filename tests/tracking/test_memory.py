@@ -11,7 +11,7 @@ from tests.tracking.rooms import GOAL, Room, room
 
 N_WARM, N_MORE = 12, 24
 PERIOD_NS = 66_000_000
-# The grey picture of a box has 100,000. Caches of the interpreter fill by some 1,000 at first.
+# A picture has millions. Caches of the interpreter fill by some 1,000 at first.
 LARGEST_GROWTH_BYTES_PER_FRAME = 5000
 
 
@@ -20,7 +20,8 @@ def followed(a: Room, state: TrackState, first: int, n: int) -> TrackState:
     for number in range(first, first + n):
         frame = a.frames[number % len(a.frames)]
         right = np.zeros_like(frame.right) if number % 12 == 11 else frame.right
-        _, state = a.line.track(frame.left, right, number * PERIOD_NS, state, GOAL)
+        left = frame.left.copy()  # a camera's pictures are new as well
+        _, state = a.line.track(left, right, number * PERIOD_NS, state, GOAL)
     return state
 
 
