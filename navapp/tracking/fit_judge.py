@@ -51,7 +51,6 @@ class FitJudge:
         goal: Goal,
         timings: LineTimings,
         predicted: RigidTransform | None = None,
-        coarse: CoarseMap | None = None,
         checks: CrossChecks | None = None,
     ) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
@@ -62,14 +61,13 @@ class FitJudge:
             goal: of the stage.
             timings: of what came before the fit.
             predicted: pose expected by the motion model, in the rectified camera.
-            coarse: whatever lies around the bone; matched anew where it does not reach.
-            checks: of that pair, if any were begun.
+            checks: of that pair, where more than the fit is known of it.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, timings)
         started = time.perf_counter_ns()
         depth_mm = float(fit.pose.apply(self._model.centre_mm)[2])
-        checks = checks or self.checking(pair, lambda: coarse)
+        checks = checks or self.checking(pair)
         health, agreement, coarse_px = checks.of(fit.measured, fit.pose)
         if agreement is not None:
             noise2 = noise_ratio2(lies_open=agreement.lies_open)
@@ -88,7 +86,9 @@ class FitJudge:
         estimate = None if verdict.predicted_tre_mm is None else self._unrectified(fit.estimate)
         return TrackedFrame(self._model.bone.name, estimate, verdict, timings, rows)
 
-    def checking(self, pair: RectifiedPair, coarse: Callable[[], CoarseMap | None]) -> CrossChecks:
+    def checking(
+        self, pair: RectifiedPair, coarse: Callable[[], CoarseMap | None] = lambda: None
+    ) -> CrossChecks:
         """Checks of what is measured in a pair.
 
         Args:

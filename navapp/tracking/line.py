@@ -139,10 +139,11 @@ class Line:
         expected = self._rectified(state.predicted(captured_ns, self.centre_mm))
         pair, timings = self._rectified_pair(left, right, expected, NEAR_VIEW)
         coarse = self._meter.coarsely(pair, expected)
+        checks = self._fit_judge.checking(pair, lambda: coarse)
         answers = [self._fit_judge.lost(Reason.BONE_LOST, timings)]
         for fit in self.locator.rests(pair, expected):
             timings = answers[-1].timings
-            answers.append(self._fit_judge.judged(pair, fit, goal, timings, expected, coarse))
+            answers.append(self._fit_judge.judged(pair, fit, goal, timings, expected, checks))
             if not is_place_doubted(answers[-1].verdict):
                 break
         best = min(reversed(answers), key=lambda one: one.verdict.order)
@@ -168,14 +169,13 @@ class Line:
             self._fit_judge.checking(pair, job.result) as checks,
         ):
             fit = self.locator.locate(pair, start, checks.begin)
-            coarse = job.result()
-            first = self._fit_judge.judged(pair, fit, goal, timings, predicted, coarse, checks)
+            first = self._fit_judge.judged(pair, fit, goal, timings, predicted, checks)
         answers = [first]
         if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
             return answers[0]
         for buried in self._buried.followed(pair, start, searches=searches):
             timings = answers[-1].timings
-            answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, coarse))
+            answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, checks))
             if answers[-1].verdict.status is Status.OK:
                 break
         return replace(min(answers, key=lambda one: one.verdict.order), timings=answers[-1].timings)

@@ -50,5 +50,5 @@ class LineParts:
 
     def lies_open(self, pair: RectifiedPair, fit: Fit) -> bool:
         """More of the model is seen than something hides."""
-        agreement = self.judge.checking(pair, lambda: None).of(fit.measured, fit.pose).agreement
+        agreement = self.judge.checking(pair).of(fit.measured, fit.pose).agreement
         return agreement is not None and agreement.lies_open
