@@ -180,7 +180,7 @@ def main() -> None:
     options = parser.parse_args()
     print("| threads | chain | TRE mm | ms p50 | p95 | CPU ms | frames/s | of peers | parts, ms |")
     print("|---|---|---|---|---|---|---|---|---|", flush=True)
-    cores = sorted(os.sched_getaffinity(0))
+    cores, failed = sorted(os.sched_getaffinity(0)), 0
     for n_threads in options.threads:
         # Open3D has threads that only the cores of its process limit, from its start on.
         os.sched_setaffinity(0, cores[:n_threads])
@@ -188,7 +188,8 @@ def main() -> None:
         child = multiprocessing.get_context("spawn").Process(target=compare, args=given)
         child.start()
         child.join()
-    sys.exit(child.exitcode)
+        failed = failed or child.exitcode
+    sys.exit(failed)
 
 
 def compare(n_threads: int, seed: int, n_frames: int, n_runs: int) -> None:
