@@ -1,5 +1,6 @@
 """Rectangles of pixels: where in a picture something is."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,9 +55,11 @@ class Box:
     @classmethod
     def around(cls, pixels: FloatArray) -> "Box | None":
         """The smallest box around pixel positions (N, 2); None when none is finite."""
-        finite = pixels[np.isfinite(pixels).all(axis=1)]
+        is_finite = np.isfinite(pixels[:, 0]) & np.isfinite(pixels[:, 1])
+        finite = pixels if is_finite.all() else pixels[is_finite]
         if len(finite) == 0:
             return None
-        low = np.floor(finite.min(axis=0)).astype(int)
-        high = np.ceil(finite.max(axis=0)).astype(int)
-        return cls(int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1))
+        columns, rows = finite[:, 0], finite[:, 1]
+        x, y = math.floor(columns.min()), math.floor(rows.min())
+        last_x, last_y = math.ceil(columns.max()), math.ceil(rows.max())
+        return cls(x, y, last_x - x + 1, last_y - y + 1)

@@ -63,16 +63,13 @@ class Camera:
     def project(self, points_mm: ArrayLike) -> FloatArray:
         """(N, 2) px of points (N, 3) mm in this camera's frame; NaN at or behind the camera."""
         points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 3)
-        pixels = np.full((len(points), 2), np.nan)
-        front = points[:, 2] > 1e-6
-        if not front.any():
-            return pixels
-        x = points[front, 0] / points[front, 2]
-        y = points[front, 1] / points[front, 2]
+        depth = np.where(points[:, 2] > 1e-6, points[:, 2], np.nan)
+        x, y = points[:, 0] / depth, points[:, 1] / depth
         if self.is_distorted:
             x, y = distort(x, y, self.distortion)
-        pixels[front, 0] = self.matrix[0, 0] * x + self.matrix[0, 2]
-        pixels[front, 1] = self.matrix[1, 1] * y + self.matrix[1, 2]
+        pixels = np.empty((len(points), 2))
+        pixels[:, 0] = self.matrix[0, 0] * x + self.matrix[0, 2]
+        pixels[:, 1] = self.matrix[1, 1] * y + self.matrix[1, 2]
         return pixels
 
     def rays(self, pixels: ArrayLike) -> FloatArray:

@@ -14,6 +14,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer_kernels import (
+    N_COEFFICIENTS,
     bounds_of_points,
     project_points,
     raster_nearest,
@@ -69,14 +70,16 @@ def render(
         is_whole: the whole picture; otherwise only the box around the mesh, empty out of view.
         is_closed: as for `render_rectified`.
     """
-    points_mm = camera_from_mesh.apply(mesh.vertices_mm)
-    pixels = camera.project(points_mm)
+    matrix = camera.matrix
+    focal_px, centre = (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2])
+    distortion = camera.distortion if camera.is_distorted else None
+    pixels, depths_mm = _projected(mesh, camera_from_mesh, focal_px, centre, distortion)
     box = Box(0, 0, camera.width, camera.height)
     if not is_whole:
         around = Box.around(pixels)
         box = Box(0, 0, 0, 0) if around is None else around.clipped(camera.width, camera.height)
-    shifted = np.ascontiguousarray(pixels - (box.x, box.y))
-    return _raster(shifted, points_mm[:, 2].copy(), mesh.faces, box, is_closed)
+    pixels -= (box.x, box.y)
+    return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
 def render_rectified(
@@ -97,12 +100,9 @@ def render_rectified(
         is_closed: the mesh has no border, and its triangles look outward: half of them need not be
             drawn.
     """
-    pixels, depths_mm = np.empty((len(mesh.vertices_mm), 2)), np.empty(len(mesh.vertices_mm))
-    project_points(
-        mesh.vertices_mm, rectified_from_mesh.rotation, rectified_from_mesh.translation_mm,
-        geometry.focal_px, (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y),
-        pixels, depths_mm,
-    )  # fmt: skip
+    focal_px = (geometry.focal_px, geometry.focal_px)
+    centre = (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y)
+    pixels, depths_mm = _projected(mesh, rectified_from_mesh, focal_px, centre)
     return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
@@ -152,6 +152,27 @@ def unhidden_vertices(
     surface_mm = view.depth_mm[row[inside], column[inside]]
     shown[inside] = points_mm[inside, 2] <= surface_mm + _SELF_OCCLUSION_MM
     return shown
+
+
+def _projected(
+    mesh: TriangleMesh,
+    camera_from_mesh: RigidTransform,
+    focal_px: tuple[float, float],
+    centre: tuple[float, float],
+    distortion: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Pixels (V, 2) and depths (V,) mm of the vertices; see `project_points`."""
+    n, rotation, shift_mm = (
+        len(mesh.vertices_mm), camera_from_mesh.rotation, camera_from_mesh.translation_mm
+    )  # fmt: skip
+    pixels, depths_mm = np.empty((n, 2)), np.empty(n)
+    coefficients = np.zeros(0 if distortion is None else N_COEFFICIENTS)
+    if distortion is not None:
+        coefficients[: len(distortion)] = distortion
+    project_points(
+        mesh.vertices_mm, rotation, shift_mm, focal_px, centre, coefficients, pixels, depths_mm
+    )
+    return pixels, depths_mm
 
 
 def _raster(

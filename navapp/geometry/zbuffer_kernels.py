@@ -15,36 +15,56 @@ from navapp.geometry.float_lane_kernels import (
     where_positive,
 )
 
+# Of OpenCV's model, the tilt included.
+N_COEFFICIENTS = 14
+
 
 @njit(cache=True, nogil=True)
 def project_points(
     points: NDArray[np.float64],
     rotation: NDArray[np.float64],
     translation: NDArray[np.float64],
-    focal_px: float,
+    focal_px: tuple[float, float],
     centre: tuple[float, float],
+    distortion: NDArray[np.float64],
     pixels: NDArray[np.float64],
     depths: NDArray[np.float64],
 ) -> None:
-    """Pixels and depths of points that a pinhole camera sees.
+    """Pixels and depths of points that a camera sees.
 
     Args:
         points: (V, 3) mm.
         rotation: (3, 3) of the camera from the points.
         translation: (3,) of it, mm.
-        focal_px: of the camera.
+        focal_px: of the camera, across and down.
         centre: column and row of its axis, px.
+        distortion: (14,) as in `navapp.geometry.camera.distort`, or (0,) of a pinhole.
         pixels: (V, 2) in place; NaN at or behind the camera.
         depths: (V,) in place, mm.
     """
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         depth = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]
-        scale = focal_px / depth if depth > 1e-6 else np.nan
+        scale = 1.0 / depth if depth > 1e-6 else np.nan
         across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
         down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
-        pixels[i, 0], pixels[i, 1] = scale * across + centre[0], scale * down + centre[1]
+        u, v = scale * across, scale * down
+        if len(distortion) > 0:
+            u, v = _distorted(u, v, distortion)
+        pixels[i, 0], pixels[i, 1] = focal_px[0] * u + centre[0], focal_px[1] * v + centre[1]
         depths[i] = depth
+
+
+@njit(cache=True, nogil=True)
+def _distorted(x: float, y: float, k: NDArray[np.float64]) -> tuple[float, float]:
+    """As `navapp.geometry.camera.distort`, of one point."""
+    r2, xy2 = x * x + y * y, 2.0 * x * y
+    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (
+        1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
+    )
+    across = k[2] * xy2 + k[3] * (r2 + 2.0 * x * x) + r2 * (k[8] + r2 * k[9])
+    down = k[2] * (r2 + 2.0 * y * y) + k[3] * xy2 + r2 * (k[10] + r2 * k[11])
+    return x * radial + across, y * radial + down
 
 
 @njit(cache=True, nogil=True)

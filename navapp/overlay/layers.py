@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import in_row_bands
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import drawn, is_closed
@@ -74,7 +75,12 @@ def draw_bone(image: Image, scene: Scene) -> None:
     # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
     towards = scene.left_from_bone.rotation[2]
     share = shares_of_faces(mesh.normals, mesh.faces, towards, _LEAST_SHARE, _STEEP_SHARE)
-    tint_pixels(part, view.face_index, share, scene.colour)
+    in_row_bands(
+        box.height,
+        lambda first, last: tint_pixels(
+            part[first:last], view.face_index[first:last], share, scene.colour
+        ),
+    )
     mask = view.mask.astype(np.uint8)
     contours, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     cv2.drawContours(image, contours, -1, scene.colour, 2, offset=(box.x, box.y))

@@ -58,7 +58,7 @@ class ResidualBlock:
 
 def near(block: ResidualBlock, covariance: FloatArray) -> NDArray[np.bool_]:
     """(N,) residuals that a pose of that covariance allows."""
-    by_pose = np.einsum("ij,jk,ik->i", block.jacobian, covariance, block.jacobian)
+    by_pose = ((block.jacobian @ covariance) * block.jacobian).sum(axis=1)
     expected = block.variance + by_pose + block.common_sd**2
     answer: NDArray[np.bool_] = block.residual**2 < _GATE_SIGMAS**2 * expected
     return answer

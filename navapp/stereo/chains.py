@@ -118,7 +118,7 @@ def match_on_support(
     """
     started = time.perf_counter_ns()
     left = _without_specks(refine(pair, support_px, MODEL_REFINEMENT))
-    n_expected = int(np.isfinite(support_px).sum())
+    n_expected = np.count_nonzero(np.isfinite(support_px))
     if left.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
         return _nothing(pair, _NOT_CONFIRMED, started)
     if not fills:

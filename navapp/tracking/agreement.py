@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.masks import where
 from navapp.geometry.rectification import RectifiedGeometry
+from navapp.geometry.regions import mark_large
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.agreement_kernels import (
@@ -23,7 +24,6 @@ from navapp.tracking.agreement_kernels import (
     classify_pixels,
     gather_open,
 )
-from navapp.tracking.regions import mark_large
 from navapp.values import DisparityMap, Origin
 
 # Nearer or further than the model by at least this, and by so many sigma, is not the model.

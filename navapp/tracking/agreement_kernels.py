@@ -60,6 +60,9 @@ def classify_pixels(
     Returns:
         Pixels of the model, and those that agree.
     """
+    scale, off_mm = np.float32(limits.scale_px_mm), np.float32(limits.off_mm)
+    off_sigmas, fit_sigmas = np.float32(limits.off_sigmas), np.float32(limits.fit_sigmas)
+    off_coarse_px, one = np.float32(limits.off_coarse_px), np.float32(1.0)
     n_visible, n_agreeing = 0, 0
     for y in range(depth_mm.shape[0]):
         for x in range(depth_mm.shape[1]):
@@ -67,22 +70,24 @@ def classify_pixels(
             found = 0
             if face >= 0:
                 n_visible += 1
-                expected_px = limits.scale_px_mm / depth_mm[y, x]
-                px_per_mm = expected_px / depth_mm[y, x]
-                off_px = limits.off_mm * px_per_mm
+                per_mm = one / depth_mm[y, x]
+                expected_px = scale * per_mm
+                px_per_mm = expected_px * per_mm
+                off_px = off_mm * px_per_mm
                 if is_matched[y, x]:
-                    surface_px = face_sigma_mm[face] * px_per_mm
-                    total_px = np.sqrt(sigma_px[y, x] ** 2 + surface_px**2)
+                    surface_px = np.float32(face_sigma_mm[face]) * px_per_mm
+                    own_px = sigma_px[y, x]
+                    total_px = np.sqrt(own_px * own_px + surface_px * surface_px)
                     difference_px = disparity_px[y, x] - expected_px
                     deviation[y, x], sigma[y, x] = difference_px, total_px
-                    off_px = max(off_px, limits.off_sigmas * total_px)
+                    off_px = max(off_px, off_sigmas * total_px)
                     found = MEASURED + NEARER * (difference_px > off_px)
                     found += FURTHER * (difference_px < -off_px)
-                    agrees = abs(difference_px) < limits.fit_sigmas * total_px
+                    agrees = abs(difference_px) < fit_sigmas * total_px
                     found += AGREES * agrees
                     n_agreeing += agrees
                 else:
-                    off_px = max(off_px, limits.off_coarse_px)
+                    off_px = max(off_px, off_coarse_px)
                     # Comparisons with NaN are false.
                     found = COARSELY_NEARER * (coarse_px[y, x] - expected_px > off_px)
                     found += COARSELY_FURTHER * (coarse_px[y, x] - expected_px < -off_px)
@@ -114,9 +119,10 @@ def gather_open(
     n_open, n = 0, 0
     for y in range(classes.shape[0]):
         for x in range(classes.shape[1]):
+            n_open += (classes[y, x] & MEASURED) * (not is_hidden[y, x])
+    for y in range(0, classes.shape[0], every):
+        for x in range(0, classes.shape[1], every):
             if classes[y, x] & MEASURED and not is_hidden[y, x]:
-                n_open += 1
-                if y % every == 0 and x % every == 0:
-                    deviations[n], sigmas[n] = deviation[y, x], sigma[y, x]
-                    n += 1
+                deviations[n], sigmas[n] = deviation[y, x], sigma[y, x]
+                n += 1
     return n_open, n

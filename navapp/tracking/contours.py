@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import beside
 from navapp.geometry.box import Box
 from navapp.geometry.mesh_edges import ridge_edges
-from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
+from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.geometry.zbuffer_kernels import known_range
@@ -113,14 +113,14 @@ class ContourMeter:
             coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
         left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
-        with beside(
-            lambda: self._steps(pair.right, right, pose, *self._seen_from_right(view, right))
-        ) as in_right:
-            in_left = self._steps(pair.left, left, pose, view.depth_mm, view.box)
-        blocks = [
-            self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
-            for steps in (in_left, in_right.result())
-        ]
+
+        def of(picture: Image, eye: Eye, depth_mm: NDArray[np.float32], box: Box) -> ResidualBlock:
+            steps = self._steps(picture, eye, pose, depth_mm, box)
+            return self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
+
+        with beside(lambda: of(pair.right, right, *self._seen_from_right(view, right))) as in_right:
+            in_left = of(pair.left, left, view.depth_mm, view.box)
+        blocks = (in_left, in_right.result())
         return ResidualBlock(
             np.concatenate([block.jacobian for block in blocks]),
             np.concatenate([block.residual for block in blocks]),
@@ -147,7 +147,7 @@ class ContourMeter:
 
     def _steps(
         self,
-        picture: NDArray[np.uint8],
+        picture: Image,
         eye: Eye,
         pose: RigidTransform,
         depth_mm: NDArray[np.float32],

@@ -244,12 +244,13 @@ class Judge:
         is_seen: NDArray[np.bool_],
     ) -> float:
         """Of the measurement alone; over what is seen when there are no targets."""
+        named = np.arange(len(targets_mm))
         if len(targets_mm) == 0:
-            targets_mm = model.bone.mesh.vertices_mm[is_seen]
-        if len(targets_mm) == 0:
+            targets_mm, named = model.bone.mesh.vertices_mm, np.flatnonzero(is_seen)
+        if len(named) == 0:
             return float("inf")
-        step = max(1, len(targets_mm) // self._limits.max_bound_targets)
-        return predicted_tre_mm(estimate, model.centre_mm, targets_mm[::step])
+        some = named[:: max(1, len(named) // self._limits.max_bound_targets)]
+        return predicted_tre_mm(estimate, model.centre_mm, targets_mm[some])
 
 
 def within_tolerance(verdict: Verdict, goal: Goal) -> Verdict:

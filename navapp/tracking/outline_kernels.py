@@ -166,16 +166,18 @@ def warp_depth(
         first_warped: its first column in that eye's picture.
     """
     height, width = depth.shape
+    last, shift = warped.shape[1] - 1, np.float32(first_column - first_warped)
+    px_mm = np.float32(eye.focal_px * eye.x_mm)
     for r in range(height):
         for c in range(width):
             z = depth[r, c]
-            if not z > 0.0:
+            if not z > np.float32(0.0):
                 continue
-            column = c + first_column - eye.focal_px * eye.x_mm / z - first_warped
-            first = int(np.floor(column))
-            for at in range(first, first + 2):
-                if 0 <= at < warped.shape[1] and not warped[r, at] <= z:
-                    warped[r, at] = z
+            at = int(np.floor(np.float32(c) + shift - px_mm / z))
+            if 0 <= at <= last and not warped[r, at] <= z:
+                warped[r, at] = z
+            if -1 <= at < last and not warped[r, at + 1] <= z:
+                warped[r, at + 1] = z
 
 
 @njit(cache=True, nogil=True)

@@ -21,10 +21,10 @@ class PictureBox:
         """The smallest box around pixel positions (N, 2); None unless all are finite."""
         if len(pixels) == 0 or not np.isfinite(pixels).all():
             return None
-        (x, y), (width, height) = pixels.min(axis=0), np.ptp(pixels, axis=0)
-        if width <= 0.0 or height <= 0.0:
-            return None
-        return cls(float(x), float(y), float(width), float(height))
+        columns, rows = pixels[:, 0], pixels[:, 1]
+        x, y = float(columns.min()), float(rows.min())
+        width, height = float(columns.max()) - x, float(rows.max()) - y
+        return cls(x, y, width, height) if width > 0.0 and height > 0.0 else None
 
     @property
     def centre(self) -> FloatArray:

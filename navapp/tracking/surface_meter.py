@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
+from navapp.geometry.regions import large_regions
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
@@ -21,7 +22,6 @@ from navapp.stereo import (
     refine_samples,
     reproject,
 )
-from navapp.tracking.regions import large_regions
 from navapp.values import DisparityMap, LineTimings, SurfaceCloud
 
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
@@ -211,7 +211,7 @@ class SurfaceMeter:
         answer = match_on_support(expected.pair, expected.support_px, fills=False)
         found, is_expected = answer.disparity, np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
-        share = found.matched_share * found.origin.size / max(int(is_expected.sum()), 1)
+        share = found.matched_share * found.origin.size / max(int(np.count_nonzero(is_expected)), 1)
         return Measurement(found, cloud, answer.timings, share, MODEL_CORRELATION_PX, expected.view)
 
     def sampled(self, expected: Expected) -> Measurement:
@@ -222,8 +222,10 @@ class SurfaceMeter:
         started = time.perf_counter_ns()
         support_px = expected.support_px
         thin = refine_samples(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
-        n_asked = np.isfinite(support_px[::_SAMPLES_PX, ::_SAMPLES_PX]).sum()
-        share = float((thin.origin > 0).sum() / max(n_asked, 1))
+        asked = support_px[::_SAMPLES_PX, ::_SAMPLES_PX]
+        share = int(np.count_nonzero(thin.origin)) / max(
+            int(np.count_nonzero(np.isfinite(asked))), 1
+        )
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = reproject(found, self.geometry, _SAMPLES_PX)
         timings = LineTimings(stereo_ms=_ms_since(started))
@@ -264,7 +266,7 @@ def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> Dis
     size = 2 * _MIXED_PX + 1
     around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     stays = is_matched & ~around
-    if stays.sum() < _LEAST_UNMIXED * is_matched.sum():
+    if np.count_nonzero(stays) < _LEAST_UNMIXED * np.count_nonzero(is_matched):
         return found
     return found.only(stays)
 

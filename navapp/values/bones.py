@@ -1,6 +1,7 @@
 """Bones of a plan: surface, cartilage, and what of them is an edge to the eye."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -140,8 +141,17 @@ class AspectGraph:
 def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
     """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
     # In the bone's frame, nothing but the camera has to be moved.
-    positions = mesh.vertices_mm - left_from_bone.inverse().translation_mm
-    towards = np.einsum("ij,ij->i", mesh.normals, positions)
-    away_mm = np.sqrt(np.einsum("ij,ij->i", positions, positions))
-    facing: NDArray[np.bool_] = towards < -0.2 * away_mm
+    camera_mm = left_from_bone.inverse().translation_mm
+    heights_mm, squares_mm2 = _about_origin(mesh)
+    towards_mm = heights_mm - mesh.normals @ camera_mm
+    away_mm2 = squares_mm2 - mesh.vertices_mm @ (2.0 * camera_mm) + camera_mm @ camera_mm
+    facing: NDArray[np.bool_] = (towards_mm < 0.0) & (towards_mm**2 > 0.04 * away_mm2)
     return facing
+
+
+@lru_cache(maxsize=16)
+def _about_origin(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """(V,) heights of the tangent planes over the origin, and (V,) squared distances from it."""
+    heights_mm = np.einsum("ij,ij->i", mesh.normals, mesh.vertices_mm)
+    squares_mm2 = np.einsum("ij,ij->i", mesh.vertices_mm, mesh.vertices_mm)
+    return heights_mm, squares_mm2

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
+from navapp.geometry.camera import Camera
 from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
@@ -332,16 +333,32 @@ def test_points_are_projected_as_the_geometry_says():
     moved = tilted.apply(points)
     pixels, depths = np.empty((200, 2)), np.empty(200)
     centre = (GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
-    place = (tilted.rotation, tilted.translation_mm, GEOMETRY.focal_px, centre)
-    project_points(points, *place, pixels, depths)
+    place, focal_px = (tilted.rotation, tilted.translation_mm), GEOMETRY.focal_px
+    project_points(points, *place, (focal_px, focal_px), centre, np.empty(0), pixels, depths)
     expected = GEOMETRY.project(moved)
     assert np.isnan(expected).any()
     np.testing.assert_allclose(pixels, expected, rtol=1e-9)
     np.testing.assert_allclose(depths, moved[:, 2], rtol=1e-9)
-    limits = bounds_of_points(points, *place)
+    limits = bounds_of_points(points, *place, focal_px, centre)
     low, high = np.nanmin(expected, axis=0), np.nanmax(expected, axis=0)
     np.testing.assert_allclose(limits[:4], [*low, *high], rtol=1e-9)
     np.testing.assert_allclose(limits[4:], [moved[:, 2].min(), moved[:, 2].max()], rtol=1e-9)
+
+
+def test_a_lens_is_seen_through_as_its_camera_says():
+    rng = np.random.default_rng(6)
+    points = rng.uniform((-60.0, -40.0, -90.0), (60.0, 40.0, 300.0), (200, 3))
+    tilted = pose((0.2, -0.1, 0.3), (4.0, -7.0, 60.0))
+    coefficients = np.append(rng.uniform(-0.02, 0.02, 12), (0.0, 0.0))
+    seen_by = Camera(camera().matrix * np.array([[1.0], [1.1], [1.0]]), coefficients, 640, 480)
+    pixels, depths = np.empty((200, 2)), np.empty(200)
+    project_points(
+        points, tilted.rotation, tilted.translation_mm, tuple(np.diag(seen_by.matrix)[:2]),
+        tuple(seen_by.matrix[:2, 2]), seen_by.distortion, pixels, depths,
+    )  # fmt: skip
+    expected = seen_by.project(tilted.apply(points))
+    assert np.isnan(expected).any()
+    np.testing.assert_allclose(pixels, expected, rtol=1e-9)
 
 
 def test_the_range_is_that_of_what_is_known():

@@ -8,13 +8,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.stereo.matching.consistency_kernels import fixed_point, partner_values
+from navapp.geometry.regions import large_smooth_regions
+from navapp.stereo.matching.consistency_kernels import partner_values
 
 T = TypeVar("T", bound=np.generic)
 
-# Fixed point of OpenCV's speckle filter; 1,024 disparities stay far from its mark.
-_PER_PX = 16
-_NO_DISPARITY = -16000
+# Of disparities in float32, a whole step apart.
+_ROUNDED_PX = 1e-3
 
 
 def at_partner(
@@ -58,14 +58,7 @@ def speckle_free(
 
     Neighbours (four of them) are connected when their disparities differ by up to `max_step_px`.
     """
-    import cv2
-
-    fixed = np.empty(disparity_px.shape, dtype=np.int16)
-    fixed_point(
-        np.ascontiguousarray(disparity_px), np.float32(_PER_PX), np.int16(_NO_DISPARITY), fixed
-    )
-    cv2.filterSpeckles(fixed, _NO_DISPARITY, least_px - 1, round(max_step_px * _PER_PX))
-    return np.asarray(fixed != _NO_DISPARITY)
+    return large_smooth_regions(disparity_px, least_px, max_step_px + _ROUNDED_PX)
 
 
 def agreement_share(agrees: NDArray[np.bool_], is_judged: NDArray[np.bool_]) -> float:

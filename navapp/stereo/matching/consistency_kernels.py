@@ -105,31 +105,3 @@ def judge_rows(
             else:
                 left_px[y, x] = np.nan
                 confidence[y, x] = 0.0
-
-
-@njit(cache=True, nogil=True)
-def fixed_point(
-    disparity_px: NDArray[np.float32],
-    per_px: np.float32,
-    unknown: np.int16,
-    fixed: NDArray[np.int16],
-) -> None:
-    """Disparities above the lowest one as rounded whole numbers.
-
-    Args:
-        disparity_px: (h, w), NaN unknown.
-        per_px: whole numbers in one px.
-        unknown: what stands for NaN.
-        fixed: (h, w) in place.
-    """
-    height, width = disparity_px.shape
-    lowest = np.float32(np.inf)
-    for y in range(height):
-        for x in range(width):
-            # False for NaN.
-            if disparity_px[y, x] < lowest:
-                lowest = disparity_px[y, x]
-    for y in range(height):
-        for x in range(width):
-            above = disparity_px[y, x] - lowest
-            fixed[y, x] = np.int16(np.rint(above * per_px)) if above >= 0.0 else unknown

@@ -138,18 +138,19 @@ def _steps(
     rows = slice(box.y, box.y + box.height)
     columns = _reached(support, box.x, pair.right.shape[1])
     seen = pair.left[rows, box.x : box.x + box.width]
-    # About the middle, the products of float32 keep their digits.
-    centre = np.float32(seen.mean() if seen.size else 0.0)
+    # About a middle value, the products of float32 keep their digits.
+    centre = np.float32(seen[::_SAMPLE_PX, ::_SAMPLE_PX].mean() if seen.size else 0.0)
     left = np.subtract(seen, centre, dtype=np.float32)
     right = np.subtract(pair.right[rows, columns], centre, dtype=np.float32)
     radius, offset, refined = settings.radius_px, np.zeros_like(support), np.empty_like(support)
     least = settings.min_filled * (2 * radius + 1) ** 2
     height, width = (-(-length // stride_px) for length in support.shape)
     quality = np.empty((height, width, N_QUALITIES), dtype=np.float32)
+    every, middle = 8 * stride_px, _middle(support)
     for _ in range(settings.n_steps):
         fixed = (left, right, support, offset, box.x - columns.start, (radius, stride_px, least))
         band = partial(_band, fixed, refined, quality)
-        in_row_bands(box.height, band, 8 * stride_px, _middle(support))
+        in_row_bands(box.height, band, every, middle)
         offset, refined = refined, offset
         if settings.stops_at_rest and _is_at_rest(quality, settings):
             break

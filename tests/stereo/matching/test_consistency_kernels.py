@@ -6,7 +6,6 @@ import pytest
 from navapp.stereo.matching.consistency_kernels import (
     Demands,
     Evidence,
-    fixed_point,
     judge_rows,
     partner_values,
 )
@@ -54,10 +53,3 @@ def test_partners_are_found_as_the_definition_says(shift) -> None:
     partner_values(seen.right_px, seen.left_px, shift, np.float32(-9.0), found)
     expected = reference.at_partner(seen.right_px, seen.left_px, shift, -9.0)
     assert np.array_equal(found, expected, equal_nan=True)
-
-
-def test_disparities_become_whole_numbers_above_the_lowest() -> None:
-    given = np.array([[np.nan, 3.0, 2.5], [2.53, np.nan, 900.0]], dtype=np.float32)
-    fixed = np.empty(given.shape, dtype=np.int16)
-    fixed_point(given, np.float32(16.0), np.int16(-5), fixed)
-    assert fixed.tolist() == [[-5, 8, 0], [0, -5, 14360]]

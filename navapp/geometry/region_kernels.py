@@ -40,6 +40,33 @@ def find_runs(
 
 
 @njit(cache=True, nogil=True)
+def find_smooth_runs(
+    values: NDArray[np.float32], step: np.float32, runs: NDArray[np.int32], ends: NDArray[np.int32]
+) -> int:
+    """As `find_runs`, of known pixels (h, w) that differ from the one before by at most a step."""
+    height, width = values.shape
+    n = 0
+    for y in range(height):
+        row = values[y]
+        x = 0
+        while x < width:
+            first = x
+            # Comparisons with NaN are false.
+            while x < width and row[x] == row[x]:
+                x += 1
+                if x < width and not abs(row[x] - row[x - 1]) <= step:
+                    break
+            if x == first:
+                x += 1
+                continue
+            if n < runs.shape[0]:
+                runs[n, 0], runs[n, 1] = first, x
+            n += 1
+        ends[y] = n
+    return n
+
+
+@njit(cache=True, nogil=True)
 def root_of(parent: NDArray[np.int32], run: int) -> int:
     """The first run of a run's region; the way there is made shorter."""
     while parent[run] != run:
@@ -71,6 +98,40 @@ def join_runs(
             while j < last_above and runs[j, 0] < runs[i, 1] + reach:
                 a, b = root_of(parent, i), root_of(parent, j)
                 parent[max(a, b)] = min(a, b)
+                j += 1
+
+
+@njit(cache=True, nogil=True)
+def join_smooth_runs(
+    values: NDArray[np.float32],
+    step: np.float32,
+    runs: NDArray[np.int32],
+    ends: NDArray[np.int32],
+    parent: NDArray[np.int32],
+) -> None:
+    """As `join_runs`, where a pixel differs by at most a step from the one above it.
+
+    Args:
+        values: (h, w), NaN where unknown.
+        step: see above.
+        runs: as `find_smooth_runs` leaves them.
+        ends: the same.
+        parent: as in `join_runs`.
+    """
+    for i in range(parent.shape[0]):
+        parent[i] = i
+    for y in range(1, ends.shape[0]):
+        above, last_above = ends[y - 2] if y > 1 else 0, ends[y - 1]
+        for i in range(ends[y - 1], ends[y]):
+            while above < last_above and runs[above, 1] <= runs[i, 0]:
+                above += 1
+            j = above
+            while j < last_above and runs[j, 0] < runs[i, 1]:
+                for x in range(max(runs[i, 0], runs[j, 0]), min(runs[i, 1], runs[j, 1])):
+                    if abs(values[y, x] - values[y - 1, x]) <= step:
+                        a, b = root_of(parent, i), root_of(parent, j)
+                        parent[max(a, b)] = min(a, b)
+                        break
                 j += 1
 
 

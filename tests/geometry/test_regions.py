@@ -1,7 +1,9 @@
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from navapp.tracking.regions import large_regions, mark_large
+from navapp.geometry.regions import large_regions, large_smooth_regions, mark_large
 
 
 def test_only_regions_of_enough_pixels_are_left() -> None:
@@ -36,19 +38,43 @@ def test_the_kernels_agree_with_a_flood(share: float, connectivity: int) -> None
     np.testing.assert_array_equal(found, expected)
 
 
-def flooded(mask: np.ndarray, least: int, connectivity: int) -> np.ndarray:
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.95])
+@pytest.mark.parametrize("step", [0.4, 1.0])
+def test_smooth_regions_agree_with_a_flood(share: float, step: float) -> None:
+    rng = np.random.default_rng(int(100 * share))
+    values = rng.integers(0, 4, (83, 211)).astype(np.float32)
+    values[30:60, 50:150] = 0.3 * np.arange(100)
+    values[rng.random(values.shape) < share] = np.nan
+    known = np.isfinite(values)
+    expected = flooded(known, 7, 4, lambda a, b: abs(values[a] - values[b]) <= step)
+    np.testing.assert_array_equal(large_smooth_regions(values, 7, step), expected)
+
+
+def anything(a: tuple[int, int], b: tuple[int, int]) -> bool:
+    return True
+
+
+def flooded(
+    mask: np.ndarray,
+    least: int,
+    connectivity: int,
+    are_connected: Callable[[tuple[int, int], tuple[int, int]], bool] = anything,
+) -> np.ndarray:
     """Region by region, pixel by pixel."""
     steps = [(0, 1), (1, 0), (0, -1), (-1, 0)]
     steps += [(1, 1), (1, -1), (-1, 1), (-1, -1)] if connectivity == 8 else []
     left, large = mask.copy(), np.zeros_like(mask)
     for place in np.argwhere(mask):
-        region, rim = [], [tuple(place)]
+        region, rim = [], [tuple(place)] if left[tuple(place)] else []
+        left[tuple(place)] = False
         while rim:
             y, x = rim.pop()
-            if 0 <= y < mask.shape[0] and 0 <= x < mask.shape[1] and left[y, x]:
-                left[y, x] = False
-                region.append((y, x))
-                rim += [(y + dy, x + dx) for dy, dx in steps]
+            region.append((y, x))
+            for near in ((y + dy, x + dx) for dy, dx in steps):
+                is_inside = 0 <= near[0] < mask.shape[0] and 0 <= near[1] < mask.shape[1]
+                if is_inside and left[near] and are_connected(near, (y, x)):
+                    left[near] = False
+                    rim.append(near)
         if len(region) >= least:
             large[tuple(np.array(region).T)] = True
     return large
