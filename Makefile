@@ -8,7 +8,7 @@ PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
 # Every kernel is run by one of them at least.
-KERNEL_TESTS := tests/geometry/test_zbuffer.py \
+KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_regions.py \
     tests/registration --ignore tests/registration/test_register.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
     tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \

@@ -106,6 +106,20 @@ def test_vertices_that_face_the_camera_are_visible():
     assert not visible_vertices(ball.flipped(), POSE)[cosine > 0].any()
 
 
+@pytest.mark.parametrize(
+    "mesh",
+    [sphere(30.0, 24, (400.0, -150.0, 80.0)), cube(40.0, (-5.0, 20.0, 9.0)), sphere(9.0, 12)],
+)
+def test_what_is_visible_follows_the_definition(mesh) -> None:
+    beyond = RigidTransform.from_parts(
+        "left", "femur", POSE.rotation, POSE.translation_mm - POSE.rotate(mesh.centroid_mm[None])[0]
+    )
+    view, normals = beyond.apply(mesh.vertices_mm), beyond.rotate(mesh.normals)
+    expected = np.einsum("ij,ij->i", normals, view) < -0.2 * np.linalg.norm(view, axis=1)
+    np.testing.assert_array_equal(visible_vertices(mesh, beyond), expected)
+    assert 0.1 < expected.mean() < 0.9
+
+
 def test_a_bone_fills_in_what_is_not_given():
     bone = BoneModel("femur", cube())
     for values, kind in ((bone.cartilage_mm, float), (bone.is_removed, bool)):

@@ -50,15 +50,14 @@ def find_smooth_runs(
         row = values[y]
         x = 0
         while x < width:
-            first = x
-            # Comparisons with NaN are false.
-            while x < width and row[x] == row[x]:
-                x += 1
-                if x < width and not abs(row[x] - row[x - 1]) <= step:
-                    break
-            if x == first:
+            if np.isnan(row[x]):
                 x += 1
                 continue
+            first = x
+            x += 1
+            # Comparisons with NaN are false.
+            while x < width and abs(row[x] - row[x - 1]) <= step:
+                x += 1
             if n < runs.shape[0]:
                 runs[n, 0], runs[n, 1] = first, x
             n += 1

@@ -59,12 +59,13 @@ def large_smooth_regions(
     """Pixels (h, w) of the regions of at least so many that are known and go on smoothly.
 
     Args:
-        values: (h, w), NaN where unknown.
+        values: (h, w), NaN where unknown; nothing is connected to an infinite one.
         least_px2: pixels of a large region.
         max_step: neighbours (four) are connected when they differ by no more.
     """
     is_large = np.zeros(values.shape, dtype=np.bool_)
-    values, step = np.ascontiguousarray(values, dtype=np.float32), np.float32(max_step)
+    values = np.ascontiguousarray(values, dtype=np.float32)
+    step = np.float32(max_step)
     runs, ends, parent = _all_runs(len(values), partial(find_smooth_runs, values, step))
     join_smooth_runs(values, step, runs, ends, parent)
     keep_large(runs, ends, parent, least_px2, is_large)

@@ -14,7 +14,6 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer_kernels import (
-    N_COEFFICIENTS,
     bounds_of_points,
     project_points,
     raster_nearest,
@@ -23,6 +22,8 @@ from navapp.geometry.zbuffer_kernels import (
 
 # A vertex hidden by less than this is still the surface itself, seen at a grazing angle.
 _SELF_OCCLUSION_MM = 1.0
+# Rectified views have no lens.
+_PINHOLE = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,9 +72,8 @@ def render(
         is_closed: as for `render_rectified`.
     """
     matrix = camera.matrix
-    focal_px, centre = (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2])
-    distortion = camera.distortion if camera.is_distorted else None
-    pixels, depths_mm = _projected(mesh, camera_from_mesh, focal_px, centre, distortion)
+    focal_px, centre_px = (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2])
+    pixels, depths_mm = _projected(mesh, camera_from_mesh, focal_px, centre_px, camera.coefficients)
     box = Box(0, 0, camera.width, camera.height)
     if not is_whole:
         around = Box.around(pixels)
@@ -101,8 +101,8 @@ def render_rectified(
             drawn.
     """
     focal_px = (geometry.focal_px, geometry.focal_px)
-    centre = (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y)
-    pixels, depths_mm = _projected(mesh, rectified_from_mesh, focal_px, centre)
+    centre_px = (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y)
+    pixels, depths_mm = _projected(mesh, rectified_from_mesh, focal_px, centre_px, _PINHOLE)
     return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
@@ -158,20 +158,15 @@ def _projected(
     mesh: TriangleMesh,
     camera_from_mesh: RigidTransform,
     focal_px: tuple[float, float],
-    centre: tuple[float, float],
-    distortion: FloatArray | None = None,
+    centre_px: tuple[float, float],
+    coefficients: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Pixels (V, 2) and depths (V,) mm of the vertices; see `project_points`."""
-    n, rotation, shift_mm = (
-        len(mesh.vertices_mm), camera_from_mesh.rotation, camera_from_mesh.translation_mm
-    )  # fmt: skip
-    pixels, depths_mm = np.empty((n, 2)), np.empty(n)
-    coefficients = np.zeros(0 if distortion is None else N_COEFFICIENTS)
-    if distortion is not None:
-        coefficients[: len(distortion)] = distortion
+    pixels, depths_mm = np.empty((len(mesh.vertices_mm), 2)), np.empty(len(mesh.vertices_mm))
     project_points(
-        mesh.vertices_mm, rotation, shift_mm, focal_px, centre, coefficients, pixels, depths_mm
-    )
+        mesh.vertices_mm, camera_from_mesh.rotation, camera_from_mesh.translation_mm,
+        focal_px, centre_px, coefficients, pixels, depths_mm,
+    )  # fmt: skip
     return pixels, depths_mm
 
 

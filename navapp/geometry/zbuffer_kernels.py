@@ -15,18 +15,15 @@ from navapp.geometry.float_lane_kernels import (
     where_positive,
 )
 
-# Of OpenCV's model, the tilt included.
-N_COEFFICIENTS = 14
 
-
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def project_points(
     points: NDArray[np.float64],
     rotation: NDArray[np.float64],
     translation: NDArray[np.float64],
     focal_px: tuple[float, float],
-    centre: tuple[float, float],
-    distortion: NDArray[np.float64],
+    centre_px: tuple[float, float],
+    coefficients: NDArray[np.float64],
     pixels: NDArray[np.float64],
     depths: NDArray[np.float64],
 ) -> None:
@@ -37,8 +34,8 @@ def project_points(
         rotation: (3, 3) of the camera from the points.
         translation: (3,) of it, mm.
         focal_px: of the camera, across and down.
-        centre: column and row of its axis, px.
-        distortion: (14,) as in `navapp.geometry.camera.distort`, or (0,) of a pinhole.
+        centre_px: column and row of its axis.
+        coefficients: (12,) as `Camera.coefficients` has them; (0,) of a pinhole.
         pixels: (V, 2) in place; NaN at or behind the camera.
         depths: (V,) in place, mm.
     """
@@ -49,13 +46,14 @@ def project_points(
         across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
         down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
         u, v = scale * across, scale * down
-        if len(distortion) > 0:
-            u, v = _distorted(u, v, distortion)
-        pixels[i, 0], pixels[i, 1] = focal_px[0] * u + centre[0], focal_px[1] * v + centre[1]
+        if len(coefficients) > 0:
+            u, v = _distorted(u, v, coefficients)
+        pixels[i, 0] = focal_px[0] * u + centre_px[0]
+        pixels[i, 1] = focal_px[1] * v + centre_px[1]
         depths[i] = depth
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _distorted(x: float, y: float, k: NDArray[np.float64]) -> tuple[float, float]:
     """As `navapp.geometry.camera.distort`, of one point."""
     r2, xy2 = x * x + y * y, 2.0 * x * y
@@ -75,9 +73,10 @@ def bounds_of_points(
     focal_px: float,
     centre: tuple[float, float],
 ) -> tuple[float, float, float, float, float, float]:
-    """Least and largest column, row (of points before the camera) and depth; see `project_points`.
+    """Least and largest column, row (of points before the camera) and depth, without a lens.
 
-    No point before the camera: the least column is infinite.
+    As `project_points`, of a pinhole of one focal length. No point before the camera: the least
+    column is infinite.
     """
     u0, v0, u1, v1 = np.inf, np.inf, -np.inf, -np.inf
     near, far = np.inf, -np.inf
@@ -92,6 +91,29 @@ def bounds_of_points(
         u, v = focal_px * across / depth + centre[0], focal_px * down / depth + centre[1]
         u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
     return u0, v0, u1, v1, near, far
+
+
+@njit(cache=True, nogil=True)
+def find_facing(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    eye: NDArray[np.float64],
+    least_cosine: float,
+    is_facing: NDArray[np.bool_],
+) -> None:
+    """Which points of a surface face an eye.
+
+    Args:
+        points: (V, 3) mm.
+        normals: (V, 3) unit.
+        eye: (3,) mm.
+        least_cosine: of the angle between the normal and the way to the eye.
+        is_facing: (V,) in place.
+    """
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
+        away = normals[i, 0] * x + normals[i, 1] * y + normals[i, 2] * z
+        is_facing[i] = away < -least_cosine * np.sqrt(x * x + y * y + z * z)
 
 
 @njit(cache=True, nogil=True)

@@ -70,9 +70,9 @@ def classify_pixels(
             found = 0
             if face >= 0:
                 n_visible += 1
-                per_mm = one / depth_mm[y, x]
-                expected_px = scale * per_mm
-                px_per_mm = expected_px * per_mm
+                inverse_depth = one / depth_mm[y, x]
+                expected_px = scale * inverse_depth
+                px_per_mm = expected_px * inverse_depth
                 off_px = off_mm * px_per_mm
                 if is_matched[y, x]:
                     surface_px = np.float32(face_sigma_mm[face]) * px_per_mm
@@ -119,7 +119,7 @@ def gather_open(
     n_open, n = 0, 0
     for y in range(classes.shape[0]):
         for x in range(classes.shape[1]):
-            n_open += (classes[y, x] & MEASURED) * (not is_hidden[y, x])
+            n_open += (classes[y, x] & MEASURED != 0) * (not is_hidden[y, x])
     for y in range(0, classes.shape[0], every):
         for x in range(0, classes.shape[1], every):
             if classes[y, x] & MEASURED and not is_hidden[y, x]:

@@ -114,12 +114,16 @@ class ContourMeter:
         """
         left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
 
-        def of(picture: Image, eye: Eye, depth_mm: NDArray[np.float32], box: Box) -> ResidualBlock:
+        def residuals_in(
+            picture: Image, eye: Eye, depth_mm: NDArray[np.float32], box: Box
+        ) -> ResidualBlock:
             steps = self._steps(picture, eye, pose, depth_mm, box)
             return self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
 
-        with beside(lambda: of(pair.right, right, *self._seen_from_right(view, right))) as in_right:
-            in_left = of(pair.left, left, view.depth_mm, view.box)
+        with beside(
+            lambda: residuals_in(pair.right, right, *self._seen_from_right(view, right))
+        ) as in_right:
+            in_left = residuals_in(pair.left, left, view.depth_mm, view.box)
         blocks = (in_left, in_right.result())
         return ResidualBlock(
             np.concatenate([block.jacobian for block in blocks]),

@@ -244,13 +244,14 @@ class Judge:
         is_seen: NDArray[np.bool_],
     ) -> float:
         """Of the measurement alone; over what is seen when there are no targets."""
-        named = np.arange(len(targets_mm))
-        if len(targets_mm) == 0:
-            targets_mm, named = model.bone.mesh.vertices_mm, np.flatnonzero(is_seen)
-        if len(named) == 0:
+        if len(targets_mm) > 0:
+            points_mm, index = targets_mm, np.arange(len(targets_mm))
+        else:
+            points_mm, index = model.bone.mesh.vertices_mm, np.flatnonzero(is_seen)
+        if len(index) == 0:
             return float("inf")
-        some = named[:: max(1, len(named) // self._limits.max_bound_targets)]
-        return predicted_tre_mm(estimate, model.centre_mm, targets_mm[some])
+        step = max(1, len(index) // self._limits.max_bound_targets)
+        return predicted_tre_mm(estimate, model.centre_mm, points_mm[index[::step]])
 
 
 def within_tolerance(verdict: Verdict, goal: Goal) -> Verdict:

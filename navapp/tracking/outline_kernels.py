@@ -166,17 +166,17 @@ def warp_depth(
         first_warped: its first column in that eye's picture.
     """
     height, width = depth.shape
-    last, shift = warped.shape[1] - 1, np.float32(first_column - first_warped)
-    px_mm = np.float32(eye.focal_px * eye.x_mm)
+    last_column, shift_px = warped.shape[1] - 1, np.float32(first_column - first_warped)
+    scale_px_mm = np.float32(eye.focal_px * eye.x_mm)
     for r in range(height):
         for c in range(width):
             z = depth[r, c]
             if not z > np.float32(0.0):
                 continue
-            at = int(np.floor(np.float32(c) + shift - px_mm / z))
-            if 0 <= at <= last and not warped[r, at] <= z:
+            at = int(np.floor(np.float32(c) + shift_px - scale_px_mm / z))
+            if 0 <= at <= last_column and not warped[r, at] <= z:
                 warped[r, at] = z
-            if -1 <= at < last and not warped[r, at + 1] <= z:
+            if -1 <= at < last_column and not warped[r, at + 1] <= z:
                 warped[r, at + 1] = z
 
 

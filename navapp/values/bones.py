@@ -1,7 +1,6 @@
 """Bones of a plan: surface, cartilage, and what of them is an edge to the eye."""
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -15,6 +14,8 @@ Side = Literal["left", "right"]
 # Those that can be followed; the fibula only tells the side.
 FollowedBone = Literal["femur", "tibia", "patella"]
 FOLLOWED_BONES: tuple[str, ...] = get_args(FollowedBone)
+# Of the angle between a vertex's normal and the way to the camera.
+_LEAST_COSINE = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,18 +141,11 @@ class AspectGraph:
 
 def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
     """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
+    # What is compiled is not loaded by those who only read values.
+    from navapp.geometry.zbuffer_kernels import find_facing
+
     # In the bone's frame, nothing but the camera has to be moved.
     camera_mm = left_from_bone.inverse().translation_mm
-    heights_mm, squares_mm2 = _about_origin(mesh)
-    towards_mm = heights_mm - mesh.normals @ camera_mm
-    away_mm2 = squares_mm2 - mesh.vertices_mm @ (2.0 * camera_mm) + camera_mm @ camera_mm
-    facing: NDArray[np.bool_] = (towards_mm < 0.0) & (towards_mm**2 > 0.04 * away_mm2)
-    return facing
-
-
-@lru_cache(maxsize=16)
-def _about_origin(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """(V,) heights of the tangent planes over the origin, and (V,) squared distances from it."""
-    heights_mm = np.einsum("ij,ij->i", mesh.normals, mesh.vertices_mm)
-    squares_mm2 = np.einsum("ij,ij->i", mesh.vertices_mm, mesh.vertices_mm)
-    return heights_mm, squares_mm2
+    is_facing = np.empty(len(mesh.vertices_mm), dtype=np.bool_)
+    find_facing(mesh.vertices_mm, mesh.normals, camera_mm, _LEAST_COSINE, is_facing)
+    return is_facing

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from navapp.geometry import zbuffer
 from navapp.geometry.box import Box
-from navapp.geometry.camera import Camera
 from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
@@ -345,20 +345,29 @@ def test_points_are_projected_as_the_geometry_says():
     np.testing.assert_allclose(limits[4:], [moved[:, 2].min(), moved[:, 2].max()], rtol=1e-9)
 
 
-def test_a_lens_is_seen_through_as_its_camera_says():
+@pytest.mark.parametrize("n_coefficients", [0, 4, 5, 8, 12, 14])
+def test_a_lens_is_seen_through_as_its_camera_says(n_coefficients, monkeypatch):
+    """What is drawn are the camera's own pixels, whatever it knows of its lens."""
     rng = np.random.default_rng(6)
-    points = rng.uniform((-60.0, -40.0, -90.0), (60.0, 40.0, 300.0), (200, 3))
-    tilted = pose((0.2, -0.1, 0.3), (4.0, -7.0, 60.0))
-    coefficients = np.append(rng.uniform(-0.02, 0.02, 12), (0.0, 0.0))
-    seen_by = Camera(camera().matrix * np.array([[1.0], [1.1], [1.0]]), coefficients, 640, 480)
-    pixels, depths = np.empty((200, 2)), np.empty(200)
-    project_points(
-        points, tilted.rotation, tilted.translation_mm, tuple(np.diag(seen_by.matrix)[:2]),
-        tuple(seen_by.matrix[:2, 2]), seen_by.distortion, pixels, depths,
-    )  # fmt: skip
-    expected = seen_by.project(tilted.apply(points))
-    assert np.isnan(expected).any()
-    np.testing.assert_allclose(pixels, expected, rtol=1e-9)
+    lens = rng.uniform(-0.05, 0.05, n_coefficients)
+    lens[12:] = 0.0
+    seen_by, ball = camera(lens), sphere(30.0, 8, (3.0, 4.0, 5.0))
+    tilted = pose((0.2, -0.1, 0.3), (40.0, -70.0, 300.0))
+    drawn = []
+    monkeypatch.setattr(zbuffer, "_raster", lambda *given: drawn.append(given))
+    render(ball, tilted, seen_by)
+    points = tilted.apply(ball.vertices_mm)
+    np.testing.assert_allclose(drawn[0][0], seen_by.project(points), rtol=1e-9)
+    np.testing.assert_allclose(drawn[0][1], points[:, 2], rtol=1e-9)
+
+
+def test_where_a_lens_has_no_answer_nothing_is_drawn():
+    """At 45 degrees from the axis the denominator of this lens is 0."""
+    odd = camera((0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0))
+    corners = np.array([[100.0, 0.0, 100.0], [0.0, 0.0, 100.0], [0.0, 10.0, 100.0]])
+    mesh = TriangleMesh(corners, np.array([[0, 1, 2]]))
+    view = render(mesh, RigidTransform.identity("left", "bone"), odd)
+    assert not view.mask.any()
 
 
 def test_the_range_is_that_of_what_is_known():

@@ -3,6 +3,7 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render
+from navapp.overlay import layers
 from navapp.overlay.layers import (
     CURVE_COLOURS,
     DEFECT_COLOUR,
@@ -11,6 +12,7 @@ from navapp.overlay.layers import (
     TARGET_COLOUR,
     Scene,
 )
+from navapp.overlay.tint_kernels import shares_of_faces, tint_pixels
 from navapp.values import BoneModel, Defect, Plan, RiskStructure, SurgicalContent
 from tests.geometry.shapes import sphere
 from tests.overlay.scenes import BEHIND, CAMERA, HEIGHT, MESH, POSE, TARGET, WIDTH, scene, video
@@ -49,6 +51,23 @@ def test_the_veil_covers_the_model_and_nothing_else() -> None:
     inner = mask & ~grown(~mask, 4)
     # Light: what lies beneath can still be told.
     assert np.corrcoef(before[inner][:, 0], image[inner][:, 0])[0, 1] > 0.5
+
+
+def test_every_pixel_is_tinted_once() -> None:
+    """Two threads share the picture: a band that both did would be twice as green."""
+    drawn, image = scene("bone"), video()
+    view, mesh = drawn.view, drawn.drawn_mesh
+    box = view.box
+    expected = video()[box.y : box.y + box.height, box.x : box.x + box.width]
+    share = shares_of_faces(
+        mesh.normals, mesh.faces, POSE.rotation[2], layers._LEAST_SHARE, layers._STEEP_SHARE
+    )
+    tint_pixels(expected, view.face_index, share, GUIDE_COLOUR)
+    LAYERS["bone"](image, drawn)
+    found = image[box.y : box.y + box.height, box.x : box.x + box.width]
+    inner = view.mask & ~grown(view.silhouette(), 3)
+    assert inner.mean() > 0.3
+    np.testing.assert_array_equal(found[inner], expected[inner])
 
 
 @pytest.mark.parametrize("layer", list(LAYERS))

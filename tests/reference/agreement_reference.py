@@ -4,7 +4,10 @@ import numpy as np
 
 
 def classify_slowly(view, face_sigma_mm, measured_map, coarse_px, limits):
-    """Masks by name, and deviation and its standard deviation in px, NaN where not measured."""
+    """Masks by name, and deviation and its standard deviation in px, NaN where not measured.
+
+    At last how far each pixel lies from where one of the masks would change, px.
+    """
     seen = view.face_index >= 0
     expected = np.where(seen, limits.scale_px_mm / view.depth_mm.astype(float), np.nan)
     px_per_mm = expected**2 / limits.scale_px_mm
@@ -23,4 +26,12 @@ def classify_slowly(view, face_sigma_mm, measured_map, coarse_px, limits):
         "coarsely further": coarse < -off_coarse,
         "agrees": np.abs(difference) < limits.fit_sigmas * sigma,
     }
-    return masks, difference, sigma
+    apart = np.stack(
+        [
+            np.abs(difference) - off,
+            np.abs(difference) - limits.fit_sigmas * sigma,
+            np.abs(coarse) - off_coarse,
+        ]
+    )
+    clearance = np.nan_to_num(np.abs(apart), nan=np.inf).min(axis=0)
+    return masks, difference, sigma, clearance

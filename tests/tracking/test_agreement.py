@@ -160,15 +160,22 @@ def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
         VIEW.depth_mm, VIEW.face_index, face_sigma_mm, noisy.disparity_px, noisy.sigma_px,
         noisy.origin == Origin.MATCHED, coarse_px, limits, classes, deviation, sigma,
     )  # fmt: skip
-    masks, expected, expected_sigma = classify_slowly(VIEW, face_sigma_mm, noisy, coarse_px, limits)
+    masks, expected, expected_sigma, clearance_px = classify_slowly(
+        VIEW, face_sigma_mm, noisy, coarse_px, limits
+    )
+    # Single precision may decide the others either way.
+    is_clear = clearance_px > 1e-4
+    assert is_clear.mean() > 0.999
     assert n_visible == SEEN.sum()
-    assert n_agreeing == masks["agrees"].sum() > 0
+    assert abs(n_agreeing - masks["agrees"].sum()) <= (~is_clear).sum()
+    assert n_agreeing > 0
     for bit, (name, mask) in zip(
         (MEASURED, NEARER, FURTHER, COARSELY_NEARER, COARSELY_FURTHER, AGREES),
         masks.items(),
         strict=True,
     ):
-        np.testing.assert_array_equal((classes & bit) > 0, mask, err_msg=name)
+        found = (classes & bit) > 0
+        np.testing.assert_array_equal(found[is_clear], mask[is_clear], err_msg=name)
         assert mask.any() == (with_coarse or "coarse" not in name), name
     measured = masks["measured"]
     np.testing.assert_allclose(deviation[measured], expected[measured], atol=1e-4)

@@ -6,9 +6,9 @@ import pytest
 from navapp.geometry.rig import RigQuality
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
 from navapp.stereo import reproject
-from navapp.tracking.judge import OK_ERROR_MM, Goal, Judge, within_tolerance
+from navapp.tracking.judge import OK_ERROR_MM, Goal, Judge, JudgeLimits, within_tolerance
 from navapp.tracking.locator import STEREO_SETTINGS
-from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict
+from navapp.values import BoneModel, DisparityMap, Origin, Reason, Status, Verdict, visible_vertices
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.registration.shapes import GEOMETRY, TRUE, disturbed, femur
 from tests.tracking.rooms import measured_map
@@ -127,6 +127,32 @@ def test_a_view_that_fixes_the_pose_too_loosely_is_degraded_whatever_the_toleran
     estimate = estimate_at(scene_of(measured), MODEL, TRUE, STEREO_SETTINGS)
     goal = Goal(NO_TARGETS, 99.0, seen_mm=1.01 * verdict.predicted_tre_mm)
     assert Judge(GEOMETRY).judge(MODEL, estimate, measured, goal).status is Status.OK
+
+
+def test_without_targets_the_bound_is_that_of_what_is_seen() -> None:
+    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, STEREO_SETTINGS)
+    judge = Judge(GEOMETRY, limits=JudgeLimits(max_bound_targets=100_000))
+    is_seen = visible_vertices(MODEL.bone.mesh, TRUE)
+    vertices_mm = MODEL.bone.mesh.vertices_mm
+    bounds = [
+        judge.judge(MODEL, estimate, MAP, Goal(targets_mm, 9.0)).predicted_tre_mm
+        for targets_mm in (NO_TARGETS, vertices_mm[is_seen], vertices_mm[~is_seen])
+    ]
+    assert bounds[0] == bounds[1]
+    assert abs(bounds[2] - bounds[0]) > 0.05 * bounds[0]
+
+
+def test_of_many_targets_some_stand_for_all() -> None:
+    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, STEREO_SETTINGS)
+    targets_mm = MODEL.bone.mesh.vertices_mm
+    step = len(targets_mm) // 50
+    bounds = [
+        Judge(GEOMETRY, limits=JudgeLimits(max_bound_targets=n))
+        .judge(MODEL, estimate, MAP, Goal(some_mm, 9.0))
+        .predicted_tre_mm
+        for n, some_mm in ((50, targets_mm), (100_000, targets_mm[::step]))
+    ]
+    assert bounds[0] == bounds[1]
 
 
 def test_what_the_calibration_leaves_widens_the_bound_and_nothing_else() -> None:

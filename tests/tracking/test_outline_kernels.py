@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+import pytest
 
 from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.zbuffer import projected_box, render_rectified
@@ -87,16 +88,37 @@ def test_the_seen_rim_runs_along_the_silhouette() -> None:
     assert np.quantile(apart, 0.9) < 4.0
 
 
-def test_the_warped_buffer_is_that_of_the_reference() -> None:
+@pytest.mark.parametrize(("before", "width"), [(270, 400), (200, 150), (150, 60)])
+def test_the_warped_buffer_is_that_of_the_reference(before: int, width: int) -> None:
+    """Also where it ends before the surface does, on either side."""
     view = left_view()
-    warped = np.full((view.box.height, view.box.width + 80), np.nan, dtype=np.float32)
-    first = view.box.x - 270
+    # What is written beside the buffer would show.
+    around = np.full((view.box.height, width + 20), np.nan, dtype=np.float32)
+    warped, first = around[:, 10:-10], view.box.x - before
     warp_depth(view.depth_mm, view.box.x, RIGHT, warped, first)
-    expected = reference.warped(view.depth_mm, view.box.x, RIGHT, warped.shape[1], first)
+    expected = reference.warped(view.depth_mm, view.box.x, RIGHT, width, first)
     assert np.isfinite(warped).mean() > 0.2
     # A pixel that falls on a border may round to either side.
     is_same = np.isclose(warped, expected, rtol=1e-6, equal_nan=True)
-    assert is_same.mean() > 0.9999
+    assert is_same.mean() > 0.999
+    assert np.isnan(around[:, :10]).all()
+    assert np.isnan(around[:, -10:]).all()
+
+
+def test_the_nearer_of_two_stays_in_the_warped_buffer() -> None:
+    near_mm, far_mm = 400.0, 500.0
+    shift = [RIGHT.focal_px * RIGHT.x_mm / z for z in (near_mm, far_mm)]
+    depth = np.full((2, 200), np.nan, dtype=np.float32)
+    # Both fall on the same columns, the near one first, and the far one first.
+    at_near, at_far = 150, 150 - round(shift[0] - shift[1])
+    depth[0, at_near], depth[0, at_far] = near_mm, far_mm
+    depth[1, at_near], depth[1, at_far] = far_mm, near_mm
+    warped = np.full((2, 300), np.nan, dtype=np.float32)
+    first = 150 - round(shift[0]) - 100
+    warp_depth(depth, 0, RIGHT, warped, first)
+    expected = reference.warped(depth, 0, RIGHT, 300, first)
+    np.testing.assert_allclose(warped, expected, rtol=1e-6)
+    assert (warped[0] == near_mm).sum() == 2
 
 
 def test_thinned_points_are_outermost_with_the_normals_of_the_reference() -> None:

@@ -13,7 +13,7 @@ from navapp.stereo.matching.consistency_kernels import partner_values
 
 T = TypeVar("T", bound=np.generic)
 
-# Of disparities in float32, a whole step apart.
+# In float32, disparities a whole pixel apart can differ by up to 6e-5 px more.
 _ROUNDED_PX = 1e-3
 
 
@@ -56,7 +56,8 @@ def speckle_free(
 ) -> NDArray[np.bool_]:
     """(h, w) known pixels in a connected patch of at least `least_px` pixels.
 
-    Neighbours (four of them) are connected when their disparities differ by up to `max_step_px`.
+    Neighbours (four of them) are connected when their disparities differ by up to `max_step_px`, or
+    a thousandth more.
     """
     return large_smooth_regions(disparity_px, least_px, max_step_px + _ROUNDED_PX)
 

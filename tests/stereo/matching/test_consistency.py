@@ -70,6 +70,14 @@ def test_patches_are_parted_where_the_disparity_jumps() -> None:
     assert kept[:, 3:].all()
 
 
+def test_whole_steps_of_single_precision_connect_and_larger_ones_part() -> None:
+    # Across a power of two, the last digits of two neighbours weigh differently.
+    whole = (1020.0 + 8.54e-5 + np.arange(8.0)).astype(np.float32)[None]
+    assert np.abs(np.diff(whole)).max() > 1.0
+    assert speckle_free(whole, 8, 1.0).all()
+    assert not speckle_free((1.01 * np.arange(8.0)).astype(np.float32)[None], 2, 1.0).any()
+
+
 def test_nothing_known_stays_nothing() -> None:
     assert not speckle_free(np.full((3, 3), np.nan, dtype=np.float32), 2, 1.0).any()
 
