@@ -31,7 +31,8 @@ run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
 test: setup check  ## the whole test suite
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	# Three on two cores: some tests wait in real time.
+	$(BIN)/python -m pytest -n 3 --dist loadgroup
 	# Compiled code does not check its indices: the kernels' tests run again with the check, and
 	# with a cache of their own, because the cache does not know about that switch. Most of the
 	# time goes into compiling: quickly rather than well, and a kernel in one worker if possible.
