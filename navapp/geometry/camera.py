@@ -72,7 +72,10 @@ class Camera:
         return padded
 
     def project(self, points_mm: ArrayLike) -> FloatArray:
-        """(N, 2) px of points (N, 3) mm in this camera's frame; NaN at or behind the camera."""
+        """(N, 2) px of points (N, 3) mm in this camera's frame.
+
+        NaN at or behind the camera, and where its lens shows nothing.
+        """
         points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 3)
         depth_mm = np.where(points[:, 2] > 1e-6, points[:, 2], np.nan)
         x, y = points[:, 0] / depth_mm, points[:, 1] / depth_mm
@@ -114,12 +117,13 @@ class Camera:
 def distort(x: FloatArray, y: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Distorted normalised coordinates of undistorted ones, by `Camera.coefficients` (12,).
 
+    NaN at and beyond the pole of a rational lens: it shows nothing there.
+
     Source: OpenCV's model up to the thin prism.
     """
     r2 = x * x + y * y
-    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (
-        1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
-    )
+    below = 1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
+    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / np.where(below > 0.0, below, np.nan)
     xy2 = 2.0 * x * y
     x_distorted = x * radial + k[2] * xy2 + k[3] * (r2 + 2.0 * x * x) + k[8] * r2 + k[9] * r2 * r2
     y_distorted = y * radial + k[2] * (r2 + 2.0 * y * y) + k[3] * xy2 + k[10] * r2 + k[11] * r2 * r2

@@ -34,8 +34,9 @@ def _reached(places: Places, part: Box) -> Box:
     if inside.is_empty:
         return inside
     low, high = inside.y, inside.y + inside.height - 1
+    # Columns grow along a row, but for a lens that folds the picture's ends.
     ends = [places.columns[low : high + 1, x] for x in (inside.x, inside.x + inside.width - 1)]
-    begin, end = min(end.min() for end in ends), max(end.max() for end in ends)
+    begin, end = min(column.min() for column in ends), max(column.max() for column in ends)
     first, last = np.clip([begin - TAPS_PX, end + TAPS_PX], 0, width - 1).astype(int)
     curves = places.rows[[low, high], first : last + 1]
     top, bottom = np.clip([curves.min() - TAPS_PX, curves.max() + TAPS_PX], 0, height - 1).astype(

@@ -16,7 +16,7 @@ from navapp.geometry.float_lane_kernels import (
 )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def project_points(
     points: NDArray[np.float64],
     rotation: NDArray[np.float64],
@@ -36,7 +36,7 @@ def project_points(
         focal_px: of the camera, across and down.
         centre_px: column and row of its axis.
         coefficients: (12,) as `Camera.coefficients` has them; (0,) of a pinhole.
-        pixels: (V, 2) in place; NaN at or behind the camera.
+        pixels: (V, 2) in place; NaN at or behind the camera, and where its lens shows nothing.
         depths: (V,) in place, mm.
     """
     for i in range(points.shape[0]):
@@ -53,13 +53,13 @@ def project_points(
         depths[i] = depth
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _distorted(x: float, y: float, k: NDArray[np.float64]) -> tuple[float, float]:
     """As `navapp.geometry.camera.distort`, of one point."""
     r2, xy2 = x * x + y * y, 2.0 * x * y
-    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (
-        1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
-    )
+    below = 1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
+    below = below if below > 0.0 else np.nan
+    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / below
     across = k[2] * xy2 + k[3] * (r2 + 2.0 * x * x) + r2 * (k[8] + r2 * k[9])
     down = k[2] * (r2 + 2.0 * y * y) + k[3] * xy2 + r2 * (k[10] + r2 * k[11])
     return x * radial + across, y * radial + down
@@ -71,7 +71,7 @@ def bounds_of_points(
     rotation: NDArray[np.float64],
     translation: NDArray[np.float64],
     focal_px: float,
-    centre: tuple[float, float],
+    centre_px: tuple[float, float],
 ) -> tuple[float, float, float, float, float, float]:
     """Least and largest column, row (of points before the camera) and depth, without a lens.
 
@@ -88,7 +88,7 @@ def bounds_of_points(
             continue
         across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
         down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
-        u, v = focal_px * across / depth + centre[0], focal_px * down / depth + centre[1]
+        u, v = focal_px * across / depth + centre_px[0], focal_px * down / depth + centre_px[1]
         u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
     return u0, v0, u1, v1, near, far
 

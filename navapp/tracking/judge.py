@@ -55,7 +55,7 @@ class JudgeLimits:
         rms_ratio_ok, rms_ratio_lost: rms of the fit's residual over what its sigma predicts.
         cartilage_sd_ok: rms standard deviation, mm, of the cartilage over the seen surface.
         jump_mm, jump_deg: largest motion of the bone's centre from the prediction, and turn.
-        max_bound_targets: targets used for the predicted error; for time alone.
+        max_bound_targets: about so many targets are used for the predicted error; for time alone.
     """
 
     coverage_ok: float = 0.4

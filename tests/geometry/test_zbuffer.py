@@ -351,22 +351,28 @@ def test_a_lens_is_seen_through_as_its_camera_says(n_coefficients, monkeypatch):
     rng = np.random.default_rng(6)
     lens = rng.uniform(-0.05, 0.05, n_coefficients)
     lens[12:] = 0.0
+    # Some of the ball lies behind the camera.
     seen_by, ball = camera(lens), sphere(30.0, 8, (3.0, 4.0, 5.0))
-    tilted = pose((0.2, -0.1, 0.3), (40.0, -70.0, 300.0))
-    drawn = []
-    monkeypatch.setattr(zbuffer, "_raster", lambda *given: drawn.append(given))
-    render(ball, tilted, seen_by)
-    points = tilted.apply(ball.vertices_mm)
-    np.testing.assert_allclose(drawn[0][0], seen_by.project(points), rtol=1e-9)
-    np.testing.assert_allclose(drawn[0][1], points[:, 2], rtol=1e-9)
+    for depth_mm, is_cut in ((300.0, False), (10.0, True)):
+        tilted, drawn = pose((0.2, -0.1, 0.3), (40.0, -70.0, depth_mm)), []
+        monkeypatch.setattr(zbuffer, "_raster", lambda *given, kept=drawn: kept.append(given))
+        render(ball, tilted, seen_by)
+        points = tilted.apply(ball.vertices_mm)
+        expected = seen_by.project(points)
+        assert np.isnan(expected).any() == is_cut
+        np.testing.assert_allclose(drawn[0][0], expected, rtol=1e-9)
+        np.testing.assert_allclose(drawn[0][1], points[:, 2], rtol=1e-9)
 
 
-def test_where_a_lens_has_no_answer_nothing_is_drawn():
-    """At 45 degrees from the axis the denominator of this lens is 0."""
+@pytest.mark.parametrize("is_whole", [True, False])
+@pytest.mark.parametrize("turned", range(3))
+@pytest.mark.parametrize("away", [(100.0, 0.0), (60.0, 80.0), (90.0, 120.0)])
+def test_where_a_lens_shows_nothing_nothing_is_drawn(away, turned, is_whole):
+    """At and beyond 45 degrees from the axis, where the denominator of this lens is 0, or less."""
     odd = camera((0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0))
-    corners = np.array([[100.0, 0.0, 100.0], [0.0, 0.0, 100.0], [0.0, 10.0, 100.0]])
-    mesh = TriangleMesh(corners, np.array([[0, 1, 2]]))
-    view = render(mesh, RigidTransform.identity("left", "bone"), odd)
+    corners = np.array([[*away, 100.0], [0.0, 0.0, 100.0], [0.0, 10.0, 100.0]])
+    mesh = TriangleMesh(np.roll(corners, turned, axis=0), np.array([[0, 1, 2]]))
+    view = render(mesh, RigidTransform.identity("left", "bone"), odd, is_whole=is_whole)
     assert not view.mask.any()
 
 

@@ -106,19 +106,17 @@ def test_the_warped_buffer_is_that_of_the_reference(before: int, width: int) -> 
 
 
 def test_the_nearer_of_two_stays_in_the_warped_buffer() -> None:
-    near_mm, far_mm = 400.0, 500.0
-    shift = [RIGHT.focal_px * RIGHT.x_mm / z for z in (near_mm, far_mm)]
-    depth = np.full((2, 200), np.nan, dtype=np.float32)
-    # Both fall on the same columns, the near one first, and the far one first.
-    at_near, at_far = 150, 150 - round(shift[0] - shift[1])
-    depth[0, at_near], depth[0, at_far] = near_mm, far_mm
-    depth[1, at_near], depth[1, at_far] = far_mm, near_mm
-    warped = np.full((2, 300), np.nan, dtype=np.float32)
-    first = 150 - round(shift[0]) - 100
+    scale_px_mm, first = RIGHT.focal_px * RIGHT.x_mm, -300
+    depth = np.full((2, 400), np.nan, dtype=np.float32)
+    # The far one comes first in a row, the near one falls on its columns.
+    depth[0, 94], depth[0, 150] = scale_px_mm / 224.4, scale_px_mm / 280.4
+    # The near one comes first, and the far one falls on its second column.
+    depth[1, 150], depth[1, 151] = scale_px_mm / 280.6, scale_px_mm / 280.3
+    warped = np.full((2, 400), np.nan, dtype=np.float32)
     warp_depth(depth, 0, RIGHT, warped, first)
-    expected = reference.warped(depth, 0, RIGHT, 300, first)
-    np.testing.assert_allclose(warped, expected, rtol=1e-6)
-    assert (warped[0] == near_mm).sum() == 2
+    np.testing.assert_allclose(warped, reference.warped(depth, 0, RIGHT, 400, first), rtol=1e-6)
+    assert np.flatnonzero(warped[0] == depth[0, 150]).tolist() == [169, 170]
+    assert np.flatnonzero(warped[1] == depth[1, 150]).tolist() == [169, 170]
 
 
 def test_thinned_points_are_outermost_with_the_normals_of_the_reference() -> None:

@@ -13,7 +13,7 @@ from navapp.stereo.matching.consistency_kernels import partner_values
 
 T = TypeVar("T", bound=np.generic)
 
-# In float32, disparities a whole pixel apart can differ by up to 6e-5 px more.
+# In float32, disparities below 2048 px that are a whole pixel apart can differ by 6e-5 px more.
 _ROUNDED_PX = 1e-3
 
 
@@ -57,7 +57,7 @@ def speckle_free(
     """(h, w) known pixels in a connected patch of at least `least_px` pixels.
 
     Neighbours (four of them) are connected when their disparities differ by up to `max_step_px`, or
-    a thousandth more.
+    0.001 px more.
     """
     return large_smooth_regions(disparity_px, least_px, max_step_px + _ROUNDED_PX)
 
