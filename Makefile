@@ -31,7 +31,7 @@ run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
 test: setup check  ## the whole test suite
-	# More workers than two cores: some tests wait in real time, and compiling does not.
+	# One worker more than two cores carry: some tests wait in real time.
 	$(BIN)/python -m pytest -n 3 --dist loadgroup
 	# Compiled code does not check its indices: the kernels' tests run again with the check, and
 	# with a cache of their own, because the cache does not know about that switch. Most of the

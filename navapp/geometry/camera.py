@@ -7,9 +7,6 @@ from numpy.typing import ArrayLike
 
 from navapp.geometry.transform import FloatArray, read_only
 
-# k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
-_N_COEFFICIENTS = 12
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
@@ -63,14 +60,6 @@ class Camera:
         """Whether straight lines bend."""
         return bool(np.any(self.distortion != 0.0))
 
-    @property
-    def coefficients(self) -> FloatArray:
-        """(12,) distortion up to the thin prism, those not given 0; (0,) of a pinhole."""
-        given = self.distortion[:_N_COEFFICIENTS]
-        padded = np.zeros(_N_COEFFICIENTS if self.is_distorted else 0)
-        padded[: given.size] = given[: padded.size]
-        return padded
-
     def project(self, points_mm: ArrayLike) -> FloatArray:
         """(N, 2) px of points (N, 3) mm in this camera's frame.
 
@@ -80,7 +69,7 @@ class Camera:
         depth_mm = np.where(points[:, 2] > 1e-6, points[:, 2], np.nan)
         x, y = points[:, 0] / depth_mm, points[:, 1] / depth_mm
         if self.is_distorted:
-            x, y = distort(x, y, self.coefficients)
+            x, y = distort(x, y, self.distortion)
         pixels = np.empty((len(points), 2))
         pixels[:, 0] = self.matrix[0, 0] * x + self.matrix[0, 2]
         pixels[:, 1] = self.matrix[1, 1] * y + self.matrix[1, 2]
@@ -114,13 +103,13 @@ class Camera:
         )
 
 
-def distort(x: FloatArray, y: FloatArray, k: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Distorted normalised coordinates of undistorted ones, by `Camera.coefficients` (12,).
+def distort(x: FloatArray, y: FloatArray, distortion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distorted normalised coordinates of undistorted ones (OpenCV's model up to thin prism).
 
     NaN at and beyond the pole of a rational lens: it shows nothing there.
-
-    Source: OpenCV's model up to the thin prism.
     """
+    k = np.zeros(14)
+    k[: distortion.size] = distortion
     r2 = x * x + y * y
     below = 1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
     radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / np.where(below > 0.0, below, np.nan)

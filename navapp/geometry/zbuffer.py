@@ -22,8 +22,6 @@ from navapp.geometry.zbuffer_kernels import (
 
 # A vertex hidden by less than this is still the surface itself, seen at a grazing angle.
 _SELF_OCCLUSION_MM = 1.0
-# Rectified views have no lens.
-_PINHOLE = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,15 +69,14 @@ def render(
         is_whole: the whole picture; otherwise only the box around the mesh, empty out of view.
         is_closed: as for `render_rectified`.
     """
-    matrix = camera.matrix
-    focal_px, centre_px = (matrix[0, 0], matrix[1, 1]), (matrix[0, 2], matrix[1, 2])
-    pixels, depths_mm = _projected(mesh, camera_from_mesh, focal_px, centre_px, camera.coefficients)
+    points_mm = camera_from_mesh.apply(mesh.vertices_mm)
+    pixels = camera.project(points_mm)
     box = Box(0, 0, camera.width, camera.height)
     if not is_whole:
         around = Box.around(pixels)
         box = Box(0, 0, 0, 0) if around is None else around.clipped(camera.width, camera.height)
     pixels -= (box.x, box.y)
-    return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
+    return _raster(pixels, points_mm[:, 2].copy(), mesh.faces, box, is_closed)
 
 
 def render_rectified(
@@ -100,9 +97,12 @@ def render_rectified(
         is_closed: the mesh has no border, and its triangles look outward: half of them need not be
             drawn.
     """
-    focal_px = (geometry.focal_px, geometry.focal_px)
-    centre_px = (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y)
-    pixels, depths_mm = _projected(mesh, rectified_from_mesh, focal_px, centre_px, _PINHOLE)
+    pixels, depths_mm = np.empty((len(mesh.vertices_mm), 2)), np.empty(len(mesh.vertices_mm))
+    project_points(
+        mesh.vertices_mm, rectified_from_mesh.rotation, rectified_from_mesh.translation_mm,
+        geometry.focal_px, (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y),
+        pixels, depths_mm,
+    )  # fmt: skip
     return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
@@ -152,22 +152,6 @@ def unhidden_vertices(
     surface_mm = view.depth_mm[row[inside], column[inside]]
     shown[inside] = points_mm[inside, 2] <= surface_mm + _SELF_OCCLUSION_MM
     return shown
-
-
-def _projected(
-    mesh: TriangleMesh,
-    camera_from_mesh: RigidTransform,
-    focal_px: tuple[float, float],
-    centre_px: tuple[float, float],
-    coefficients: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Pixels (V, 2) and depths (V,) mm of the vertices; see `project_points`."""
-    pixels, depths_mm = np.empty((len(mesh.vertices_mm), 2)), np.empty(len(mesh.vertices_mm))
-    project_points(
-        mesh.vertices_mm, camera_from_mesh.rotation, camera_from_mesh.translation_mm,
-        focal_px, centre_px, coefficients, pixels, depths_mm,
-    )  # fmt: skip
-    return pixels, depths_mm
 
 
 def _raster(

@@ -21,48 +21,30 @@ def project_points(
     points: NDArray[np.float64],
     rotation: NDArray[np.float64],
     translation: NDArray[np.float64],
-    focal_px: tuple[float, float],
-    centre_px: tuple[float, float],
-    coefficients: NDArray[np.float64],
+    focal_px: float,
+    centre: tuple[float, float],
     pixels: NDArray[np.float64],
     depths: NDArray[np.float64],
 ) -> None:
-    """Pixels and depths of points that a camera sees.
+    """Pixels and depths of points that a pinhole camera sees.
 
     Args:
         points: (V, 3) mm.
         rotation: (3, 3) of the camera from the points.
         translation: (3,) of it, mm.
-        focal_px: of the camera, across and down.
-        centre_px: column and row of its axis.
-        coefficients: (12,) as `Camera.coefficients` has them; (0,) of a pinhole.
-        pixels: (V, 2) in place; NaN at or behind the camera, and where its lens shows nothing.
+        focal_px: of the camera.
+        centre: column and row of its axis, px.
+        pixels: (V, 2) in place; NaN at or behind the camera.
         depths: (V,) in place, mm.
     """
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         depth = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]
-        scale = 1.0 / depth if depth > 1e-6 else np.nan
+        scale = focal_px / depth if depth > 1e-6 else np.nan
         across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
         down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
-        u, v = scale * across, scale * down
-        if len(coefficients) > 0:
-            u, v = _distorted(u, v, coefficients)
-        pixels[i, 0] = focal_px[0] * u + centre_px[0]
-        pixels[i, 1] = focal_px[1] * v + centre_px[1]
+        pixels[i, 0], pixels[i, 1] = scale * across + centre[0], scale * down + centre[1]
         depths[i] = depth
-
-
-@njit(cache=True, nogil=True)
-def _distorted(x: float, y: float, k: NDArray[np.float64]) -> tuple[float, float]:
-    """As `navapp.geometry.camera.distort`, of one point."""
-    r2, xy2 = x * x + y * y, 2.0 * x * y
-    below = 1.0 + r2 * (k[5] + r2 * (k[6] + r2 * k[7]))
-    below = below if below > 0.0 else np.nan
-    radial = (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / below
-    across = k[2] * xy2 + k[3] * (r2 + 2.0 * x * x) + r2 * (k[8] + r2 * k[9])
-    down = k[2] * (r2 + 2.0 * y * y) + k[3] * xy2 + r2 * (k[10] + r2 * k[11])
-    return x * radial + across, y * radial + down
 
 
 @njit(cache=True, nogil=True)
@@ -71,12 +53,11 @@ def bounds_of_points(
     rotation: NDArray[np.float64],
     translation: NDArray[np.float64],
     focal_px: float,
-    centre_px: tuple[float, float],
+    centre: tuple[float, float],
 ) -> tuple[float, float, float, float, float, float]:
-    """Least and largest column, row (of points before the camera) and depth, without a lens.
+    """Least and largest column, row (of points before the camera) and depth; see `project_points`.
 
-    As `project_points`, of a pinhole of one focal length. No point before the camera: the least
-    column is infinite.
+    No point before the camera: the least column is infinite.
     """
     u0, v0, u1, v1 = np.inf, np.inf, -np.inf, -np.inf
     near, far = np.inf, -np.inf
@@ -88,32 +69,9 @@ def bounds_of_points(
             continue
         across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
         down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
-        u, v = focal_px * across / depth + centre_px[0], focal_px * down / depth + centre_px[1]
+        u, v = focal_px * across / depth + centre[0], focal_px * down / depth + centre[1]
         u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
     return u0, v0, u1, v1, near, far
-
-
-@njit(cache=True, nogil=True)
-def find_facing(
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    eye: NDArray[np.float64],
-    least_cosine: float,
-    is_facing: NDArray[np.bool_],
-) -> None:
-    """Which points of a surface face an eye.
-
-    Args:
-        points: (V, 3) mm.
-        normals: (V, 3) unit.
-        eye: (3,) mm.
-        least_cosine: of the angle between the normal and the way to the eye.
-        is_facing: (V,) in place.
-    """
-    for i in range(points.shape[0]):
-        x, y, z = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
-        away = normals[i, 0] * x + normals[i, 1] * y + normals[i, 2] * z
-        is_facing[i] = away < -least_cosine * np.sqrt(x * x + y * y + z * z)
 
 
 @njit(cache=True, nogil=True)

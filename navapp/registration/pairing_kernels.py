@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.facing_kernels import faces
 from navapp.registration.lookup_kernels import (
     ModelArrays,
     SceneGrid,
@@ -80,23 +81,6 @@ def moved(
         rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
         rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2],
     )
-
-
-@njit(cache=True, nogil=True)
-def faces(
-    camera: NDArray[np.float64],
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    v: int,
-    least_cosine: float,
-) -> bool:
-    """Whether vertex v shows its outer side to a camera, both in bone coordinates."""
-    dx, dy, dz = camera[0] - points[v, 0], camera[1] - points[v, 1], camera[2] - points[v, 2]
-    towards = normals[v, 0] * dx + normals[v, 1] * dy + normals[v, 2] * dz
-    if least_cosine == 0.0:  # most calls, and no root needed
-        return bool(towards >= 0.0)
-    seen: bool = towards >= least_cosine * np.sqrt(dx * dx + dy * dy + dz * dz)
-    return seen
 
 
 @njit(cache=True, nogil=True)

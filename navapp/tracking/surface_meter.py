@@ -223,9 +223,8 @@ class SurfaceMeter:
         support_px = expected.support_px
         thin = refine_samples(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
         asked = support_px[::_SAMPLES_PX, ::_SAMPLES_PX]
-        share = int(np.count_nonzero(thin.origin)) / max(
-            int(np.count_nonzero(np.isfinite(asked))), 1
-        )
+        n_asked = int(np.count_nonzero(np.isfinite(asked)))
+        share = int(np.count_nonzero(thin.origin)) / max(n_asked, 1)
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = reproject(found, self.geometry, _SAMPLES_PX)
         timings = LineTimings(stereo_ms=_ms_since(started))

@@ -142,10 +142,10 @@ class AspectGraph:
 def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
     """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
     # What is compiled is not loaded by those who only read values.
-    from navapp.geometry.zbuffer_kernels import find_facing
+    from navapp.geometry.facing_kernels import find_facing
 
     # In the bone's frame, nothing but the camera has to be moved.
     camera_mm = left_from_bone.inverse().translation_mm
     is_facing = np.empty(len(mesh.vertices_mm), dtype=np.bool_)
-    find_facing(mesh.vertices_mm, mesh.normals, camera_mm, _LEAST_COSINE, is_facing)
+    find_facing(camera_mm, mesh.vertices_mm, mesh.normals, _LEAST_COSINE, is_facing)
     return is_facing

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from navapp.geometry import zbuffer
 from navapp.geometry.box import Box
 from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
@@ -333,35 +332,16 @@ def test_points_are_projected_as_the_geometry_says():
     moved = tilted.apply(points)
     pixels, depths = np.empty((200, 2)), np.empty(200)
     centre = (GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
-    place, focal_px = (tilted.rotation, tilted.translation_mm), GEOMETRY.focal_px
-    project_points(points, *place, (focal_px, focal_px), centre, np.empty(0), pixels, depths)
+    place = (tilted.rotation, tilted.translation_mm, GEOMETRY.focal_px, centre)
+    project_points(points, *place, pixels, depths)
     expected = GEOMETRY.project(moved)
     assert np.isnan(expected).any()
     np.testing.assert_allclose(pixels, expected, rtol=1e-9)
     np.testing.assert_allclose(depths, moved[:, 2], rtol=1e-9)
-    limits = bounds_of_points(points, *place, focal_px, centre)
+    limits = bounds_of_points(points, *place)
     low, high = np.nanmin(expected, axis=0), np.nanmax(expected, axis=0)
     np.testing.assert_allclose(limits[:4], [*low, *high], rtol=1e-9)
     np.testing.assert_allclose(limits[4:], [moved[:, 2].min(), moved[:, 2].max()], rtol=1e-9)
-
-
-@pytest.mark.parametrize("n_coefficients", [0, 4, 5, 8, 12, 14])
-def test_a_lens_is_seen_through_as_its_camera_says(n_coefficients, monkeypatch):
-    """What is drawn are the camera's own pixels, whatever it knows of its lens."""
-    rng = np.random.default_rng(6)
-    lens = rng.uniform(-0.05, 0.05, n_coefficients)
-    lens[12:] = 0.0
-    # Some of the ball lies behind the camera.
-    seen_by, ball = camera(lens), sphere(30.0, 8, (3.0, 4.0, 5.0))
-    for depth_mm, is_cut in ((300.0, False), (10.0, True)):
-        tilted, drawn = pose((0.2, -0.1, 0.3), (40.0, -70.0, depth_mm)), []
-        monkeypatch.setattr(zbuffer, "_raster", lambda *given, kept=drawn: kept.append(given))
-        render(ball, tilted, seen_by)
-        points = tilted.apply(ball.vertices_mm)
-        expected = seen_by.project(points)
-        assert np.isnan(expected).any() == is_cut
-        np.testing.assert_allclose(drawn[0][0], expected, rtol=1e-9)
-        np.testing.assert_allclose(drawn[0][1], points[:, 2], rtol=1e-9)
 
 
 @pytest.mark.parametrize("is_whole", [True, False])
