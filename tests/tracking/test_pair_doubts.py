@@ -7,6 +7,7 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.stereo import PictureHealth, StereoHealth
 from navapp.tracking import Line, TrackState
+from navapp.tracking.buried import BuriedBone
 from navapp.tracking.pair_doubts import pair_doubts, row_check
 from navapp.values import Reason, RowCheck, Status
 from tests.registration.shapes import GEOMETRY
@@ -100,6 +101,23 @@ def test_a_rig_that_moved_is_never_ok(row_offset_px: float) -> None:
     status, reasons = tracked(Line(turned(a.rig, row_offset_px), a.line.model.bone))
     assert status is not Status.OK
     assert reasons[0] is Reason.ROWS_DISAGREE
+
+
+def test_only_a_rig_that_has_not_moved_makes_a_doubt_worth_a_search(monkeypatch) -> None:
+    a, asked = room(), []
+
+    def followed(buried, pair, predicted, *, searches):
+        asked.append(searches)
+        return iter(())
+
+    monkeypatch.setattr(BuriedBone, "followed", followed)
+    bone = a.line.model.bone
+    larger = replace(bone, mesh=replace(bone.mesh, vertices_mm=1.05 * bone.mesh.vertices_mm))
+    for line in (Line(a.rig, larger), Line(turned(a.rig, -1.0), bone)):
+        status, reasons = tracked(line)
+        assert status is Status.DEGRADED
+        assert Reason.SURFACE_MISFIT in reasons
+    assert asked == [True, False]
 
 
 @pytest.mark.parametrize("eye", ["left", "right"])
