@@ -59,17 +59,21 @@ def is_within(mesh: TriangleMesh, surface: TriangleMesh, distance_mm: float) -> 
 
     points = mesh.vertices_mm[np.unique(mesh.faces)]
     corners = surface.vertices_mm[surface.faces]
+    middles = corners.mean(axis=1)
     n_near = min(_N_TRIANGLES, len(corners))
-    _, near = cKDTree(corners.mean(axis=1)).query(points, k=n_near, workers=2)
-    nearest = np.full(len(points), np.inf)
+    _, near = cKDTree(middles).query(points, k=n_near, workers=2)
+    nearest, in_doubt = np.full(len(points), np.inf), np.arange(len(points))
     for triangle in near.reshape(len(points), n_near).T:
-        np.minimum(nearest, _to_triangles_mm(points, corners[triangle]), out=nearest)
-    # A large triangle lies nearer than its middle tells: those in doubt are asked of all. The worst
-    # first, so that a surface that is too far away is soon found out.
-    in_doubt = np.flatnonzero(nearest > distance_mm)
-    for index in in_doubt[np.argsort(-nearest[in_doubt])]:
-        point = np.broadcast_to(points[index], (len(corners), 3))
-        if _to_triangles_mm(point, corners).min() > distance_mm:
+        off = _to_triangles_mm(points[in_doubt], corners[triangle[in_doubt]])
+        nearest[in_doubt] = np.minimum(nearest[in_doubt], off)
+        in_doubt = in_doubt[nearest[in_doubt] > distance_mm]
+    # A large triangle lies nearer than its middle tells: those in doubt are asked of all that reach
+    # so far. The worst first, so that a surface that is too far away is soon found out.
+    reach_mm = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1) + distance_mm
+    for point in points[in_doubt[np.argsort(-nearest[in_doubt])]]:
+        able = corners[np.linalg.norm(middles - point, axis=1) <= reach_mm]
+        off = _to_triangles_mm(np.broadcast_to(point, (len(able), 3)), able)
+        if not (off <= distance_mm).any():
             return False
     return True
 

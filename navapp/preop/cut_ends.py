@@ -58,11 +58,15 @@ def on_flat_caps(mesh: TriangleMesh) -> NDArray[np.bool_]:
     """
     is_cap = np.zeros(len(mesh.vertices_mm), dtype=bool)
     areas = mesh.face_areas_mm2()
+    # A third of a triangle belongs to each corner: triangles within a layer have no more area than
+    # its vertices have. Few directions need a closer look.
+    owned = np.bincount(mesh.faces.ravel(), np.repeat(areas / 3.0, 3), len(is_cap))
     for normal in _hull_directions(mesh):
         height = mesh.vertices_mm @ normal
         depth = height.max() - height
-        if _is_cap(mesh, areas, normal, depth):
-            is_cap |= depth < _LAYER_MM
+        is_low = depth < _LAYER_MM
+        if owned[is_low].sum() > _CAP_MM2 and _is_cap(mesh, areas, normal, depth):
+            is_cap |= is_low
     return is_cap
 
 
