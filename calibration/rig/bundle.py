@@ -91,19 +91,19 @@ def solve_bundle(
         left_from_board: (V, 6) start.
         is_fixed: leave the shared numbers as they are and solve for the poses alone.
     """
-    shared, left_from_board = shared.copy(), left_from_board.copy()
+    views = _Views(board, pairs, model, [_believed_px(pair) for pair in pairs])
+    here = _Place(views, shared.copy(), left_from_board.copy())
+    cost, normal = here.cost(here.scale), _NormalEquations(here)
     damping, is_settled = _FIRST_DAMPING, False
-    views = _Views(board, pairs, model)
-    linear = _Linearised(views, shared, left_from_board)
     for _ in range(_MOST_STEPS):
-        step_shared, step_poses = linear.step(damping, is_fixed)
-        moved = left_from_board + step_poses
-        trial = _Linearised(views, shared + step_shared, moved, linear.scale)
-        if trial.cost <= linear.cost * (1.0 + 1e-12):
-            gain = 1.0 - trial.cost / max(linear.cost, 1e-300)
-            shared, left_from_board = shared + step_shared, moved
+        step_shared, step_poses = normal.step(damping, is_fixed)
+        there = _Place(views, here.shared + step_shared, here.left_from_board + step_poses)
+        there_cost = there.cost(here.scale)
+        if there_cost <= cost * (1.0 + 1e-12):
+            gain = 1.0 - there_cost / max(cost, 1e-300)
             # The next step weighs by what is left now.
-            linear = _Linearised(views, shared, left_from_board)
+            here = there
+            cost, normal = here.cost(here.scale), _NormalEquations(here)
             damping = max(damping * 0.1, 1e-9)
             if gain < _SETTLED:
                 is_settled = True
@@ -116,67 +116,110 @@ def solve_bundle(
     n = 2 * sum(len(pair.left.ids) + len(pair.right.ids) for pair in pairs)
     n_solved = (0 if is_fixed else model.n_shared) + left_from_board.size
     # What was solved for takes its part of the noise with it.
-    scale = linear.scale * (n / max(n - n_solved, 1)) ** 0.5
+    scale = here.scale * (n / max(n - n_solved, 1)) ** 0.5
     return Bundle(
-        model, shared, left_from_board, linear.reduced(), scale, linear.residuals_px, is_settled
-    )
+        model, here.shared, here.left_from_board, normal.reduced(), scale, here.residuals_px,
+        is_settled,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Views:
-    """What stays the same in all steps."""
+    """What stays the same in all steps.
+
+    Attributes:
+        board: that was seen.
+        pairs: views.
+        model: which numbers are solved for.
+        sigma_px: of each view, of the left and the right marks (n,).
+    """
 
     board: Board
     pairs: Sequence[SeenPair]
     model: RigModel
+    sigma_px: Sequence[tuple[FloatArray, FloatArray]]
 
 
-class _Linearised:
-    """Residuals and normal equations at one place."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Residuals:
+    """Of one picture.
 
-    def __init__(
-        self,
-        views: _Views,
-        shared: FloatArray,
-        left_from_board: FloatArray,
-        scale: float | None = None,
-    ) -> None:
-        self._model, self._shared = views.model, shared
-        self._views = [
+    Attributes:
+        residual_px: (n, 2) seen less predicted.
+        by_shared: (2 n, n_shared) slopes.
+        by_pose: (2 n, 6) slopes.
+        sigma_px: (n,) standard errors.
+        length: (n,) of the residuals, in standard errors.
+    """
+
+    residual_px: FloatArray
+    by_shared: FloatArray
+    by_pose: FloatArray
+    sigma_px: FloatArray
+    length: FloatArray
+
+
+class _Place:
+    """What the views leave, and how it changes, at one place."""
+
+    def __init__(self, views: _Views, shared: FloatArray, left_from_board: FloatArray) -> None:
+        self.views, self.shared, self.left_from_board = views, shared, left_from_board
+        self.residuals = [
             [
-                self._seen(views.board, seen, pose, number)
-                for number, seen in enumerate((pair.left, pair.right))
+                self._seen(seen, sigma_px, pose, number)
+                for number, (seen, sigma_px) in enumerate(
+                    zip((pair.left, pair.right), sigmas_px, strict=True)
+                )
             ]
-            for pair, pose in zip(views.pairs, left_from_board, strict=True)
+            for pair, sigmas_px, pose in zip(
+                views.pairs, views.sigma_px, left_from_board, strict=True
+            )
         ]
-        self.residuals_px = [(view[0][0], view[1][0]) for view in self._views]
-        lengths = np.concatenate(
-            [
-                np.abs(residual / sigma[:, None]).ravel()
-                for view in self._views
-                for residual, _, _, sigma in view
-            ]
-        )
-        self.scale = max(_MAD_TO_SIGMA * float(np.median(lengths)), 1e-6)
-        self._limit = _HUBER * (self.scale if scale is None else scale)
-        self.cost = 0.0
-        n = self._model.n_shared
-        self._shared_normal, self._shared_right = np.zeros((n, n)), np.zeros(n)
-        self._view_normals: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        for view in self._views:
-            self._add(view)
-        self._expect_board(np.array(_EXPECTED_SHARE_OFF) * views.board.spacing_mm)
+        each = [
+            np.abs(one.residual_px / one.sigma_px[:, None]).ravel()
+            for view in self.residuals
+            for one in view
+        ]
+        self.scale = max(_MAD_TO_SIGMA * float(np.median(np.concatenate(each))), 1e-6)
+
+    @property
+    def residuals_px(self) -> list[tuple[FloatArray, FloatArray]]:
+        """As a bundle has them."""
+        return [(left.residual_px, right.residual_px) for left, right in self.residuals]
+
+    def cost(self, scale: float) -> float:
+        """What is left, weighed as Huber does, and how far the marks are from their places.
+
+        Args:
+            scale: robust standard deviation that is taken for the noise.
+        """
+        # Two coordinates: their length has a limit a little beyond that of one.
+        limit, total = _HUBER * scale, 0.0
+        for view in self.residuals:
+            for one in view:
+                length = one.length
+                beyond = 2.0 * limit * length - limit**2
+                total += float(np.where(length <= limit, length**2, beyond).sum())
+        _, off = self.marks_off()
+        # In the same units as what the pictures say: their noise is `scale` of what they claim.
+        return total + self.scale**2 * float(off @ off)
+
+    def marks_off(self) -> tuple[FloatArray, FloatArray]:
+        """(k,) standard deviations mm of the marks' coordinates, and (k,) how many of them off."""
+        model = self.views.model
+        expected_mm = np.array(_EXPECTED_SHARE_OFF) * self.views.board.spacing_mm
+        sigma_mm = np.tile(expected_mm, model.n_marks)
+        return sigma_mm, self.shared[model.n_rig :] / sigma_mm
 
     def _seen(
-        self, board: Board, seen: SeenBoard, left_from_board: FloatArray, number: int
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Residuals (n, 2), slopes by the shared numbers and by the pose, standard errors (n,)."""
-        model = self._model
-        points_mm = board.points_mm[seen.ids]
+        self, seen: SeenBoard, sigma_px: FloatArray, left_from_board: FloatArray, number: int
+    ) -> _Residuals:
+        model = self.views.model
+        points_mm = self.views.board.points_mm[seen.ids]
         if model.n_marks:
-            points_mm = points_mm + shape_mm(model, self._shared)[seen.ids]
+            points_mm = points_mm + shape_mm(model, self.shared)[seen.ids]
         pixels, by_rig, by_pose, by_point = projected(
-            points_mm, left_from_board, model, self._shared, number
+            points_mm, left_from_board, model, self.shared, number
         )
         by_shared = np.zeros((len(by_rig), model.n_shared))
         by_shared[:, : model.n_rig] = by_rig
@@ -184,24 +227,32 @@ class _Linearised:
             rows = np.arange(len(by_rig))[:, None]
             places = model.n_rig + 3 * np.repeat(seen.ids, 2)[:, None] + np.arange(3)
             by_shared[rows, places] = by_point
-        # A mark that claims to be far better than the others is not believed.
-        sigma = np.hypot(seen.sigma_px, np.median(seen.sigma_px))
-        return seen.pixels - pixels, by_shared, by_pose, sigma
+        residual_px = seen.pixels - pixels
+        length = np.linalg.norm(residual_px / sigma_px[:, None], axis=1)
+        return _Residuals(residual_px, by_shared, by_pose, sigma_px, length)
 
-    def _add(self, view: list[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]) -> None:
-        """Add one view to the normal equations, weighed as Huber does."""
-        n = self._model.n_shared
+
+class _NormalEquations:
+    """What a step at one place is solved from, weighed by what is left there."""
+
+    def __init__(self, place: _Place) -> None:
+        n = place.views.model.n_shared
+        self._limit = _HUBER * place.scale
+        self._shared_normal, self._shared_right = np.zeros((n, n)), np.zeros(n)
+        self._view_normals: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+        for view in place.residuals:
+            self._add(view)
+        self._expect_board(place)
+
+    def _add(self, view: list[_Residuals]) -> None:
+        """Add one view, weighed as Huber does."""
+        n = len(self._shared_right)
         mixed, own, right = np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(6)
-        for residual_px, by_shared, by_pose, sigma_px in view:
-            length = np.linalg.norm(residual_px / sigma_px[:, None], axis=1)
-            # Two coordinates: their length has a limit a little beyond that of one.
-            limit = self._limit
-            weight = np.minimum(1.0, limit / np.maximum(length, 1e-12))
-            inside = length <= limit
-            self.cost += float(np.where(inside, length**2, 2.0 * limit * length - limit**2).sum())
-            root = np.repeat(np.sqrt(weight) / sigma_px, 2)
-            a, b = by_shared * root[:, None], by_pose * root[:, None]
-            r = residual_px.ravel() * root
+        for one in view:
+            weight = np.minimum(1.0, self._limit / np.maximum(one.length, 1e-12))
+            root = np.repeat(np.sqrt(weight) / one.sigma_px, 2)
+            a, b = one.by_shared * root[:, None], one.by_pose * root[:, None]
+            r = one.residual_px.ravel() * root
             self._shared_normal += a.T @ a
             self._shared_right += a.T @ r
             mixed += a.T @ b
@@ -209,23 +260,17 @@ class _Linearised:
             right += b.T @ r
         self._view_normals.append((mixed, own, right))
 
-    def _expect_board(self, off_mm: FloatArray) -> None:
+    def _expect_board(self, place: _Place) -> None:
         """What is known of the marks' places beforehand; it also fixes the board's frame."""
-        model = self._model
-        if not model.n_marks:
-            return
-        sigma_mm = np.tile(off_mm, model.n_marks)
-        off = self._shared[model.n_rig :] / sigma_mm
-        # In the same units as what the pictures say: their noise is `scale` of what they claim.
-        trust = self.scale**2
+        model, trust = place.views.model, place.scale**2
+        sigma_mm, off = place.marks_off()
         diagonal = np.arange(model.n_rig, model.n_shared)
         self._shared_normal[diagonal, diagonal] += trust / sigma_mm**2
         self._shared_right[model.n_rig :] -= trust * off / sigma_mm
-        self.cost += trust * float(off @ off)
 
     def step(self, damping: float, is_fixed: bool) -> tuple[FloatArray, FloatArray]:
         """Steps of the shared numbers and of the poses (V, 6)."""
-        n = self._model.n_shared
+        n = len(self._shared_right)
         reduced = self._shared_normal + damping * np.diag(np.diag(self._shared_normal))
         right = self._shared_right.copy()
         inverses = []
@@ -247,6 +292,17 @@ class _Linearised:
         for mixed, own, _ in self._view_normals:
             reduced -= mixed @ np.linalg.solve(own, mixed.T)
         return 0.5 * (reduced + reduced.T)
+
+
+def _believed_px(pair: SeenPair) -> tuple[FloatArray, FloatArray]:
+    """Standard errors (n,) and (m,) of the marks in both pictures.
+
+    A mark that claims to be far better than the others is not believed.
+    """
+    left, right = (
+        np.hypot(seen.sigma_px, np.median(seen.sigma_px)) for seen in (pair.left, pair.right)
+    )
+    return left, right
 
 
 def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
