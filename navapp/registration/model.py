@@ -70,7 +70,8 @@ class RegistrationModel:
         """What the compiled loops read; made at first use."""
         from scipy.spatial import cKDTree
 
-        tree = cKDTree(self.points_mm)
+        # Most places that are asked for lie far from all points: large, loose boxes answer sooner.
+        tree = cKDTree(self.points_mm, leafsize=64, compact_nodes=False, balanced_tree=False)
         neighbours = neighbour_table(self.points_mm, self.bone.mesh.faces, tree)
         curvatures, spacing = curvature(self.points_mm, self.normals, neighbours)
         low = self.points_mm.min(axis=0) - _GRID_MARGIN_MM

@@ -35,12 +35,13 @@ def neighbour_table(
         index = np.asarray(index).reshape(len(alone), -1)
         near = np.column_stack([np.repeat(alone, index.shape[1]), index.ravel()])
         pairs = np.concatenate([pairs, near[near[:, 0] != near[:, 1]]])
-    pairs = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
-    starts = np.searchsorted(pairs[:, 0], np.arange(n + 1))
-    rank = np.arange(len(pairs)) - starts[pairs[:, 0]]
+    one, other = pairs.T.astype(np.int64)
+    # Both ways, by the first and then by the second; numbers are soon sorted.
+    start, end = np.divmod(np.unique(np.concatenate([one * n + other, other * n + one])), n)
+    rank = np.arange(len(start)) - np.searchsorted(start, np.arange(n))[start]
     table = np.full((n, _MAX_NEIGHBOURS), -1, dtype=np.int32)
     kept = rank < _MAX_NEIGHBOURS
-    table[pairs[kept, 0], rank[kept]] = pairs[kept, 1]
+    table[start[kept], rank[kept]] = end[kept]
     return table
 
 
