@@ -62,15 +62,14 @@ def paired_half_edges(faces: IntArray) -> NDArray[np.int64]:
 
     Edges of more than two triangles keep the first two.
     """
-    one, other = half_edges(faces).T.astype(np.int64)
-    # One number for both ends, whichever way the edge is gone along: soon sorted.
-    edge = np.minimum(one, other) * (max(one.max(initial=0), other.max(initial=0)) + 1)
-    edge += np.maximum(one, other)
+    low, high = np.sort(half_edges(faces), axis=1).T.astype(np.int64)
+    # One number sorts faster than two.
+    edge = low * (high.max(initial=0) + 1) + high
     order = np.argsort(edge, kind="stable")
     first = np.flatnonzero(np.diff(edge[order], prepend=-1))
     is_double = np.diff(np.append(first, len(edge))) >= 2
-    other = np.where(is_double, order[np.minimum(first + 1, len(edge) - 1)], -1)
-    return np.column_stack([order[first], other])
+    second = np.where(is_double, order[np.minimum(first + 1, len(edge) - 1)], -1)
+    return np.column_stack([order[first], second])
 
 
 def open_border(n_vertices: int, faces: IntArray) -> NDArray[np.bool_]:

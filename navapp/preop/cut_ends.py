@@ -107,8 +107,8 @@ def _hull_directions(mesh: TriangleMesh) -> FloatArray:
     except (QhullError, ValueError):  # flat, or hardly a surface
         return np.empty((0, 3))
     area = TriangleMesh(mesh.vertices_mm, hull.simplices).face_areas_mm2()
+    # One number sorts faster than four.
     steps = np.rint(hull.equations / _SAME_FACET).astype(np.int64)
-    # One number for all four: soon sorted.
     steps -= steps.min(axis=0)
     _, group = np.unique(np.ravel_multi_index(steps.T, steps.max(axis=0) + 1), return_inverse=True)
     total = np.bincount(group, area)

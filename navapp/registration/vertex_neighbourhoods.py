@@ -36,7 +36,7 @@ def neighbour_table(
         near = np.column_stack([np.repeat(alone, index.shape[1]), index.ravel()])
         pairs = np.concatenate([pairs, near[near[:, 0] != near[:, 1]]])
     one, other = pairs.T.astype(np.int64)
-    # Both ways, by the first and then by the second; numbers are soon sorted.
+    # Both ways, by the first and then by the second: one number sorts faster than two.
     start, end = np.divmod(np.unique(np.concatenate([one * n + other, other * n + one])), n)
     rank = np.arange(len(start)) - np.searchsorted(start, np.arange(n))[start]
     table = np.full((n, _MAX_NEIGHBOURS), -1, dtype=np.int32)

@@ -170,11 +170,13 @@ class Line:
         ):
             fit = self.locator.locate(pair, start, checks.begin)
             first = self._fit_judge.judged(pair, fit, goal, timings, predicted, checks)
+        if self.locator.is_baseline or not is_place_doubted(first.verdict):
+            return first
         answers = [first]
-        if self.locator.is_baseline or not is_place_doubted(answers[0].verdict):
-            return answers[0]
-        # Under a rig that moved nothing fits well, wherever the bone is.
-        searches = searches and not (first.rows is not None and first.rows.is_off)
+        # While the rows disagree no answer can be OK: a search would run to its end for one that is
+        # as doubtful.
+        if first.rows_disagree and first.verdict.status is not Status.LOST:
+            searches = False
         for buried in self._buried.followed(pair, start, searches=searches):
             timings = answers[-1].timings
             answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, checks))

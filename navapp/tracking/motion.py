@@ -39,7 +39,7 @@ class TrackState:
         velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
         n_lost: frames lost since then.
         n_doubted: answers in a row whose place was in doubt. A lost frame neither counts nor ends
-            the row; a glance, which searches nothing, ends it.
+            the row; what searches nothing ends it: a glance, a pair whose rows disagree.
         box: of the bone in the newest picture, and what it looks like; None before the first.
         cause: what was found to be wrong for good, until a frame is OK.
     """
@@ -100,7 +100,8 @@ class TrackState:
         velocity = np.zeros(6)
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
             velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
-        n_doubted = self.n_doubted + 1 if is_place_doubted(verdict) else 0
+        is_doubted = is_place_doubted(verdict) and not tracked.rows_disagree
+        n_doubted = self.n_doubted + 1 if is_doubted else 0
         return TrackState(pose, captured_ns, velocity, 0, n_doubted, self.box, verdict.cause)
 
 

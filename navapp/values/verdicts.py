@@ -221,6 +221,11 @@ class TrackedFrame:
         """The pose, when there is one."""
         return None if self.estimate is None else self.estimate.camera_from_bone
 
+    @property
+    def rows_disagree(self) -> bool:
+        """Whether the cameras' rows surely do: no pose of this pair is OK then."""
+        return self.rows is not None and self.rows.is_off
+
     def because(self, cause: Reason | None) -> "TrackedFrame":
         """The same answer with the cause of its failure in front; an OK has none."""
         if cause is None or self.verdict.status is Status.OK:

@@ -66,3 +66,18 @@ def test_a_large_triangle_near_a_point_is_not_overlooked() -> None:
     mesh = TriangleMesh(point, np.array([[0, 1, 2]]))
     assert is_within(mesh, surface, 1.0 + 1e-9)
     assert not is_within(mesh, surface, 1.0 - 1e-9)
+
+
+def test_a_large_triangle_is_asked_for_what_lies_just_beyond_its_corner() -> None:
+    """Further from its middle than the corner is, and many small triangles are nearer to that."""
+    large = np.array([[-1000.0, -1000.0, 0.0], [1000.0, -1000.0, 0.0], [0.0, 1000.0, 0.0]])
+    crumbs = [
+        np.array([[k, 990.0, 9.0], [k + 0.5, 990.0, 9.0], [k, 990.5, 9.0]]) for k in range(20)
+    ]
+    surface = TriangleMesh(
+        np.concatenate([large, *crumbs]), np.arange(63, dtype=np.int32).reshape(-1, 3)
+    )
+    corner = np.array([[0.0, 1001.0, 0.0], [1e-9, 1001.0, 0.0], [0.0, 1001.0, 1e-9]])
+    mesh = TriangleMesh(corner, np.array([[0, 1, 2]]))
+    assert is_within(mesh, surface, 1.0 + 1e-6)
+    assert not is_within(mesh, surface, 1.0 - 1e-6)

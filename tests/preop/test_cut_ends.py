@@ -45,6 +45,25 @@ def test_a_flat_end_is_found_however_oblique_and_a_round_one_is_none(across) -> 
     assert (cut.vertices_mm[found] @ across > 19.5).all()
 
 
+def rod(radius_mm: float, n: int = 64) -> TriangleMesh:
+    """A closed cylinder, 60 mm long, along z."""
+    angle = 2.0 * np.pi * np.arange(n) / n
+    ring = radius_mm * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = [np.column_stack([ring, np.full(n, z)]) for z in (0.0, 60.0)]
+    middles = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 60.0]])
+    a, b = np.arange(n), np.roll(np.arange(n), -1)
+    low, high = np.full(n, 2 * n), np.full(n, 2 * n + 1)
+    corners = [(b, a, low), (a + n, b + n, high), (a, b, b + n), (a, b + n, a + n)]
+    faces = np.concatenate([np.column_stack(one) for one in corners])
+    return TriangleMesh(np.vstack([*ends, middles]), faces.astype(np.int32))
+
+
+def test_an_end_of_two_and_a_half_square_centimetres_is_a_cap_and_a_smaller_one_is_none() -> None:
+    # 64 sides: 250 mm2 at 8.927 mm.
+    assert on_flat_caps(rod(8.94)).all()
+    assert not on_flat_caps(rod(8.91)).any()
+
+
 def test_a_long_border_is_a_cut_and_a_hole_is_none() -> None:
     assert not on_cut_borders(BALL).any()
     assert not on_cut_borders(TriangleMesh(BALL.vertices_mm, BALL.faces[1:])).any()

@@ -8,7 +8,15 @@ from navapp.tracking import TrackState
 from navapp.tracking.box_tracker import BoxState
 from navapp.tracking.motion import twist_between
 from navapp.tracking.picture_box import PictureBox
-from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
+from navapp.values import (
+    LineTimings,
+    PoseEstimate,
+    Reason,
+    RowCheck,
+    Status,
+    TrackedFrame,
+    Verdict,
+)
 
 CENTRE = np.array([3.0, -20.0, 15.0])
 START = RigidTransform.from_parts(
@@ -168,6 +176,16 @@ def test_after_a_sure_frame_the_next_doubt_is_searched_at_once() -> None:
         state = state.updated(doubtful(START), PERIOD_NS, CENTRE)
     assert not state.is_search_due
     assert state.updated(frame(START), PERIOD_NS, CENTRE).is_search_due
+
+
+def test_a_doubt_under_rows_that_disagree_puts_off_no_search() -> None:
+    state, rows_off = TrackState.at_rest(START, 0), RowCheck(0.5, True)
+    for number in range(3):
+        found = replace(doubtful(START), rows=rows_off)
+        state = state.updated(found, number * PERIOD_NS, CENTRE)
+    assert state.is_search_due
+    state = state.updated(doubtful(START), 3 * PERIOD_NS, CENTRE)
+    assert state.n_doubted == 1
 
 
 def test_a_lost_frame_neither_counts_as_a_doubt_nor_ends_a_row_of_them() -> None:

@@ -103,7 +103,7 @@ def test_a_rig_that_moved_is_never_ok(row_offset_px: float) -> None:
     assert reasons[0] is Reason.ROWS_DISAGREE
 
 
-def test_only_a_rig_that_has_not_moved_makes_a_doubt_worth_a_search(monkeypatch) -> None:
+def test_a_doubt_is_searched_for_only_while_the_rows_agree(monkeypatch) -> None:
     a, asked = room(), []
 
     def followed(buried, pair, predicted, *, searches):
