@@ -33,26 +33,30 @@ class Views:
 
     Attributes:
         board: that was seen.
-        pairs: V of it.
         model: which numbers are solved for.
-        sigma_px: V standard errors (n,) and (m,) of the left and the right marks.
+        pictures: V left and right ones: the marks, and their standard errors (n,) px.
     """
 
     board: Board
-    pairs: Sequence[SeenPair]
     model: RigModel
-    sigma_px: Sequence[tuple[FloatArray, FloatArray]]
+    pictures: Sequence[tuple[tuple[SeenBoard, FloatArray], ...]]
 
     @classmethod
     def of(cls, board: Board, pairs: Sequence[SeenPair], model: RigModel) -> "Views":
         """A mark that claims to be far better than the others of its picture is not believed."""
-        sigma_px = [(_believed_px(pair.left), _believed_px(pair.right)) for pair in pairs]
-        return cls(board, pairs, model, sigma_px)
+        pictures = [
+            tuple(
+                (seen, np.hypot(seen.sigma_px, np.median(seen.sigma_px)))
+                for seen in (pair.left, pair.right)
+            )
+            for pair in pairs
+        ]
+        return cls(board, model, pictures)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PictureLinearisation:
-    """Of one picture.
+    """What one picture leaves, and how it changes.
 
     Attributes:
         residual_px: (n, 2) seen less predicted.
@@ -70,7 +74,7 @@ class _PictureLinearisation:
 
 
 class Linearisation:
-    """What the views leave, and how it changes, at one place.
+    """What the views leave, and how it changes, at one linear.
 
     Args:
         views: V.
@@ -80,20 +84,16 @@ class Linearisation:
 
     def __init__(self, views: Views, shared: FloatArray, left_from_board: FloatArray) -> None:
         self.views, self.shared, self.left_from_board = views, shared, left_from_board
-        self.residuals = [
+        self.pictures = [
             [
-                self._seen(seen, sigma_px, pose, number)
-                for number, (seen, sigma_px) in enumerate(
-                    zip((pair.left, pair.right), sigmas_px, strict=True)
-                )
+                self._linearised(seen, sigma_px, pose, number)
+                for number, (seen, sigma_px) in enumerate(view)
             ]
-            for pair, sigmas_px, pose in zip(
-                views.pairs, views.sigma_px, left_from_board, strict=True
-            )
+            for view, pose in zip(views.pictures, left_from_board, strict=True)
         ]
         each = [
             np.abs(one.residual_px / one.sigma_px[:, None]).ravel()
-            for view in self.residuals
+            for view in self.pictures
             for one in view
         ]
         self.scale = max(_MAD_TO_SIGMA * float(np.median(np.concatenate(each))), 1e-6)
@@ -101,7 +101,7 @@ class Linearisation:
     @property
     def residuals_px(self) -> list[tuple[FloatArray, FloatArray]]:
         """As a bundle has them."""
-        return [(left.residual_px, right.residual_px) for left, right in self.residuals]
+        return [(left.residual_px, right.residual_px) for left, right in self.pictures]
 
     def cost(self, scale: float) -> float:
         """What is left, weighed as Huber does, and how far the marks are from their places.
@@ -111,7 +111,7 @@ class Linearisation:
         """
         # Two coordinates: their length has a limit a little beyond that of one.
         limit, total = _HUBER * scale, 0.0
-        for view in self.residuals:
+        for view in self.pictures:
             for one in view:
                 length = one.length
                 beyond = 2.0 * limit * length - limit**2
@@ -127,7 +127,7 @@ class Linearisation:
         sigma_mm = np.tile(expected_mm, model.n_marks)
         return sigma_mm, self.shared[model.n_rig :] / sigma_mm
 
-    def _seen(
+    def _linearised(
         self, seen: SeenBoard, sigma_px: FloatArray, left_from_board: FloatArray, number: int
     ) -> _PictureLinearisation:
         """One picture: of the left camera (0) or the right one (1)."""
@@ -152,14 +152,14 @@ class Linearisation:
 class NormalEquations:
     """What a step at one place is solved from, weighed by what is left there."""
 
-    def __init__(self, place: Linearisation) -> None:
-        n = place.views.model.n_shared
-        self._limit = _HUBER * place.scale
+    def __init__(self, linear: Linearisation) -> None:
+        n = linear.views.model.n_shared
+        self._limit = _HUBER * linear.scale
         self._shared_normal, self._shared_right = np.zeros((n, n)), np.zeros(n)
         self._view_normals: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        for view in place.residuals:
+        for view in linear.pictures:
             self._add(view)
-        self._expect_board(place)
+        self._expect_board(linear)
 
     def _add(self, view: list[_PictureLinearisation]) -> None:
         """Add one view, weighed as Huber does."""
@@ -177,10 +177,10 @@ class NormalEquations:
             right += b.T @ r
         self._view_normals.append((mixed, own, right))
 
-    def _expect_board(self, place: Linearisation) -> None:
+    def _expect_board(self, linear: Linearisation) -> None:
         """What is known of the marks' places beforehand; it also fixes the board's frame."""
-        model, trust = place.views.model, place.scale**2
-        sigma_mm, off = place.marks_off()
+        model, trust = linear.views.model, linear.scale**2
+        sigma_mm, off = linear.marks_off()
         diagonal = np.arange(model.n_rig, model.n_shared)
         self._shared_normal[diagonal, diagonal] += trust / sigma_mm**2
         self._shared_right[model.n_rig :] -= trust * off / sigma_mm
@@ -209,11 +209,6 @@ class NormalEquations:
         for mixed, own, _ in self._view_normals:
             reduced -= mixed @ np.linalg.solve(own, mixed.T)
         return 0.5 * (reduced + reduced.T)
-
-
-def _believed_px(seen: SeenBoard) -> FloatArray:
-    believed: FloatArray = np.hypot(seen.sigma_px, np.median(seen.sigma_px))
-    return believed
 
 
 def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:

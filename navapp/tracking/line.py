@@ -21,7 +21,7 @@ from navapp.tracking.fit_judge import FitJudge
 from navapp.tracking.follower import Fit, sum_timings
 from navapp.tracking.judge import Goal
 from navapp.tracking.locator import NEAR_VIEW, STEREO_SETTINGS, WIDE_VIEW, Locator, LocatorSettings
-from navapp.tracking.motion import TrackState, is_place_doubted
+from navapp.tracking.motion import TrackState, is_place_doubted, is_worth_a_search
 from navapp.tracking.recovery import Recovery
 from navapp.tracking.registrar import Registrar
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
@@ -173,10 +173,7 @@ class Line:
         if self.locator.is_baseline or not is_place_doubted(first.verdict):
             return first
         answers = [first]
-        # While the rows disagree no answer can be OK: a search would run to its end for one that is
-        # as doubtful.
-        if first.rows_disagree and first.verdict.status is not Status.LOST:
-            searches = False
+        searches = searches and is_worth_a_search(first)
         for buried in self._buried.followed(pair, start, searches=searches):
             timings = answers[-1].timings
             answers.append(self._fit_judge.judged(pair, buried, goal, timings, predicted, checks))

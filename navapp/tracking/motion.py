@@ -100,14 +100,22 @@ class TrackState:
         velocity = np.zeros(6)
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
             velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
-        is_doubted = is_place_doubted(verdict) and not tracked.rows_disagree
-        n_doubted = self.n_doubted + 1 if is_doubted else 0
+        n_doubted = self.n_doubted + 1 if is_worth_a_search(tracked) else 0
         return TrackState(pose, captured_ns, velocity, 0, n_doubted, self.box, verdict.cause)
 
 
 def is_place_doubted(verdict: Verdict) -> bool:
     """Whether something speaks against a pose's place; always when it is lost."""
     return verdict.status is Status.LOST or not _AGAINST.isdisjoint(verdict.reasons)
+
+
+def is_worth_a_search(tracked: TrackedFrame) -> bool:
+    """Whether the place is in doubt, and a search could find one that is not.
+
+    While the cameras' rows disagree no answer can be OK: only what is lost has something to gain.
+    """
+    is_lost = tracked.verdict.status is Status.LOST
+    return is_place_doubted(tracked.verdict) and (is_lost or not tracked.rows_disagree)
 
 
 def twist_between(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> FloatArray:

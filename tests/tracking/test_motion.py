@@ -6,7 +6,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import TrackState
 from navapp.tracking.box_tracker import BoxState
-from navapp.tracking.motion import twist_between
+from navapp.tracking.motion import is_worth_a_search, twist_between
 from navapp.tracking.picture_box import PictureBox
 from navapp.values import (
     LineTimings,
@@ -176,6 +176,22 @@ def test_after_a_sure_frame_the_next_doubt_is_searched_at_once() -> None:
         state = state.updated(doubtful(START), PERIOD_NS, CENTRE)
     assert not state.is_search_due
     assert state.updated(frame(START), PERIOD_NS, CENTRE).is_search_due
+
+
+@pytest.mark.parametrize(
+    ("status", "reasons", "rows", "is_worth"),
+    [
+        (Status.OK, (), None, False),
+        (Status.DEGRADED, (Reason.TRE_TOO_LARGE,), None, False),
+        (Status.DEGRADED, (Reason.SURFACE_MISFIT,), None, True),
+        (Status.DEGRADED, (Reason.SURFACE_MISFIT,), RowCheck(0.1, False), True),
+        (Status.DEGRADED, (Reason.SURFACE_MISFIT,), RowCheck(0.5, True), False),
+        (Status.LOST, (Reason.SURFACE_MISFIT,), RowCheck(0.5, True), True),
+    ],
+)
+def test_a_search_is_made_where_it_could_mend_the_place(status, reasons, rows, is_worth) -> None:
+    found = replace(frame(START), verdict=Verdict(status, 1.0, reasons), rows=rows)
+    assert is_worth_a_search(found) is is_worth
 
 
 def test_a_doubt_under_rows_that_disagree_puts_off_no_search() -> None:

@@ -1,0 +1,51 @@
+"""The normal equations' right side is the slope of the cost that they lower."""
+
+import numpy as np
+import pytest
+
+from calibration.rig.linearisation import Linearisation, NormalEquations, Views
+from calibration.rig.parameters import RigModel, packed
+from calibration.rig.start import vector_of
+from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig, seen_pair
+
+
+@pytest.mark.parametrize("n_marks", [0, len(BOARD.points_mm)])
+def test_a_step_goes_down_the_slope_of_the_cost(n_marks) -> None:
+    rng = np.random.default_rng(3)
+    true, model = drawn_rig(rng), RigModel(5, n_marks, WIDTH, HEIGHT)
+    poses = [drawn_pose(rng) for _ in range(3)]
+    pairs = [seen_pair(i, true, pose, rng) for i, pose in enumerate(poses)]
+    # Beyond Huber's limit, and marks that are not where they should be.
+    pairs[0].left.pixels[:2] += 4.0
+    views = Views.of(BOARD, pairs, model)
+    shared = np.concatenate([packed(RigModel(5, 0, WIDTH, HEIGHT), true), np.zeros(3 * n_marks)])
+    shared[model.n_rig :] = rng.normal(0.0, 0.05, 3 * n_marks)
+    start = np.array([vector_of(pose.matrix) for pose in poses])
+    linear = Linearisation(views, shared, start)
+    normal = NormalEquations(linear)
+    for _ in range(8):
+        by_shared = 1e-7 * rng.normal(size=shared.size) * np.maximum(np.abs(shared), 1e-2)
+        by_pose = 1e-7 * rng.normal(size=start.shape)
+        ahead, behind = (
+            Linearisation(views, shared + k * by_shared, start + k * by_pose).cost(linear.scale)
+            for k in (1.0, -1.0)
+        )
+        right = np.array([one[2] for one in normal._view_normals])
+        expected = -2.0 * (normal._shared_right @ by_shared + (right * by_pose).sum())
+        assert 0.5 * (ahead - behind) == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_first_step_lowers_the_cost_and_a_rig_at_rest_stays() -> None:
+    rng = np.random.default_rng(4)
+    true, model = drawn_rig(rng), RigModel(5, 0, WIDTH, HEIGHT)
+    poses = [drawn_pose(rng) for _ in range(8)]
+    views = Views.of(BOARD, [seen_pair(i, true, p, rng) for i, p in enumerate(poses)], model)
+    shared, start = packed(model, true), np.array([vector_of(pose.matrix) for pose in poses])
+    costs = []
+    for _ in range(4):
+        linear = Linearisation(views, shared, start)
+        costs.append(linear.cost(1.0))
+        by_shared, by_pose = NormalEquations(linear).step(1e-9, False)
+        shared, start = shared + by_shared, start + by_pose
+    assert costs[1] < costs[0]
+    assert costs[3] == pytest.approx(costs[2], rel=1e-6)
