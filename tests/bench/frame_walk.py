@@ -1,0 +1,137 @@
+"""How many modules a frame passes through, printed as two figures and a table.
+
+usage: python -m tests.bench.frame_walk [--calls]
+
+Counted are the modules of `navapp` that are entered, and the calls from one of them into another,
+while a bone that lies in the open is followed into one frame with the answer OK, on both threads.
+Kernels, properties and value classes (frozen dataclasses, named tuples, enumerations) do not
+count; a call through another library counts from the last module of `navapp` before it. With
+--calls each pair of modules has a line.
+"""
+
+import argparse
+import dataclasses
+import enum
+import functools
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable
+from types import CodeType, FrameType
+from typing import Any
+
+import numpy as np
+
+from navapp.geometry.bands import pool
+from navapp.tracking import Goal, Line, TrackState
+from navapp.values import Status
+from sim_devices.scenario import Scenario
+from tests.knees import SimulatedKnee
+
+_SEED = 5
+# Frames followed before the one that is counted: everything that is made once is made.
+_WARM_FRAMES = 3
+
+
+def main() -> None:
+    """Count, and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--calls", action="store_true", help="a line for each pair of modules")
+    options = parser.parse_args()
+    walk = walked_frame()
+    print(f"modules entered: {len(walk.modules)}")
+    print(f"calls from one module into another: {sum(walk.calls.values())}")
+    if options.calls:
+        for (caller, callee), n in sorted(walk.calls.items(), key=lambda one: -one[1]):
+            print(f"{n:4d}  {caller} -> {callee}")
+
+
+class Walk:
+    """Counts calls between modules while it is on; to be set as the profiler of each thread."""
+
+    def __init__(self) -> None:
+        self.calls: Counter[tuple[str, str]] = Counter()
+        self.modules: set[str] = set()
+        self.is_on = False
+        self._counts: dict[CodeType, bool] = {}
+        self._lock = threading.Lock()
+
+    def __call__(self, frame: FrameType, event: str, argument: object) -> None:
+        """A profiler's event."""
+        if event != "call" or not self.is_on:
+            return
+        name = frame.f_globals.get("__name__", "")
+        if not name.startswith("navapp.") or not self._is_counted(frame, name):
+            return
+        caller = _navapp_caller(frame)
+        with self._lock:
+            self.modules.add(name)
+            if caller != name:
+                self.calls[caller, name] += 1
+
+    def _is_counted(self, frame: FrameType, name: str) -> bool:
+        code = frame.f_code
+        if code not in self._counts:
+            self._counts[code] = not (
+                name.endswith("_kernels")
+                or code.co_filename == "<string>"
+                or _is_of_value(sys.modules[name], code.co_qualname)
+            )
+        return self._counts[code]
+
+
+def _navapp_caller(frame: FrameType) -> str:
+    """The nearest caller's module in navapp; empty at the root of a thread."""
+    caller = frame.f_back
+    while caller is not None:
+        name: str = caller.f_globals.get("__name__", "")
+        if name.startswith("navapp."):
+            return name
+        caller = caller.f_back
+    return ""
+
+
+def _is_of_value(module: Any, qualified_name: str) -> bool:
+    """A property, or a method of a value class."""
+    *owners, name = qualified_name.split(".")
+    owner: Any = module
+    for part in owners:
+        if part == "<locals>":
+            return False
+        owner = getattr(owner, part, None)
+    if not isinstance(owner, type):
+        return False
+    if isinstance(vars(owner).get(name), property | functools.cached_property):
+        return True
+    is_frozen = dataclasses.is_dataclass(owner) and owner.__dataclass_params__.frozen
+    return is_frozen or hasattr(owner, "_fields") or issubclass(owner, enum.Enum)
+
+
+def walked_frame() -> Walk:
+    """Follow a simulated knee and count in the last frame."""
+    knee = SimulatedKnee(Scenario(seed=_SEED, motion="breathing"))
+    frames = knee.frames(2 + _WARM_FRAMES)
+    line, goal = Line(knee.rig, knee.bone), Goal(np.empty((0, 3)), 2.0)
+    first = frames[0]
+    best = line.register(first.left, first.right, knee.prior, goal)[0]
+    assert best.left_from_bone is not None
+    state = TrackState.at_rest(best.left_from_bone, first.captured_ns)
+    for frame in frames[1:-1]:
+        _, state = line.track(frame.left, frame.right, frame.captured_ns, state, goal)
+    walk, last = Walk(), frames[-1]
+    _on_both_threads(lambda: sys.setprofile(walk))
+    walk.is_on = True
+    tracked, _ = line.track(last.left, last.right, last.captured_ns, state, goal)
+    walk.is_on = False
+    _on_both_threads(lambda: sys.setprofile(None))
+    assert tracked.verdict.status is Status.OK, tracked.verdict
+    return walk
+
+
+def _on_both_threads(job: Callable[[], None]) -> None:
+    pool().submit(job).result()
+    job()
+
+
+if __name__ == "__main__":
+    main()
