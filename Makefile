@@ -8,11 +8,11 @@ PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
 # Every kernel is run by one of them at least.
-KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_regions.py \
+KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
     tests/registration --ignore tests/registration/test_register.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
     tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \
-    tests/stereo tests/tracking/test_agreement.py tests/tracking/test_contour_kernels.py \
+    tests/stereo tests/tracking/test_agreement.py tests/tracking/test_edge_kernels.py \
     tests/tracking/test_outline_kernels.py tests/overlay/test_tint.py tests/preop/test_aspects.py \
     tests/calibration/targets/test_detection.py tests/calibration/targets/test_mark_kernels.py
 

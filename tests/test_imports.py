@@ -81,9 +81,9 @@ def test_the_contracts_hold(checkout: Path) -> None:
 # File, breach, and the contract that must break.
 BREACHES = [
     ("navapp/geometry/camera.py", "import navapp.values", "the rooms of navapp"),
-    ("navapp/tracking/line.py", "import sim_devices.truth", "the pipeline never sees"),
-    ("navapp/tracking/line.py", "import pydicom", "only planning reads a CT"),
-    ("navapp/tracking/judge.py", "import navapp.overlay", "tracking stands on"),
+    ("navapp/tracking/tracker.py", "import sim_devices.truth", "the pipeline never sees"),
+    ("navapp/tracking/tracker.py", "import pydicom", "only planning reads a CT"),
+    ("navapp/tracking/judging.py", "import navapp.overlay", "tracking stands on"),
     ("navapp/control/pursuit.py", "import sim_devices.world", "control is handed"),
     ("navapp/control/states.py", "import navapp.inventory.looking", "control is handed"),
     ("navapp/control/sources.py", "import drivers.replay_camera", "control knows the device"),

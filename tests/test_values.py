@@ -18,7 +18,6 @@ from navapp.values import (
     SurfaceCloud,
     TrackedFrame,
     Verdict,
-    predicted_tre_mm,
     visible_vertices,
 )
 from navapp.values import Status as PoseStatus
@@ -48,7 +47,7 @@ def test_the_predicted_error_bounds_the_sampled_one(seed):
         direction = rng.normal(size=6) * [0.5, 0.5, 0.5, 0.01, 0.01, 0.01]
         covariance = np.outer(direction, direction)
     centre, targets = rng.normal(size=3) * 10, rng.normal(size=(5, 3)) * 40
-    bound = predicted_tre_mm(estimate(covariance), centre, targets)
+    bound = estimate(covariance).predicted_tre_mm(centre, targets)
     twists = rng.multivariate_normal(np.zeros(6), covariance, 2000, method="eigh")
     true = POSE.apply(targets)
     errors = [
@@ -62,7 +61,7 @@ def test_the_predicted_error_bounds_the_sampled_one(seed):
 
 def test_the_predicted_error_of_a_shift_is_its_chi_square_quantile():
     covariance = np.diag([0.01, 0.01, 0.01, 0, 0, 0])
-    bound = predicted_tre_mm(estimate(covariance), np.zeros(3), np.eye(3) * 70)
+    bound = estimate(covariance).predicted_tre_mm(np.zeros(3), np.eye(3) * 70)
     assert bound == pytest.approx(0.1 * np.sqrt(7.815), rel=1e-4)
 
 
@@ -70,7 +69,7 @@ def test_the_predicted_error_grows_with_the_distance_from_the_centre():
     covariance = np.diag([0, 0, 0, 1e-4, 1e-4, 1e-4])
     centre = np.array([5.0, 6.0, 7.0])
     bounds = [
-        predicted_tre_mm(estimate(covariance), centre, np.add(centre, [[d, 0.0, 0.0]]))
+        estimate(covariance).predicted_tre_mm(centre, np.add(centre, [[d, 0.0, 0.0]]))
         for d in (0.0, 10.0, 20.0)
     ]
     np.testing.assert_allclose(bounds, np.array([0, 0.1, 0.2]) * np.sqrt(5.991), rtol=1e-4)
@@ -83,16 +82,16 @@ def test_a_turn_that_a_shift_undoes_leaves_its_point_without_error():
     offset = POSE.rotate(target[0] - centre)
     twist = np.r_[-np.cross(turn, offset), turn]
     covariance = np.outer(twist, twist)
-    assert predicted_tre_mm(estimate(covariance), centre, target) < 1e-6
+    assert estimate(covariance).predicted_tre_mm(centre, target) < 1e-6
     # On the other side of the centre both add up.
-    opposite = predicted_tre_mm(estimate(covariance), centre, 2 * centre - target)
+    opposite = estimate(covariance).predicted_tre_mm(centre, 2 * centre - target)
     expected = 2 * np.linalg.norm(np.cross(turn, offset)) * np.sqrt(3.841)
     assert opposite == pytest.approx(expected, rel=1e-4)
 
 
 def test_no_targets_have_no_predicted_error():
     with pytest.raises(ValueError, match="no targets"):
-        predicted_tre_mm(estimate(np.eye(6)), np.zeros(3), np.empty((0, 3)))
+        estimate(np.eye(6)).predicted_tre_mm(np.zeros(3), np.empty((0, 3)))
 
 
 def test_vertices_that_face_the_camera_are_visible():
@@ -304,18 +303,6 @@ def test_a_frame_without_an_estimate_has_no_pose():
     assert lost.left_from_bone is None
     found = dataclasses.replace(lost, estimate=estimate(np.eye(6)))
     assert found.left_from_bone is POSE
-
-
-def test_the_cause_comes_first_and_once_and_an_ok_has_none():
-    verdict = Verdict(PoseStatus.LOST, None, (Reason.TOO_FEW_POINTS,))
-    lost = TrackedFrame("femur", None, verdict, LineTimings())
-    assert lost.because(None) is lost
-    named = lost.because(Reason.PICTURES_SWAPPED)
-    assert named.verdict.reasons == (Reason.PICTURES_SWAPPED, Reason.TOO_FEW_POINTS)
-    assert named.because(Reason.PICTURES_SWAPPED).verdict.reasons == named.verdict.reasons
-    assert (verdict.cause, named.verdict.cause) == (None, Reason.PICTURES_SWAPPED)
-    fine = dataclasses.replace(lost, verdict=Verdict(PoseStatus.OK, 0.1))
-    assert fine.because(Reason.OTHER_SIDE) is fine
 
 
 def test_verdicts_have_an_order() -> None:

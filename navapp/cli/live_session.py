@@ -113,7 +113,7 @@ def controller_of(
     """The controller with its listeners and, when asked for, its recorder."""
     from navapp.control.controller import SessionController, SessionOptions
     from navapp.control.executors import InlineExecutor, ThreadExecutor
-    from navapp.tracking import LineSettings, LocatorSettings
+    from navapp.tracking import TrackerSettings
 
     configuration, opened = session.configuration, session.opened
     return SessionController(
@@ -123,9 +123,8 @@ def controller_of(
         session.prior,
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
         options=SessionOptions(
-            line=LineSettings(
-                LocatorSettings(method=configuration.tracking.method),
-                depth_mm=configuration.camera.depth_mm,
+            line=TrackerSettings(
+                configuration.tracking.method, depth_mm=configuration.camera.depth_mm
             ),
             first_stage=session.stage,
             overlay_valid_ms=configuration.display.withdrawn_ms,

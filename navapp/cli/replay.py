@@ -213,7 +213,7 @@ def _controller(
 ) -> "SessionController":
     from navapp.control.controller import SessionController, SessionOptions
     from navapp.control.session import SessionHooks
-    from navapp.tracking import LineSettings, LocatorSettings
+    from navapp.tracking import TrackerSettings
 
     return SessionController(
         opened.devices,
@@ -222,9 +222,7 @@ def _controller(
         replay.prior,
         executor=replay.executor,
         options=SessionOptions(
-            line=LineSettings(
-                LocatorSettings(method=replay.method), depth_mm=configuration.camera.depth_mm
-            ),
+            line=TrackerSettings(replay.method, depth_mm=configuration.camera.depth_mm),
             first_stage=replay.stage,
             overlay_valid_ms=configuration.display.valid_ms,
             others=tuple(stage.bone for stage in replay.others),

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.stereo.surface import reproject
 from navapp.values import DisparityMap, Origin
 
 _ALL = (Origin.MATCHED, Origin.FILLED_BORDER, Origin.FILLED_INTERIOR, Origin.MISMATCH_FILLED)
@@ -36,7 +35,7 @@ def coloured(disparity_map: DisparityMap) -> NDArray[np.uint8]:
 
 def cloud_ply(disparity_map: DisparityMap, geometry: RectifiedGeometry) -> bytes:
     """Binary PLY: points in the unrectified left camera, mm, with sigma on the ray and origin."""
-    cloud = reproject(disparity_map, geometry, origins=_ALL)
+    cloud = disparity_map.reproject(geometry, origins=_ALL)
     points = geometry.rectified_from_left.inverse().apply(cloud.points_mm)
     table = np.empty(
         len(cloud),

@@ -34,7 +34,7 @@ from navapp.control.states import Blank, Command, EventLevel, Interrupt, Session
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import make_preview
-from navapp.tracking import LineSettings
+from navapp.tracking import TrackerSettings
 from navapp.values import (
     LineTimings,
     OverlayMode,
@@ -59,7 +59,7 @@ class SessionOptions:
         mirror_deg: where the mirror stood when the display was calibrated.
     """
 
-    line: LineSettings = field(default_factory=LineSettings)
+    line: TrackerSettings = field(default_factory=TrackerSettings)
     first_stage: StageSpec = STAGES[0]
     overlay_valid_ms: float = 500.0
     is_recording: bool = False

@@ -8,7 +8,7 @@ from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.preop import build_aspects
-from navapp.tracking import Goal, Line, LineSettings, TrackState
+from navapp.tracking import Goal, Tracker, TrackerSettings, TrackState, make_tracker
 from navapp.values import (
     LineTimings,
     Plan,
@@ -73,7 +73,7 @@ class Pursuit:
         rig: StereoRig,
         plan: Plan,
         prior: Prior,
-        settings: LineSettings,
+        settings: TrackerSettings,
         executor: Executor,
     ) -> None:
         self._rig = rig
@@ -81,7 +81,7 @@ class Pursuit:
         self._prior = prior
         self._settings = settings
         self._executor = executor
-        self._lines: dict[str, Line] = {}
+        self._lines: dict[str, Tracker] = {}
         self._edged: set[str] = set()
         self._tracks: dict[str, TrackState] = {}
         self._candidates: list[Candidate] = []
@@ -242,7 +242,7 @@ class Pursuit:
             self._tracks[stage.bone] = track
         return best
 
-    def _searching_line(self, stage: StageSpec) -> Line:
+    def _searching_line(self, stage: StageSpec) -> Tracker:
         """The bone's line, which knows its edges when there is no pose to start from."""
         name, prior = stage.bone, self._prior
         axis = prior.axis_for(name)
@@ -253,15 +253,15 @@ class Pursuit:
             aspects = build_aspects(bone, axis, prior.approach_half_angle_deg)
         else:
             aspects = built.within(ViewCone(axis, prior.approach_half_angle_deg))
-        line = Line(self._rig, bone, self._settings, aspects)
+        line = make_tracker(self._rig, bone, self._settings, aspects)
         self._lines[name] = line
         self._edged.add(name)
         return line
 
-    def _line(self, stage: StageSpec) -> Line:
+    def _line(self, stage: StageSpec) -> Tracker:
         name = stage.bone
         if name not in self._lines:
-            self._lines[name] = Line(self._rig, self._plan.bones[name], self._settings)
+            self._lines[name] = make_tracker(self._rig, self._plan.bones[name], self._settings)
         return self._lines[name]
 
     def _goal(self, stage: StageSpec) -> Goal:

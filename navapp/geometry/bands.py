@@ -3,9 +3,12 @@
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Generic, Self, TypeVar
 
 _Answer = TypeVar("_Answer")
+_Other = TypeVar("_Other")
+Rows = tuple[int, int]
 
 _lock = threading.Lock()
 _pools: list[ThreadPoolExecutor] = []
@@ -49,6 +52,11 @@ class Job(Generic[_Answer]):
                     self._taken.append(self._begun.result())
             return self._taken[0]
 
+    @property
+    def is_over(self) -> bool:
+        """The answer was asked for and is there."""
+        return bool(self._taken)
+
     def drop(self) -> None:
         """Nobody wants the answer: never begun, or waited for, and its errors are nobody's."""
         if self._begun is not None and not self._begun.cancel():
@@ -69,33 +77,29 @@ def beside(work: Callable[[], _Answer]) -> Job[_Answer]:
     return Job(work)
 
 
-def run_both(first: Callable[[], object], second: Callable[[], object]) -> None:
-    """Run two jobs side by side and wait for both; the first error is raised."""
-    other = beside(second)
-    error: Exception | None = None
-    try:
-        first()
-    except Exception as raised:  # noqa: BLE001 - the other job must have ended before it is raised
-        error = raised
-    try:
-        other.result()
-    except Exception:
-        if error is None:
-            raise
-    if error is not None:
-        raise error
+def run_both(first: Callable[[], _Answer], second: Callable[[], _Other]) -> tuple[_Answer, _Other]:
+    """Run two jobs side by side and wait for both answers; the first one's error goes before."""
+    with beside(second) as other:
+        answer = first()
+    return answer, other.result()
 
 
 def in_row_bands(
-    height: int, job: Callable[[int, int], object], every: int = 8, middle: int | None = None
+    height: int,
+    job: Callable[[Rows], object],
+    every: int = 8,
+    middle: int | None = None,
+    first: int = 0,
 ) -> None:
-    """Run `job(first_row, last_row)` for the upper and the lower half of the rows.
+    """Run `job((first row, row after the last))` for the upper and the lower half of the rows.
 
     Args:
         height: number of rows.
         job: of some rows.
         every: the lower half begins at a multiple of this: a job for every n-th row meets its rows.
         middle: row before which half of the work lies; by default half of the rows.
+        first: number of the first row.
     """
     middle = (height // 2 if middle is None else middle) // every * every
-    run_both(lambda: job(0, middle), lambda: job(middle, height))
+    middle, last = first + middle, first + height
+    run_both(partial(job, (first, middle)), partial(job, (middle, last)))

@@ -2,7 +2,7 @@
 
 Spelled out, because the compiler's own vectors stop at loops that read some arrays and write
 others: it cannot know that they do not overlap. Lanes are added, subtracted, multiplied and divided
-by + - * / among themselves. `lane_kernels.py` has whole numbers.
+by + - * / among themselves. `stereo/matching/byte_lane_kernels.py` has whole numbers.
 
 All but `lanes_for` is for compiled code only. Arrays are flat and C-contiguous; an index is not
 checked.

@@ -2,14 +2,14 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.errors import RigError
-from navapp.geometry.bands import beside
+from navapp.geometry.bands import in_row_bands, run_both
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
@@ -169,8 +169,6 @@ class Rectifier:
         Raises:
             ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
         """
-        from navapp.geometry.resampling import luma_for, resampled
-
         for picture in (left, right):
             if picture.shape[:2] != (self.rig.height, self.rig.width):
                 raise ValueError(
@@ -187,17 +185,19 @@ class Rectifier:
             last = inside.x + inside.width - math.floor(band_px[0]) + TAPS_PX
             in_left, in_right = inside, replace(inside, x=first, width=last - first)
         if self.interpolation == "bilinear":
-            pictures = (luma(left), luma(right)) if is_grey else (left, right)
-            return self._bilinear(pictures, (in_left, in_right), inside)
+            greys = (luma(left), luma(right)) if is_grey else (left, right)
+            return self._bilinear(greys, (in_left, in_right), inside)
         for_left, for_right = self._places
 
-        def of(picture: Image, places: "Places", part: Box) -> Image:
-            grey = luma_for(picture, places, part) if is_grey else picture
-            return resampled(grey, places, part)
+        def rectify_one(picture: Image, places: "Places", part: Box) -> Image:
+            grey = _luma_for(picture, places, part) if is_grey else picture
+            return resample(grey, places, part)
 
-        with beside(lambda: of(right, for_right, in_right)) as of_right:
-            of_left = of(left, for_left, in_left)
-        return RectifiedPair(of_left, of_right.result(), self.geometry, inside)
+        pictures = run_both(
+            lambda: rectify_one(left, for_left, in_left),
+            lambda: rectify_one(right, for_right, in_right),
+        )
+        return RectifiedPair(*pictures, self.geometry, inside)
 
     def _bilinear(
         self, pictures: tuple[Image, Image], parts: tuple[Box, Box], inside: Box
@@ -212,20 +212,16 @@ class Rectifier:
     @cached_property
     def _places(self) -> "tuple[Places, Places]":
         """Where the rectified pixels lie in the left and in the right picture."""
-        from navapp.geometry.resampling import find_places
-
         left_x, left_y, right_x, right_y = self.maps
         return find_places(left_x, left_y), find_places(right_x, right_y)
 
 
-def undistorted(picture: Image, camera: Camera, interpolation: Interpolation = "cubic") -> Image:
+def undistort(picture: Image, camera: Camera, interpolation: Interpolation = "cubic") -> Image:
     """The picture (H, W) or (H, W, 3) as the same camera without distortion sees it; else 0."""
-    from navapp.geometry.resampling import find_places, resampled
-
     columns, rows = lens_maps(camera, np.eye(3), camera.matrix)
     if interpolation == "bilinear":
         return bilinear(picture, columns, rows, Box(0, 0, camera.width, camera.height).slices)
-    return resampled(picture, find_places(columns, rows))
+    return resample(picture, find_places(columns, rows))
 
 
 def _solve(rig: StereoRig) -> tuple[Any, Any, Any, Any]:
@@ -253,3 +249,99 @@ def luma(picture: Image) -> Image:
     if picture.ndim == 2:
         return picture
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def _luma_for(picture: Image, places: "Places", part: Box) -> Image:
+    """The grey picture where a part of its rectified one asks for it; anything elsewhere."""
+    import cv2
+
+    if picture.ndim == 2:
+        return picture
+    grey = np.empty(picture.shape[:2], dtype=np.uint8)
+    asked = _source_box(places, part)
+    if not asked.is_empty:
+        rows, columns = (
+            slice(asked.y, asked.y + asked.height),
+            slice(asked.x, asked.x + asked.width),
+        )
+        cv2.cvtColor(picture[rows, columns], cv2.COLOR_BGR2GRAY, dst=grey[rows, columns])
+    return grey
+
+
+def _source_box(places: "Places", part: Box) -> Box:
+    """What of the other picture a part of the rectified one is made of."""
+    height, width = places.columns.shape
+    inside = part.clipped(width, height)
+    if inside.is_empty:
+        return inside
+    low, high = inside.y, inside.y + inside.height - 1
+    # Columns grow along a row, but for a lens that folds the picture's ends.
+    ends = [places.columns[low : high + 1, x] for x in (inside.x, inside.x + inside.width - 1)]
+    begin, end = min(column.min() for column in ends), max(column.max() for column in ends)
+    first, last = np.clip([begin - TAPS_PX, end + TAPS_PX], 0, width - 1).astype(int)
+    curves = places.rows[[low, high], first : last + 1]
+    top, bottom = np.clip([curves.min() - TAPS_PX, curves.max() + TAPS_PX], 0, height - 1).astype(
+        int
+    )
+    return Box(int(first), int(top), int(last - first + 1), int(bottom - top + 1))
+
+
+def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> "Places":
+    """Where to look for pixels (h, w), from smooth maps of both coordinates; columns grow in them.
+
+    The other picture has the same size.
+    """
+    from navapp.geometry.resample_kernels import Places
+
+    height, width = columns.shape
+    at = np.arange(width)
+    crossings = np.empty((height, width), dtype=np.float32)
+    for y in range(height):
+        # Interpolation looks beyond either end.
+        reached, found = (np.pad(line[y], 1, _extend) for line in (columns, rows))
+        crossings[y] = np.interp(at, np.maximum.accumulate(reached), found)
+    is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
+    steps = _lane_blocks(np.floor(columns) - at.astype(np.float32))
+    lines = _lane_blocks(np.floor(crossings))
+    in_step = ((steps == steps[..., :1]) | (steps == steps[..., -1:])).all(axis=2)
+    in_row = (lines == lines[..., :1]).all(axis=2)
+    return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
+
+
+def _extend(line: NDArray[np.float32], *_: object) -> None:
+    """Straight on at either end of a line, by so many pixels as interpolation asks for."""
+    line[0] = line[1] + TAPS_PX * (line[1] - line[2])
+    line[-1] = line[-2] + TAPS_PX * (line[-2] - line[-3])
+
+
+def _lane_blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(h, blocks, LANES) of (h, w); a cut block is filled up with numbers that are not the same."""
+    from navapp.geometry.float_lane_kernels import LANES, lanes_for
+
+    height, width = values.shape
+    full = np.full((height, lanes_for(width)), np.nan, dtype=np.float32)
+    full[:, :width] = values
+    return full.reshape(height, -1, LANES)
+
+
+def resample(picture: Image, places: "Places", part: Box | None = None) -> Image:
+    """The picture at real places (h, w), cubic over six pixels; 0 outside it, and outside a part.
+
+    Linear interpolation, and less so a cubic over four pixels, blurs by where a pixel falls;
+    OpenCV's cubic (a = -0.75) bends a ramp: all tilt a disparity that is measured to a part of a
+    pixel.
+    """
+    from navapp.geometry.resample_kernels import resample_rows
+
+    if picture.ndim == 3:
+        return np.dstack([resample(picture[..., k], places, part) for k in range(3)])
+    picture = np.ascontiguousarray(picture)
+    values = np.zeros(places.columns.shape, dtype=np.uint8)
+    height, width = places.columns.shape
+    inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
+    if inside.is_empty:
+        return values
+    span = (inside.x, inside.x + inside.width)
+    rows_of = partial(resample_rows, picture, places, span=span, resampled=values)
+    in_row_bands(inside.height, rows_of, first=inside.y)
+    return values

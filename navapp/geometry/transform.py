@@ -115,6 +115,24 @@ class RigidTransform:
         moved[:3, 3] = centre - rotation @ centre + values[:3]
         return RigidTransform(self.target, self.source, moved @ self.matrix)
 
+    def twist_to(self, other: "RigidTransform", centre_mm: ArrayLike) -> FloatArray:
+        """(6,) twist (mm, rad) that moves this pose to another, left, about a point of the source.
+
+        Args:
+            other: of the same frames.
+            centre_mm: (3,) in the source frame.
+        """
+        shift = other.apply(centre_mm) - self.apply(centre_mm)
+        return np.concatenate([shift, vector_from_rotation(other.rotation @ self.rotation.T)])
+
+    def mean_motion_mm(self, other: "RigidTransform", points_mm: FloatArray) -> float:
+        """Mean displacement of points (N, 3) of the source between this pose and another."""
+        turned, shifted_mm = (
+            other.rotation - self.rotation, other.translation_mm - self.translation_mm
+        )  # fmt: skip
+        moved = points_mm @ turned.T + shifted_mm
+        return float(np.sqrt(np.einsum("ij,ij->i", moved, moved)).mean())
+
     def renamed(self, target: str, source: str) -> "RigidTransform":
         """The same motion under other frame names (a border between naming schemes)."""
         return RigidTransform(target, source, self.matrix)

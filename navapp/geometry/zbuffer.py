@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer_kernels import (
     bounds_of_points,
     project_points,
-    raster_nearest,
-    tell_depth,
+    render_rows,
 )
 
 # A vertex hidden by less than this is still the surface itself, seen at a grazing angle.
@@ -169,11 +169,11 @@ def _raster(
     face_code = np.full(inverse_depth.shape, -1, dtype=np.int32)
     writable = np.array(faces)
 
-    def draw(first: int, last: int) -> None:
-        band, codes = (first, last), face_code.view(np.float32)
-        raster_nearest(pixels, depths_mm, writable, inverse_depth, codes, band, is_closed)
-        tell_depth(inverse_depth, face_code, band, depth, face_index)
-
     if not box.is_empty:
+        draw = partial(
+            render_rows, pixels, depths_mm, writable, is_closed, inverse_depth=inverse_depth,
+            face_code=face_code.view(np.float32), coded=face_code, depth=depth,
+            face_index=face_index,
+        )  # fmt: skip
         in_row_bands(box.height, draw)
     return RenderedView(depth, face_index, box)

@@ -210,3 +210,21 @@ def tell_depth(
         for x in range(out.shape[0]):
             out[x] = one / drawn[x] if drawn[x] > np.float32(0.0) else unknown
         face_index[y] = face_code[y, : face_index.shape[1]]
+
+
+@njit(cache=True, nogil=True)
+def render_rows(
+    pixels: NDArray[np.float64],
+    depths: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    is_closed: bool,
+    band: tuple[int, int],
+    inverse_depth: NDArray[np.float32],
+    face_code: NDArray[np.float32],
+    coded: NDArray[np.int32],
+    depth: NDArray[np.float32],
+    face_index: NDArray[np.int32],
+) -> None:
+    """`raster_nearest`, then `tell_depth`; `coded` is `face_code` read as whole numbers."""
+    raster_nearest(pixels, depths, faces, inverse_depth, face_code, band, is_closed)
+    tell_depth(inverse_depth, coded, band, depth, face_index)

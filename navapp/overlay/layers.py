@@ -77,8 +77,8 @@ def draw_bone(image: Image, scene: Scene) -> None:
     share = shares_of_faces(mesh.normals, mesh.faces, towards, _LEAST_SHARE, _STEEP_SHARE)
     in_row_bands(
         box.height,
-        lambda first, last: tint_pixels(
-            part[first:last], view.face_index[first:last], share, scene.colour
+        lambda rows: tint_pixels(
+            part[slice(*rows)], view.face_index[slice(*rows)], share, scene.colour
         ),
     )
     mask = view.mask.astype(np.uint8)

@@ -6,6 +6,7 @@ are spread over some pixels: Hinterstoisser et al., PAMI 2012.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,10 +98,10 @@ def _responses(picture: Image, inside: Box, scale: int, reach: int) -> NDArray[n
     least = _NOISE_SIGMAS * _BLURRED_NOISE * _noise(picture, inside) / scale
     least = max(least, float(np.quantile(part, _FLAT_SHARE)) if part.size else 0.0)
     bins = np.zeros(small.shape, dtype=np.uint8)
-    in_row_bands(height, lambda a, b: quantised_gradients(small, least, (a, b), bins))
+    in_row_bands(height, partial(quantised_gradients, small, least, bins=bins))
     response = np.zeros((height, width, N_BINS), dtype=np.uint8)
     answers = answer_table()
-    in_row_bands(height, lambda a, b: spread_responses(bins, reach, answers, (a, b), response))
+    in_row_bands(height, lambda rows: spread_responses(bins, reach, answers, rows, response))
     return response
 
 

@@ -27,7 +27,7 @@ from navapp.registration.multi_start import (
 )
 from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.scene import Scene
-from navapp.values import PoseEstimate, Reason, predicted_tre_mm
+from navapp.values import PoseEstimate, Reason
 
 Method = Literal["bimcc", "bimcc-literal", "icp"]
 
@@ -254,7 +254,7 @@ def _predicted_tre_mm(
     if len(points) == 0 or not np.isfinite(estimate.covariance).all():
         return None
     some = points[:: max(1, len(points) // _N_TRE_POINTS)]
-    return predicted_tre_mm(estimate, model.centre_mm, some)
+    return estimate.predicted_tre_mm(model.centre_mm, some)
 
 
 def _facing(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:

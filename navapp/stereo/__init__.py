@@ -1,7 +1,6 @@
 """From a rectified pair to a surface: matching, occlusion filling, reprojection."""
 
 from navapp.stereo.chains import (
-    MODEL_REFINEMENT,
     StereoAnswer,
     match_baseline,
     match_on_support,
@@ -11,8 +10,13 @@ from navapp.stereo.chains import (
 )
 from navapp.stereo.coarse import are_swapped, match_coarsely
 from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
-from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
-from navapp.stereo.surface import reproject
+from navapp.stereo.subpixel.refine import (
+    MODEL_REFINEMENT,
+    RefineSettings,
+    refine,
+    refine_on_model,
+    refine_samples,
+)
 
 __all__ = [
     "MODEL_REFINEMENT",
@@ -28,7 +32,7 @@ __all__ = [
     "match_surface",
     "measure_health",
     "refine",
+    "refine_on_model",
     "refine_samples",
-    "reproject",
     "smoothed",
 ]

@@ -8,28 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo.coarse import LEAST_AGREEMENT, Evidence, clipped, coarse_surface
+from navapp.stereo.coarse import LEAST_AGREEMENT, Evidence, clip_box, coarse_surface
 from navapp.stereo.matching.census_sgm import CensusSettings, match_census
-from navapp.stereo.matching.consistency import speckle_free
 from navapp.stereo.matching.gradient import GradientSettings, match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, seen_from_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface
-from navapp.stereo.subpixel.refine import RefineSettings, refine
+from navapp.stereo.subpixel.refine import refine_on_model, without_specks
 from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, LineTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
-# What the residual of a window does not show is less on the model than on a surface that is
-# guessed; at the true poses of simulated knees it is so much (docs/accuracy.md).
-MODEL_REFINEMENT = RefineSettings(systematic_px=0.08)
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
 _NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
-# Chance and repeated texture confirm a few per cent of any support, in specks.
-_LEAST_CONFIRMED = 0.1
-_SPECKLE_PX, _SPECKLE_STEP_PX = 60, 1.0
 _LEAST_IN_PATCHES = 0.5
 _NOT_CONFIRMED = (
     "the surface is not where the pose says: is the pose right, are the pictures swapped?"
@@ -69,7 +62,7 @@ def match_scene(
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
     """
     started = time.perf_counter_ns()
-    pair = clipped(pair)
+    pair = clip_box(pair)
     found = match_census(pair, band_px, _settings_for(band_px))
     if not found.agreement >= LEAST_AGREEMENT:
         return _nothing(pair, _why(found.agreement), started)
@@ -92,7 +85,7 @@ def match_surface(
     tell where; `refine_surface` measures. Arguments as for `match_scene`.
     """
     started = time.perf_counter_ns()
-    pair = clipped(pair)
+    pair = clip_box(pair)
     coarse = coarse_surface(pair, band_px)
     if not coarse.agreement >= LEAST_AGREEMENT:
         return _nothing(pair, _why(coarse.agreement), started)
@@ -117,9 +110,8 @@ def match_on_support(
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
     """
     started = time.perf_counter_ns()
-    left = _without_specks(refine(pair, support_px, MODEL_REFINEMENT))
-    n_expected = np.count_nonzero(np.isfinite(support_px))
-    if left.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
+    left = refine_on_model(pair, support_px)
+    if np.isfinite(support_px).any() and not (left.origin > 0).any():
         return _nothing(pair, _NOT_CONFIRMED, started)
     if not fills:
         return StereoAnswer(left, left, (), LineTimings(stereo_ms=_ms(started)))
@@ -133,10 +125,10 @@ def match_on_support(
 def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoAnswer:
     """The paper's state of the art: gradient magnitudes, winner takes all, Gaussian; no fill."""
     started = time.perf_counter_ns()
-    pair = clipped(pair)
+    pair = clip_box(pair)
     matched = match_gradient(pair, band_px)
     # Matches of chance stand alone.
-    in_patches = _without_specks(matched).matched_share
+    in_patches = without_specks(matched).matched_share
     if matched.matched_share == 0.0:
         return _nothing(pair, _NO_CONTRAST, started)
     if in_patches < _LEAST_IN_PATCHES * matched.matched_share:
@@ -199,11 +191,6 @@ def _settings_for(band_px: tuple[float, float]) -> CensusSettings:
     if band_px[1] - band_px[0] < _WIDE_SEARCH_PX:
         return CensusSettings()
     return CensusSettings(radius_x=4, radius_y=3, p1=20, p2=120)
-
-
-def _without_specks(found: DisparityMap) -> DisparityMap:
-    """The map without small patches that stand alone."""
-    return found.only(speckle_free(found.disparity_px, _SPECKLE_PX, _SPECKLE_STEP_PX))
 
 
 def _why(agreement: float) -> str:

@@ -1,17 +1,24 @@
-"""What lies where, to about a pixel: the coarse surface that the finer steps of a chain begin with.
+"""What lies where, to about a pixel: the coarse surface that the finer steps begin with.
 
-Census and semi-global matching, at half resolution where that leaves enough of the picture.
+Census and semi-global matching, at half resolution where that leaves enough of the picture: one
+pixel of the half is the mean of four, pixel k lies at 2 k + 0.5 of the whole, and a disparity of
+the whole is exactly twice that of the half.
 """
 
+import math
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.box import Box
+from navapp.geometry.masks import where
+from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.census_sgm import CensusSettings, match_census
-from navapp.stereo.subpixel.coarse_to_fine import calmed, without_steps
-from navapp.stereo.subpixel.half_resolution import doubled, doubled_disparity, halved
+from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
+
+T = TypeVar("T", bound=np.generic)
 
 # Below this share of left-right agreement the two pictures do not show the same scene that way
 # round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
@@ -20,6 +27,13 @@ LEAST_AGREEMENT, _MOST_AGREE = 0.15, 0.5
 _SURFACE_CENSUS = CensusSettings(radius_x=3, radius_y=2, p1=5, p2=30)
 # So few are soon matched as they are; at half resolution too little of the picture is left.
 _FEW_CELLS = 3_000_000
+_COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.5, 0.75, 0.4))
+# Neighbours over which a map is averaged that only has to tell what lies where.
+_CALM_PX = 5
+_COARSE_STEP_PX = 0.5
+_FAR_FROM_MATCH_PX = 1.5
+# What windows and the steps at the ends of a search ask for beside a box, at half resolution.
+_WINDOW_PX = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,16 +71,16 @@ def _is_wide(pair: RectifiedPair, band_px: tuple[float, float]) -> bool:
 def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
     found = match_census(pair, band_px, _SURFACE_CENSUS)
     evidence = Evidence(found.right_px, found.right_x0, found.confidence)
-    return CoarseSurface(without_steps(found.left.disparity_px), evidence, found.agreement)
+    return CoarseSurface(smooth_steps(found.left.disparity_px), evidence, found.agreement)
 
 
 def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
     low, high = band_px
-    found = match_census(halved(pair, band_px), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
-    surface_px = doubled_disparity(without_steps(found.left.disparity_px), pair.box)
+    found = match_census(halve(pair, band_px), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
+    surface_px = double_disparity(smooth_steps(found.left.disparity_px), pair.box)
     right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
-    right_px = np.float32(2.0) * doubled(found.right_px, right)
-    evidence = Evidence(right_px, right.x, doubled(found.confidence, pair.box))
+    right_px = np.float32(2.0) * double(found.right_px, right)
+    evidence = Evidence(right_px, right.x, double(found.confidence, pair.box))
     return CoarseSurface(surface_px, evidence, found.agreement)
 
 
@@ -81,15 +95,15 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray
         (h, w) disparity over the part of `pair.box` inside the pictures, NaN where unknown; all
         unknown when the pictures hardly agree.
     """
-    pair = clipped(pair)
+    pair = clip_box(pair)
     is_half = _is_wide(pair, band_px)
-    small = halved(pair, band_px) if is_half else pair
+    small = halve(pair, band_px) if is_half else pair
     band_px = (band_px[0] / 2.0, band_px[1] / 2.0) if is_half else band_px
     found = match_census(small, band_px, _SURFACE_CENSUS)
     if not found.agreement >= LEAST_AGREEMENT:
         return np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
-    surface_px = calmed(found.left.disparity_px)
-    return doubled_disparity(surface_px, pair.box) if is_half else surface_px
+    surface_px = calm(found.left.disparity_px)
+    return double_disparity(surface_px, pair.box) if is_half else surface_px
 
 
 def are_swapped(
@@ -104,12 +118,128 @@ def are_swapped(
         band_px: smallest and largest disparity of the scene around the box.
         exchanged: the same, left called right before they were rectified.
     """
-    if coarse_surface(clipped(given), band_px).agreement >= LEAST_AGREEMENT:
+    if coarse_surface(clip_box(given), band_px).agreement >= LEAST_AGREEMENT:
         return False
-    return coarse_surface(clipped(exchanged), band_px).agreement >= _MOST_AGREE
+    return coarse_surface(clip_box(exchanged), band_px).agreement >= _MOST_AGREE
 
 
-def clipped(pair: RectifiedPair) -> RectifiedPair:
+def clip_box(pair: RectifiedPair) -> RectifiedPair:
     """The pair with the part of its box that lies in the pictures."""
     height, width = pair.left.shape[:2]
     return replace(pair, box=pair.box.clipped(width, height))
+
+
+def smooth_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A matched map (h, w) of whole disparities as a smooth surface, single holes closed."""
+    import cv2
+
+    known = np.isfinite(coarse_px)
+    weights = known.astype(np.float32)
+    surface = regional_support(coarse_px, weights, coarse_px.shape, _COARSE_SURFACE)
+    around = cv2.dilate(known.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    with np.errstate(invalid="ignore"):
+        is_same = np.abs(surface - coarse_px) < _FAR_FROM_MATCH_PX
+    smooth = np.where(known & ~is_same, coarse_px, surface)
+    return np.where(around, smooth, np.float32(np.nan)).astype(np.float32)
+
+
+def calm(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A matched map (h, w) with less noise, single holes closed: to tell what lies where.
+
+    A pixel whose neighbourhood is off by more than a step of the map keeps what it has: edges keep
+    their place.
+    """
+    import cv2
+
+    known = np.isfinite(coarse_px)
+    counts = known.astype(np.float32)
+    window = (_CALM_PX, _CALM_PX)
+    filled = cv2.patchNaNs(coarse_px.copy(), 0.0)
+    total = cv2.boxFilter(filled, -1, window, normalize=False)
+    mean = total / np.maximum(cv2.boxFilter(counts, -1, window, normalize=False), np.float32(1.0))
+    around = cv2.dilate(known.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    with np.errstate(invalid="ignore"):
+        is_off = np.abs(mean - coarse_px) > _COARSE_STEP_PX
+    cv2.copyTo(coarse_px, is_off.view(np.uint8), mean)
+    return where(around, mean, np.float32(np.nan))
+
+
+def halve(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> RectifiedPair:
+    """The pair at half its resolution; an odd last row or column is left out.
+
+    Args:
+        pair: rectified grey pictures.
+        band_px: smallest and largest disparity. With it only the pair's box, and what it reaches in
+            the right picture, is made; the rest is 0.
+    """
+    geometry = pair.geometry
+    height, width = (length // 2 for length in pair.left.shape)
+    half, whole = half_box(pair.box), Box(0, 0, width, height)
+    in_left = in_right = whole
+    if band_px is not None:
+        in_left = half.grown(_WINDOW_PX)
+        # From the farthest partner of the first column to the nearest of the last.
+        farthest, nearest = math.ceil(band_px[1] / 2.0), math.floor(band_px[0] / 2.0)
+        first, after = in_left.x - farthest, in_left.x + in_left.width - nearest
+        in_right = replace(in_left, x=first, width=max(after - first, 0))
+    return RectifiedPair(
+        _halve(pair.left, in_left.clipped(width, height), whole),
+        _halve(pair.right, in_right.clipped(width, height), whole),
+        replace(
+            geometry,
+            focal_px=geometry.focal_px / 2.0,
+            centre_x_px=(geometry.centre_x_px - 0.5) / 2.0,
+            centre_y_px=(geometry.centre_y_px - 0.5) / 2.0,
+            width=width,
+            height=height,
+        ),
+        half,
+    )
+
+
+def _halve(image: Image, part: Box, whole: Box) -> Image:
+    """A part (of the half) of a picture at half its resolution; 0 elsewhere."""
+    import cv2
+
+    small = np.zeros((whole.height, whole.width), dtype=np.uint8)
+    if not part.is_empty:
+        rows, columns = (
+            slice(part.y, part.y + part.height), slice(part.x, part.x + part.width)
+        )  # fmt: skip
+        even = image[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop]
+        size = (part.width, part.height)
+        cv2.resize(even, size, dst=small[rows, columns], interpolation=cv2.INTER_AREA)
+    return small
+
+
+def half_box(box: Box) -> Box:
+    """The pixels of the half that cover a box of the whole."""
+    x, y = box.x // 2, box.y // 2
+    return Box(x, y, -(-(box.x + box.width) // 2) - x, -(-(box.y + box.height) // 2) - y)
+
+
+def double_disparity(half_px: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
+    """(h, w) disparity over a box of the whole, from that over `half_box(box)`; interpolated.
+
+    A pixel whose half pixel is known is known: unknown neighbours do not spread.
+    """
+    import cv2
+
+    height, width = half_px.shape
+    # OpenCV's enlargement puts the half's pixel k at 2 k + 0.5, as it should be.
+    between = cv2.resize(half_px, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
+    between = between[_inside(box)]
+    finest = double(half_px, box)
+    cv2.copyTo(between, np.isfinite(between).view(np.uint8), finest)
+    return np.asarray(np.float32(2.0) * finest, dtype=np.float32)
+
+
+def double(half: NDArray[T], box: Box) -> NDArray[T]:
+    """(h, w) values over a box of the whole: those of the half pixel each pixel lies in."""
+    return np.repeat(np.repeat(half, 2, axis=0), 2, axis=1)[_inside(box)]
+
+
+def _inside(box: Box) -> tuple[slice, slice]:
+    """The box's rows and columns among the pixels that its half covers."""
+    top, left = box.y % 2, box.x % 2
+    return slice(top, top + box.height), slice(left, left + box.width)

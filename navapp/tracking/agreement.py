@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.masks import where
+from navapp.geometry.masks import mark_large
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.geometry.regions import mark_large
-from navapp.geometry.zbuffer import RenderedView
+from navapp.geometry.transform import RigidTransform
+from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.agreement_kernels import (
     COARSELY_FURTHER,
@@ -104,11 +104,9 @@ def compare(
     if n_visible == 0:
         return NO_AGREEMENT
     is_hidden, is_behind = (np.zeros(classes.shape, dtype=np.bool_) for _ in range(2))
-    for kind in (NEARER, COARSELY_NEARER):
-        mark_large(classes, kind, _LEAST_REGION_PX2, is_hidden)
-    inner = where(_without_rim(view.mask), classes, np.uint8(0))
-    for kind in (FURTHER, COARSELY_FURTHER):
-        mark_large(inner, kind, _LEAST_REGION_PX2, is_behind)
+    mark_large(classes, (NEARER, COARSELY_NEARER), _LEAST_REGION_PX2, is_hidden)
+    inner = _without_rim(classes, view.mask)
+    mark_large(inner, (FURTHER, COARSELY_FURTHER), _LEAST_REGION_PX2, is_behind)
     room = classes[::_SPREAD_STRIDE_PX, ::_SPREAD_STRIDE_PX].size
     deviations, sigmas = (np.empty(room, dtype=np.float32) for _ in range(2))
     n_open, n = gather_open(
@@ -124,6 +122,20 @@ def compare(
     )
 
 
+def compare_at(
+    pose: RigidTransform,
+    model: RegistrationModel,
+    measured: DisparityMap,
+    geometry: RectifiedGeometry,
+    coarse_px: NDArray[np.float32] | None = None,
+) -> Agreement:
+    """As `compare`, of the model rendered at a pose (rectified left camera from bone)."""
+    view = render_rectified(
+        model.drawn_mesh, pose, geometry, measured.box, is_closed=model.is_closed
+    )
+    return compare(view, model, measured, geometry, coarse_px)
+
+
 def _spread_ratio(deviations_px: NDArray[np.float32], sigmas_px: NDArray[np.float32]) -> float:
     if len(deviations_px) == 0:
         return 0.0
@@ -131,9 +143,10 @@ def _spread_ratio(deviations_px: NDArray[np.float32], sigmas_px: NDArray[np.floa
     return float(_MAD_TO_SIGMA * np.median(from_middle / sigmas_px))
 
 
-def _without_rim(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _without_rim(classes: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """(h, w) classes, 0 beside a mask and on its rim."""
     import cv2
 
     size = 2 * _RIM_PX + 1
     inner = cv2.erode(mask.astype(np.uint8), np.ones((size, size), np.uint8), borderValue=0)
-    return np.asarray(inner > 0)
+    return np.asarray(cv2.copyTo(classes, inner), dtype=np.uint8)

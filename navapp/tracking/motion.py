@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from navapp.geometry.transform import FloatArray, RigidTransform, vector_from_rotation
-from navapp.tracking.box_tracker import BoxState
-from navapp.values import Reason, Status, TrackedFrame, Verdict
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.tracking.box.tracker import BoxState
+from navapp.tracking.verdict import is_place_doubted, is_worth_a_search
+from navapp.values import Reason, Status, TrackedFrame
 
 # A patient's limb slows down: the prediction takes this part of the last velocity.
 _DAMPING = 0.7
@@ -15,18 +16,6 @@ _MAX_GAP_NS = 400_000_000
 # A search for a buried bone that keeps finding nothing is made again after twice as many frames, at
 # most so many: it takes as long as many frames do.
 _MOST_BETWEEN_SEARCHES = 8
-# What speaks against a pose's place, not against its accuracy.
-_AGAINST = frozenset(
-    {
-        Reason.COVERAGE_LOW,
-        Reason.SEEN_THROUGH,
-        Reason.SURFACE_MISFIT,
-        Reason.OUTLIERS,
-        Reason.NOT_CONVERGED,
-        Reason.AMBIGUOUS,
-        Reason.DEGENERATE,
-    }
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,33 +81,13 @@ class TrackState:
         pose = tracked.left_from_bone
         verdict = tracked.verdict
         # What lies far from where it was expected, and fits badly too, is something else.
-        is_elsewhere = Reason.JUMPED in verdict.reasons and _AGAINST.intersection(verdict.reasons)
+        is_elsewhere = Reason.JUMPED in verdict.reasons and is_place_doubted(verdict)
         if pose is None or verdict.status is Status.LOST or is_elsewhere:
             lost = replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
             return replace(lost, cause=verdict.cause)
         elapsed_ns = captured_ns - self.captured_ns
         velocity = np.zeros(6)
         if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
-            velocity = twist_between(self.left_from_bone, pose, centre_mm) / (elapsed_ns / 1e9)
+            velocity = self.left_from_bone.twist_to(pose, centre_mm) / (elapsed_ns / 1e9)
         n_doubted = self.n_doubted + 1 if is_worth_a_search(tracked) else 0
         return TrackState(pose, captured_ns, velocity, 0, n_doubted, self.box, verdict.cause)
-
-
-def is_place_doubted(verdict: Verdict) -> bool:
-    """Whether something speaks against a pose's place; always when it is lost."""
-    return verdict.status is Status.LOST or not _AGAINST.isdisjoint(verdict.reasons)
-
-
-def is_worth_a_search(tracked: TrackedFrame) -> bool:
-    """Whether the place is in doubt, and a search could find one that is not.
-
-    While the cameras' rows disagree no answer can be OK: only what is lost has something to gain.
-    """
-    is_lost = tracked.verdict.status is Status.LOST
-    return is_place_doubted(tracked.verdict) and (is_lost or not tracked.rows_disagree)
-
-
-def twist_between(a: RigidTransform, b: RigidTransform, centre_mm: FloatArray) -> FloatArray:
-    """(6,) twist (mm, rad) that moves pose a to pose b, left, about the bone's centre."""
-    shift = b.apply(centre_mm) - a.apply(centre_mm)
-    return np.concatenate([shift, vector_from_rotation(b.rotation @ a.rotation.T)])

@@ -1,28 +1,31 @@
-"""The measured surface around a pose: freely, or on the model itself."""
+"""The surface of a bone, measured in a pair of pictures.
 
-import time
+Four kinds: on the model at a pose, exact and near; on samples of it; freely, whatever is there; and
+coarsely, to tell what lies where.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.masks import large_regions
 from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
-from navapp.geometry.regions import large_regions
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     MODEL_REFINEMENT,
-    match_baseline,
     match_coarsely,
-    match_on_support,
     match_surface,
+    refine_on_model,
     refine_samples,
-    reproject,
 )
-from navapp.values import DisparityMap, LineTimings, SurfaceCloud
+from navapp.values import DisparityMap, SurfaceCloud
 
 # Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
 # it; on the model's own surface over a window.
@@ -37,6 +40,17 @@ _MIXED_PX = 3
 _LEAST_UNMIXED = 0.5
 
 
+_KEPT_BOUNDS = 8
+
+# Matches a pair's box within a band of disparities (px).
+Matcher = Callable[[RectifiedPair, tuple[float, float]], DisparityMap]
+
+
+def match_smooth_surface(pair: RectifiedPair, band_px: tuple[float, float]) -> DisparityMap:
+    """Without a pose: census and semi-global matching, refined on a smooth support."""
+    return match_surface(pair, band_px, fills=False).disparity
+
+
 @dataclass(frozen=True, slots=True)
 class Margins:
     """How far around the predicted bone is looked: in the picture, and in depth."""
@@ -45,6 +59,10 @@ class Margins:
     band_mm: float
 
 
+# Rectified around an expected bone: a little more than is matched when it is there, for it may have
+# moved; much more when it has to be searched.
+NEAR_VIEW = Margins(box_px=56, band_mm=60.0)
+WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
 # What hides the bone may be so much nearer; what is seen through a wrong pose, so much further.
 _AROUND = Margins(box_px=24, band_mm=60.0)
 
@@ -56,16 +74,14 @@ class Measurement:
     Attributes:
         disparity: over the box.
         cloud: of the measured pixels, thinned.
-        timings: how long it took.
-        answered_share: of the pixels that were asked for: the box's, or the model's.
+        answered_fraction: of the pixels that were asked for: the box's, or the model's.
         correlation_px: distance in the picture over which its errors go together.
         view: the model that it was measured on; None of a free measurement.
     """
 
     disparity: DisparityMap
     cloud: SurfaceCloud
-    timings: LineTimings
-    answered_share: float
+    answered_fraction: float
     correlation_px: float
     view: RenderedView | None = None
 
@@ -77,19 +93,17 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expected:
-    """What the model at a pose lets expect.
+    """What is to be seen of the model at a pose.
 
     Attributes:
         pair: with the model's box.
         support_px: (h, w) disparity of the model over the box, NaN beside it.
         view: the model in that box.
-        render_ms: how long that took.
     """
 
     pair: RectifiedPair
     support_px: NDArray[np.float32]
     view: RenderedView
-    render_ms: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +126,14 @@ class CoarseMap:
 
 
 class SurfaceMeter:
-    """Measures the surface of one bone under one rig."""
+    """Measures the surface of one bone under one rig.
+
+    Attributes:
+        model: of the bone.
+        rectifier: of the rig's pictures.
+        geometry: of its rectified pairs.
+        depth_mm: nearest and farthest surface that the rig is used for.
+    """
 
     def __init__(
         self,
@@ -122,56 +143,49 @@ class SurfaceMeter:
         max_points: int,
     ) -> None:
         self.rectifier = Rectifier(rig)
-        self._model = model
-        self._depth_mm = depth_mm
+        self.model = model
+        self.depth_mm = depth_mm
         self._max_points = max_points
         self.geometry = self.rectifier.geometry
+        # Several steps ask for the same few poses.
+        self._bounds = lru_cache(_KEPT_BOUNDS)(self._find_bounds)
 
-    def rectified(
+    def rectify(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins
-    ) -> tuple[RectifiedPair, LineTimings]:
+    ) -> RectifiedPair:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
-        started = time.perf_counter_ns()
         box, band_px = self._region(around, margins) or (None, None)
-        pair = self.rectifier.rectify(left, right, box, band_px, is_grey=True)
-        return pair, LineTimings(rectify_ms=_ms_since(started))
+        return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
 
-    def surroundings(
+    def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None
     ) -> tuple[RectifiedPair, tuple[float, float]]:
         """Both pictures around a pose, and the disparities there; the whole view without one."""
         region = None if around is None else self._region(around, _AROUND)
-        near_mm, far_mm = self._depth_mm
+        near_mm, far_mm = self.depth_mm
         everything = None, (self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm))
         box, band_px = region or everything
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True), band_px
 
-    def freely(
+    def measure_freely(
         self,
         pair: RectifiedPair,
         pose: RigidTransform,
         margins: Margins,
-        *,
-        is_baseline: bool = False,
+        match: Matcher = match_smooth_surface,
     ) -> Measurement | None:
         """Whatever surface is in the box and depth band around a pose; None out of view.
 
-        It sees whatever is there, also where the bone is not. The baseline is the paper's matcher.
+        It sees whatever is there, also where the bone is not.
         """
         region = self._region(pose, margins)
         if region is None:
             return None
         box, band_px = region
-        inside = replace(pair, box=box)
-        if is_baseline:
-            answer = match_baseline(inside, band_px)
-        else:
-            answer = match_surface(inside, band_px, fills=False)
-        cloud = self._cloud(answer.disparity)
-        share = answer.disparity.matched_share
-        return Measurement(answer.disparity, cloud, answer.timings, share, FREE_CORRELATION_PX)
+        found = match(replace(pair, box=box), band_px)
+        return Measurement(found, self._cloud(found), found.matched_share, FREE_CORRELATION_PX)
 
-    def coarsely(
+    def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
     ) -> CoarseMap | None:
         """Whatever lies in a box, as a coarse map; None out of view or depth.
@@ -187,64 +201,65 @@ class SurfaceMeter:
         around = box or region[0]
         return CoarseMap(match_coarsely(replace(pair, box=around), region[1]), around)
 
-    def expected(
+    def render(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
     ) -> Expected | None:
-        """What the model at a pose lets expect of a pair; None out of view."""
-        started = time.perf_counter_ns()
+        """What is to be seen of the model at a pose; None out of view."""
         region = self._region(pose, margins)
         if region is None:
             return None
-        model = self._model
+        model = self.model
         view = render_rectified(
             model.drawn_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
         )
         support_px = self.geometry.disparity_map_px(view.depth_mm)
-        return Expected(replace(pair, box=region[0]), support_px, view, _ms_since(started))
+        return Expected(replace(pair, box=region[0]), support_px, view)
 
-    def on_model(self, expected: Expected) -> Measurement:
+    def measure_on_model(self, expected: Expected) -> Measurement:
         """Sub-pixel matching on the model's own surface.
 
         Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
         it answers nothing.
         """
-        answer = match_on_support(expected.pair, expected.support_px, fills=False)
-        found, is_expected = answer.disparity, np.isfinite(expected.support_px)
+        found = refine_on_model(expected.pair, expected.support_px)
+        is_expected = np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
         share = found.matched_share * found.origin.size / max(int(np.count_nonzero(is_expected)), 1)
-        return Measurement(found, cloud, answer.timings, share, MODEL_CORRELATION_PX, expected.view)
+        return Measurement(found, cloud, share, MODEL_CORRELATION_PX, expected.view)
 
-    def sampled(self, expected: Expected) -> Measurement:
-        """As `on_model`, only on samples, in more steps if it needs them: it sees further.
+    def measure_on_samples(self, expected: Expected) -> Measurement:
+        """As `measure_on_model`, only on samples, in more steps if it needs them: it sees further.
 
         What hides the bone counts as well: nothing is left out for the company that it keeps.
         """
-        started = time.perf_counter_ns()
         support_px = expected.support_px
         thin = refine_samples(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
         asked = support_px[::_SAMPLES_PX, ::_SAMPLES_PX]
         n_asked = int(np.count_nonzero(np.isfinite(asked)))
         share = int(np.count_nonzero(thin.origin)) / max(n_asked, 1)
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
-        cloud = reproject(found, self.geometry, _SAMPLES_PX)
-        timings = LineTimings(stereo_ms=_ms_since(started))
-        return Measurement(found, cloud, timings, share, MODEL_CORRELATION_PX, expected.view)
+        cloud = found.reproject(self.geometry, _SAMPLES_PX)
+        return Measurement(found, cloud, share, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About as many points as the line wants."""
         n_matched = found.matched_share * found.origin.size
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
-        return reproject(found, self.geometry, stride_px)
+        return found.reproject(self.geometry, stride_px)
+
+    def _find_bounds(self, pose: RigidTransform) -> tuple[Box | None, tuple[float, float]]:
+        """What bounds the model at a pose: its box, and nearest and farthest depth, mm."""
+        return bounds_of(self.model.hull_mm, pose, self.geometry)
 
     def _region(
         self, pose: RigidTransform, margins: Margins
     ) -> tuple[Box, tuple[float, float]] | None:
         """Box and disparity band around the model at a pose; None out of view or out of depth."""
-        box, (nearest_mm, farthest_mm) = bounds_of(self._model.hull_mm, pose, self.geometry)
+        box, (nearest_mm, farthest_mm) = self._bounds(pose)
         if box is None:
             return None
-        near = max(nearest_mm - margins.band_mm, self._depth_mm[0])
-        far = min(farthest_mm + margins.band_mm, self._depth_mm[1])
+        near = max(nearest_mm - margins.band_mm, self.depth_mm[0])
+        far = min(farthest_mm + margins.band_mm, self.depth_mm[1])
         if near >= far:
             return None
         grown = box.grown(margins.box_px).clipped(self.geometry.width, self.geometry.height)
@@ -278,7 +293,3 @@ def _spread(thin: DisparityMap, stride_px: int, shape: tuple[int, ...]) -> Dispa
     sigma_px[::stride_px, ::stride_px] = thin.sigma_px
     origin[::stride_px, ::stride_px] = thin.origin
     return DisparityMap(disparity_px, sigma_px, origin, thin.x, thin.y)
-
-
-def _ms_since(started_ns: int) -> float:
-    return (time.perf_counter_ns() - started_ns) / 1e6

@@ -30,14 +30,13 @@ from navapp.values.contents import (
 from navapp.values.measured import DisparityMap, Origin, RowCheck, SurfaceCloud
 from navapp.values.pictures import OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
+from navapp.values.timings import LineTimings, Stopwatch
 from navapp.values.verdicts import (
-    LineTimings,
     PoseEstimate,
     Reason,
     Status,
     TrackedFrame,
     Verdict,
-    predicted_tre_mm,
 )
 
 __all__ = [
@@ -71,10 +70,10 @@ __all__ = [
     "StageContent",
     "StageSpec",
     "Status",
+    "Stopwatch",
     "SurfaceCloud",
     "SurgicalContent",
     "TrackedFrame",
     "Verdict",
-    "predicted_tre_mm",
     "visible_vertices",
 ]

@@ -64,6 +64,10 @@ class BoneModel:
                 raise ValueError(f"{self.name}: {name} must be finite and not negative")
             object.__setattr__(self, name, values)
 
+    def visible_vertices(self, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
+        """(V,) vertices that face the left camera; see the function `visible_vertices`."""
+        return visible_vertices(self.mesh, left_from_bone)
+
     def seen_surface(self) -> TriangleMesh:
         """What a camera sees: moved out by the mean cartilage, without what a stage removed.
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.geometry.masks import where
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray
 
 
@@ -50,16 +50,48 @@ class DisparityMap:
         n_matched = np.count_nonzero(self.origin == Origin.MATCHED)
         return float(n_matched / self.origin.size) if self.origin.size else 0.0
 
+    def reproject(
+        self,
+        geometry: RectifiedGeometry,
+        stride_px: int = 1,
+        origins: tuple[Origin, ...] = (Origin.MATCHED,),
+    ) -> "SurfaceCloud":
+        """Points of the rectified left camera, every `stride_px`-th pixel each way.
+
+        Args:
+            geometry: of the rectified pair.
+            stride_px: 1 takes all pixels.
+            origins: which pixels; by default the measured ones only.
+
+        Source: z = f B / d; sigma_z = z^2 / (f B) * sigma_d.
+        """
+        # What is compiled is not loaded by those who only read values.
+        from navapp.geometry.reprojection_kernels import count_wanted, reproject_pixels
+
+        is_wanted = np.zeros(256, dtype=np.bool_)
+        is_wanted[[int(origin) for origin in origins]] = True
+        fixed = (self.origin, is_wanted, stride_px)
+        n = count_wanted(self.disparity_px, *fixed)
+        points_mm, sigma_ray_mm = np.empty((n, 3)), np.empty(n)
+        pixels, origin = np.empty((n, 2), dtype=np.int32), np.empty(n, dtype=np.uint8)
+        camera = (
+            geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px, geometry.baseline_mm
+        )  # fmt: skip
+        reproject_pixels(
+            self.disparity_px, self.sigma_px, *fixed, (self.x, self.y), camera, points_mm,
+            sigma_ray_mm, pixels, origin,
+        )  # fmt: skip
+        return SurfaceCloud(points_mm, sigma_ray_mm, pixels, origin, stride_px)
+
     def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
         """The map, unknown beside a mask (h, w)."""
-        unknown = np.float32(np.nan)
-        return DisparityMap(
-            where(stays, self.disparity_px, unknown),
-            where(stays, self.sigma_px, unknown),
-            where(stays, self.origin, np.uint8(Origin.UNKNOWN)),
-            self.x,
-            self.y,
+        # What is compiled is not loaded by those who only read values.
+        from navapp.geometry.masks import where_all
+
+        disparity_px, sigma_px, origin = where_all(
+            stays, ((self.disparity_px, np.nan), (self.sigma_px, np.nan), (self.origin, 0))
         )
+        return DisparityMap(disparity_px, sigma_px, origin, self.x, self.y)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.measured import RowCheck
+from navapp.values.timings import LineTimings
 
 
 class Reason(Enum):
@@ -135,6 +136,39 @@ class PoseEstimate:
         """The same estimate with one more reason against it."""
         return replace(self, reasons=(*self.reasons, reason))
 
+    def predicted_tre_mm(self, centre_mm: FloatArray, targets_mm: FloatArray) -> float:
+        """95 % bound of the mean error over target points of a bone.
+
+        Args:
+            centre_mm: (3,) mean of the model's vertices, in bone coordinates.
+            targets_mm: (N, 3) in bone coordinates.
+
+        The mean length is at most the root mean square, whose square is a weighted sum of
+        chi-squares: here one chi-square of the same mean and variance (Welch 1938, Satterthwaite
+        1946).
+
+        Source: e(p) = J x, J = [I | -[p - c]x], x ~ N(0, S); mean |e|^2 = x^T M x, M = mean J^T J.
+        """
+        from scipy.special import chdtri
+
+        if len(targets_mm) == 0:
+            raise ValueError("no targets to predict an error for")
+        offsets = (targets_mm - centre_mm) @ self.camera_from_bone.rotation.T
+        jacobian = np.zeros((len(offsets), 3, 6))
+        jacobian[:, :, :3] = np.eye(3)
+        x, y, z = offsets.T
+        # -[p - c]x, row by row.
+        jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+        jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+        jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+        mean_square = np.einsum("nki,nkj->ij", jacobian, jacobian) / len(jacobian)
+        errors = self.covariance @ mean_square
+        first, second = float(np.trace(errors)), float(np.trace(errors @ errors))
+        if first <= 0.0:
+            return 0.0
+        freedom = first**2 / second
+        return float(np.sqrt(first / freedom * chdtri(freedom, 0.05)))
+
 
 class Status(Enum):
     """The judge's word on a pose."""
@@ -180,24 +214,6 @@ class Verdict:
         return rank, Reason.AMBIGUOUS in self.reasons, -self.coverage
 
 
-@dataclass(frozen=True, slots=True)
-class LineTimings:
-    """How long the parts of one frame took, in real time."""
-
-    rectify_ms: float = 0.0
-    stereo_ms: float = 0.0
-    fill_ms: float = 0.0
-    estimate_ms: float = 0.0
-    judge_ms: float = 0.0
-    overlay_ms: float = 0.0
-
-    @property
-    def total_ms(self) -> float:
-        """Sum."""
-        measured_ms = self.rectify_ms + self.stereo_ms + self.fill_ms
-        return measured_ms + self.estimate_ms + self.judge_ms + self.overlay_ms
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedFrame:
     """What the line answers for one frame and one bone.
@@ -225,46 +241,3 @@ class TrackedFrame:
     def rows_disagree(self) -> bool:
         """Whether the cameras' rows surely do: no pose of this pair is OK then."""
         return self.rows is not None and self.rows.is_off
-
-    def because(self, cause: Reason | None) -> "TrackedFrame":
-        """The same answer with the cause of its failure in front; an OK has none."""
-        if cause is None or self.verdict.status is Status.OK:
-            return self
-        others = tuple(reason for reason in self.verdict.reasons if reason is not cause)
-        return replace(self, verdict=replace(self.verdict, reasons=(cause, *others)))
-
-
-def predicted_tre_mm(
-    estimate: PoseEstimate, centre_mm: FloatArray, targets_mm: FloatArray
-) -> float:
-    """95 % bound of the mean error over target points of a bone.
-
-    Args:
-        estimate: pose and covariance.
-        centre_mm: (3,) mean of the model's vertices, in bone coordinates.
-        targets_mm: (N, 3) in bone coordinates.
-
-    The mean length is at most the root mean square, whose square is a weighted sum of chi-squares:
-    here one chi-square of the same mean and variance (Welch 1938, Satterthwaite 1946).
-
-    Source: e(p) = J x, J = [I | -[p - c]x], x ~ N(0, S); mean |e|^2 = x^T M x, M = mean J^T J.
-    """
-    from scipy.special import chdtri
-
-    if len(targets_mm) == 0:
-        raise ValueError("no targets to predict an error for")
-    offsets = (targets_mm - centre_mm) @ estimate.camera_from_bone.rotation.T
-    jacobian = np.zeros((len(offsets), 3, 6))
-    jacobian[:, :, :3] = np.eye(3)
-    x, y, z = offsets.T
-    # -[p - c]x, row by row.
-    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
-    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
-    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
-    mean_square = np.einsum("nki,nkj->ij", jacobian, jacobian) / len(jacobian)
-    errors = estimate.covariance @ mean_square
-    first, second = float(np.trace(errors)), float(np.trace(errors @ errors))
-    if first <= 0.0:
-        return 0.0
-    freedom = first**2 / second
-    return float(np.sqrt(first / freedom * chdtri(freedom, 0.05)))

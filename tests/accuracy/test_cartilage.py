@@ -1,4 +1,4 @@
-"""Cartilage through the whole line: what the plan knows of it decides what the pose is worth."""
+"""Cartilage through the whole tracker: what the plan knows of it decides what the pose is worth."""
 
 from functools import lru_cache
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from navapp.evaluation import mean_tre_mm
-from navapp.tracking import Line, TrackState
-from navapp.tracking.judge import OK_ERROR_MM
+from navapp.tracking import TrackState, make_tracker
+from navapp.tracking.verdict import OK_ERROR_MM
 from navapp.values import BoneModel, Prior, Reason, Status, TrackedFrame
 from tests.bench.cartilage import (
     GOAL,
@@ -36,15 +36,15 @@ def known(seed: int) -> Patient:
 def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
     """Followed from a degree and a millimetre off the truth; each with its TRE."""
     case = known(seed)
-    line = Line(case.world.rig, make(case))
+    tracker = make_tracker(case.world.rig, make(case))
     bone = BoneModel("femur", case.mesh)
     turn = np.radians(1.0) * np.array([0.6, -0.64, 0.48])
     twist = np.concatenate([[0.5, -0.5, 0.7], turn])
-    start = case.poses[0].moved(twist, case.poses[0].apply(line.centre_mm))
+    start = case.poses[0].moved(twist, case.poses[0].apply(tracker.centre_mm))
     state = TrackState.at_rest(start, case.frames[0].captured_ns)
     found = []
     for frame, true in zip(case.frames, case.poses, strict=True):
-        answer, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answer, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         assert answer.left_from_bone is not None
         error_mm = mean_tre_mm(answer.left_from_bone, true, bone, np.empty((0, 3)))
         found.append((answer, error_mm))
@@ -72,10 +72,10 @@ def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> N
 def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(seed: int) -> None:
     """Soft tissue continues its exact parts: they must not pull the search to themselves."""
     case = patient(seed, 1)
-    line = Line(case.world.rig, mapped(case))
+    tracker = make_tracker(case.world.rig, mapped(case))
     first = case.frames[0]
     prior = Prior({"femur": case.world.nominal_left_from_femur})
-    answer = line.register(first.left, first.right, prior, GOAL)[0]
+    answer = tracker.register(first.left, first.right, prior, GOAL)[0]
     assert answer.verdict.status is Status.OK
     bone = BoneModel("femur", case.mesh)
     assert mean_tre_mm(answer.left_from_bone, case.poses[0], bone, np.empty((0, 3))) <= WRONG_MM

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Side, Status, visible_vertices
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
@@ -39,7 +39,7 @@ class Judged:
 def run(seed: int, side: Side) -> tuple[Judged, ...]:
     knee = SimulatedKnee(Scenario(seed=seed, side=side, motion="patient"))
     mesh = knee.bone.mesh
-    line = Line(knee.rig, knee.bone)
+    tracker = make_tracker(knee.rig, knee.bone)
     judged = []
 
     def judge(frame, tracked) -> None:
@@ -56,12 +56,12 @@ def run(seed: int, side: Side) -> tuple[Judged, ...]:
         )  # fmt: skip
 
     frame = knee.camera.read(1.0)
-    first = line.register(frame.left, frame.right, knee.prior, GOAL)[0]
+    first = tracker.register(frame.left, frame.right, knee.prior, GOAL)[0]
     judge(frame, first)
     state = TrackState.at_rest(first.left_from_bone, frame.captured_ns)
     for _ in range(N_TRACKED):
         frame = knee.camera.read(1.0)
-        tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         judge(frame, tracked)
     return tuple(judged)
 

@@ -13,7 +13,6 @@ from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMe
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.zbuffer import projected_box
-from navapp.stereo import reproject
 from navapp.values import DisparityMap, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -128,7 +127,7 @@ def fit_error_mm(scene: Scene, found: DisparityMap, mesh: TriangleMesh) -> float
 
     Unweighted, started at the truth, nothing beyond 3 mm, until the step is below 1e-4 mm.
     """
-    points = reproject(on_bone(scene, found), scene.pair.geometry, 2).points_mm
+    points = on_bone(scene, found).reproject(scene.pair.geometry, 2).points_mm
     tree = cKDTree(mesh.vertices_mm)
     pose = scene.pose
     for _ in range(60):

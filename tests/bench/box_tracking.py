@@ -1,12 +1,12 @@
 """The bone's box without a pose, and how soon both are found again (docs/accuracy.md).
 
 usage: python -m tests.bench.box_tracking [--first N] [--seeds N] [--frames N] [--only WORD]
-           [--line]
+           [--poses]
 
 Simulated knees, half of them left ones, in the situations of the paper and two harder ones. Each is
 registered in its first frame from its nominal pose; from then on the box is followed by pictures
-of the left camera alone, with no other pose and no other learning. `--line` follows the leaving
-knee with the whole line as well, and the moving one with the baseline.
+of the left camera alone, with no other pose and no other learning. `--poses` follows the
+leaving knee with the whole tracker as well, and the moving one with the baseline.
 
 A frame counts where at least half of the true box lies in the picture. A box is right where it and
 the true one, both cut at the picture's sides, overlap (intersection over union) by 0.7 or more.
@@ -23,10 +23,10 @@ import numpy as np
 from drivers.frames import StereoFrame
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import Goal, Line, LineSettings, LocatorSettings, TrackState
-from navapp.tracking.box_guide import BoxGuide
-from navapp.tracking.box_tracker import followed, placed
-from navapp.tracking.picture_box import PictureBox
+from navapp.registration import RegistrationModel
+from navapp.tracking import Goal, Tracker, TrackerSettings, TrackState, make_tracker
+from navapp.tracking.box.picture_box import PictureBox
+from navapp.tracking.box.tracker import BoxTracker, follow_box, place_box
 from navapp.values import Status
 from sim_devices.camera import NOMINAL_EXPOSURE_MS
 from sim_devices.motion import smooth_step
@@ -77,13 +77,13 @@ class LeavingWorld(World):
 
 @dataclass
 class Scene:
-    """A knee and the line that follows it."""
+    """A knee and the tracker that follows it."""
 
     seed: int
     situation: Situation
     knee: SimulatedKnee = field(init=False)
-    line: Line = field(init=False)
-    guide: BoxGuide = field(init=False)
+    tracker: Tracker = field(init=False)
+    boxes: BoxTracker = field(init=False)
 
     def __post_init__(self) -> None:
         kind = LeavingWorld if self.situation.is_leaving else World
@@ -94,8 +94,8 @@ class Scene:
             instrument=self.situation.instrument,
         )
         self.knee = SimulatedKnee(kind(scenario))
-        self.line = Line(self.knee.rig, self.knee.bone)
-        self.guide = BoxGuide(self.knee.rig, self.line.model)
+        self.tracker = make_tracker(self.knee.rig, self.knee.bone)
+        self.boxes = BoxTracker(self.knee.rig, RegistrationModel(self.knee.bone))
 
     def frames(self, n_frames: int) -> Iterator[tuple[StereoFrame, RigidTransform]]:
         """Frames with the true pose in each."""
@@ -108,13 +108,13 @@ class Scene:
 
     def registered(self, frame: StereoFrame) -> RigidTransform | None:
         """The first pose, found from the nominal one."""
-        found = self.line.register(frame.left, frame.right, self.knee.prior, GOAL)
+        found = self.tracker.register(frame.left, frame.right, self.knee.prior, GOAL)
         return found[0].left_from_bone if found else None
 
     def overlap(self, box: PictureBox | None, truth: RigidTransform) -> tuple[float, float]:
         """Of a box with the true one, -1 without a box; and how much of that is in the picture."""
         width, height = self.knee.rig.width, self.knee.rig.height
-        true_box = self.guide.projected(truth)
+        true_box = self.boxes.project(truth)
         assert true_box is not None
         seen = true_box.seen_share(width, height)
         if box is None:
@@ -134,18 +134,18 @@ class Tally:
     searching_ms: list[float] = field(default_factory=list)
 
 
-def follow_box(scene: Scene, n_frames: int, tally: Tally) -> None:
+def follow_pictures(scene: Scene, n_frames: int, tally: Tally) -> None:
     """The box by pictures alone, after one accepted frame."""
     state, n_back, was_away = None, 0, False
     for frame, truth in scene.frames(n_frames):
         if state is None:
             start = scene.registered(frame)
             assert start is not None
-            state = placed(None, frame.left, scene.guide.projected(start), hidden_share=0.0)
+            state = place_box(None, frame.left, scene.boxes.project(start), hidden_share=0.0)
             continue
         times = tally.searching_ms if state.box is None else tally.ms
         started = time.perf_counter()
-        state = followed(state, frame.left)
+        state = follow_box(state, frame.left)
         times.append(1e3 * (time.perf_counter() - started))
         overlap, seen = scene.overlap(state.picture_box, truth)
         if seen < AWAY:
@@ -165,14 +165,14 @@ def follow_box(scene: Scene, n_frames: int, tally: Tally) -> None:
 
 
 def follow_pose(scene: Scene, n_frames: int) -> str:
-    """Status of every frame of the whole line, and when the pose is back."""
+    """Status of every frame of the whole tracker, and when the pose is back."""
     state, statuses, n_back, back, wrong, was_away = None, "", 0, "never", 0.0, False
     for frame, truth in scene.frames(n_frames):
         if state is None:
             start = scene.registered(frame)
             assert start is not None
             state = TrackState.at_rest(start, frame.captured_ns)
-        answer, state = scene.line.track(
+        answer, state = scene.tracker.track(
             frame.left, frame.right, frame.captured_ns, state, GOAL
         )  # fmt: skip
         status = answer.verdict.status
@@ -191,14 +191,14 @@ def follow_pose(scene: Scene, n_frames: int) -> str:
 
 def follow_baseline(scene: Scene, n_frames: int) -> str:
     """Share of right boxes of the baseline, whose judge accepts next to nothing."""
-    line = Line(scene.knee.rig, scene.knee.bone, LineSettings(LocatorSettings(method="icp")))
+    tracker = make_tracker(scene.knee.rig, scene.knee.bone, TrackerSettings("icp"))
     state, overlaps, n_ok = None, [], 0
     for frame, truth in scene.frames(n_frames):
         if state is None:
             start = scene.registered(frame)
             assert start is not None
             state = TrackState.at_rest(start, frame.captured_ns)
-        answer, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answer, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         n_ok += answer.verdict.status is Status.OK
         box = None if state.box is None else state.box.picture_box
         overlaps.append(scene.overlap(box, truth)[0])
@@ -213,7 +213,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--frames", type=int, default=105)
     parser.add_argument("--only", default="", help="situations with this in their name")
-    parser.add_argument("--line", action="store_true", help="the whole line as well")
+    parser.add_argument("--poses", action="store_true", help="the whole tracker as well")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.seeds)
     print("| situation | frames | right | no box | wrong box | overlap median | found again after | box while away | ms | ms without a box before |")  # fmt: skip  # noqa: E501
@@ -223,12 +223,12 @@ def main() -> int:
             continue
         tally = Tally()
         for seed in seeds:
-            follow_box(Scene(seed, situation), options.frames, tally)
+            follow_pictures(Scene(seed, situation), options.frames, tally)
         print(row(name, tally), flush=True)
-    if options.line:
+    if options.poses:
         for seed in seeds:
             leaving = Scene(seed, SITUATIONS["leg leaves and returns"])
-            print(f"line, seed {seed}: {follow_pose(leaving, options.frames)}", flush=True)
+            print(f"poses, seed {seed}: {follow_pose(leaving, options.frames)}", flush=True)
             moving = Scene(seed, SITUATIONS["both move"])
             print(f"baseline, seed {seed}: {follow_baseline(moving, options.frames)}", flush=True)
     return 0

@@ -13,7 +13,7 @@ import numpy as np
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import Goal, Line
+from navapp.tracking import Goal, Tracker, make_tracker
 from navapp.values import BoneModel, Prior, Status
 from sim_devices.scenario import Scenario
 from sim_devices.world import World
@@ -37,11 +37,11 @@ def main() -> int:
         knee = SimulatedKnee(World(Scenario(seed=seed, side=side, motion="patient")))
         mesh = knee.world.anatomy.bones["tibia"]
         bone = BoneModel("tibia", TriangleMesh(mesh.vertices_mm, mesh.faces), side)
-        frame, line = knee.frames(1)[0], Line(knee.rig, bone)
+        frame, tracker = knee.frames(1)[0], make_tracker(knee.rig, bone)
         true = knee.oracle.left_from_body("tibia", frame.captured_ns)
         started = time.perf_counter()
-        prior = Prior({"tibia": off(true, line, seed)})
-        tracked = line.register(frame.left, frame.right, prior, _GOAL)[0]
+        prior = Prior({"tibia": off(true, tracker, seed)})
+        tracked = tracker.register(frame.left, frame.right, prior, _GOAL)[0]
         took_s = time.perf_counter() - started
         pose, verdict = tracked.left_from_bone, tracked.verdict
         error = "-"
@@ -60,12 +60,12 @@ def main() -> int:
     return 0
 
 
-def off(true: RigidTransform, line: Line, seed: int) -> RigidTransform:
+def off(true: RigidTransform, tracker: Tracker, seed: int) -> RigidTransform:
     """A rough pose."""
     rng = np.random.default_rng([seed, 9])
     axis, shift = (one / np.linalg.norm(one) for one in rng.normal(size=(2, 3)))
     twist = np.concatenate([_OFF_MM * shift, np.radians(_OFF_DEG) * axis])
-    return true.moved(twist, true.apply(line.centre_mm))
+    return true.moved(twist, true.apply(tracker.centre_mm))
 
 
 if __name__ == "__main__":

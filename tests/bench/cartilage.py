@@ -21,8 +21,9 @@ from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.preop.cartilage import MAPPED_SD_MM, even_cartilage
-from navapp.tracking import Goal, Line, TrackState
-from navapp.tracking.surface_meter import Margins, SurfaceMeter
+from navapp.tracking import Goal, TrackState
+from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.surface_meter import Margins
 from navapp.values import BoneModel, Origin, Side, Status, TrackedFrame
 from sim_devices.relief import waves
 from sim_devices.scenario import Scenario
@@ -52,7 +53,7 @@ class Patient:
 
 @dataclass(frozen=True)
 class Row:
-    """What the line answered in one frame, and how far off it was."""
+    """What the tracker answered in one frame, and how far off it was."""
 
     seed: int
     frame: int
@@ -130,27 +131,27 @@ def _mapped(known: Patient, thickness_mm: FloatArray) -> BoneModel:
 
 def followed(known: Patient, bone: BoneModel) -> Iterator[Row]:
     """Register in the first frame, track through the others."""
-    line = Line(known.world.rig, bone)
+    tracker = BimccTracker(known.world.rig, bone)
     first = known.frames[0]
-    answers = line.register(first.left, first.right, nominal_prior(known.world), GOAL)
+    answers = tracker.register(first.left, first.right, nominal_prior(known.world), GOAL)
     if not answers or answers[0].left_from_bone is None:
         yield _lost(known.seed, 0, "no candidate")
         return
     tracked = answers[0]
-    yield _row(known, 0, tracked, line)
+    yield _row(known, 0, tracked, tracker)
     state = TrackState.at_rest(tracked.left_from_bone, first.captured_ns)
     for number, frame in enumerate(known.frames[1:], start=1):
-        tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
-        yield _row(known, number, tracked, line)
+        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        yield _row(known, number, tracked, tracker)
 
 
-def _row(known: Patient, number: int, tracked: TrackedFrame, line: Line) -> Row:
+def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTracker) -> Row:
     verdict, pose = tracked.verdict, tracked.left_from_bone
     reasons = "; ".join(reason.value for reason in verdict.reasons)
     if pose is None:
         return _lost(known.seed, number, reasons)
     frame = known.frames[number]
-    free = line.assess(frame.left, frame.right, pose, GOAL).verdict
+    free = tracker.assess(frame.left, frame.right, pose, GOAL).verdict
     bone = BoneModel("femur", known.mesh, known.side)
     return Row(
         known.seed,
@@ -162,7 +163,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, line: Line) -> Row:
         _ratio(verdict.rms_mm, verdict.expected_rms_mm),
         verdict.coverage,
         verdict.inlier_share,
-        thirds_mm(line, frame, pose),
+        thirds_mm(tracker, frame, pose),
         _ratio(free.rms_mm, free.expected_rms_mm),
         free.coverage,
         free.inlier_share,
@@ -177,18 +178,17 @@ def _ratio(rms_mm: float | None, expected_mm: float | None) -> float:
     return rms_mm / expected_mm if rms_mm is not None and expected_mm else float("nan")
 
 
-def thirds_mm(line: Line, frame: StereoFrame, pose: RigidTransform) -> float:
+def thirds_mm(tracker: BimccTracker, frame: StereoFrame, pose: RigidTransform) -> float:
     """Largest median of measured minus expected depth over a third of the model's columns or rows.
 
-    Matched on the model, as the line's last round is.
+    Matched on the model, as the tracker's last round is.
     """
-    meter = SurfaceMeter(line.rig, line.model, line.settings.depth_mm, line.settings.max_points)
-    rectified = meter.geometry.rectified_from_left @ pose
-    pair, _ = meter.rectified(frame.left, frame.right, rectified, _MARGINS)
-    expected = meter.expected(pair, rectified, _MARGINS)
+    meter, rectified = tracker.meter, tracker.rectify_pose(pose)
+    pair = meter.rectify(frame.left, frame.right, rectified, _MARGINS)
+    expected = meter.render(pair, rectified, _MARGINS)
     if expected is None:
         return float("nan")
-    found = meter.on_model(expected).disparity
+    found = meter.measure_on_model(expected).disparity
     rows, columns = np.nonzero(found.origin == Origin.MATCHED)
     depths = [
         meter.geometry.focal_px * meter.geometry.baseline_mm / disparity_px[rows, columns]

@@ -9,22 +9,19 @@ alone tell it and with what they leave. The truth only starts and scores.
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
-from navapp.tracking.correlated_residuals import (
-    noise_ratio2,
-    shown_ratio2,
-    with_correlated_residuals,
-)
-from navapp.values import BoneModel, Reason, predicted_tre_mm, visible_vertices
+from navapp.tracking.frame import NOISE_RATIO
+from navapp.tracking.verdict import Evidence, decide
+from navapp.values import BoneModel, Reason, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
-from tests.bench.line_parts import LineParts
+from tests.bench.tracker_parts import TrackerParts
 
 _BONES = ("femur", "tibia")
 _START_OFF_MM, _START_OFF_DEG, _STARTS = 0.5, 0.5, 3
@@ -68,27 +65,28 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
     left, right = (sensor.picture(world.render(eye, time_ns), eye, 0) for eye in ("left", "right"))
     mesh = world.anatomy.bones[name]
     bone = BoneModel(name, TriangleMesh(mesh.vertices_mm, mesh.faces), side)
-    parts = LineParts(world.rig, bone)
-    true = parts.rectified(world.left_from_body(name, time_ns))
-    pair = parts.pair(left, right, true)
+    parts = TrackerParts(world.rig, bone)
+    true = parts.rectify_pose(world.left_from_body(name, time_ns))
+    near = parts.frame(left, right, true)
     for _ in range(_STARTS):
         off = rng.normal(0.0, np.repeat([_START_OFF_MM, np.radians(_START_OFF_DEG)], 3))
-        fit = parts.locator.locate(pair, true.moved(off, true.apply(parts.centre_mm)))
+        # One pair of pictures, rectified around the truth, for every start.
+        frame = replace(near, start=true.moved(off, true.apply(parts.centre_mm)))
+        fit = parts.find(frame)
         if fit is None or fit.measured.view is None:
             continue
-        noise2 = noise_ratio2(lies_open=parts.lies_open(pair, fit))
-        shown = with_correlated_residuals(parts.with_outline(pair, fit, noise2).estimate, noise2)
-        fit = parts.with_outline(pair, fit)
+        noise2 = NOISE_RATIO**2 if parts.lies_open(frame, fit) else 1.0
+        shown = parts.with_outline(frame, fit, noise2).with_correlated_residuals(noise2)
+        fit = parts.with_outline(frame, fit)
         targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
         bounds_mm = (
-            predicted_tre_mm(one, parts.centre_mm, targets[:: max(1, len(targets) // 200)])
-            for one in (fit.estimate, shown)
+            one.estimate.predicted_tre_mm(parts.centre_mm, targets[:: max(1, len(targets) // 200)])
+            for one in (fit, shown)
         )
         error_mm = mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
-        ratio, is_misfit = (
-            shown_ratio2(fit.estimate) ** 0.5,
-            Reason.SURFACE_MISFIT in shown.reasons,
-        )
+        evidence = Evidence(correlated_ratio=shown.variance_ratio / NOISE_RATIO**2)
+        is_misfit = Reason.SURFACE_MISFIT in decide(evidence).reasons
+        ratio = shown.variance_ratio**0.5
         yield Answer(ratio, is_misfit, error_mm, *bounds_mm)
 
 

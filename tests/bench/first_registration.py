@@ -27,7 +27,8 @@ from navapp.geometry import RigidTransform, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.preop import build_aspects
-from navapp.tracking import Goal, Line
+from navapp.tracking import Goal
+from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, Prior, Status
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -86,19 +87,22 @@ def main() -> int:
         build_started = time.perf_counter()
         aspects = build_aspects(case.bone, case.axis, case.half_angle_deg)
         build_s = time.perf_counter() - build_started
-        lines = {True: Line(case.rig, case.bone, aspects=aspects), False: Line(case.rig, case.bone)}
-        for line in lines.values():
-            _ = line.model.arrays
+        trackers = {
+            True: BimccTracker(case.rig, case.bone, aspects=aspects),
+            False: BimccTracker(case.rig, case.bone),
+        }
+        for tracker in trackers.values():
+            _ = tracker.model.arrays
         for number, frame in enumerate(case.frames):
             for way, prior in ways(case, frame, number):
                 if options.only and not all(
                     word in f"{frame.group} {way}" for word in options.only.split()
                 ):
                     continue
-                line = lines["+" in way]
+                tracker = trackers["+" in way]
                 if not found:  # compiles
-                    line.register(frame.left, frame.right, prior, _GOAL)
-                answer = registered(line, frame, prior)
+                    tracker.register(frame.left, frame.right, prior, _GOAL)
+                answer = registered(tracker, frame, prior)
                 found.setdefault((frame.group, way), []).append(answer)
                 if options.verbose:
                     print(frame.group, number, way, answer, f"built in {build_s:.1f} s", flush=True)
@@ -133,15 +137,15 @@ def drawn_box(visible: np.ndarray, seed: int) -> tuple[int, int, int, int]:
     return int(x), int(y), int(right - x), int(bottom - y)
 
 
-def registered(line: Line, frame: Frame, prior: Prior) -> Answer:
+def registered(tracker: BimccTracker, frame: Frame, prior: Prior) -> Answer:
     """The best candidate against the truth."""
     started = time.perf_counter()
-    tracked = line.register(frame.left, frame.right, prior, _GOAL)
+    tracked = tracker.register(frame.left, frame.right, prior, _GOAL)
     seconds = time.perf_counter() - started
     pose = tracked[0].left_from_bone if tracked else None
     if pose is None:
         return Answer(np.inf, False, seconds)
-    error_mm = mean_tre_mm(pose, frame.true, line.model.bone, np.empty((0, 3)))
+    error_mm = mean_tre_mm(pose, frame.true, tracker.model.bone, np.empty((0, 3)))
     return Answer(error_mm, tracked[0].verdict.status is Status.OK, seconds)
 
 

@@ -12,10 +12,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from navapp.tracking.follower import ON_MODEL, fitted, moved_surface_mm
+from navapp.registration import fit_bimcc
+from navapp.tracking.frame import MODEL_FIT
 from navapp.values import BoneModel, Reason
 from tests.bench.bone_scenes import Sequence, disturbed, simulated_sequence
-from tests.bench.line_parts import LineParts
+from tests.bench.tracker_parts import TrackerParts
 
 _SHIFTS_MM = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0)
 _SEQUENCES = ("opening", "drilling")
@@ -44,21 +45,22 @@ def rounds(
     sequence: Sequence, shift_mm: float, n_seeds: int
 ) -> Iterator[tuple[float, float, float]]:
     """Off before, share of the samples that answer, off after; infinite without a fit."""
-    parts = LineParts(sequence.rig, BoneModel("femur", sequence.mesh))
+    parts = TrackerParts(sequence.rig, BoneModel("femur", sequence.mesh))
     model, meter = parts.model, parts.meter
     radius_mm = np.linalg.norm(model.hull_mm - parts.centre_mm, axis=1).mean()
     for scene in sequence.scenes:
         for seed in range(n_seeds):
             turn_deg = float(np.degrees(shift_mm / radius_mm))
             start = disturbed(scene.pose, parts.centre_mm, turn_deg, shift_mm, seed)
-            expected = meter.expected(scene.pair, start, parts.tracking)
+            expected = meter.render(scene.pair, start, parts.settings.near.tracking)
             assert expected is not None
-            measured = meter.sampled(expected)
-            found = fitted(measured, model, start, ON_MODEL)
-            is_lost = Reason.TOO_FEW_POINTS in found.estimate.reasons
-            left_mm = np.inf if is_lost else moved_surface_mm(model, scene.pose, found.pose)
-            off_mm = moved_surface_mm(model, scene.pose, start)
-            yield off_mm, measured.answered_share, left_mm
+            measured = meter.measure_on_samples(expected)
+            found = fit_bimcc(measured.scene, model, start, MODEL_FIT)
+            is_lost = Reason.TOO_FEW_POINTS in found.reasons
+            pose = found.camera_from_bone
+            left_mm = np.inf if is_lost else scene.pose.mean_motion_mm(pose, model.hull_mm)
+            off_mm = scene.pose.mean_motion_mm(start, model.hull_mm)
+            yield off_mm, measured.answered_fraction, left_mm
 
 
 if __name__ == "__main__":

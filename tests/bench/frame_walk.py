@@ -2,11 +2,11 @@
 
 usage: python -m tests.bench.frame_walk [--calls]
 
-Counted are the modules of `navapp` that are entered, and the calls from one of them into another,
-while a bone that lies in the open is followed into one frame with the answer OK, on both threads.
-Kernels, properties and value classes (frozen dataclasses, named tuples, enumerations) do not
-count; a call through another library counts from the last module of `navapp` before it. With
---calls each pair of modules has a line.
+Counted are the calls from one module of `navapp` into another, and the modules so entered, while a
+bone that lies in the open is followed into one frame with the answer OK, on both threads. Kernels,
+properties and value classes (frozen dataclasses, named tuples, enumerations) do not count; a call
+through another library counts from the last module of `navapp` before it, one at the root of a
+thread as well. With --calls each pair of modules has a line.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from navapp.geometry.bands import pool
-from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Status
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
@@ -51,7 +51,6 @@ class Walk:
 
     def __init__(self) -> None:
         self.calls: Counter[tuple[str, str]] = Counter()
-        self.modules: set[str] = set()
         self.is_on = False
         self._counts: dict[CodeType, bool] = {}
         self._lock = threading.Lock()
@@ -64,10 +63,14 @@ class Walk:
         if not name.startswith("navapp.") or not self._is_counted(frame, name):
             return
         caller = _navapp_caller(frame)
-        with self._lock:
-            self.modules.add(name)
-            if caller != name:
+        if caller != name:
+            with self._lock:
                 self.calls[caller, name] += 1
+
+    @property
+    def modules(self) -> set[str]:
+        """Those that were entered from another one."""
+        return {callee for _, callee in self.calls}
 
     def _is_counted(self, frame: FrameType, name: str) -> bool:
         code = frame.f_code
@@ -92,12 +95,10 @@ def _navapp_caller(frame: FrameType) -> str:
 
 
 def _is_of_value(module: Any, qualified_name: str) -> bool:
-    """A property, or a method of a value class."""
-    *owners, name = qualified_name.split(".")
+    """A property, a method of a value class, or a function inside one of them."""
+    *owners, name = qualified_name.split(".<locals>")[0].split(".")
     owner: Any = module
     for part in owners:
-        if part == "<locals>":
-            return False
         owner = getattr(owner, part, None)
     if not isinstance(owner, type):
         return False
@@ -111,17 +112,17 @@ def walked_frame() -> Walk:
     """Follow a simulated knee and count in the last frame."""
     knee = SimulatedKnee(Scenario(seed=_SEED, motion="breathing"))
     frames = knee.frames(2 + _WARM_FRAMES)
-    line, goal = Line(knee.rig, knee.bone), Goal(np.empty((0, 3)), 2.0)
+    tracker, goal = make_tracker(knee.rig, knee.bone), Goal(np.empty((0, 3)), 2.0)
     first = frames[0]
-    best = line.register(first.left, first.right, knee.prior, goal)[0]
+    best = tracker.register(first.left, first.right, knee.prior, goal)[0]
     assert best.left_from_bone is not None
     state = TrackState.at_rest(best.left_from_bone, first.captured_ns)
     for frame in frames[1:-1]:
-        _, state = line.track(frame.left, frame.right, frame.captured_ns, state, goal)
+        _, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, goal)
     walk, last = Walk(), frames[-1]
     _on_both_threads(lambda: sys.setprofile(walk))
     walk.is_on = True
-    tracked, _ = line.track(last.left, last.right, last.captured_ns, state, goal)
+    tracked, _ = tracker.track(last.left, last.right, last.captured_ns, state, goal)
     walk.is_on = False
     _on_both_threads(lambda: sys.setprofile(None))
     assert tracked.verdict.status is Status.OK, tracked.verdict

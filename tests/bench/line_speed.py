@@ -32,7 +32,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import projected_box
 from navapp.overlay.layers import Scene, draw_bone
 from navapp.registration import RegistrationModel
-from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Plan, StageSpec, Status
 from sim_devices.rigs import default_rig
 from sim_devices.scenario import Scenario
@@ -78,8 +78,8 @@ _STAGE = StageSpec(1, "opening", "femur", 2.0, 2.0, (), ("bone",), ())
 
 
 def ours(recording: Recording) -> Way:
-    """`Line.track`, then the overlay."""
-    line = Line(recording.rig, recording.bone)
+    """`Tracker.track`, then the overlay."""
+    tracker = make_tracker(recording.rig, recording.bone)
     state = TrackState.at_rest(recording.poses[0], recording.frames[0].captured_ns)
 
     def follow(number: int) -> tuple[RigidTransform, dict[str, float]]:
@@ -88,7 +88,7 @@ def ours(recording: Recording) -> Way:
         if number == 0:
             state = TrackState.at_rest(recording.poses[0], frame.captured_ns)
         started = time.perf_counter()
-        tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
+        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
         followed = time.perf_counter()
         assert tracked.verdict.status is Status.OK, tracked.verdict
         assert tracked.left_from_bone is not None

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Status
 from tests.bench.line_speed import Recording
 
@@ -69,7 +69,7 @@ def main() -> int:
 
 def followed(recording: Recording, n_frames: int) -> Iterator[tuple[int, bool]]:
     """Number of each frame, from 1, and whether it was OK."""
-    line = Line(recording.rig, recording.bone)
+    tracker = make_tracker(recording.rig, recording.bone)
     state = TrackState.at_rest(recording.poses[0], 0)
     dark = np.zeros_like(recording.frames[0].left)
     period = 2 * _RENDERED - 2
@@ -77,7 +77,7 @@ def followed(recording: Recording, n_frames: int) -> Iterator[tuple[int, bool]]:
         place = min(number % period, period - number % period)
         frame = recording.frames[place]
         right = dark if number % period == period - 1 else frame.right
-        tracked, state = line.track(frame.left.copy(), right, number * _FRAME_NS, state, _GOAL)
+        tracked, state = tracker.track(frame.left.copy(), right, number * _FRAME_NS, state, _GOAL)
         is_ok = tracked.verdict.status is Status.OK
         if is_ok and tracked.left_from_bone is not None:
             recording.overlay(place, tracked.left_from_bone)

@@ -14,8 +14,8 @@ import numpy as np
 
 from navapp.registration import RegistrationModel
 from navapp.stereo import MODEL_REFINEMENT
-from navapp.tracking.locator import NEAR_VIEW, LocatorSettings
-from navapp.tracking.surface_meter import SurfaceMeter
+from navapp.tracking import NearSettings
+from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
 from navapp.values import Origin
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
@@ -43,10 +43,10 @@ def _row(seed: int) -> str:
     meter = SurfaceMeter(knee.rig, RegistrationModel(knee.bone), _DEPTH_MM, _MAX_POINTS)
     frame = knee.frames(1)[0]
     true = meter.geometry.rectified_from_left @ knee.truth(frame)
-    pair, _ = meter.rectified(frame.left, frame.right, true, NEAR_VIEW)
-    expected = meter.expected(pair, true, LocatorSettings().tracking)
+    pair = meter.rectify(frame.left, frame.right, true, NEAR_VIEW)
+    expected = meter.render(pair, true, NearSettings().tracking)
     assert expected is not None
-    found = meter.on_model(expected).disparity
+    found = meter.measure_on_model(expected).disparity
     is_matched = found.origin == Origin.MATCHED
     off_px = (found.disparity_px - expected.support_px)[is_matched]
     claimed_px = found.sigma_px[is_matched]

@@ -19,19 +19,16 @@ import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
-from navapp.registration.blocks import near
-from navapp.tracking import Goal
-from navapp.tracking.contour_kernels import missing_share, sample_across, strongest_edge
-from navapp.tracking.follower import Fit
+from navapp.registration.information import near
+from navapp.tracking.edge_kernels import missing_share, sample_across, strongest_edge
+from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
-from navapp.values import BoneModel, predicted_tre_mm, visible_vertices
+from navapp.values import BoneModel, visible_vertices
 from tests.bench.first_registration import Case, simulated
-from tests.bench.line_parts import LineParts
+from tests.bench.tracker_parts import TrackerParts
 
-GOAL = Goal(np.empty((0, 3)), 2.0)
 DARKER = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 1.01)
 NEAR_PX = 0.5
 START_OFF_MM, START_OFF_DEG = 0.25, 0.25
@@ -58,11 +55,11 @@ def main() -> int:
     shares: dict[float, list[float]] = {size: [] for size in SIZES}
     for seed in range(options.first, options.first + options.seeds):
         case = simulated(seed)
-        parts = LineParts(case.rig, case.bone)
+        parts = TrackerParts(case.rig, case.bone)
         edges += edges_of(case, parts)
         rows += joined(case, parts, seed)
         for size in SIZES:
-            sized = parts if size == 1.0 else LineParts(case.rig, _sized(case.bone, size))
+            sized = parts if size == 1.0 else TrackerParts(case.rig, _sized(case.bone, size))
             shares[size] += near_shares(case, sized, seed)
     print("| darker behind by | edges | within 0.5 px | median px | MAD px |")
     print("|---|---|---|---|---|")
@@ -88,12 +85,12 @@ def _sized(bone: BoneModel, size: float) -> BoneModel:
     return replace(bone, mesh=TriangleMesh(scaled_mm, bone.mesh.faces))
 
 
-def edges_of(case: Case, parts: LineParts) -> Iterator[Edge]:
+def edges_of(case: Case, parts: TrackerParts) -> Iterator[Edge]:
     """Of the left picture, at the true pose."""
     frame = case.frames[0]
-    true = parts.rectified(frame.true)
-    pair = parts.pair(frame.left, frame.right, true)
-    expected = parts.meter.expected(pair, true, parts.tracking)
+    true = parts.rectify_pose(frame.true)
+    pair = parts.frame(frame.left, frame.right, true).pair
+    expected = parts.meter.render(pair, true, parts.settings.near.tracking)
     if expected is None:
         return
     wide, flank = np.empty(31), np.empty(17)
@@ -107,53 +104,55 @@ def edges_of(case: Case, parts: LineParts) -> Iterator[Edge]:
 
 
 def outline(
-    parts: LineParts, pose: RigidTransform, view: RenderedView
+    parts: TrackerParts, pose: RigidTransform, view: RenderedView
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Pixel and normal of each point of it in the left picture."""
     geometry = parts.meter.geometry
     eye = Eye(0.0, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
     turn, shift_mm = np.array(pose.rotation), np.array(pose.translation_mm)
-    rim = find_rim(parts.contours.ridges, turn, shift_mm, eye)
+    rim = find_rim(parts.outline.ridges, turn, shift_mm, eye)
     seen = is_outline(rim, view.depth_mm, view.box.x, view.box.y)
     rim = thin_rim(Rim(*(part[seen] for part in rim)))
     yield from zip(rim.pixel, rim.normal, strict=True)
 
 
-def joined(case: Case, parts: LineParts, seed: int) -> Iterator[tuple[float, float, float, float]]:
+def joined(
+    case: Case, parts: TrackerParts, seed: int
+) -> Iterator[tuple[float, float, float, float]]:
     """Error and bound of the surface alone, then of both; nothing when the bone is not found."""
-    true = parts.rectified(case.frames[0].true)
-    pair, fit = located(case, parts, seed)
+    true = parts.rectify_pose(case.frames[0].true)
+    frame, fit = located(case, parts, seed)
     if fit is None:
         return
     answer: list[float] = []
-    for one in (fit, parts.with_outline(pair, fit)):
+    for one in (fit, parts.with_outline(frame, fit)):
         mesh = parts.model.bone.mesh
         targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
-        bound_mm = predicted_tre_mm(one.estimate, parts.centre_mm, targets[:: len(targets) // 200])
+        bound_mm = one.estimate.predicted_tre_mm(parts.centre_mm, targets[:: len(targets) // 200])
         answer += [mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
     yield answer[0], answer[1], answer[2], answer[3]
 
 
-def located(case: Case, parts: LineParts, seed: int) -> tuple[RectifiedPair, Fit | None]:
+def located(case: Case, parts: TrackerParts, seed: int) -> tuple[Frame, Fit | None]:
     """The surface's fit from next to the truth; None when the bone is not found."""
-    frame, rng = case.frames[0], np.random.default_rng([seed, 3])
-    true = parts.rectified(frame.true)
+    taken, rng = case.frames[0], np.random.default_rng([seed, 3])
+    true = parts.rectify_pose(taken.true)
     off = np.concatenate(
         [rng.normal(0.0, START_OFF_MM, 3), np.radians(rng.normal(0.0, START_OFF_DEG, 3))]
     )
     start = true.moved(off, true.apply(parts.centre_mm))
-    pair = parts.pair(frame.left, frame.right, start)
-    fit = parts.locator.locate(pair, start)
-    return pair, None if fit is None or fit.measured.view is None else fit
+    frame = parts.frame(taken.left, taken.right, start)
+    fit = parts.find(frame)
+    return frame, None if fit is None or fit.measured.view is None else fit
 
 
-def near_shares(case: Case, parts: LineParts, seed: int) -> Iterator[float]:
+def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
     """Share of the edges that the fit allows; nothing without a fit, or with too few edges."""
-    pair, fit = located(case, parts, seed)
+    frame, fit = located(case, parts, seed)
     if fit is None:
         return
-    measured, coarse_px = fit.measured, parts.coarse_px(pair, fit)
-    block = parts.contours.block(pair, fit.pose, measured.view, measured.disparity, coarse_px)
+    measured, coarse_px = fit.measured, parts.coarse_px(frame, fit)
+    block = parts.outline.block(frame.pair, fit.pose, measured.view, measured.disparity, coarse_px)
     weight = 1.0 / block.n_sharing
     if weight.sum() >= FEWEST:
         yield float(weight[near(block, fit.estimate.covariance)].sum() / weight.sum())

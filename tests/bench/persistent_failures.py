@@ -18,7 +18,7 @@ import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
-from navapp.tracking import Line, TrackState
+from navapp.tracking import TrackState, make_tracker
 from navapp.values import BoneModel, Prior, Status, TrackedFrame
 from sim_devices.anatomy import KneeSpec, make_knee
 from sim_devices.rigs import NO_TURN, Turn
@@ -128,7 +128,7 @@ def followed(
     """Answers, and how far they are off."""
     world = loop.world
     camera = stepped_camera(loop, SensorModel(seed=world.scenario.seed), _RATE_HZ)
-    line, own = Line(world.rig, bone), femur_of(world)
+    tracker, own = make_tracker(world.rig, bone), femur_of(world)
     state: TrackState | None = None
     for _ in range(n_frames):
         frame = camera.read(1.0)
@@ -138,11 +138,11 @@ def followed(
         )
         if state is None:
             start = truth if from_truth else world.nominal_left_from_femur
-            tracked = line.register(left, right, Prior({"femur": start}), GOAL)[0]
+            tracked = tracker.register(left, right, Prior({"femur": start}), GOAL)[0]
             found = None if from_truth else tracked.left_from_bone
             state = TrackState.at_rest(found or start, frame.captured_ns, tracked.verdict.cause)
         else:
-            tracked, state = line.track(left, right, frame.captured_ns, state, GOAL)
+            tracked, state = tracker.track(left, right, frame.captured_ns, state, GOAL)
         pose = tracked.left_from_bone
         yield tracked, np.nan if pose is None else mean_tre_mm(pose, truth, own, np.empty((0, 3)))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from navapp.evaluation import mean_tre_mm
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking import Goal, Tracker, TrackState
 from navapp.values import BoneModel, Prior, Status, TrackedFrame, visible_vertices
 from sim_devices.motion import LegMotion, smooth_step
 from sim_devices.rigs import NO_TURN, Turn
@@ -172,7 +172,7 @@ class Theatre:
 
 @dataclass(frozen=True)
 class Shown:
-    """One frame, what the line answered, and how far off that was.
+    """One frame, what the tracker answered, and how far off that was.
 
     Attributes:
         time_s: of the capture.
@@ -192,7 +192,7 @@ class Shown:
         return self.tracked.verdict.status is Status.OK
 
 
-def played(theatre: Theatre, line: Line, rate_hz: float, until_s: float) -> Iterator[Shown]:
+def played(theatre: Theatre, tracker: Tracker, rate_hz: float, until_s: float) -> Iterator[Shown]:
     """Register in the first frame, then track, as the controller does: by the capture times."""
     camera = stepped_camera(theatre, SensorModel(seed=theatre.seed), rate_hz)
     state: TrackState | None = None
@@ -204,12 +204,12 @@ def played(theatre: Theatre, line: Line, rate_hz: float, until_s: float) -> Iter
             return
         started = time.perf_counter()
         if state is None:
-            tracked = line.register(frame.left, frame.right, theatre.prior, GOAL)[0]
+            tracked = tracker.register(frame.left, frame.right, theatre.prior, GOAL)[0]
             # Even what is not OK is taken: nothing here is easier than an operation.
             start = tracked.left_from_bone or theatre.prior.left_from_bone["femur"]
             state = TrackState.at_rest(start, frame.captured_ns)
         else:
-            tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+            tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         took_ms = 1e3 * (time.perf_counter() - started)
         pose = tracked.left_from_bone
         tre_mm = (

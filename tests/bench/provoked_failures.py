@@ -12,7 +12,7 @@ from collections import Counter
 
 import numpy as np
 
-from navapp.tracking import Line
+from navapp.tracking import Tracker, make_tracker
 from tests.bench.provoked import Event, Shown, Theatre, played
 
 # Not the seeds of any test or default, nor of the other benches.
@@ -54,19 +54,19 @@ def main() -> int:
             if options.only not in event.name:
                 continue
             theatre = Theatre(seed, event)
-            line = Line(theatre.rig, theatre.bone)
-            frames = watched(theatre, line, options.rate)
+            tracker = make_tracker(theatre.rig, theatre.bone)
+            frames = watched(theatre, tracker, options.rate)
             print(table_row(theatre, frames), flush=True)
             if options.each:
                 print_each(frames)
     return 0
 
 
-def watched(theatre: Theatre, line: Line, rate_hz: float) -> list[Shown]:
+def watched(theatre: Theatre, tracker: Tracker, rate_hz: float) -> list[Shown]:
     """All frames until some time after the bone is back."""
     event = theatre.event
     frames: list[Shown] = []
-    for one in played(theatre, line, rate_hz, event.end_s + PATIENCE_S):
+    for one in played(theatre, tracker, rate_hz, event.end_s + PATIENCE_S):
         frames.append(one)
         if one.time_s > event.end_s + back_after_s(event, frames) + AFTERWARDS_S:
             break

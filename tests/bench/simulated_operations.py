@@ -4,7 +4,7 @@ usage: python -m tests.bench.simulated_operations [--seeds N] [--first SEED] [--
                                                   [--only SITUATION]
 
 Each knee lies 6 to 9 degrees and 6 to 10 mm off its nominal pose, from which it is registered; from
-then on it is followed. Nothing but pictures, rig, bone and nominal pose reaches the line. A
+then on it is followed. Nothing but pictures, rig, bone and nominal pose reaches the tracker. A
 registration succeeds when its first answer is OK and less than 1 mm off. When it does not succeed
 in the first frame it is tried again in the next; frames before it are not counted.
 """
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navapp.evaluation import mean_tre_mm
-from navapp.tracking import Goal, Line, TrackState
+from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import BoneModel, Side, Status, TrackedFrame
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
@@ -44,7 +44,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Operation:
-    """What a line did in one simulated operation."""
+    """What a tracker did in one simulated operation."""
 
     is_registered_at_once: bool
     answers: list[Answer]
@@ -75,15 +75,15 @@ def operated(seed: int, situation: str, n_frames: int) -> Operation:
     side: Side = "left" if seed % 2 else "right"
     motion, instrument = SITUATIONS[situation]
     knee = SimulatedKnee(Scenario(seed=seed, side=side, motion=motion, instrument=instrument))
-    line, state = Line(knee.rig, knee.bone), None
+    tracker, state = make_tracker(knee.rig, knee.bone), None
     answers: list[Answer] = []
     is_at_once = False
     for number in range(n_frames):
         frame = knee.camera.read(1.0)
         if state is None:
-            tracked = line.register(frame.left, frame.right, knee.prior, _GOAL)[0]
+            tracked = tracker.register(frame.left, frame.right, knee.prior, _GOAL)[0]
         else:
-            tracked, state = line.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
+            tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
         answer = _answer(tracked, knee.truth(frame), knee.bone)
         if state is None and tracked.verdict.status is Status.OK:
             state = TrackState.at_rest(tracked.left_from_bone, frame.captured_ns)

@@ -25,14 +25,14 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.stereo import measure_health
-from navapp.tracking import Goal, Line, TrackState
-from navapp.tracking.locator import WIDE_VIEW
-from navapp.tracking.pair_doubts import pair_doubts
+from navapp.tracking import TrackState
+from navapp.tracking.surface_meter import WIDE_VIEW
 from navapp.values import BoneModel, Reason, Status
-from tests.bench.line_parts import LineParts
+from tests.bench.tracker_parts import GOAL, TrackerParts
 
 OFFSETS_PX = (0.0, 0.15, 0.3, 0.5, -0.5, 1.0)
-GOAL = Goal(np.empty((0, 3)), 2.0)
+# Of a pair's pictures, beside its rows.
+OF_LIGHT = {Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE}
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -79,31 +79,30 @@ def turned(rig: StereoRig, row_offset_px: float) -> StereoRig:
 
 def _followed(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[Row]:
     """Every frame from its own truth."""
-    line, parts = Line(rig, bone), LineParts(rig, bone)
+    tracker = TrackerParts(rig, bone)
     for entry in json.loads((sequence / "truth.json").read_text(encoding="utf-8"))["frames"]:
         truth = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
         left, right = (
             cv2.imread(str(sequence / f"{side}_{entry['index']:04d}.jpg"))
             for side in ("left", "right")
         )
-        tracked, _ = line.track(left, right, 0, TrackState.at_rest(truth, 0), GOAL)
-        pose = parts.rectified(truth)
-        pair = parts.pair(left, right, pose, WIDE_VIEW)
-        fit = parts.locator.locate(pair, pose)
+        tracked, _ = tracker.track(left, right, 0, TrackState.at_rest(truth, 0), GOAL)
+        frame = tracker.frame(left, right, tracker.rectify_pose(truth), WIDE_VIEW)
+        fit = tracker.find(frame)
         if fit is None:
             continue
-        depth_mm = float(fit.pose.apply(parts.centre_mm)[2])
+        depth_mm = float(fit.pose.apply(tracker.centre_mm)[2])
         started = time.perf_counter()
-        geometry = pair.geometry
+        pair, geometry = frame.pair, frame.pair.geometry
         health = measure_health(pair, fit.measured.disparity, geometry.disparity_px(depth_mm))
         cost_ms = 1e3 * (time.perf_counter() - started)
-        doubts = pair_doubts(health, geometry, depth_mm)
+        reasons = tracker.verdict(frame, fit).reasons
         found = tracked.left_from_bone
         yield Row(
             health.row_offset_px,
             health.row_offset_sigma_px,
-            Reason.ROWS_DISAGREE in doubts,
-            sum(doubt is not Reason.ROWS_DISAGREE for doubt in doubts),
+            Reason.ROWS_DISAGREE in reasons,
+            len(OF_LIGHT.intersection(reasons)),
             tracked.verdict.status is Status.OK,
             np.nan if found is None else mean_tre_mm(found, truth, bone, _NO_TARGETS),
             cost_ms,

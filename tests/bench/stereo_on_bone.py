@@ -5,7 +5,7 @@ usage: python -m tests.bench.stereo_on_bone [FOLDER] [--seeds N] [--only NAME]
 
 Without a pose: the whole frame, within the depths that a rig is used for; then a plain fit of the
 true model to every second measured point each way, started at the truth (it shows a tilt of the
-disparity). With a pose: the truth disturbed about the bone's centre, then located as in the line.
+disparity). With a pose: the truth disturbed about the bone's centre, found as the tracker does it.
 The floor: the same plain fit to what is measured on the true surface itself.
 """
 
@@ -19,8 +19,8 @@ import numpy as np
 from navapp.geometry import Box
 from navapp.geometry.zbuffer import render_rectified
 from navapp.stereo import match_on_support, match_surface, smoothed
-from navapp.tracking import Goal
-from navapp.values import BoneModel, DisparityMap, LineTimings, Status
+from navapp.tracking.frame import Frame
+from navapp.values import BoneModel, DisparityMap, Status, Stopwatch
 from tests.bench.bone_scenes import (
     Scene,
     Sequence,
@@ -30,11 +30,10 @@ from tests.bench.bone_scenes import (
     sequences,
     tre_mm,
 )
-from tests.bench.line_parts import LineParts
 from tests.bench.sgbm import match_sgbm
+from tests.bench.tracker_parts import TrackerParts
 
 _DISTURBANCES = ((1.0, 0.6), (2.0, 2.0), (5.0, 5.0), (8.0, 8.0))
-_GOAL = Goal(np.empty((0, 3)), 2.0)
 _DEPTH_MM = (300.0, 700.0)
 _CAUGHT_MM = 0.5
 
@@ -138,21 +137,21 @@ def free(sequence: Sequence) -> None:
 
 def guided(sequence: Sequence, n_seeds: int) -> None:
     """With a pose that is disturbed by an angle and a length."""
-    parts = LineParts(sequence.rig, BoneModel("femur", sequence.mesh))
+    parts = TrackerParts(sequence.rig, BoneModel("femur", sequence.mesh))
     for angle_deg, length_mm in _DISTURBANCES:
         before, after, signed, n_silent = [], [], [], 0
         for scene in sequence.scenes:
             for seed in range(n_seeds):
                 start = disturbed(scene.pose, parts.centre_mm, angle_deg, length_mm, seed)
-                fit = parts.locator.locate(scene.pair, start)
+                frame = Frame(scene.pair, start, Stopwatch())
+                fit = parts.find(frame)
                 before.append(tre_mm(start, scene.pose, sequence.mesh))
                 if fit is None:
                     after.append(np.inf)
                     continue
                 after.append(tre_mm(fit.pose, scene.pose, sequence.mesh))
                 if after[-1] > _CAUGHT_MM:
-                    judged = parts.judge.judged(scene.pair, fit, _GOAL, LineTimings())
-                    n_silent += judged.verdict.status is not Status.LOST
+                    n_silent += parts.verdict(frame, fit).status is not Status.LOST
                 signed.append(np.median(depth_error_mm(scene, fit.measured.disparity, sequence)))
         report_guided(f"{sequence.name} {angle_deg:g} deg {length_mm:g} mm", before, after, signed)
         if n_silent:

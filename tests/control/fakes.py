@@ -98,7 +98,7 @@ class Script:
 
 
 class FakeLine:
-    """Stands for `navapp.tracking.Line`."""
+    """Stands for a `navapp.tracking.Tracker`."""
 
     script: Script
 
@@ -204,7 +204,7 @@ class Bench:
     ) -> None:
         self.script = Script()
         line = type("ScriptedLine", (FakeLine,), {"script": self.script})
-        monkeypatch.setattr("navapp.control.pursuit.Line", line)
+        monkeypatch.setattr("navapp.control.pursuit.make_tracker", line)
         self.clock = clock or ManualClock(10**9)
         self.camera = camera or FakeCamera(self.clock)
         if isinstance(self.camera, FakeCamera):

@@ -42,7 +42,7 @@ def test_the_first_error_is_raised_after_both_have_ended():
 @pytest.mark.parametrize("height", [0, 1, 7, 16, 40, 41])
 def test_bands_cover_every_row_once(height):
     rows = []
-    in_row_bands(height, lambda first, last: rows.extend(range(first, last)))
+    in_row_bands(height, lambda band: rows.extend(range(*band)))
     assert sorted(rows) == list(range(height))
 
 
@@ -50,7 +50,7 @@ def test_bands_cover_every_row_once(height):
 @pytest.mark.parametrize("middle", [None, 60, 199])
 def test_the_lower_half_begins_at_a_multiple(every, middle):
     bands = []
-    in_row_bands(200, lambda first, last: bands.append((first, last)), every, middle)
+    in_row_bands(200, bands.append, every, middle)
     (first, begin), (again, last) = sorted(bands)
     assert (first, last) == (0, 200)
     assert begin == again

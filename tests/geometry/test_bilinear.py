@@ -8,7 +8,7 @@ import pytest
 
 from navapp.geometry.bilinear import bilinear
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Rectifier, undistorted
+from navapp.geometry.rectification import Rectifier, undistort
 from navapp.geometry.rig_files import read_rig
 from tests.geometry.shapes import STRONG, camera, toed_in_rig
 
@@ -45,7 +45,7 @@ def test_a_spot_is_undistorted_to_where_the_plain_camera_sees_it(interpolation: 
     raw_px, plain_px = lens.project(ray)[0], camera().project(ray)[0]
     v, u = np.mgrid[:480, :640]
     spot = 250 * np.exp(-((u - raw_px[0]) ** 2 + (v - raw_px[1]) ** 2) / 18)
-    found = undistorted(spot.astype(np.uint8), lens, interpolation).astype(float)
+    found = undistort(spot.astype(np.uint8), lens, interpolation).astype(float)
     centre = np.array([(u * found).sum(), (v * found).sum()]) / found.sum()
     assert np.linalg.norm(raw_px - plain_px) > 1.0
     np.testing.assert_allclose(centre, plain_px, atol=0.1)
@@ -79,8 +79,8 @@ def test_reference_pictures_are_met_to_a_tenth_of_a_grey_level(data: Path, numbe
     found = {
         ("left", "rect"): pair.left,
         ("right", "rect"): pair.right,
-        ("left", "undist"): undistorted(left, rig.left, "bilinear"),
-        ("right", "undist"): undistorted(right, rig.right, "bilinear"),
+        ("left", "undist"): undistort(left, rig.left, "bilinear"),
+        ("right", "undist"): undistort(right, rig.right, "bilinear"),
     }
     for (side, kind), picture in found.items():
         off = np.abs(picture.astype(float) - stored(side, kind))

@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from navapp.geometry.box import Box
-from navapp.geometry.resampling import find_places, resampled
+from navapp.geometry.rectification import find_places, resample
 from tests.reference.resample_reference import resample_slowly
 
 
@@ -18,14 +18,14 @@ def places(height: int, width: int, dx: float, dy: float) -> tuple[np.ndarray, n
 def test_a_ramp_comes_out_as_a_ramp(shift: float) -> None:
     rows, columns = np.mgrid[:40, :60]
     ramp = (2 * columns + 2 * rows).astype(np.uint8)
-    found = resampled(ramp, find_places(*places(40, 60, shift, -shift))).astype(float)
+    found = resample(ramp, find_places(*places(40, 60, shift, -shift))).astype(float)
     error = found[3:-3, 3:-3] - ramp[3:-3, 3:-3]
     assert np.abs(error).max() <= 0.5
 
 
 def test_whole_places_give_the_picture_itself() -> None:
     picture = np.random.default_rng(1).integers(0, 256, (30, 40), dtype=np.uint8)
-    found = resampled(picture, find_places(*places(30, 40, 0.0, 0.0)))
+    found = resample(picture, find_places(*places(30, 40, 0.0, 0.0)))
     np.testing.assert_array_equal(found, picture)
 
 
@@ -33,7 +33,7 @@ def test_whole_places_give_the_picture_itself() -> None:
 def test_outside_the_picture_there_is_nothing(dx: float, dy: float) -> None:
     picture = np.full((30, 40), 200, dtype=np.uint8)
     columns, rows = places(30, 40, dx, dy)
-    found = resampled(picture, find_places(columns, rows))
+    found = resample(picture, find_places(columns, rows))
     is_inside = (columns >= 0) & (columns <= 39) & (rows >= 0) & (rows <= 29)
     np.testing.assert_array_equal(found, np.where(is_inside, 200, 0))
 
@@ -54,7 +54,7 @@ def test_the_kernel_agrees_with_the_readable_reference(turn: float, scale: float
     picture = np.clip(128 + 200 * gaussian_filter(rng.normal(size=(44, 67)), 1.5), 0, 255)
     picture = picture.astype(np.uint8)
     columns, rows = bent(44, 67, turn, scale)
-    found = resampled(picture, find_places(columns, rows)).astype(int)
+    found = resample(picture, find_places(columns, rows)).astype(int)
     expected = resample_slowly(picture, columns, rows)
     # The outermost pixel falls on one side of the edge or on the other.
     inside = (columns > 1) & (columns < 65) & (rows > 1) & (rows < 42)
@@ -65,6 +65,6 @@ def test_the_kernel_agrees_with_the_readable_reference(turn: float, scale: float
     assert (found[beyond] == 0).all()
     part = Box(13, 7, 38, 21)
     rows_of, columns_of = slice(7, 28), slice(13, 51)
-    cut = resampled(picture, find_places(columns, rows), part)
+    cut = resample(picture, find_places(columns, rows), part)
     np.testing.assert_array_equal(cut[rows_of, columns_of], found[rows_of, columns_of])
     assert np.count_nonzero(cut) == np.count_nonzero(cut[rows_of, columns_of])

@@ -6,7 +6,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform, rotation_from_vector, vector_from_rotation
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
 from navapp.registration.bimcc import BimccSettings, fit_coarsely, fit_pose
-from navapp.values import BoneModel, PoseEstimate, Reason, predicted_tre_mm
+from navapp.values import BoneModel, PoseEstimate, Reason
 from tests.registration.shapes import (
     TRUE,
     as_cloud,
@@ -228,7 +228,7 @@ def test_the_covariance_predicts_the_scatter_of_known_noise() -> None:
     targets = BONE.mesh.vertices_mm[chosen[::20]]
     covered = [
         np.linalg.norm(e.camera_from_bone.apply(targets) - TRUE.apply(targets), axis=1).mean()
-        <= predicted_tre_mm(e, MODEL.centre_mm, targets)
+        <= e.predicted_tre_mm(MODEL.centre_mm, targets)
         for e in estimates
     ]
     assert np.mean(covered) >= 0.9

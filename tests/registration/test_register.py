@@ -11,7 +11,7 @@ from navapp.registration import Outcome, RegistrationModel, Scene, point_to_poin
 from navapp.registration.bimcc import BimccSettings, solution_at
 from navapp.registration.multi_start import Candidate
 from navapp.registration.register import smooth_part_mm
-from navapp.values import BoneModel, Reason, predicted_tre_mm
+from navapp.values import BoneModel, Reason
 from tests.registration.shapes import (
     TRUE,
     ball_mesh,
@@ -378,9 +378,9 @@ def test_the_error_is_predicted_over_what_faces_the_camera() -> None:
     cosine = -(placed * normals).sum(axis=1) / np.linalg.norm(placed, axis=1)
     seen = MODEL.points_mm[cosine > 0.2]
     assert 0.1 * len(placed) < len(seen) < 0.6 * len(placed)
-    expected_mm = predicted_tre_mm(found.estimate, MODEL.centre_mm, seen)
+    expected_mm = found.estimate.predicted_tre_mm(MODEL.centre_mm, seen)
     assert found.predicted_tre_mm == pytest.approx(expected_mm, rel=0.01)
-    everywhere_mm = predicted_tre_mm(found.estimate, MODEL.centre_mm, MODEL.points_mm)
+    everywhere_mm = found.estimate.predicted_tre_mm(MODEL.centre_mm, MODEL.points_mm)
     assert found.predicted_tre_mm != pytest.approx(everywhere_mm, rel=0.015)
 
 

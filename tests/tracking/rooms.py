@@ -6,10 +6,13 @@ from functools import lru_cache
 import numpy as np
 
 from drivers.frames import StereoFrame
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import projected_box, render_rectified
-from navapp.tracking import Goal, Line
+from navapp.tracking import Goal
+from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, DisparityMap, Origin, Prior, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -36,12 +39,18 @@ def measured_map(bone: BoneModel, pose: RigidTransform = TRUE, margin_px: int = 
     )
 
 
+def blank_pair() -> RectifiedPair:
+    """Grey pictures that show nothing."""
+    grey = np.full((GEOMETRY.height, GEOMETRY.width), 90, np.uint8)
+    return RectifiedPair(grey, grey, GEOMETRY, Box(0, 0, GEOMETRY.width, GEOMETRY.height))
+
+
 @dataclass(frozen=True)
 class Room:
-    """Frames of a simulated knee, the line that follows it, and the truth for judging."""
+    """Frames of a simulated knee, the tracker that follows it, and the truth for judging."""
 
     rig: StereoRig
-    line: Line
+    tracker: BimccTracker
     frames: tuple[StereoFrame, ...]
     oracle: TruthOracle
     prior: Prior
@@ -51,7 +60,7 @@ class Room:
 
     def error_mm(self, pose: RigidTransform, frame: StereoFrame) -> float:
         """Mean over the visible vertices."""
-        truth, mesh = self.truth(frame), self.line.model.bone.mesh
+        truth, mesh = self.truth(frame), self.tracker.model.bone.mesh
         points = mesh.vertices_mm[visible_vertices(mesh, truth)]
         return float(np.linalg.norm(pose.apply(points) - truth.apply(points), axis=1).mean())
 
@@ -59,8 +68,8 @@ class Room:
 @lru_cache(maxsize=4)
 def room(motion: str = "still", n_frames: int = 3, is_grey: bool = False) -> Room:
     knee = SimulatedKnee(Scenario(seed=5, motion=motion), SensorModel(seed=5, is_grey=is_grey))
-    line, frames = Line(knee.rig, knee.bone), tuple(knee.frames(n_frames))
-    return Room(knee.rig, line, frames, knee.oracle, knee.prior)
+    tracker, frames = BimccTracker(knee.rig, knee.bone), tuple(knee.frames(n_frames))
+    return Room(knee.rig, tracker, frames, knee.oracle, knee.prior)
 
 
 @lru_cache(maxsize=1)

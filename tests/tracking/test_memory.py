@@ -21,7 +21,7 @@ def followed(a: Room, state: TrackState, first: int, n: int) -> TrackState:
         frame = a.frames[number % len(a.frames)]
         right = np.zeros_like(frame.right) if number % 12 == 11 else frame.right
         left = frame.left.copy()  # a camera's pictures are new as well
-        _, state = a.line.track(left, right, number * PERIOD_NS, state, GOAL)
+        _, state = a.tracker.track(left, right, number * PERIOD_NS, state, GOAL)
     return state
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import TrackState
-from navapp.tracking.box_tracker import BoxState
-from navapp.tracking.motion import is_worth_a_search, twist_between
-from navapp.tracking.picture_box import PictureBox
+from navapp.tracking.box.picture_box import PictureBox
+from navapp.tracking.box.tracker import BoxState
+from navapp.tracking.verdict import is_worth_a_search, with_cause
 from navapp.values import (
     LineTimings,
     PoseEstimate,
@@ -122,7 +122,7 @@ def test_rotations_do_not_drift_over_a_thousand_updates() -> None:
 
 def test_the_twist_between_two_poses_moves_one_to_the_other() -> None:
     other = moved(START, 20.0 * STEP)
-    twist = twist_between(START, other, CENTRE)
+    twist = START.twist_to(other, CENTRE)
     np.testing.assert_allclose(moved(START, twist).matrix, other.matrix, atol=1e-9)
 
 
@@ -152,7 +152,7 @@ def test_what_is_wrong_for_good_is_remembered_until_a_frame_is_ok() -> None:
     for number, status in enumerate((Status.DEGRADED, Status.LOST), start=1):
         found = frame(START, status)
         found = replace(found, verdict=Verdict(status, 0.2, (Reason.SURFACE_MISFIT,)))
-        state = state.updated(found.because(state.cause), number * PERIOD_NS, CENTRE)
+        state = state.updated(with_cause(found, state.cause), number * PERIOD_NS, CENTRE)
         assert state.cause is Reason.OTHER_SIDE
     assert state.updated(frame(START), 3 * PERIOD_NS, CENTRE).cause is None
 

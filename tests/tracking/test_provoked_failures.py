@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import pytest
 
-from navapp.tracking import Line
+from navapp.tracking import Tracker, make_tracker
 from navapp.values import Reason
 from tests.bench.provoked import Event, Shown, Theatre, played
 from tests.bench.provoked_failures import back_after_s
@@ -24,13 +24,13 @@ EVENTS = {
 
 
 @lru_cache(maxsize=1)
-def line() -> Line:
+def tracker() -> Tracker:
     theatre = Theatre(SEED, Event("nothing"))
-    return Line(theatre.rig, theatre.bone)
+    return make_tracker(theatre.rig, theatre.bone)
 
 
 def frames_of(event: Event, until_s: float) -> list[Shown]:
-    return list(played(Theatre(SEED, event), line(), RATE_HZ, until_s))
+    return list(played(Theatre(SEED, event), tracker(), RATE_HZ, until_s))
 
 
 @pytest.mark.slow

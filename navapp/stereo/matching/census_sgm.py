@@ -5,20 +5,19 @@ good as a support, to be refined for geometry.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands, run_both
-from navapp.geometry.box import Box
-from navapp.geometry.masks import where
+from navapp.geometry.masks import large_smooth_regions
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.byte_lane_kernels import lanes_for
 from navapp.stereo.matching.census_kernels import census_rows
 from navapp.stereo.matching.choice_kernels import Choice, choose_rows
-from navapp.stereo.matching.consistency import agreement_share, speckle_free
 from navapp.stereo.matching.consistency_kernels import Demands, Evidence, judge_rows
-from navapp.stereo.matching.search import Search, contrast_grey, crop, plan_search
+from navapp.stereo.matching.search import Crop, Search
 from navapp.stereo.matching.sgm_kernels import (
     MAX_PENALTY,
     NONE,
@@ -134,12 +133,11 @@ def match_census(
     2008.
     """
     settings = settings or CensusSettings()
-    search = plan_search(pair, band_px)
+    search = Search.plan(pair, band_px)
     _check_volume(search, settings)
     if search.is_empty:
         return _nothing(search)
-    left = _view(pair.left, search.inside, settings)
-    right = _view(pair.right, search.right, settings)
+    left, right = _views_of(pair, search, settings)
     left_px, right_px, uniqueness = _aggregate_and_choose(left, right, search, settings)
     is_judged = np.empty(left_px.shape, dtype=np.bool_)
     confidence = np.empty_like(left_px)
@@ -147,15 +145,16 @@ def match_census(
         left_px, right_px, uniqueness, left.contrast_grey, right.contrast_grey, search.shift
     )
     demands = _demands(settings)
-    in_row_bands(
-        left_px.shape[0],
-        lambda first, last: judge_rows(evidence, demands, (first, last), is_judged, confidence),
-    )
+    judge = partial(judge_rows, evidence, demands, is_judged=is_judged, confidence=confidence)
+    in_row_bands(left_px.shape[0], judge)
     # Smooth paths agree by chance too, but in specks.
-    is_matched = speckle_free(left_px, settings.speckle_px, settings.max_difference_px)
-    left_px = where(is_matched, left_px, np.float32(np.nan))
-    confidence = where(is_matched, confidence, np.float32(0.0))
-    agreement = agreement_share(is_matched, is_judged)
+    is_matched = large_smooth_regions(left_px, settings.speckle_px, settings.max_difference_px)
+    np.copyto(left_px, np.float32(np.nan), where=~is_matched)
+    np.copyto(confidence, np.float32(0.0), where=~is_matched)
+    # Exchanged pictures give a tiny share.
+    n_judged = np.count_nonzero(is_judged)
+    n_agreeing = np.count_nonzero(is_matched & is_judged)
+    agreement = n_agreeing / n_judged if n_judged else float("nan")
     return _result(search, settings, left_px, right_px, confidence, agreement)
 
 
@@ -179,13 +178,17 @@ def _check_volume(search: Search, settings: CensusSettings) -> None:
         )
 
 
-def _view(image: Image, box: Box, settings: CensusSettings) -> _View:
-    radius_x, radius_y = radius = (settings.radius_x, settings.radius_y)
-    grown = crop(image, box, radius)
-    grey = grown[radius_y : radius_y + box.height, radius_x : radius_x + box.width]
-    codes = np.empty((box.height, -(-settings.code_bits // 8), box.width), dtype=np.uint8)
-    in_row_bands(box.height, lambda first, last: census_rows(grown, *radius, (first, last), codes))
-    return _View(np.ascontiguousarray(grey), codes, contrast_grey(grown, radius))
+def _views_of(pair: RectifiedPair, search: Search, settings: CensusSettings) -> tuple[_View, _View]:
+    """What the matcher sees of the left and of the right picture."""
+    radius = (settings.radius_x, settings.radius_y)
+    views, fills = [], []
+    for image, box in ((pair.left, search.inside), (pair.right, search.right)):
+        crop = Crop.of(image, box, radius)
+        codes = np.empty((box.height, -(-settings.code_bits // 8), box.width), dtype=np.uint8)
+        fills.append(partial(census_rows, crop.values, *radius, (0, box.height), codes))
+        views.append(_View(np.ascontiguousarray(crop.inner), codes, crop.contrast_grey()))
+    run_both(*fills)
+    return views[0], views[1]
 
 
 def _aggregate_and_choose(
@@ -211,12 +214,12 @@ def _aggregate_and_choose(
     down, up = new_paths(width, n), new_paths(width, n)
     middle = height // 2
     run_both(
-        lambda: keep_rows(views, down, (0, middle), 1, kept),
-        lambda: keep_rows(views, up, (height - 1, middle - 1), -1, kept),
+        partial(keep_rows, views, down, (0, middle), 1, kept),
+        partial(keep_rows, views, up, (height - 1, middle - 1), -1, kept),
     )
     run_both(
-        lambda: choose_rows(views, down, (middle, height), 1, kept, choice),
-        lambda: choose_rows(views, up, (middle - 1, -1), -1, kept, choice),
+        partial(choose_rows, views, down, (middle, height), 1, kept, choice),
+        partial(choose_rows, views, up, (middle - 1, -1), -1, kept, choice),
     )
     return choice.left_px, choice.right_px, choice.uniqueness
 
@@ -268,10 +271,7 @@ def matched_map(search: Search, disparity_px: NDArray[np.float32], sigma_px: flo
     """The map over the whole box; (h, w) of its inside part, NaN where unmatched."""
     whole = search.over_box(disparity_px.astype(np.float32, copy=False), np.float32(np.nan))
     is_matched = np.isfinite(whole)
-    return DisparityMap(
-        whole,
-        where(is_matched, np.full_like(whole, sigma_px), np.float32(np.nan)),
-        where(is_matched, np.full(whole.shape, Origin.MATCHED, np.uint8), Origin.UNKNOWN),
-        search.box.x,
-        search.box.y,
-    )
+    # Unknown where the disparity is: NaN less NaN.
+    sigma = whole - whole + np.float32(sigma_px)
+    origin = is_matched.astype(np.uint8) * np.uint8(Origin.MATCHED)
+    return DisparityMap(whole, sigma, origin, search.box.x, search.box.y)

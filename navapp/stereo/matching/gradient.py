@@ -16,7 +16,7 @@ from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.census_sgm import matched_map
 from navapp.stereo.matching.consistency import at_partner, view_difference_px
 from navapp.stereo.matching.gradient_kernels import match_rows
-from navapp.stereo.matching.search import Search, contrast_grey, crop, plan_search
+from navapp.stereo.matching.search import Crop, Search
 from navapp.values import DisparityMap
 
 _PER_GREY = 16.0
@@ -66,7 +66,7 @@ def match_gradient(
     magnitude shifted by d, m_r(x - d, y).
     """
     settings = settings or GradientSettings()
-    search = plan_search(pair, band_px)
+    search = Search.plan(pair, band_px)
     if search.is_empty:
         shape = (search.inside.height, search.inside.width)
         return matched_map(search, np.full(shape, np.nan, dtype=np.float32), settings.sigma_px)
@@ -76,7 +76,7 @@ def match_gradient(
     is_matched = difference <= settings.max_difference_px
     radius = settings.window_px // 2
     left_spread, right_spread = (
-        contrast_grey(crop(image, box, (radius, radius)), (radius, radius))
+        Crop.of(image, box, (radius, radius)).contrast_grey()
         for image, box in ((pair.left, search.inside), (pair.right, search.right))
     )
     partner_spread = at_partner(right_spread, left_px, search.shift, np.uint8(0))
@@ -116,8 +116,9 @@ def _winners(
     radius = settings.window_px // 2
     first = inside.x - (search.lowest + n - 1)
     reached = Box(first, inside.y, inside.width + n - 1, inside.height)
-    left = crop(magnitude(pair.left), inside, (radius, radius))
-    mirrored = np.ascontiguousarray(crop(magnitude(pair.right), reached, (radius, radius))[:, ::-1])
+    left = Crop.of(magnitude(pair.left), inside, (radius, radius)).values
+    right = Crop.of(magnitude(pair.right), reached, (radius, radius)).values
+    mirrored = np.ascontiguousarray(right[:, ::-1])
     left_best = np.empty((inside.height, inside.width), dtype=np.int32)
     right_best = np.empty((reached.height, reached.width), dtype=np.int32)
     # Only partners inside the picture compete.
@@ -128,7 +129,7 @@ def _winners(
     # d = arg min over D of CA(p, d)                                                (equation 3)
     in_row_bands(
         inside.height,
-        lambda top, end: match_rows(left, mirrored, columns, (top, end), left_best, right_best),
+        lambda rows: match_rows(left, mirrored, columns, rows, left_best, right_best),
     )
     # The best at the end of the search is no minimum.
     is_minimum = (left_best > 0) & (left_best < n - 1)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Image, RectifiedPair
+from navapp.geometry.rectification import RectifiedPair
 
 MAX_DISPARITIES = 1024
 
@@ -33,6 +33,38 @@ class Search:
     count: int
     right: Box
 
+    @classmethod
+    def plan(cls, pair: RectifiedPair, band_px: tuple[float, float]) -> "Search":
+        """The search of `pair.box` for disparities in a band (px).
+
+        Raises:
+            ValueError: pictures that are not grey or differ in size; a band that is none
+                or too wide.
+        """
+        for picture in (pair.left, pair.right):
+            if picture.ndim != 2 or picture.dtype != np.uint8:
+                raise ValueError(f"grey pictures of 8 bits are needed, not {picture.shape}")
+        if pair.left.shape != pair.right.shape:
+            raise ValueError(f"pictures differ in size: {pair.left.shape} and {pair.right.shape}")
+        low, high = band_px
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise ValueError(f"a disparity band needs two growing numbers, not {band_px}")
+        lowest = int(np.floor(low)) - 1
+        count = int(np.ceil(high)) + 2 - lowest
+        if count > MAX_DISPARITIES:
+            raise ValueError(
+                f"the band {low:g} to {high:g} px needs {count} disparities; "
+                f"at most {MAX_DISPARITIES} are searched: narrow the range of depths"
+            )
+        height, width = pair.left.shape
+        box = Box(pair.box.x, pair.box.y, max(pair.box.width, 0), max(pair.box.height, 0))
+        inside = box.clipped(width, height)
+        reached = Box(
+            inside.x - (lowest + count - 1), inside.y, inside.width + count - 1, inside.height
+        )
+        right = Box(0, 0, 0, 0) if inside.is_empty else reached.clipped(width, height)
+        return cls(box, inside, lowest, count, right)
+
     @property
     def shift(self) -> int:
         """Column of `inside`'s first pixel, counted from `right`'s first; may be negative."""
@@ -51,47 +83,48 @@ class Search:
         return out
 
 
-def plan_search(pair: RectifiedPair, band_px: tuple[float, float]) -> Search:
-    """The search of `pair.box` for disparities in a band.
+@dataclass(frozen=True, slots=True, eq=False)
+class Crop:
+    """A box of a picture with a margin around it; the picture's edge is repeated outside.
 
-    Raises:
-        ValueError: pictures that are not grey or differ in size; a band that is none or too wide.
+    Attributes:
+        values: (h + 2 rows, w + 2 columns).
+        margin_px: columns and rows of the margin.
     """
-    for picture in (pair.left, pair.right):
-        if picture.ndim != 2 or picture.dtype != np.uint8:
-            raise ValueError(f"grey pictures of 8 bits are needed, not {picture.shape}")
-    if pair.left.shape != pair.right.shape:
-        raise ValueError(f"pictures differ in size: {pair.left.shape} and {pair.right.shape}")
-    low, high = band_px
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise ValueError(f"a disparity band needs two growing numbers, not {band_px}")
-    lowest = int(np.floor(low)) - 1
-    count = int(np.ceil(high)) + 2 - lowest
-    if count > MAX_DISPARITIES:
-        raise ValueError(
-            f"the band {low:g} to {high:g} px needs {count} disparities; "
-            f"at most {MAX_DISPARITIES} are searched: narrow the range of depths"
-        )
-    height, width = pair.left.shape
-    box = Box(pair.box.x, pair.box.y, max(pair.box.width, 0), max(pair.box.height, 0))
-    inside = box.clipped(width, height)
-    reached = Box(
-        inside.x - (lowest + count - 1), inside.y, inside.width + count - 1, inside.height
-    )
-    right = Box(0, 0, 0, 0) if inside.is_empty else reached.clipped(width, height)
-    return Search(box, inside, lowest, count, right)
 
+    values: NDArray[Any]
+    margin_px: tuple[int, int]
 
-def crop(image: NDArray[T], box: Box, margin_px: tuple[int, int]) -> NDArray[T]:
-    """A box with a margin (columns, rows) around it; the picture's edge is repeated outside."""
-    import cv2
+    @classmethod
+    def of(cls, image: NDArray[Any], box: Box, margin_px: tuple[int, int]) -> "Crop":
+        """The box of a picture, which it may leave."""
+        import cv2
 
-    height, width = image.shape
-    rows, above, below = _inside(box.y - margin_px[1], box.height + 2 * margin_px[1], height)
-    columns, before, after = _inside(box.x - margin_px[0], box.width + 2 * margin_px[0], width)
-    part: Any = image[rows, columns]
-    grown: Any = cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE)
-    return np.asarray(grown, dtype=image.dtype)
+        height, width = image.shape
+        rows, above, below = _inside(box.y - margin_px[1], box.height + 2 * margin_px[1], height)
+        columns, before, after = _inside(box.x - margin_px[0], box.width + 2 * margin_px[0], width)
+        part: Any = image[rows, columns]
+        grown: Any = cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE)
+        return cls(np.asarray(grown, dtype=image.dtype), margin_px)
+
+    @property
+    def inner(self) -> NDArray[Any]:
+        """(h, w) without the margin."""
+        return self._without_margin(self.values)
+
+    def contrast_grey(self) -> NDArray[np.uint8]:
+        """(h, w) range of grey levels in the window of the margin's size around each pixel."""
+        import cv2
+
+        columns, rows = self.margin_px
+        window = np.ones((2 * rows + 1, 2 * columns + 1), dtype=np.uint8)
+        spread = cv2.subtract(cv2.dilate(self.values, window), cv2.erode(self.values, window))
+        return self._without_margin(np.asarray(spread)).astype(np.uint8)
+
+    def _without_margin(self, values: NDArray[Any]) -> NDArray[Any]:
+        columns, rows = self.margin_px
+        height, width = values.shape
+        return values[rows : height - rows, columns : width - columns]
 
 
 def _inside(first: int, count: int, size: int) -> tuple[slice, int, int]:
@@ -99,15 +132,3 @@ def _inside(first: int, count: int, size: int) -> tuple[slice, int, int]:
     begin, end = (min(max(place, 0), size - 1) for place in (first, first + count - 1))
     before = min(max(begin - first, 0), count - 1)
     return slice(begin, end + 1), before, count - before - (end + 1 - begin)
-
-
-def contrast_grey(image: Image, radius_px: tuple[int, int]) -> NDArray[np.uint8]:
-    """(h, w) range of grey levels in each window of a crop with a margin of `radius_px`."""
-    import cv2
-
-    radius_x, radius_y = radius_px
-    window = np.ones((2 * radius_y + 1, 2 * radius_x + 1), dtype=np.uint8)
-    spread = np.asarray(cv2.subtract(cv2.dilate(image, window), cv2.erode(image, window)))
-    height, width = image.shape
-    inner = spread[radius_y : height - radius_y, radius_x : width - radius_x]
-    return inner.astype(np.uint8)

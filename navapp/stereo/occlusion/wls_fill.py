@@ -69,7 +69,7 @@ def fill_wls(
     """The map with its classified pixels filled; every other pixel keeps all its bits.
 
     Args:
-        left: of the left view, or a mirrored one of the right view (`occlusion.mirrored`).
+        left: of the left view, or a mirrored one of the right view (`occlusion.classify.mirrored`).
         picture: (h, w) or (h, w, 3) rectified picture over the map.
         confidence: (h, w) float32, 0 to 1, of the matches.
         classes: (h, w) of `occlusion.classify`.

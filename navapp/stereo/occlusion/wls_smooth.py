@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import in_row_bands
+from navapp.geometry.bands import Rows, in_row_bands
 from navapp.stereo.occlusion.classify import with_channels
 from navapp.stereo.occlusion.wls_smooth_kernels import (
     Lines,
@@ -75,11 +75,11 @@ def smooth_wls(
     for k in range(1, n_rounds + 1):
         step = np.float32(pass_strength(strength, k, n_rounds))
         in_row_bands(height, partial(_solve_rows, columns.values, rows, step))
-        in_row_bands(width, partial(solve_columns, columns, step))
+        in_row_bands(width, partial(_solve_columns, columns, step))
     bounded = np.empty_like(measured.disparity)
     in_row_bands(
         height,
-        lambda first, last: bound_rows(measured, columns.values, centre, first, last, bounded),
+        lambda band: bound_rows(measured, columns.values, centre, *band, bounded),
     )
     return replace(disparity_map, disparity_px=bounded)
 
@@ -105,7 +105,8 @@ def _weighed(
     per_step = (3 // picture.shape[2]) / colour_sigma
     link_weight = np.exp(-per_step * np.arange(_N_COLOUR_STEPS)).astype(np.float32)
 
-    def weigh(first: int, last: int) -> None:
+    def weigh(band: Rows) -> None:
+        first, last = band
         weigh_rows(measured, centre, first, last, columns.values, columns.trust)
         link_rows(measured.disparity, picture, link_weight, first, last, across, columns.links)
         cv2.transpose(columns.trust[first:last], dst=rows.trust[:, first:last])
@@ -115,14 +116,17 @@ def _weighed(
     return columns, rows
 
 
-def _solve_rows(
-    values: NDArray[np.float32], rows: Lines, strength: np.float32, first: int, last: int
-) -> None:
+def _solve_rows(values: NDArray[np.float32], rows: Lines, strength: np.float32, band: Rows) -> None:
     import cv2
 
+    first, last = band
     cv2.transpose(values[first:last], dst=rows.values[:, first:last])
     solve_columns(rows, strength, first, last)
     cv2.transpose(rows.values[:, first:last], dst=values[first:last])
+
+
+def _solve_columns(columns: Lines, strength: np.float32, band: Rows) -> None:
+    solve_columns(columns, strength, *band)
 
 
 def _centre(disparity: NDArray[np.float32]) -> np.float32:

@@ -9,7 +9,6 @@ out: a support is never a measurement.
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.masks import where
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel.highlights import without_highlights
 from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
@@ -17,7 +16,6 @@ from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 from navapp.values import DisparityMap
 
 # Steps of a coarse map are about half a pixel of it.
-_COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.5, 0.75, 0.4))
 _SURFACE = RegionalSettings(radius_px=12)
 _N_TURNS = 2
 # On a support that is itself measured, a larger window rounds off crests.
@@ -29,12 +27,8 @@ _FAIR = RefineSettings(
 _GOOD = RefineSettings(radius_px=_RADIUS_PX, last_step_px=0.25, max_roughness_px=0.35)
 # A window that wants to be further from the surface through its neighbours follows something else.
 _FAR_FROM_SURFACE_PX = 0.4
-# Neighbours over which a map is averaged that only has to tell what lies where.
-_CALM_PX = 5
-_COARSE_STEP_PX = 0.5
 # A surface that is further from the coarse map belongs to another thing: edges keep their place.
 _FAR_PX = 3.0
-_FAR_FROM_MATCH_PX = 1.5
 # Noise below this is as good as none: other errors are larger.
 _SMALL_NOISE_PX = 0.05
 
@@ -59,39 +53,6 @@ def refine_surface(pair: RectifiedPair, coarse_px: NDArray[np.float32]) -> Dispa
     found = refine(pair, without_highlights(pair, support), _GOOD)
     with np.errstate(invalid="ignore"):
         return found.only(np.abs(found.disparity_px - support) <= _FAR_FROM_SURFACE_PX)
-
-
-def without_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A matched map (h, w) of whole disparities as a smooth surface, single holes closed."""
-    import cv2
-
-    known = np.isfinite(coarse_px)
-    weights = known.astype(np.float32)
-    surface = regional_support(coarse_px, weights, coarse_px.shape, _COARSE_SURFACE)
-    around = cv2.dilate(known.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    with np.errstate(invalid="ignore"):
-        is_same = np.abs(surface - coarse_px) < _FAR_FROM_MATCH_PX
-    smooth = np.where(known & ~is_same, coarse_px, surface)
-    return np.where(around, smooth, np.float32(np.nan)).astype(np.float32)
-
-
-def calmed(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A matched map (h, w) with less noise, single holes closed: to tell what lies where.
-
-    A pixel whose neighbourhood is off by more than a step of the map keeps what it has: edges keep
-    their place.
-    """
-    import cv2
-
-    known = np.isfinite(coarse_px)
-    counts = known.astype(np.float32)
-    window = (_CALM_PX, _CALM_PX)
-    total = cv2.boxFilter(where(known, coarse_px, np.float32(0.0)), -1, window, normalize=False)
-    mean = total / np.maximum(cv2.boxFilter(counts, -1, window, normalize=False), np.float32(1.0))
-    around = cv2.dilate(known.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    with np.errstate(invalid="ignore"):
-        is_off = np.abs(mean - coarse_px) > _COARSE_STEP_PX
-    return where(around, where(is_off, coarse_px, mean), np.float32(np.nan))
 
 
 def _weights(samples: DisparityMap) -> NDArray[np.float32]:

@@ -87,15 +87,13 @@ def regional_support(
     window, rules = _window(samples, settings), _rules(settings)
     in_row_bands(
         n_rows * side,
-        lambda first, last: fit_rows(
-            samples, window, rules, -(-first // side), -(-last // side), nodes
+        lambda rows: fit_rows(
+            samples, window, rules, -(-rows[0] // side), -(-rows[1] // side), nodes
         ),
     )
     picture = np.empty(shape, dtype=np.float32)
     unit = np.float32(side / settings.radius_px)
-    in_row_bands(
-        shape[0], lambda first, last: picture_rows(nodes, side, unit, first, last, picture)
-    )
+    in_row_bands(shape[0], lambda rows: picture_rows(nodes, side, unit, *rows, picture))
     return picture
 
 

@@ -304,7 +304,7 @@ def test_the_pool_is_shared_and_two_jobs_run_side_by_side() -> None:
     run_both(meeting.wait, meeting.wait)
     for height in (7, 32):
         seen: list[range] = []
-        in_row_bands(height, lambda first, last, seen=seen: seen.append(range(first, last)))
+        in_row_bands(height, lambda band, seen=seen: seen.append(range(*band)))
         assert len(seen) == 2
         # Every row once.
         assert sorted(row for rows in seen for row in rows) == list(range(height))

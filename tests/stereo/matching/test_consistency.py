@@ -1,14 +1,10 @@
-"""Left-right check, speckles, share of agreement."""
-
-import math
+"""Left-right check."""
 
 import numpy as np
 import pytest
 
 from navapp.stereo.matching.consistency import (
-    agreement_share,
     at_partner,
-    speckle_free,
     view_difference_px,
 )
 
@@ -47,42 +43,3 @@ def test_the_difference_of_the_views_is_unknown_where_either_is() -> None:
     assert found[1] == 0.0
     assert found[2] == pytest.approx(1.6)
     assert np.isnan(found[[0, 3, 4]]).all()
-
-
-@pytest.mark.parametrize("base", [0.0, 900.0, -300.5])
-def test_small_patches_go_and_large_ones_stay(base) -> None:
-    disparity = np.full((12, 20), np.nan, dtype=np.float32)
-    disparity[1:5, 1:5] = base + 10.0  # 16 pixels
-    disparity[7:10, 1:6] = base + 10.0  # 15 pixels
-    disparity[1:9, 10:18] = base + 20.0 + 0.9 * np.arange(8)  # slanted, connected
-    kept = speckle_free(disparity, 16, 1.0)
-    assert kept[1:5, 1:5].all()
-    assert not kept[7:10].any(where=np.arange(20) < 8)
-    assert kept[1:9, 10:18].all()
-    assert kept.sum() == 16 + 64
-
-
-def test_patches_are_parted_where_the_disparity_jumps() -> None:
-    disparity = np.full((4, 8), 5.0, dtype=np.float32)
-    disparity[:, 3:] = 6.5
-    kept = speckle_free(disparity, 20, 1.0)
-    assert not kept[:, :3].any()
-    assert kept[:, 3:].all()
-
-
-def test_whole_steps_of_single_precision_connect_and_larger_ones_part() -> None:
-    # Across a power of two, the last digits of two neighbours weigh differently.
-    whole = (1020.0 + 8.54e-5 + np.arange(8.0)).astype(np.float32)[None]
-    assert np.abs(np.diff(whole)).max() > 1.0
-    assert speckle_free(whole, 8, 1.0).all()
-    assert not speckle_free((1.01 * np.arange(8.0)).astype(np.float32)[None], 2, 1.0).any()
-
-
-def test_nothing_known_stays_nothing() -> None:
-    assert not speckle_free(np.full((3, 3), np.nan, dtype=np.float32), 2, 1.0).any()
-
-
-def test_the_share_counts_judged_pixels_only() -> None:
-    agrees = np.array([True, True, False, False])
-    assert agreement_share(agrees, np.array([True, False, True, False])) == 0.5
-    assert math.isnan(agreement_share(agrees, np.zeros(4, dtype=bool)))

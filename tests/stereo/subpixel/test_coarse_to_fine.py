@@ -7,7 +7,8 @@ import pytest
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo.subpixel.coarse_to_fine import calmed, refine_surface, without_steps
+from navapp.stereo.coarse import calm, smooth_steps
+from navapp.stereo.subpixel.coarse_to_fine import refine_surface
 from navapp.stereo.subpixel.refine import refine
 from navapp.values import Origin
 from tests.stereo.pairs import HEIGHT, WIDTH, shifted_pair
@@ -57,7 +58,7 @@ def without_texture(pair: RectifiedPair, truth: np.ndarray, patch: np.ndarray) -
 @pytest.mark.parametrize("slope", [0.15, 0.2, 0.3])
 def test_the_steps_of_a_slanted_surface_vanish(slope: float) -> None:
     truth = 30.0 + slope * X
-    error = without_steps(stepped(truth)) - in_box(truth)
+    error = smooth_steps(stepped(truth)) - in_box(truth)
     assert np.isfinite(error).all()
     # Rounding alone has a deviation of 0.29 and jumps of 1.
     assert error.std() < 0.1
@@ -67,7 +68,7 @@ def test_the_steps_of_a_slanted_surface_vanish(slope: float) -> None:
 
 @pytest.mark.parametrize("truth", [SLANTED, CURVED])
 def test_long_steps_become_a_gentle_slope(truth: np.ndarray) -> None:
-    surface = without_steps(stepped(truth))
+    surface = smooth_steps(stepped(truth))
     for axis in (0, 1):
         assert np.abs(np.diff(surface, axis=axis)).max() < 0.3
     assert (surface - in_box(truth)).std() < 0.75 * (stepped(truth) - in_box(truth)).std()
@@ -78,7 +79,7 @@ def test_single_holes_are_closed_and_larger_ones_stay_unknown() -> None:
     coarse[20, 30] = np.nan
     coarse[60:72, 100:112] = np.nan
     coarse[:30, 150:] = np.nan
-    surface = without_steps(coarse)
+    surface = smooth_steps(coarse)
     assert abs(surface[20, 30] - in_box(SLANTED)[20, 30]) < 0.5
     # One pixel from what is known is as near as the rim of a single hole.
     unknown = np.zeros(coarse.shape, dtype=bool)
@@ -88,7 +89,7 @@ def test_single_holes_are_closed_and_larger_ones_stay_unknown() -> None:
 
 
 def test_both_sides_of_an_edge_keep_their_own_values() -> None:
-    error = np.abs(without_steps(stepped(EDGE)) - in_box(EDGE))
+    error = np.abs(smooth_steps(stepped(EDGE)) - in_box(EDGE))
     beside = np.abs(in_box(X) - (EDGE_X - 0.5)) < 1.0
     assert error[~beside].max() < 0.6
     # At the very edge the surface may bend by less than would take a pixel across.
@@ -97,18 +98,18 @@ def test_both_sides_of_an_edge_keep_their_own_values() -> None:
 
 def test_a_thin_thing_before_a_wall_is_not_taken_for_the_wall() -> None:
     thin = in_box(np.where(np.abs(X - EDGE_X) < 3.0, 40.0, 30.0))
-    np.testing.assert_allclose(without_steps(thin), thin, atol=0.01)
+    np.testing.assert_allclose(smooth_steps(thin), thin, atol=0.01)
 
 
 def test_nothing_known_stays_nothing() -> None:
-    assert np.isnan(without_steps(np.full((40, 50), np.nan, dtype=np.float32))).all()
+    assert np.isnan(smooth_steps(np.full((40, 50), np.nan, dtype=np.float32))).all()
 
 
 @pytest.mark.parametrize("truth", [SLANTED, CURVED])
 @pytest.mark.parametrize("is_smooth", [True, False])
 def test_a_rounded_map_becomes_a_measured_surface(truth: np.ndarray, is_smooth: bool) -> None:
     pair = shifted_pair(truth, BOX)
-    coarse = without_steps(stepped(truth)) if is_smooth else stepped(truth)
+    coarse = smooth_steps(stepped(truth)) if is_smooth else stepped(truth)
     found = refine_surface(pair, coarse)
     error = found.disparity_px - in_box(truth)
     known = np.isfinite(error)
@@ -127,7 +128,7 @@ def test_a_rounded_map_becomes_a_measured_surface(truth: np.ndarray, is_smooth: 
 def test_a_bump_that_the_pictures_do_not_show_is_not_handed_out(height_px: float) -> None:
     pair = shifted_pair(CURVED, BOX)
     bump = height_px * np.maximum(1.0 - ((X - 180.0) ** 2 + (Y - 60.0) ** 2) / 10.0**2, 0.0)
-    coarse = without_steps(stepped(CURVED)) + in_box(bump)
+    coarse = smooth_steps(stepped(CURVED)) + in_box(bump)
     is_bump = in_box(bump) != 0.0
     error = (refine_surface(pair, coarse).disparity_px - in_box(CURVED))[is_bump]
     assert np.isfinite(error).mean() > 0.9
@@ -141,7 +142,7 @@ def test_a_bump_that_the_pictures_do_not_show_is_not_handed_out(height_px: float
 def test_a_patch_without_texture_stays_unknown() -> None:
     patch = (X >= 150) & (X < 200) & (Y >= 40) & (Y < 80)
     pair = without_texture(shifted_pair(SLANTED, BOX), SLANTED, patch)
-    found = refine_surface(pair, without_steps(stepped(SLANTED)))
+    found = refine_surface(pair, smooth_steps(stepped(SLANTED)))
     # A window reaches 5 px.
     within = in_box((X >= 155) & (X < 195) & (Y >= 45) & (Y < 75)) > 0
     around = in_box((X < 144) | (X >= 206) | (Y < 34) | (Y >= 86)) > 0
@@ -157,7 +158,7 @@ def test_an_edge_keeps_both_sides() -> None:
     # What the near plane hides from the right camera has no match.
     hidden_x = EDGE_X - 9
     coarse[:, hidden_x - BOX.x : EDGE_X - BOX.x] = np.nan
-    found = refine_surface(pair_before_wall(X >= EDGE_X), without_steps(coarse))
+    found = refine_surface(pair_before_wall(X >= EDGE_X), smooth_steps(coarse))
     error = np.abs(found.disparity_px - in_box(EDGE))
     columns = in_box(X)
     for beside in (
@@ -175,7 +176,7 @@ def test_a_narrow_thing_before_a_wall_keeps_its_place() -> None:
     truth = np.where(is_near, NEAR, WALL)
     coarse = stepped(truth)
     coarse[:, 161 - BOX.x : 170 - BOX.x] = np.nan
-    found = refine_surface(pair_before_wall(is_near), without_steps(coarse))
+    found = refine_surface(pair_before_wall(is_near), smooth_steps(coarse))
     error = np.abs(found.disparity_px - in_box(truth))
     # The wall around it has more pixels to speak for the surface.
     on_it = in_box(is_near) > 0
@@ -196,7 +197,7 @@ def test_a_map_without_any_answer_measures_nothing() -> None:
 def test_a_small_island_stays() -> None:
     coarse = np.full((60, 60), np.nan, np.float32)
     coarse[30:34, 30:34] = 20.0
-    assert np.isfinite(without_steps(coarse)[30:34, 30:34]).all()
+    assert np.isfinite(smooth_steps(coarse)[30:34, 30:34]).all()
 
 
 def test_a_calmed_map_has_less_noise_and_keeps_its_edges() -> None:
@@ -205,7 +206,7 @@ def test_a_calmed_map_has_less_noise_and_keeps_its_edges() -> None:
     noisy = (true + rng.uniform(-0.25, 0.25, true.shape)).astype(np.float32)
     noisy[10, 12] = np.nan
     noisy[20:30, 40:50] = np.nan
-    found = calmed(noisy)
+    found = calm(noisy)
     assert np.isfinite(found[10, 12])
     assert np.isnan(found[22:28, 42:48]).all()
     error = np.abs(found - true)

@@ -1,11 +1,10 @@
 """Sub-pixel refinement on a support."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel import refine as module
@@ -41,11 +40,14 @@ def bands_of(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     """Rows, first and after the last, of every band of every step from now on."""
     bands: list[tuple[int, int]] = []
 
-    def spy(band, fixed, refined, quality, first: int, last: int) -> None:
-        bands.append((first, last))
-        band(fixed, refined, quality, first, last)
+    def spy(height: int, job, *more) -> None:
+        def told(band: tuple[int, int]) -> None:
+            bands.append(band)
+            job(band)
 
-    monkeypatch.setattr(module, "_band", partial(spy, module._band))
+        in_row_bands(height, told if job.func is module.refine_rows else job, *more)
+
+    monkeypatch.setattr(module, "in_row_bands", spy)
     return bands
 
 

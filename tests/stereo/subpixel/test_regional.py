@@ -143,8 +143,8 @@ def test_the_row_bands_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def in_bands(n_bands: int, height: int, job) -> None:
         limits = [height * k // n_bands for k in range(n_bands + 1)]
-        for first, last in pairwise(limits):
-            job(first, last)
+        for band in pairwise(limits):
+            job(band)
 
     for n_bands in (1, 3):
         monkeypatch.setattr(regional, "in_row_bands", partial(in_bands, n_bands))

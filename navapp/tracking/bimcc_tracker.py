@@ -1,0 +1,184 @@
+"""The production tracker: stereo on the model's own surface, BiMCC-ICP, and a judge.
+
+Source: the paper's proposed system, section 3.2 and figure 2: the steps of `BimccTracker.track` are
+its intra-operative stage. How they differ from it, and why, is told in docs/registration.md.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from navapp.geometry.rectification import Image
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.diagnosis import Diagnosis
+from navapp.tracking.first_registration import FirstRegistration
+from navapp.tracking.frame import ignore
+from navapp.tracking.judging import PoseJudge
+from navapp.tracking.motion import TrackState
+from navapp.tracking.scoring import FitScorer
+from navapp.tracking.search.after_loss import SearchAfterLoss
+from navapp.tracking.search.buried import BuriedSearch
+from navapp.tracking.search.near import NearSearch
+from navapp.tracking.search.whole_view import WholeViewSearch
+from navapp.tracking.surface_meter import NEAR_VIEW
+from navapp.tracking.tracker import TrackerBase, TrackerSettings
+from navapp.tracking.verdict import Goal, is_place_doubted, is_worth_a_search, with_cause
+from navapp.values import (
+    AspectGraph,
+    BoneModel,
+    Prior,
+    Reason,
+    Status,
+    Stopwatch,
+    TrackedFrame,
+)
+
+# It is asked so often, counted in lost frames, whether the pictures are swapped; chosen.
+_LOST_BETWEEN = 10
+
+
+class BimccTracker(TrackerBase):
+    """Finds and follows one bone under one rig.
+
+    Args:
+        rig: of the pictures.
+        bone: what is followed.
+        settings: how.
+        aspects: edges of the bone, for a first registration without a pose. Without them it goes by
+            the measured surface alone, which finds the bone in a box, but less often in the whole
+            view (docs/registration.md).
+        judge: of poses; this part and the following ones have defaults.
+        near: search near an expected pose.
+        buried: search for a bone that tissue continues.
+        after_loss: search around and further off.
+        diagnosis: why a bone is not found.
+    """
+
+    def __init__(
+        self,
+        rig: StereoRig,
+        bone: BoneModel,
+        settings: TrackerSettings | None = None,
+        aspects: AspectGraph | None = None,
+        *,
+        judge: PoseJudge | None = None,
+        near: NearSearch | None = None,
+        buried: BuriedSearch | None = None,
+        after_loss: SearchAfterLoss | None = None,
+        diagnosis: Diagnosis | None = None,
+    ) -> None:
+        super().__init__(rig, bone, settings or TrackerSettings(), judge)
+        meter, scorer = self.meter, FitScorer(self.meter)
+        self.near = near or NearSearch(meter, scorer.score, self.settings.near)
+        self.buried = buried or BuriedSearch(meter, self.settings.near)
+        self.after_loss = after_loss or SearchAfterLoss(meter, self.near, scorer)
+        self.diagnosis = diagnosis or Diagnosis(meter, scorer)
+        self.first = FirstRegistration(
+            self, WholeViewSearch(meter, aspects), scorer, self.settings.n_refined
+        )
+
+    def track(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame (the paper's section 3.2, intra-operative)."""
+        watch = Stopwatch()
+        # Predict where the bone will be.
+        left_from_bone = state.predicted(captured_ns, self.centre_mm)
+        best = None
+        if state.n_lost == 0:
+            # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
+            frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
+            with self.check_beside(frame) as checks:
+                # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
+                # turns; check beside the fit; judge.
+                frame = replace(frame, on_measured=checks.check)
+                fits = self.near.find(frame)
+                best = self.judge_fits(frame, checks, fits, goal, frame.start)
+                if is_place_doubted(best.verdict):
+                    searches = state.is_search_due and is_worth_a_search(best)
+                    frame = replace(frame, searches=searches)
+                    more = self.buried.find(frame)
+                    best = self.judge_fits(frame, checks, more, goal, frame.start, best)
+        if best is None or best.verdict.status is Status.LOST:
+            state = replace(state, box=self.boxes.follow(state.box, left))
+            best = self._search_again(left, right, left_from_bone, state, goal, watch, best)
+        if best.verdict.status is not Status.OK:
+            best = with_cause(best, self._find_cause(left, right, left_from_bone, state, best))
+        # Update the motion, and the box.
+        return self.update(best, state, left, captured_ns, watch)
+
+    def glance(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame, lost or not, if it is near where it is expected.
+
+        Only the model itself is matched: that is soon done, and sees no more than some millimetres.
+        """
+        watch = Stopwatch()
+        left_from_bone = state.predicted(captured_ns, self.centre_mm)
+        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
+        with self.check_beside(frame) as checks:
+            fits = self.near.find_rests(frame)
+            best = self.judge_fits(
+                frame, checks, fits, goal, frame.start,
+                is_enough=lambda verdict: not is_place_doubted(verdict),
+            )  # fmt: skip
+        best = with_cause(best, state.cause)
+        tracked, after = self.update(best, state, left, captured_ns, watch)
+        # A doubt that nothing was searched for puts off no search.
+        return tracked, replace(after, n_doubted=0)
+
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None] = ignore,
+    ) -> list[TrackedFrame]:
+        """Find the bone from a rough pose, a box or a cone: distinct candidates, best first."""
+        return self.first.register(left, right, prior, goal, on_progress)
+
+    def _search_again(
+        self,
+        left: Image,
+        right: Image,
+        left_from_bone: RigidTransform,
+        state: TrackState,
+        goal: Goal,
+        watch: Stopwatch,
+        best: TrackedFrame | None,
+    ) -> TrackedFrame:
+        """The best answer of searches where the box lies and where the bone was expected."""
+        best = best or self.judge.lost(Reason.BONE_LOST, watch)
+        predicted = self.rectify_pose(left_from_bone)
+        for number, place in enumerate(self.boxes.starts(left_from_bone, state.box)):
+            frame = self.begin(left, right, place, watch)
+            # Further off only around the first place.
+            frame = replace(frame, n_lost=0 if number else state.n_lost)
+            checks = PairChecks(self.meter, frame.pair)
+            best = self.judge_fits(
+                frame, checks, self.after_loss.find(frame), goal, predicted, best
+            )
+            if best.verdict.status is Status.OK:
+                break
+        return best
+
+    def _find_cause(
+        self,
+        left: Image,
+        right: Image,
+        left_from_bone: RigidTransform,
+        state: TrackState,
+        tracked: TrackedFrame,
+    ) -> Reason | None:
+        """What is wrong for good: as known, or looked for anew in some of the lost frames."""
+        is_lost = tracked.verdict.status is Status.LOST
+        if not is_lost and state.cause is Reason.PICTURES_SWAPPED:
+            # Swapped pictures show no bone: they are no longer.
+            return None
+        is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
+        if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
+            return state.cause
+        return self.diagnosis.explain_loss(left, right, self.rectify_pose(left_from_bone))

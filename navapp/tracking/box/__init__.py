@@ -1,0 +1,1 @@
+"""The box of a bone in the left pictures, followed without a pose."""

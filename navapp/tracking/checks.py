@@ -1,0 +1,100 @@
+"""What a measurement says beside the fit: of its pair of pictures, and of the model.
+
+Neither asks for the pose that the fit finds: both are worked out while it is looked for.
+"""
+
+from functools import partial
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.bands import Job, beside
+from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.transform import RigidTransform
+from navapp.stereo import StereoHealth, measure_health
+from navapp.tracking.agreement import Agreement, compare
+from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
+
+
+class PairCheck(NamedTuple):
+    """What is known of one measurement.
+
+    Attributes:
+        health: of its pair of pictures.
+        agreement: of the model where it was matched; None of a free measurement.
+        coarse_px: (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
+    """
+
+    health: StereoHealth
+    agreement: Agreement | None
+    coarse_px: NDArray[np.float32] | None
+
+
+class PairChecks:
+    """Checks what is measured in one pair, one measurement at a time, on the helper.
+
+    As a context it leaves nothing running.
+
+    Args:
+        meter: of the bone's surface.
+        pair: grey, rectified.
+        coarse: being made: whatever lies around the bone; where it does not reach, or without one,
+            a check matches anew.
+    """
+
+    def __init__(
+        self,
+        meter: SurfaceMeter,
+        pair: RectifiedPair,
+        coarse: Job[CoarseMap | None] | None = None,
+    ) -> None:
+        self._meter, self._pair, self._coarse = meter, pair, coarse
+        self._begun: tuple[Measurement, Job[PairCheck]] | None = None
+
+    def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
+        """The check of a measurement: the one that was begun, or a new one, which ends that.
+
+        Args:
+            measured: in the pair.
+            pose: rectified left camera from bone, where it was measured or came to rest.
+        """
+        if self._begun is None or self._begun[0] is not measured:
+            self._drop()
+            run = partial(_run_check, self._meter, self._pair, self._coarse, measured, pose)
+            self._begun = measured, beside(run)
+        return self._begun[1]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._drop()
+        if self._coarse is not None and not self._coarse.is_over:
+            self._coarse.drop()
+
+    def _drop(self) -> None:
+        if self._begun is not None and not self._begun[1].is_over:
+            self._begun[1].drop()
+
+
+# Not a method: a job that knew its checks would keep them, and a frame's pictures, alive.
+def _run_check(
+    meter: SurfaceMeter,
+    pair: RectifiedPair,
+    coarse_job: Job[CoarseMap | None] | None,
+    measured: Measurement,
+    pose: RigidTransform,
+) -> PairCheck:
+    found, view = measured.disparity, measured.view
+    depth_mm = float(pose.apply(meter.model.centre_mm)[2])
+    health = measure_health(pair, found, meter.geometry.disparity_px(depth_mm))
+    coarse = None if coarse_job is None else coarse_job.result()
+    coarse_px = None if coarse is None else coarse.over(found.box)
+    if coarse_px is None:
+        coarse = meter.measure_coarsely(pair, pose, found.box)
+        coarse_px = None if coarse is None else coarse.disparity_px
+    agreement = (
+        None if view is None else compare(view, meter.model, found, meter.geometry, coarse_px)
+    )
+    return PairCheck(health, agreement, coarse_px)

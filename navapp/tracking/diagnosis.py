@@ -1,0 +1,137 @@
+"""Why a bone is not found: pictures that are swapped, or a plan of the other knee.
+
+The judge says that nothing fits. Here it is asked whether something else would: the same pictures
+the other way round, or the same bone's mirror image. Only asked when a bone is not found.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import fit_bimcc, tilted_starts
+from navapp.stereo import are_swapped
+from navapp.tracking.frame import FREE_FIT, Fit, ignore
+from navapp.tracking.scoring import AMBIGUOUS_FRACTION, FitScorer
+from navapp.tracking.surface_meter import WIDE_VIEW, Measurement, SurfaceMeter
+from navapp.values import DisparityMap, Reason, Status, TrackedFrame
+
+# What is said of a surface that was seen well enough, but is another one's.
+_UNFIT = frozenset({Reason.SURFACE_MISFIT, Reason.SEEN_THROUGH, Reason.OUTLIERS})
+# Tilts of the start (deg, how many), as far as a rough pose is off; so many ends are refined.
+_TILTS, _N_REFINED = (15.0, 12), 3
+_MIRROR = np.diag([-1.0, 1.0, 1.0])
+
+
+class Diagnosis:
+    """Looks for what may be wrong for good with one bone under one rig.
+
+    Args:
+        meter: of the bone's surface.
+        scorer: tells how much of the model a fit explains.
+    """
+
+    def __init__(self, meter: SurfaceMeter, scorer: FitScorer) -> None:
+        self._meter, self._scorer = meter, scorer
+
+    def explain_failure(
+        self,
+        left: Image,
+        right: Image,
+        around: RigidTransform | None,
+        failed: TrackedFrame,
+        on_progress: Callable[[float], None] = ignore,
+    ) -> Reason | None:
+        """Why a first registration failed, when it is one of these.
+
+        Args:
+            left: picture of the left camera.
+            right: of the right one.
+            around: pose in the rectified camera that the bone was looked for at, if any.
+            failed: the best answer.
+            on_progress: told that it goes on; what it raises stops the search.
+        """
+        if failed.verdict.status is Status.LOST:
+            cause = self.explain_loss(left, right, around)
+            if cause is not None:
+                return cause
+        reasons = failed.verdict.reasons
+        if around is None or not _UNFIT.intersection(reasons):
+            return None
+        pair = self._meter.rectify(left, right, around, WIDE_VIEW)
+        cause = self._explain_misfit(pair, around, on_progress)
+        # Nothing has shown yet that the plan is of this bone: that comes before what is not seen.
+        return cause or (Reason.SURFACE_MISFIT if Reason.SURFACE_MISFIT in reasons else None)
+
+    def explain_loss(
+        self, left: Image, right: Image, around: RigidTransform | None
+    ) -> Reason | None:
+        """Whether the pictures are swapped, around a pose or in the whole view."""
+        given, exchanged = (
+            self._meter.rectify_surroundings(*pictures, around)
+            for pictures in ((left, right), (right, left))
+        )
+        return Reason.PICTURES_SWAPPED if are_swapped(*given, exchanged[0]) else None
+
+    def _explain_misfit(
+        self, pair: RectifiedPair, pose: RigidTransform, on_progress: Callable[[float], None]
+    ) -> Reason | None:
+        """Whether the mirrored bone explains the surface clearly better.
+
+        The bone's mirror image fits a surface where the bone fits that surface's mirror image.
+        """
+        measured = self._meter.measure_freely(pair, pose, WIDE_VIEW)
+        if measured is None or len(measured.cloud) == 0:
+            return None
+        given = self._fit_best(measured, pose, on_progress)
+        start = mirror_pose(pose, self._meter.model.centre_mm)
+        geometry = self._meter.geometry
+        mirrored = self._fit_best(mirror_measurement(measured, geometry), start, on_progress)
+        if mirrored is None or not self._scorer.is_there(mirrored):
+            return None
+        score = 0.0 if given is None else self._scorer.score(given)
+        is_better = score < AMBIGUOUS_FRACTION * self._scorer.score(mirrored)
+        return Reason.OTHER_SIDE if is_better else None
+
+    def _fit_best(
+        self,
+        measured: Measurement,
+        start: RigidTransform,
+        on_progress: Callable[[float], None],
+    ) -> Fit | None:
+        """Of the fits that a start and tilts of it lead to, the one that explains most."""
+        starts = tilted_starts(start, start.apply(self._meter.model.centre_mm), *_TILTS)
+        found = self._scorer.find_candidates(measured, starts, lambda _: on_progress(1.0))
+        model = self._meter.model
+        poses = [one.scene_from_bone for one in found[:_N_REFINED]]
+        fits = [Fit(fit_bimcc(measured.scene, model, pose, FREE_FIT), measured) for pose in poses]
+        return max(fits, key=self._scorer.score, default=None)
+
+
+def mirror_pose(pose: RigidTransform, centre_mm: FloatArray) -> RigidTransform:
+    """Where a bone stands in the mirrored camera when its mirror image stands at a pose.
+
+    Args:
+        pose: of the bone mirrored left to right about its centre.
+        centre_mm: (3,) of the bone.
+    """
+    rotation = _MIRROR @ pose.rotation @ _MIRROR
+    shift_mm = pose.apply(np.array([2.0 * centre_mm[0], 0.0, 0.0]))
+    return RigidTransform.from_parts(pose.target, pose.source, rotation, _MIRROR @ shift_mm)
+
+
+def mirror_measurement(measured: Measurement, geometry: RectifiedGeometry) -> Measurement:
+    """What the mirrored camera would have measured, to half a pixel of place."""
+    found = measured.disparity
+    right_most = found.x + found.disparity_px.shape[1] - 1
+    mirrored = DisparityMap(
+        np.ascontiguousarray(found.disparity_px[:, ::-1]),
+        np.ascontiguousarray(found.sigma_px[:, ::-1]),
+        np.ascontiguousarray(found.origin[:, ::-1]),
+        round(2.0 * geometry.centre_x_px) - right_most,
+        found.y,
+    )
+    cloud = mirrored.reproject(geometry, measured.cloud.stride_px)
+    return replace(measured, disparity=mirrored, cloud=cloud)

@@ -1,0 +1,162 @@
+"""The first registration: from a rough pose, a box or a cone to judged poses, best first."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from navapp.geometry.rectification import Image
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import distinct, scattered_starts, tilted_starts
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.scoring import FitScorer, select_poses
+from navapp.tracking.search.whole_view import WholeViewSearch
+from navapp.tracking.surface_meter import Measurement
+from navapp.tracking.verdict import Goal, with_cause
+from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
+
+if TYPE_CHECKING:
+    from navapp.tracking.bimcc_tracker import BimccTracker
+
+# A first registration tries near starts first, which is so much of the work of all; then far ones;
+# then it looks for a bone that is partly buried.
+_NEAR_PART, _FAR_PART = 0.05, 0.45
+# Tilts and shifts of a rough pose: (deg, how many); chosen for poses 15 deg and 20 mm off.
+_NEAR_TILTS = (15.0, 12)
+_FAR_TILTS = ((15.0, 12), (28.0, 20))
+_FAR_SHIFT_MM = 8.0
+# Candidates of a search everywhere that explain less than this of the best are left out; chosen.
+_REFINED_FRACTION = 0.5
+
+
+class FirstRegistration:
+    """Finds one bone under one rig for the first time.
+
+    Args:
+        tracker: whose pictures, searches and judge it uses.
+        whole_view: tells where the bone may be without a pose.
+        scorer: of fits.
+        n_refined: so many answers of a search are refined.
+    """
+
+    def __init__(
+        self,
+        tracker: "BimccTracker",
+        whole_view: WholeViewSearch,
+        scorer: FitScorer,
+        n_refined: int,
+    ) -> None:
+        self._tracker, self._whole_view = tracker, whole_view
+        self._scorer, self._n_refined = scorer, n_refined
+
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None],
+    ) -> list[TrackedFrame]:
+        """Distinct candidates, best first; see `Tracker.register`."""
+        tracker, watch = self._tracker, Stopwatch()
+        bone = tracker.model.bone.name
+        start = prior.left_from_bone.get(bone)
+        if start is not None:
+            frame = replace(tracker.begin(left, right, start, watch), on_progress=on_progress)
+            answers = self._register_around(frame, goal)
+        elif prior.starts(bone):
+            answers = self._register_anywhere(left, right, prior, goal, on_progress, watch)
+            start = answers[0].left_from_bone
+        else:
+            return []
+        if answers[0].verdict.status is Status.OK:
+            return answers
+        around = None if start is None else tracker.rectify_pose(start)
+        cause = tracker.diagnosis.explain_failure(left, right, around, answers[0], on_progress)
+        return [with_cause(answer, cause) for answer in answers]
+
+    def _register_around(self, frame: Frame, goal: Goal) -> list[TrackedFrame]:
+        """Around a rough pose: near starts, far ones, partly buried, until one gives an OK."""
+        tracker, report = self._tracker, frame.on_progress
+        margins = tracker.settings.near.search
+        measured = tracker.meter.measure_freely(frame.pair, frame.start, margins)
+        frame.watch.lap("stereo")
+        if measured is None or len(measured.cloud) == 0:
+            return [tracker.judge.lost(Reason.NO_SURFACE, frame.watch)]
+
+        def fit_from(starts: list[RigidTransform], done: float, part: float) -> list[Fit]:
+            told = lambda share: report(done + part * share)  # noqa: E731
+            found = self._scorer.find_candidates(measured, starts, told)[: self._n_refined]
+            return [tracker.near.settle(frame, measured, one.scene_from_bone) for one in found]
+
+        centre_mm = frame.start.apply(tracker.centre_mm)
+        fits = fit_from(near_starts(frame.start, centre_mm), 0.0, _NEAR_PART)
+        answers = self._judge_distinct(frame, fits, goal)
+        if not _is_ok(answers):
+            fits += fit_from(far_starts(frame.start, centre_mm), _NEAR_PART, _FAR_PART)
+            answers = self._judge_distinct(frame, fits, goal)
+        if not _is_ok(answers):
+            buried = self._judge_buried(frame, measured, goal)
+            answers = sorted([buried, *answers], key=lambda one: one.verdict.order)
+        report(1.0)
+        return answers
+
+    def _judge_buried(self, frame: Frame, measured: Measurement, goal: Goal) -> TrackedFrame:
+        """The answer of the search for a bone that tissue continues."""
+        done, report = _NEAR_PART + _FAR_PART, frame.on_progress
+        frame = replace(frame, on_progress=lambda part: report(done + (1.0 - done) * part))
+        fit = self._tracker.buried.find_around(frame, measured)
+        checks = PairChecks(self._tracker.meter, frame.pair)
+        return self._tracker.judge.judge(frame, checks, fit, goal)
+
+    def _register_anywhere(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None],
+        watch: Stopwatch,
+    ) -> list[TrackedFrame]:
+        """In a box, or in the whole view, without a pose to start from."""
+        pair = self._whole_view.rectify(left, right, prior)
+        watch.lap("rectify")
+        candidates = self._whole_view.find_candidates(pair, prior, on_progress)
+        watch.lap("estimate")
+        poses = select_poses(candidates, self._n_refined, _REFINED_FRACTION)
+        found = [self._fit_candidate(Frame(pair, pose, watch)) for pose in poses]
+        fits = [fit for fit in found if fit is not None]
+        if not fits:
+            return [self._tracker.judge.lost(Reason.NO_SURFACE, watch)]
+        return self._judge_distinct(Frame(pair, poses[0], watch), fits, goal)
+
+    def _fit_candidate(self, frame: Frame) -> Fit | None:
+        """What explains more: the model matched where it is expected, or what lies around it.
+
+        Clutter around a bone can pull it away from where the first finds it.
+        """
+        near = self._tracker.near
+        fits = (*near.find(frame), near.find_freely(frame, near.settings.search))
+        found = (fit for fit in fits if fit is not None)
+        return max(found, key=self._scorer.score, default=None)
+
+    def _judge_distinct(self, frame: Frame, fits: list[Fit], goal: Goal) -> list[TrackedFrame]:
+        """Distinct answers, best first; a guess is called one."""
+        fits = self._scorer.rank(fits)
+        kept = distinct([fit.pose for fit in fits], self._tracker.centre_mm)
+        judge, checks = self._tracker.judge, PairChecks(self._tracker.meter, frame.pair)
+        return [judge.judge(frame, checks, fit, goal) for fit in fits if fit.pose in kept]
+
+
+def _is_ok(answers: list[TrackedFrame]) -> bool:
+    return bool(answers) and answers[0].verdict.status is Status.OK
+
+
+def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """A rough pose, and tilts of it about a place in the camera's frame."""
+    return tilted_starts(rough, centre_mm, *_NEAR_TILTS)
+
+
+def far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """Tilts of a rough pose and of what it becomes when shifted along each axis."""
+    return scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)

@@ -1,0 +1,102 @@
+"""One pair of pictures on its way through the tracker."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import BimccSettings
+from navapp.registration.step_kernels import noise_under_kernel_mm2
+from navapp.tracking.surface_meter import FREE_CORRELATION_PX, MODEL_CORRELATION_PX, Measurement
+from navapp.values import PoseEstimate, Stopwatch
+
+# Kernels of the fits: points that were measured freely know their noise, but not all of their
+# errors; on the model a kernel as narrow as the noise costs little, and keeps out tissue that lies
+# flush with the bone. All chosen.
+FREE_FIT = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
+MODEL_FIT = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
+
+# Standard deviation of residuals over the one they claim: the right poses of simulated femurs,
+# which lie in the open, reach so much and no more (tests.bench.correlated_residuals).
+NOISE_RATIO = 0.65
+
+OnMeasured = Callable[[Measurement, RigidTransform], object]
+
+
+def ignore(*_: object) -> None:
+    """Of a listener that nobody needs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A rectified pair, where the bone is expected in it, and what is asked of a search.
+
+    Attributes:
+        pair: grey pictures, rectified as far around the bone as is looked.
+        start: rectified left camera from bone, expected.
+        watch: of this frame.
+        n_lost: frames in which the bone was lost before this one.
+        searches: a search that takes as long as many frames is worth it.
+        on_measured: told what is measured on all of the model near `start`, and at which pose.
+        on_progress: told the fraction done of a long search; what it raises stops the search.
+    """
+
+    pair: RectifiedPair
+    start: RigidTransform
+    watch: Stopwatch
+    n_lost: int = 0
+    searches: bool = True
+    on_measured: OnMeasured = ignore
+    on_progress: Callable[[float], None] = ignore
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A pose in the rectified left camera, and the surface it was fitted to.
+
+    Attributes:
+        estimate: of the pose.
+        measured: the surface.
+        n_rounds: measurements and fits in turns that led to it.
+        moved_mm: how far the last of them moved the bone's surface.
+    """
+
+    estimate: PoseEstimate
+    measured: Measurement
+    n_rounds: int = 1
+    moved_mm: float = float("inf")
+
+    @property
+    def pose(self) -> RigidTransform:
+        """The rectified left camera from the bone."""
+        return self.estimate.camera_from_bone
+
+    @property
+    def variance_ratio(self) -> float:
+        """Variance of the residuals over the one they claim, of a fit on the model.
+
+        It is that of all residuals, told from those that the kernel lets through.
+        """
+        claimed_mm = max(self.estimate.expected_rms_mm, 1e-9)
+        kernel_mm = max(MODEL_FIT.narrowest_mm, MODEL_FIT.n_sigmas * claimed_mm)
+        squares_mm2 = self.estimate.rms_mm**2
+        return float(noise_under_kernel_mm2(squares_mm2, 1.0, kernel_mm)) / claimed_mm**2
+
+    def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
+        """The fit on the model with what its residuals show beyond noise in its covariance.
+
+        Noise has nothing in common with the noise a window further. Tissue that rises from the
+        bone, or a model that lies half a millimetre off, leaves residuals that go together over
+        centimetres: no number of points averages them out. That part goes together over as many
+        pixels as errors of a free measurement do, noise over a matching window: with e the ratio of
+        its variance to the claimed one, the covariance grows by 1 + e / n^2 (l_free / l_model)^2.
+
+        Args:
+            noise_variance_ratio: n^2, of the noise to the claimed one: its covariance was made
+                with it.
+        """
+        excess = max(0.0, self.variance_ratio - NOISE_RATIO**2)
+        lengths = FREE_CORRELATION_PX / MODEL_CORRELATION_PX
+        growth = 1.0 + excess / noise_variance_ratio * lengths**2
+        covariance = growth * self.estimate.covariance
+        return replace(self, estimate=replace(self.estimate, covariance=covariance))

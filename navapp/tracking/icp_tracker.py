@@ -1,0 +1,106 @@
+"""The paper's state of the art as a tracker: box, gradient matching, plain ICP.
+
+Source: section 3.1, figure 1, algorithm 1 of the paper. Here it has our judge, which accepts hardly
+any of its poses; it is there to be compared with.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from navapp.geometry.rectification import Image, RectifiedPair
+from navapp.geometry.rig import StereoRig
+from navapp.registration import fit_icp
+from navapp.stereo import match_baseline
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.frame import Fit, Frame, ignore
+from navapp.tracking.motion import TrackState
+from navapp.tracking.surface_meter import NEAR_VIEW, Margins
+from navapp.tracking.tracker import TrackerBase, TrackerSettings
+from navapp.tracking.verdict import Goal
+from navapp.values import BoneModel, DisparityMap, Prior, Reason, Status, Stopwatch, TrackedFrame
+
+
+def match_gradients(pair: RectifiedPair, band_px: tuple[float, float]) -> DisparityMap:
+    """The paper's matcher, in the box of a pair (algorithm 1)."""
+    return match_baseline(pair, band_px).disparity
+
+
+class IcpTracker(TrackerBase):
+    """Finds one bone from a pose and follows it by its box.
+
+    Args:
+        rig: of the pictures.
+        bone: what is followed.
+        settings: how.
+    """
+
+    def __init__(
+        self, rig: StereoRig, bone: BoneModel, settings: TrackerSettings | None = None
+    ) -> None:
+        super().__init__(rig, bone, settings or TrackerSettings())
+
+    def track(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone's box into the next frame, match in it, and fit."""
+        watch, margins = Stopwatch(), self.settings.near
+        expected = state.predicted(captured_ns, self.centre_mm)
+        predicted = self.rectify_pose(expected)
+        # The box comes from the pictures, and the start from the box.
+        box = self.boxes.follow(state.box, left, state.left_from_bone)
+        expected = self.boxes.starts(expected, box)[0]
+        best = self.judge.lost(Reason.BONE_LOST, watch)
+        if state.n_lost == 0:
+            frame = self.begin(left, right, expected, watch, NEAR_VIEW)
+            with self.check_beside(frame) as checks:
+                fits = self._find(frame, margins.tracking)
+                best = self.judge_fits(frame, checks, fits, goal, predicted, best)
+        if best.verdict.status is Status.LOST:
+            for place in self.boxes.starts(expected, box):
+                frame = self.begin(left, right, place, watch)
+                checks, fits = PairChecks(self.meter, frame.pair), self._find(frame, margins.search)
+                best = self.judge_fits(frame, checks, fits, goal, predicted, best)
+                if best.verdict.status is Status.OK:
+                    break
+        return self.update(best, replace(state, box=box), left, captured_ns, watch)
+
+    def glance(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Match and fit once where the bone is expected."""
+        watch = Stopwatch()
+        expected = state.predicted(captured_ns, self.centre_mm)
+        frame = self.begin(left, right, expected, watch, NEAR_VIEW)
+        with self.check_beside(frame) as checks:
+            fits = self._find(frame, self.settings.near.tracking)
+            best = self.judge_fits(frame, checks, fits, goal, frame.start)
+        return self.update(best, state, left, captured_ns, watch)
+
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None] = ignore,
+    ) -> list[TrackedFrame]:
+        """The one fit that a rough pose leads to; nothing without a pose."""
+        start = prior.left_from_bone.get(self.model.bone.name)
+        if start is None:
+            return []
+        frame = self.begin(left, right, start, Stopwatch())
+        fit = next(self._find(frame, self.settings.near.search))
+        if fit is None or len(fit.measured.cloud) == 0:
+            return [self.judge.lost(Reason.NO_SURFACE, frame.watch)]
+        return [self.judge.judge(frame, PairChecks(self.meter, frame.pair), fit, goal)]
+
+    def _find(self, frame: Frame, margins: Margins) -> Iterator[Fit | None]:
+        """The fit to what is matched around the start (equation 1); None out of view."""
+        measured = self.meter.measure_freely(frame.pair, frame.start, margins, match_gradients)
+        frame.watch.lap("stereo")
+        if measured is None:
+            yield None
+            return
+        estimate = fit_icp(measured.scene, self.model, frame.start)
+        frame.watch.lap("estimate")
+        yield Fit(estimate, measured)

@@ -1,0 +1,216 @@
+"""A fit becomes an answer: joined with the outline, weighed against all evidence, judged."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rig import RigQuality
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.stereo import StereoHealth
+from navapp.tracking.agreement import Agreement, compare_at
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.frame import NOISE_RATIO, Fit, Frame
+from navapp.tracking.outline import OutlineMeter
+from navapp.tracking.surface_meter import SurfaceMeter
+from navapp.tracking.verdict import OK_ERROR_MM, Evidence, Goal, decide
+from navapp.values import (
+    PoseEstimate,
+    Reason,
+    RowCheck,
+    Stopwatch,
+    TrackedFrame,
+    Verdict,
+)
+
+# A model that moved by less looks the same.
+_SAME_VIEW_MM = 0.05
+# Errors of a cartilage's thickness go together over much of a bone: no number of points averages
+# them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
+_COMMON_ERROR_SIGMAS = 2.0
+_SURE_SIGMAS = 3.0
+# About so many targets are used for the predicted error; for time alone.
+_MOST_TARGETS = 200
+# Light is told from pixels first: a dark or clipped picture has no detail either.
+_UNUSABLE_FRACTION = 0.7
+
+
+class PoseJudge:
+    """Judges fits of one bone under one rig.
+
+    Args:
+        meter: of the bone's surface.
+        quality: what the rig's calibration says of itself; without it the rig is taken as it is.
+        outline: of the bone.
+    """
+
+    def __init__(
+        self,
+        meter: SurfaceMeter,
+        quality: RigQuality | None = None,
+        outline: OutlineMeter | None = None,
+    ) -> None:
+        self._meter, self._quality = meter, quality
+        self._outline = outline or OutlineMeter(meter.model, meter.geometry)
+
+    def judge(
+        self,
+        frame: Frame,
+        checks: PairChecks,
+        fit: Fit | None,
+        goal: Goal,
+        predicted: RigidTransform | None = None,
+    ) -> TrackedFrame:
+        """The answer that a fit gives, in the left camera before rectification.
+
+        Args:
+            frame: that it was fitted in.
+            checks: of that frame's pair.
+            fit: of the bone; None out of view.
+            goal: of the stage.
+            predicted: pose expected by the motion model, in the rectified left camera.
+        """
+        if fit is None:
+            return self.lost(Reason.OUT_OF_VIEW, frame.watch)
+        model, geometry = self._meter.model, self._meter.geometry
+        depth_mm = float(fit.pose.apply(model.centre_mm)[2])
+        health, agreement, coarse_px = checks.check(fit.measured, fit.pose).result()
+        if agreement is not None:
+            # Of a bone in the open the noise is what right poses show at most, whatever this one
+            # shows; of a hidden one the claim stands: what lies flush with it may fit as well.
+            noise_variance_ratio = NOISE_RATIO**2 if agreement.lies_open else 1.0
+            fit = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
+            fit = fit.with_correlated_residuals(noise_variance_ratio)
+        is_on_model = agreement is not None
+        if np.isfinite(fit.estimate.covariance).all() and not (
+            # A model that the fit has moved no longer looks as it was matched.
+            agreement is not None and fit.moved_mm < _SAME_VIEW_MM
+        ):
+            agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
+        evidence = self._evidence_of_pair(health, depth_mm)
+        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted, is_on_model)
+        verdict = decide(evidence)
+        frame.watch.lap("judge")
+        estimate = None if verdict.predicted_tre_mm is None else self._unrectify(fit.estimate)
+        rows = _check_rows(health, evidence, verdict)
+        return TrackedFrame(model.bone.name, estimate, verdict, frame.watch.timings, rows)
+
+    def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
+        """The answer when there is no fit to judge."""
+        verdict = decide(Evidence(missing=reason))
+        return TrackedFrame(self._meter.model.bone.name, None, verdict, watch.timings)
+
+    def _evidence_of_pair(self, health: StereoHealth, depth_mm: float) -> Evidence:
+        """What the pictures themselves say against any pose at a depth."""
+        both = (health.left, health.right)
+        dark = max(one.dark_share for one in both)
+        saturated = max(one.saturated_share for one in both)
+        detail_ratio = 0.0
+        if max(dark, saturated) <= _UNUSABLE_FRACTION:
+            least, most = sorted(one.detail for one in both)
+            detail_ratio = most / least if least > 0.0 else math.inf if most > 0.0 else 0.0
+        # Rows tell of turns about the line between the cameras, and those alone cost little. But
+        # what turned a camera about that line turned it as far about others, and a turn that moves
+        # a picture sideways by v px moves the measured depth by z^2 / (f B) v.
+        geometry = self._meter.geometry
+        offset_px = abs(health.row_offset_px)
+        is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
+        rows_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
+        return Evidence(
+            dark_fraction=dark,
+            saturated_fraction=saturated,
+            detail_ratio=detail_ratio,
+            has_lost_rows=health.has_lost_rows,
+            rows_mm=rows_mm if is_sure else 0.0,
+            is_rig_accepted=self._quality is None or self._quality.is_accepted,
+        )
+
+    def _evidence_of_pose(
+        self,
+        known: Evidence,
+        fit: Fit,
+        agreement: Agreement | None,
+        goal: Goal,
+        predicted: RigidTransform | None,
+        is_on_model: bool,
+    ) -> Evidence:
+        """With what a fit and its agreement with the measurement say."""
+        model, estimate = self._meter.model, fit.estimate
+        if not np.isfinite(estimate.covariance).all():
+            free = estimate if estimate.reasons else estimate.doubted(Reason.DEGENERATE)
+            return replace(known, estimate=free, is_rig_accepted=True)
+        if agreement is None or agreement.n_visible == 0:
+            return replace(known, missing=Reason.OUT_OF_VIEW, is_rig_accepted=True)
+        is_seen = model.bone.visible_vertices(estimate.camera_from_bone)
+        cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
+        plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_mm, model.bone.surface_sd_mm)
+        view_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
+        bound_mm = math.hypot(view_mm, plan_mm, self._error_of_rig_mm(estimate))
+        # Errors of a cartilage's thickness that go together look like another size.
+        size_sigma_mm = math.hypot(estimate.size_sigma_mm, plan_mm)
+        jump_mm, jump_deg = 0.0, 0.0
+        if predicted is not None:
+            twist = predicted.twist_to(estimate.camera_from_bone, model.centre_mm)
+            jump_mm = float(np.linalg.norm(twist[:3]))
+            jump_deg = math.degrees(np.linalg.norm(twist[3:]))
+        return replace(
+            known,
+            estimate=estimate,
+            is_fixed=True,
+            agreement=agreement,
+            correlated_ratio=fit.variance_ratio / NOISE_RATIO**2 if is_on_model else math.nan,
+            size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),
+            view_mm=view_mm,
+            plan_mm=plan_mm,
+            bound_mm=math.hypot(bound_mm, known.rows_mm),
+            cartilage_sd_mm=cartilage_mm,
+            jump_mm=jump_mm,
+            jump_deg=jump_deg,
+            goal=goal,
+        )
+
+    def _error_of_rig_mm(self, estimate: PoseEstimate) -> float:
+        """What the calibration itself leaves at the bone."""
+        depth_mm = float(estimate.camera_from_bone.apply(self._meter.model.centre_mm)[2])
+        return 0.0 if self._quality is None else self._quality.error_mm(depth_mm)
+
+    def _bound_mm(
+        self, estimate: PoseEstimate, targets_mm: FloatArray, is_seen: NDArray[np.bool_]
+    ) -> float:
+        """95 % bound of the measurement alone; over what is seen when there are no targets."""
+        model = self._meter.model
+        if len(targets_mm) > 0:
+            points_mm, index = targets_mm, np.arange(len(targets_mm))
+        else:
+            points_mm, index = model.bone.mesh.vertices_mm, np.flatnonzero(is_seen)
+        if len(index) == 0:
+            return float("inf")
+        step = max(1, len(index) // _MOST_TARGETS)
+        return estimate.predicted_tre_mm(model.centre_mm, points_mm[index[::step]])
+
+    def _unrectify(self, estimate: PoseEstimate) -> PoseEstimate:
+        """The same estimate in the left camera before rectification: a pure rotation."""
+        left_from_rectified = self._meter.geometry.rectified_from_left.inverse()
+        turn = np.kron(np.eye(2), left_from_rectified.rotation)
+        return replace(
+            estimate,
+            camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
+            covariance=turn @ estimate.covariance @ turn.T,
+        )
+
+
+def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:
+    """What a pair says of its rig; None when its pictures or its points are too poor to tell.
+
+    Rows that are lost tell nothing either: what is matched where nothing is to be matched looks
+    the same.
+    """
+    light = (Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE)
+    if math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons):
+        return None
+    return RowCheck(health.row_offset_px, evidence.rows_mm > OK_ERROR_MM)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0

@@ -1,0 +1,67 @@
+"""After a loss: where else the bone may be, a part of it in every other frame.
+
+A search around the last pose finds what moved by little. Further off, only some of the starts
+around it lead to the bone, and a frame has no time for all of them: each other lost frame tries a
+part that is spread over all directions, until every start had its turn.
+"""
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import scattered_starts
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.scoring import FitScorer, select_poses
+from navapp.tracking.search.near import NearSearch
+from navapp.tracking.surface_meter import WIDE_VIEW, SurfaceMeter
+
+# Steps along each axis, and the tilts of each: (mm, ((deg, how many), ...)); chosen.
+_RINGS = (
+    (20.0, ((15.0, 6), (28.0, 12))),
+    (40.0, ((20.0, 6), (35.0, 8))),
+)
+_PARTS = 10
+# So many of the answers are measured exactly, if they explain so much of what the best does.
+_N_SETTLED, _SETTLED_FRACTION = 2, 0.7
+
+
+class SearchAfterLoss:
+    """Searches for one bone that was lost."""
+
+    def __init__(self, meter: SurfaceMeter, near: NearSearch, scorer: FitScorer) -> None:
+        self._meter, self._near, self._scorer = meter, near, scorer
+
+    def find(self, frame: Frame) -> list[Fit | None]:
+        """Around the start; or in every other lost frame further off. None out of view."""
+        starts = starts_after_loss(frame.start, self._meter.model.centre_mm, frame.n_lost)
+        measured = None
+        if starts:
+            measured = self._meter.measure_freely(frame.pair, frame.start, WIDE_VIEW)
+            frame.watch.lap("stereo")
+        if measured is None or len(measured.cloud) == 0:
+            return [self._near.find_freely(frame, self._near.settings.search)]
+        candidates = self._scorer.find_candidates(measured, starts)
+        poses = select_poses(candidates, _N_SETTLED, _SETTLED_FRACTION) or [frame.start]
+        # Far from where it was, a bone may look like itself in several ways.
+        return [self._scorer.rank([self._near.settle(frame, measured, one) for one in poses])[0]]
+
+
+def starts_after_loss(
+    last: RigidTransform, centre_mm: FloatArray, n_lost: int
+) -> list[RigidTransform]:
+    """What to start from besides the last pose; nothing in every other frame.
+
+    Args:
+        last: pose of the bone when it was seen last.
+        centre_mm: (3,) of the model, in bone coordinates.
+        n_lost: frames lost before this one.
+    """
+    if n_lost % 2 == 0:
+        return []
+    part = n_lost // 2 % _PARTS
+    return _all_starts(last, last.apply(centre_mm))[part::_PARTS]
+
+
+def _all_starts(last: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
+    """Tilts of the last pose where it was, and a step away along each axis."""
+    starts: list[RigidTransform] = []
+    for step_mm, tilts in _RINGS:
+        starts += scattered_starts(last, place_mm, step_mm, tilts, has_middle=not starts)
+    return starts

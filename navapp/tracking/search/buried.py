@@ -1,0 +1,173 @@
+"""A bone that is partly buried in tissue which continues its surface.
+
+Such a bone has many places to rest within a millimetre of the true one: tissue that lies flush
+holds it in each. At the true one most of the model answers to within the noise. Steps onto the
+model are therefore taken from many starts, those that find most are the next starts, and of all
+that then come to rest the one whose residuals show least stands.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import DepthMap, PoseSampler
+from navapp.tracking.following import Follower
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.scoring import rank_fits
+from navapp.tracking.search.near import NearSettings
+from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+
+# Always the same draws: the same pictures give the same pose.
+_SEED = 20
+# What the model finds at a pose: under a kernel of its own noise, asked at so many points.
+_SIGMA_MM, _N_POINTS = 0.1, 3000
+# So much of the work is the search on the free measurement, then come the steps.
+_SEARCH_FRACTION = 0.3
+
+
+class Round(NamedTuple):
+    """From each place so many starts, drawn with a standard deviation along and about each axis.
+
+    `n_kept` of all that they lead to, and of the places themselves, are the next places.
+    """
+
+    n_starts: int
+    shift_mm: float
+    turn_deg: float
+    n_kept: int
+
+    @property
+    def deviations(self) -> FloatArray:
+        """(6,) of a twist."""
+        return np.repeat([self.shift_mm, np.radians(self.turn_deg)], 3)
+
+
+class Place(NamedTuple):
+    """Where a step onto the model led, and how much of it answers there."""
+
+    fit: Fit
+    score: float
+
+
+# The free measurement finds places a millimetre beside the true one. Matching on the model sees
+# half a pixel, which is as far: each round is drawn a little nearer than the one before.
+_N_PLACES = 3
+_ROUNDS = (
+    Round(12, 0.7, 1.2, 8),
+    Round(5, 0.5, 0.8, 6),
+    Round(5, 0.4, 0.6, 5),
+    Round(5, 0.25, 0.4, 5),
+)
+# A prediction is off by part of a frame's motion.
+_N_FRAME_STARTS, _N_FRAME_PLACES = 16, 6
+_FRAME_ROUNDS = (Round(6, 0.5, 0.8, 4), Round(5, 0.3, 0.5, 3))
+
+
+class BuriedSearch:
+    """Searches for one bone that tissue continues.
+
+    Args:
+        meter: of the bone's surface.
+        settings: how the bone is located otherwise.
+    """
+
+    def __init__(self, meter: SurfaceMeter, settings: NearSettings) -> None:
+        self._meter = meter
+        self._follower = Follower(meter, settings.rest, settings.tracking)
+        one_step = replace(settings.rest, max_rounds=1)
+        self._stepper = Follower(meter, one_step, settings.tracking)
+
+    @cached_property
+    def _sampler(self) -> PoseSampler:
+        return PoseSampler(self._meter.model)
+
+    def find(self, frame: Frame) -> Iterator[Fit | None]:
+        """From one frame to the next: where the start rests, then the best around it, if asked."""
+        fit = self._follower.follow(frame, frame.start, is_near=True)
+        if fit is not None:
+            yield fit
+        if not frame.searches:
+            return
+        random = np.random.default_rng(_SEED)
+        twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations
+        centre_mm = frame.start.apply(self._meter.model.centre_mm)
+        places = self._step_from(frame, [frame.start.moved(twist, centre_mm) for twist in twists])
+        places = _select_best(places, _N_FRAME_PLACES)
+        for one in _FRAME_ROUNDS:
+            places = self._improve(frame, places, one, random)
+        fit = self._select_rest(frame, places)
+        if fit is not None:
+            yield fit
+
+    def find_around(self, frame: Frame, measured: Measurement) -> Fit | None:
+        """The bone around a rough start; it says so when it is a guess. None when nothing answers.
+
+        Args:
+            frame: with the rough pose as its start.
+            measured: freely around it.
+        """
+        report = frame.on_progress
+        depth = DepthMap.of(self._meter.geometry, measured.disparity)
+        found = self._sampler.search(
+            depth, frame.start, _N_PLACES, lambda done: report(_SEARCH_FRACTION * done)
+        )
+        places = self._step_from(frame, [one.scene_from_bone for one in found])
+        random = np.random.default_rng(_SEED)
+        for number, one in enumerate(_ROUNDS):
+            report(_SEARCH_FRACTION + (1.0 - _SEARCH_FRACTION) * number / len(_ROUNDS))
+            places = self._improve(frame, places, one, random)
+        return self._select_rest(frame, places)
+
+    def _step_from(self, frame: Frame, starts: list[RigidTransform]) -> list[Place]:
+        """Where one step onto the model leads from each start."""
+        places = []
+        for start in starts:
+            fit = self._stepper.follow(frame, start, is_near=True)
+            if fit is not None and np.isfinite(fit.estimate.covariance).all():
+                depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
+                score = self._sampler.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
+                places.append(Place(fit, score))
+        return places
+
+    def _improve(
+        self, frame: Frame, places: list[Place], one: Round, random: np.random.Generator
+    ) -> list[Place]:
+        """The best of places and of what starts around them lead to."""
+        starts = [start for place in places for start in self._around(place.fit, one, random)]
+        return _select_best(places + self._step_from(frame, starts), one.n_kept)
+
+    def _around(self, fit: Fit, one: Round, random: np.random.Generator) -> list[RigidTransform]:
+        """Poses beside a fit: in all directions alike, or as loosely as it is fixed, in turns.
+
+        What slides along tissue slides where the surface holds least.
+        """
+        centre_mm, covariance = fit.pose.apply(self._meter.model.centre_mm), fit.estimate.covariance
+        size_mm2 = np.trace(covariance[:3, :3]) + self._lever_mm**2 * np.trace(covariance[3:, 3:])
+        loose = np.linalg.cholesky(covariance) * (2.0 * one.shift_mm / size_mm2**0.5)
+        twists = random.standard_normal((one.n_starts, 6))
+        twists[0::2] *= one.deviations
+        twists[1::2] @= loose.T
+        return [fit.pose.moved(twist, centre_mm) for twist in twists]
+
+    def _select_rest(self, frame: Frame, places: list[Place]) -> Fit | None:
+        """Of all that come to rest, what leaves least; a guess when another leaves as little."""
+        found = (self._follower.follow(frame, one.fit.pose, is_near=True) for one in places)
+        fits = [fit for fit in found if fit is not None]
+        if not fits:
+            return None
+        fitting = [max(fit.variance_ratio, 1e-6) ** -0.5 for fit in fits]
+        return rank_fits(fits, fitting, self._meter.model)[0]
+
+    @cached_property
+    def _lever_mm(self) -> float:
+        """At which a rotation moves the bone as much as a shift does."""
+        offsets_mm = self._meter.model.points_mm - self._meter.model.centre_mm
+        return float(np.sqrt((offsets_mm**2).sum(axis=1).mean()))
+
+
+def _select_best(places: list[Place], n: int) -> list[Place]:
+    return sorted(places, key=lambda place: place.score, reverse=True)[:n]

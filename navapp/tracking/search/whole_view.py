@@ -1,0 +1,73 @@
+"""A bone looked for without a pose: in an operator's box, or in the whole view."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from navapp.geometry.box import Box
+from navapp.geometry.directions import ViewCone
+from navapp.geometry.rectification import Image, RectifiedPair, luma
+from navapp.registration import Candidate, Scene, find_initial
+from navapp.stereo import match_surface
+from navapp.tracking.surface_meter import FREE_CORRELATION_PX, SurfaceMeter
+from navapp.values import AspectGraph, Prior
+
+# An operator's box may cut the bone: so much more is looked at, of its size.
+_SPARE_FRACTION = 0.15
+_MOST_POINTS = 40_000
+_EDGE_SAMPLES = 9
+
+
+class WholeViewSearch:
+    """Searches for one bone in an operator's box or in all that the cameras see.
+
+    Args:
+        meter: of the bone's surface.
+        aspects: edges of the bone, of at least the prior's cone; without them the measured surface
+            alone tells.
+    """
+
+    def __init__(self, meter: SurfaceMeter, aspects: AspectGraph | None) -> None:
+        self._meter, self._aspects = meter, aspects
+
+    def rectify(self, left: Image, right: Image, prior: Prior) -> RectifiedPair:
+        """Both pictures; the box of the pair is the prior's, or the whole view without one."""
+        return self._meter.rectifier.rectify(luma(left), luma(right), self._box(prior))
+
+    def find_candidates(
+        self, pair: RectifiedPair, prior: Prior, on_progress: Callable[[float], None]
+    ) -> list[Candidate]:
+        """Where the bone may be: rectified left camera from bone, best first.
+
+        Args:
+            pair: see `rectify`.
+            prior: its cone counts for the femur only.
+            on_progress: told the fraction done; may raise to cancel.
+        """
+        if pair.box.is_empty:
+            return []
+        geometry, model = self._meter.geometry, self._meter.model
+        near_mm, far_mm = self._meter.depth_mm
+        band_px = (geometry.disparity_px(far_mm), geometry.disparity_px(near_mm))
+        found = match_surface(pair, band_px, fills=False).disparity
+        n_matched = found.matched_share * found.origin.size
+        stride_px = max(1, int(np.ceil((n_matched / _MOST_POINTS) ** 0.5)))
+        scene = Scene.from_stereo(found.reproject(geometry, stride_px), FREE_CORRELATION_PX)
+        axis = prior.axis_for(model.bone.name)
+        cone = ViewCone() if axis is None else ViewCone(axis, prior.approach_half_angle_deg)
+        return find_initial(pair, scene, model, cone, self._aspects, on_progress=on_progress)
+
+    def _box(self, prior: Prior) -> Box | None:
+        """The prior's box in the rectified left view, with what it may have cut."""
+        if prior.box is None:
+            return None
+        x, y, width, height = prior.box
+        spare_x, spare_y = _SPARE_FRACTION * width, _SPARE_FRACTION * height
+        columns = np.linspace(x - spare_x, x + width - 1 + spare_x, _EDGE_SAMPLES)
+        rows = np.linspace(y - spare_y, y + height - 1 + spare_y, _EDGE_SAMPLES)
+        # Distortion bends the box's sides.
+        pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        rays = self._meter.rectifier.rig.left.rays(pixels)
+        geometry = self._meter.geometry
+        around = Box.around(geometry.project(geometry.rectified_from_left.rotate(rays)))
+        return Box(0, 0, 0, 0) if around is None else around

@@ -1,0 +1,205 @@
+"""What every tracker does: find one bone in pairs of pictures, and follow it."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
+
+from navapp.geometry.bands import beside
+from navapp.geometry.rectification import Image
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration import RegistrationModel, estimate_at
+from navapp.tracking.box.tracker import BoxTracker
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.frame import FREE_FIT, Fit, Frame, ignore
+from navapp.tracking.judging import PoseJudge
+from navapp.tracking.motion import TrackState
+from navapp.tracking.search.near import NearSettings
+from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
+from navapp.tracking.verdict import Goal
+from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
+
+Method = Literal["bimcc", "icp"]
+
+
+@dataclass(frozen=True, slots=True)
+class TrackerSettings:
+    """How a tracker works.
+
+    Attributes:
+        method: `bimcc` is the production chain, `icp` the paper's baseline.
+        near: how the bone is located around an expected pose.
+        depth_mm: nearest and farthest surface that the rig is used for.
+        max_points: about so many measured points enter an estimate.
+        n_refined: so many answers of a first registration's searches are refined.
+    """
+
+    method: Method = "bimcc"
+    near: NearSettings = field(default_factory=NearSettings)
+    depth_mm: tuple[float, float] = (300.0, 700.0)
+    max_points: int = 2500
+    n_refined: int = 3
+
+
+class Tracker(Protocol):
+    """Finds and follows one bone under one rig; what is remembered travels in a `TrackState`."""
+
+    @property
+    def centre_mm(self) -> FloatArray:
+        """(3,) mean of the model's vertices, in bone coordinates."""
+        ...
+
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None] = ignore,
+    ) -> list[TrackedFrame]:
+        """Find the bone from a rough pose, a box or a cone: distinct candidates, best first.
+
+        Args:
+            left: picture of the left camera.
+            right: of the right one, at the same instant.
+            prior: a pose of this bone; or a box, a cone, or both, which are used without one.
+            goal: for the judge.
+            on_progress: told the fraction done; what it raises stops the search.
+        """
+        ...
+
+    def track(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame, and search for it when it is lost."""
+        ...
+
+    def glance(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame, lost or not, if it is near where it is expected."""
+        ...
+
+    def assess(
+        self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
+    ) -> TrackedFrame:
+        """Judge a pose as it stands, without moving it."""
+        ...
+
+
+class TrackerBase:
+    """What trackers share: pictures around an expected bone, judged fits, and the bone's box.
+
+    Attributes:
+        settings: of the tracker.
+        rig: of the pictures.
+        model: of the bone.
+        meter: of its surface.
+        judge: of its poses.
+        boxes: its box in the left pictures.
+    """
+
+    def __init__(
+        self,
+        rig: StereoRig,
+        bone: BoneModel,
+        settings: TrackerSettings,
+        judge: PoseJudge | None = None,
+    ) -> None:
+        self.settings, self.rig = settings, rig
+        self.model = RegistrationModel(bone)
+        self.meter = SurfaceMeter(rig, self.model, settings.depth_mm, settings.max_points)
+        self.judge = judge or PoseJudge(self.meter, rig.quality)
+        self.boxes = BoxTracker(rig, self.model)
+
+    @property
+    def centre_mm(self) -> FloatArray:
+        """(3,) mean of the model's vertices, in bone coordinates."""
+        return self.model.centre_mm
+
+    def assess(
+        self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
+    ) -> TrackedFrame:
+        """Judge a pose as it stands, without moving it, by the surface that is seen there.
+
+        Measured freely, a surface tells whether the pose is the right one, but fixes it less well
+        than a bone that is followed: only the stage's tolerance counts.
+        """
+        frame = self.begin(left, right, left_from_bone, Stopwatch(), NEAR_VIEW)
+        measured = self.meter.measure_freely(frame.pair, frame.start, self.settings.near.tracking)
+        frame.watch.lap("stereo")
+        if measured is None:
+            return self.judge.lost(Reason.OUT_OF_VIEW, frame.watch)
+        fit = Fit(estimate_at(measured.scene, self.model, frame.start, FREE_FIT), measured)
+        frame.watch.lap("estimate")
+        checks = PairChecks(self.meter, frame.pair)
+        return self.judge.judge(frame, checks, fit, replace(goal, seen_mm=math.inf))
+
+    def rectify_pose(self, left_from_bone: RigidTransform) -> RigidTransform:
+        """A pose in the rectified left camera."""
+        return self.meter.geometry.rectified_from_left @ left_from_bone
+
+    def begin(
+        self,
+        left: Image,
+        right: Image,
+        left_from_bone: RigidTransform,
+        watch: Stopwatch,
+        margins: Margins = WIDE_VIEW,
+    ) -> Frame:
+        """Both pictures, rectified around an expected bone."""
+        start = self.rectify_pose(left_from_bone)
+        pair = self.meter.rectify(left, right, start, margins)
+        watch.lap("rectify")
+        return Frame(pair, start, watch)
+
+    def check_beside(self, frame: Frame) -> PairChecks:
+        """Checks of a frame in which the bone is expected near the start, begun at once."""
+        # What may hide the bone does not depend on where exactly it is.
+        coarse = beside(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
+        return PairChecks(self.meter, frame.pair, coarse)
+
+    def judge_fits(
+        self,
+        frame: Frame,
+        checks: PairChecks,
+        fits: Iterable[Fit | None],
+        goal: Goal,
+        predicted: RigidTransform,
+        best: TrackedFrame | None = None,
+        is_enough: Callable[[Verdict], bool] = lambda verdict: verdict.status is Status.OK,
+    ) -> TrackedFrame:
+        """The best of an answer and of fits, which are asked for until one is good enough.
+
+        Args:
+            frame: that they are fitted in.
+            checks: of the frame.
+            fits: None is a bone out of view.
+            goal: of the stage.
+            predicted: pose in the rectified left camera that the motion lets expect.
+            best: answer so far; without one, and without fits, the bone is lost.
+            is_enough: no further fit is asked for.
+        """
+        for fit in fits:
+            answer = self.judge.judge(frame, checks, fit, goal, predicted)
+            # Of equals, what came later knows more.
+            if best is None or answer.verdict.order <= best.verdict.order:
+                best = answer
+            if is_enough(answer.verdict):
+                break
+        return best or self.judge.lost(Reason.BONE_LOST, frame.watch)
+
+    def update(
+        self,
+        tracked: TrackedFrame,
+        state: TrackState,
+        left: Image,
+        captured_ns: int,
+        watch: Stopwatch,
+    ) -> tuple[TrackedFrame, TrackState]:
+        """The answer with its times, and the state after it."""
+        after = state.updated(tracked, captured_ns, self.centre_mm)
+        # What is not followed does not place the box either.
+        box = self.boxes.place(state.box, left, tracked) if after.n_lost == 0 else state.box
+        return replace(tracked, timings=watch.timings), replace(after, box=box)

@@ -1,0 +1,264 @@
+"""The verdict: every rule by which a pose is shown, doubted or lost.
+
+A wrong pose is worse than none. `RULES` is the whole of it: what speaks against a pose, from which
+value on, and where that value comes from. What is measured to judge by is `Evidence`; nothing else
+adds a reason, but for a cause that the diagnosis finds once a bone is lost (`with_cause`).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from navapp.geometry.transform import FloatArray
+from navapp.tracking.agreement import Agreement
+from navapp.values import PoseEstimate, Reason, Status, TrackedFrame, Verdict
+
+# What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
+OK_ERROR_MM = 0.5
+CHOSEN = "chosen"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Goal:
+    """What a pose is measured against.
+
+    Attributes:
+        targets_mm: (N, 3) of the stage, in bone coordinates.
+        tolerance_mm: of the stage: all that is known against the pose must stay below it.
+        seen_mm: what is seen must fix the pose at least so well. What the plan's own cartilage may
+            cost goes on top, in squares: no better view mends it.
+    """
+
+    targets_mm: FloatArray
+    tolerance_mm: float
+    seen_mm: float = OK_ERROR_MM
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What is known of a pose when it is judged; NaN and None where nothing is.
+
+    Attributes:
+        missing: why there is no pose to be judged.
+        estimate: in the rectified left camera.
+        is_fixed: some surface fixes the pose in all directions.
+        agreement: of the model at the pose with what was measured.
+        dark_fraction, saturated_fraction: of the darker and of the brighter picture's pixels.
+        detail_ratio: sharper over blurred picture; 0 when light already tells.
+        has_lost_rows: the cameras' rows are too far apart to be compared.
+        rows_mm: error in depth that rows which surely disagree stand for.
+        correlated_ratio: variance of the residuals over what right poses show of the noise.
+        is_rig_accepted: by its calibration.
+        size_excess_mm: by which the bone surely has another size than the model, over what may be.
+        view_mm, plan_mm: 95 % bounds of the error by what is seen, by the plan's own surface.
+        bound_mm: 95 % bound of the error by all that is known; None without a pose.
+        cartilage_sd_mm: rms standard deviation of the cartilage over the seen surface.
+        jump_mm, jump_deg: of the bone's centre from where it was expected, and turn.
+        goal: of the stage.
+    """
+
+    missing: Reason | None = None
+    estimate: PoseEstimate | None = None
+    is_fixed: bool = False
+    agreement: Agreement | None = None
+    dark_fraction: float = math.nan
+    saturated_fraction: float = math.nan
+    detail_ratio: float = math.nan
+    has_lost_rows: bool = False
+    rows_mm: float = 0.0
+    correlated_ratio: float = math.nan
+    is_rig_accepted: bool = True
+    size_excess_mm: float = math.nan
+    view_mm: float = math.nan
+    plan_mm: float = math.nan
+    bound_mm: float | None = None
+    cartilage_sd_mm: float = math.nan
+    jump_mm: float = math.nan
+    jump_deg: float = math.nan
+    goal: Goal | None = None
+
+    def says(self, reason: Reason) -> bool:
+        """Whether the estimate itself has a reason against it."""
+        return self.estimate is not None and reason in self.estimate.reasons
+
+    @property
+    def seen(self) -> Agreement:
+        """The agreement; NaN without one."""
+        return _UNKNOWN if self.agreement is None else self.agreement
+
+    @property
+    def rms_ratio(self) -> float:
+        """Rms of the residual over what its sigma predicts."""
+        if self.agreement is None or self.estimate is None:
+            return math.nan
+        return self.estimate.rms_mm / self.estimate.expected_rms_mm
+
+    @property
+    def view_excess_mm(self) -> float:
+        """By which what is seen fixes the pose too loosely."""
+        seen_mm = math.nan if self.goal is None else self.goal.seen_mm
+        return self.view_mm - math.hypot(seen_mm, self.plan_mm)
+
+    @property
+    def tolerance_excess_mm(self) -> float:
+        """By which the bound exceeds the stage's tolerance."""
+        if self.bound_mm is None or self.goal is None:
+            return math.nan
+        return self.bound_mm - self.goal.tolerance_mm
+
+
+_UNKNOWN = Agreement(0, *[math.nan] * 5)
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One reason against a pose.
+
+    Attributes:
+        reason: that is given.
+        quantity: what is looked at, for people.
+        measure: it, of the evidence; NaN is no reason.
+        degraded, lost: beyond these the pose is not shown, or not there; None is never.
+        source: of the limits: a command that measures them, or "chosen".
+        is_below: smaller is worse.
+        doubts_place: speaks against the pose's place, not only against its accuracy.
+    """
+
+    reason: Reason
+    quantity: str
+    measure: Callable[[Evidence], float]
+    degraded: float | None
+    lost: float | None
+    source: str = CHOSEN
+    is_below: bool = False
+    doubts_place: bool = False
+
+    def status(self, evidence: Evidence) -> Status:
+        """What this rule alone says."""
+        value = self.measure(evidence)
+        if self._is_beyond(value, self.lost):
+            return Status.LOST
+        return Status.DEGRADED if self._is_beyond(value, self.degraded) else Status.OK
+
+    def _is_beyond(self, value: float, limit: float | None) -> bool:
+        return limit is not None and (value < limit if self.is_below else value > limit)
+
+
+def _without_pose(reason: Reason, quantity: str) -> Rule:
+    return Rule(reason, quantity, lambda e: e.missing is reason, None, 0)
+
+
+_PARTLY_CHOSEN = "tests.bench.wrong_plans; LOST chosen"
+_HEALTH = "tests.bench.stereo_health"
+_RESIDUALS = "chosen; noise by tests.bench.correlated_residuals"
+
+# In the order in which reasons are told: what is wrong with the pair first, as the cause.
+RULES = (
+    Rule(Reason.PICTURE_DARK, "pixels too dark for texture", lambda e: e.dark_fraction, 0.7, None),
+    Rule(Reason.PICTURE_OVEREXPOSED, "pixels that the sensor clipped",
+         lambda e: e.saturated_fraction, 0.7, None),
+    Rule(Reason.PICTURES_UNLIKE, "detail of one picture over the other's",
+         lambda e: e.detail_ratio, 2.0, None),
+    Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",
+         lambda e: e.has_lost_rows, 0, None, _HEALTH),
+    Rule(Reason.ROWS_DISAGREE, "depth error that the rows' offset stands for, mm",
+         lambda e: e.rows_mm, OK_ERROR_MM, None, _HEALTH),
+    _without_pose(Reason.BONE_LOST, "nothing was found where the bone was expected (yes 1)"),
+    _without_pose(Reason.NO_SURFACE, "no surface was measured (yes 1)"),
+    _without_pose(Reason.OUT_OF_VIEW, "no part of the model is in view (yes 1)"),
+    Rule(Reason.TOO_FEW_POINTS, "fewer than 60 points pair (yes 1)",
+         lambda e: e.says(Reason.TOO_FEW_POINTS), None, 0),
+    Rule(Reason.NOT_CONVERGED, "the fit met its limit of steps (yes 1)",
+         lambda e: e.says(Reason.NOT_CONVERGED), 0, None, doubts_place=True),
+    Rule(Reason.DEGENERATE, "a direction is free (1), nothing is fixed (2)",
+         lambda e: 0 if not e.says(Reason.DEGENERATE) else 1 if e.is_fixed else 2, 0, 1,
+         doubts_place=True),
+    Rule(Reason.AMBIGUOUS, "a different pose explains 0.9 of as much (yes 1)",
+         lambda e: e.says(Reason.AMBIGUOUS), 0, None, doubts_place=True),
+    Rule(Reason.CUES_DISAGREE, "half of the outline is off by 3 sigma (yes 1)",
+         lambda e: e.says(Reason.CUES_DISAGREE), 0, None, "tests.bench.outline"),
+    Rule(Reason.SURFACE_MISFIT, "correlated residuals' variance over the noise of right poses",
+         lambda e: e.correlated_ratio, 2.0, None, _RESIDUALS, doubts_place=True),
+    Rule(Reason.COVERAGE_LOW, "what nothing hides: measured and agreeing",
+         lambda e: e.seen.open_coverage, 0.4, 0.25, _PARTLY_CHOSEN, is_below=True,
+         doubts_place=True),
+    Rule(Reason.COVERAGE_LOW, "the whole visible model: measured and agreeing",
+         lambda e: e.seen.coverage, 0.15, 0.1, is_below=True, doubts_place=True),
+    Rule(Reason.SEEN_THROUGH, "model through which the scene is seen",
+         lambda e: e.seen.behind_share, 0.05, 0.15, doubts_place=True),
+    Rule(Reason.OUTLIERS, "measured model pixels that agree",
+         lambda e: e.seen.inlier_share, 0.8, 0.5, is_below=True, doubts_place=True),
+    Rule(Reason.SURFACE_MISFIT, "rms of the fit's residual over the predicted one",
+         lambda e: e.rms_ratio, 1.25, 2.0, _PARTLY_CHOSEN, doubts_place=True),
+    Rule(Reason.SURFACE_MISFIT, "spread of all differences over the claimed sigma",
+         lambda e: e.seen.spread_ratio, 1.1, None, doubts_place=True),
+    Rule(Reason.RIG_NOT_ACCEPTED, "the calibration refused the rig (yes 1)",
+         lambda e: not e.is_rig_accepted, 0, None),
+    Rule(Reason.SIZE_DIFFERS, "size beyond 3 sigma and 0.5 mm from the model's, mm",
+         lambda e: e.size_excess_mm, 0, None),
+    Rule(Reason.POSE_UNCERTAIN, "95 % bound by what is seen, over 0.5 mm and the plan's, mm",
+         lambda e: e.view_excess_mm, 0, None),
+    Rule(Reason.CARTILAGE_UNCERTAIN, "rms deviation of the cartilage, mm",
+         lambda e: e.cartilage_sd_mm, 0.45, None, "tests.bench.cartilage"),
+    Rule(Reason.TRE_TOO_LARGE, "95 % bound over the stage's tolerance, mm",
+         lambda e: e.tolerance_excess_mm, 0, None),
+    Rule(Reason.JUMPED, "centre from where it was expected, mm", lambda e: e.jump_mm, 12.0, None),
+    Rule(Reason.JUMPED, "turn from where it was expected, deg", lambda e: e.jump_deg, 10.0, None),
+)  # fmt: skip
+
+# Told in front of the reasons of a bone that is not OK, once the diagnosis found them.
+CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
+_AGAINST_PLACE = frozenset(rule.reason for rule in RULES if rule.doubts_place)
+_OF_AGREEMENT = tuple(
+    rule
+    for rule in RULES
+    if rule.reason in (Reason.COVERAGE_LOW, Reason.SEEN_THROUGH, Reason.OUTLIERS)
+)
+
+
+def decide(evidence: Evidence) -> Verdict:
+    """Status, reasons and bound of what is known."""
+    said = {rule: rule.status(evidence) for rule in RULES}
+    reasons = tuple(dict.fromkeys(rule.reason for rule in RULES if said[rule] is not Status.OK))
+    worst = max(said.values(), key=list(Status).index)
+    agreement, estimate = evidence.agreement, evidence.estimate
+    if agreement is None or estimate is None:
+        return Verdict(worst, None, reasons)
+    return Verdict(
+        worst,
+        evidence.bound_mm,
+        reasons,
+        agreement.coverage,
+        agreement.hidden_share,
+        agreement.inlier_share,
+        estimate.rms_mm,
+        estimate.expected_rms_mm,
+    )
+
+
+def is_elsewhere(agreement: Agreement) -> bool:
+    """Whether so little of the model agrees that the bone is not there."""
+    evidence = Evidence(agreement=agreement)
+    return any(rule.status(evidence) is Status.LOST for rule in _OF_AGREEMENT)
+
+
+def is_place_doubted(verdict: Verdict) -> bool:
+    """Whether something speaks against a pose's place; always when it is lost."""
+    return verdict.status is Status.LOST or not _AGAINST_PLACE.isdisjoint(verdict.reasons)
+
+
+def is_worth_a_search(tracked: TrackedFrame) -> bool:
+    """Whether the place is in doubt, and a search could find one that is not.
+
+    While the cameras' rows disagree no answer can be OK: only what is lost has something to gain.
+    """
+    is_lost = tracked.verdict.status is Status.LOST
+    return is_place_doubted(tracked.verdict) and (is_lost or not tracked.rows_disagree)
+
+
+def with_cause(tracked: TrackedFrame, cause: Reason | None) -> TrackedFrame:
+    """An answer with the cause of its failure in front; an OK has none."""
+    if cause is None or tracked.verdict.status is Status.OK:
+        return tracked
+    others = tuple(reason for reason in tracked.verdict.reasons if reason is not cause)
+    return replace(tracked, verdict=replace(tracked.verdict, reasons=(cause, *others)))

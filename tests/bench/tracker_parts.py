@@ -1,0 +1,56 @@
+"""The production tracker, and steps of it one by one."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import Image
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking import Goal
+from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.outline import OutlineMeter
+from navapp.tracking.surface_meter import NEAR_VIEW, Margins
+from navapp.values import BoneModel, Stopwatch, Verdict
+
+GOAL = Goal(np.empty((0, 3)), 2.0)
+
+
+class TrackerParts(BimccTracker):
+    """Of one rig and one bone, with the settings of every tracker."""
+
+    def __init__(self, rig: StereoRig, bone: BoneModel) -> None:
+        super().__init__(rig, bone)
+        self.outline = OutlineMeter(self.model, self.meter.geometry)
+
+    def frame(
+        self, left: Image, right: Image, start: RigidTransform, margins: Margins = NEAR_VIEW
+    ) -> Frame:
+        """The pictures rectified around a pose in the rectified left camera."""
+        return Frame(self.meter.rectify(left, right, start, margins), start, Stopwatch())
+
+    def find(self, frame: Frame) -> Fit | None:
+        """The surface's fit near the start; None out of view."""
+        (fit,) = self.near.find(frame)
+        return fit
+
+    def verdict(self, frame: Frame, fit: Fit) -> Verdict:
+        """What is said of a fit, by what is seen alone."""
+        return self.judge.judge(frame, self._checks(frame), fit, GOAL).verdict
+
+    def coarse_px(self, frame: Frame, fit: Fit) -> NDArray[np.float32] | None:
+        """(h, w) coarse disparity of whatever lies in a fit's box; None out of view or depth."""
+        return self._checks(frame).check(fit.measured, fit.pose).result().coarse_px
+
+    def with_outline(self, frame: Frame, fit: Fit, noise2: float = 1.0) -> Fit:
+        """A fit of the surface, joined with the outline."""
+        return self.outline.join(frame.pair, fit, self.coarse_px(frame, fit), noise2)
+
+    def lies_open(self, frame: Frame, fit: Fit) -> bool:
+        """More of the model is seen than something hides."""
+        agreement = self._checks(frame).check(fit.measured, fit.pose).result().agreement
+        return agreement is not None and agreement.lies_open
+
+    def _checks(self, frame: Frame) -> PairChecks:
+        return PairChecks(self.meter, frame.pair)

@@ -1,0 +1,82 @@
+"""A pose judged on a map that a good matcher would find, beside checks that are handed in."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+
+from navapp.geometry.rig import RigQuality
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import RegistrationModel, Scene
+from navapp.stereo import PictureHealth, StereoHealth
+from navapp.tracking import Goal
+from navapp.tracking.agreement import Agreement
+from navapp.tracking.checks import PairCheck, PairChecks
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.judging import PoseJudge
+from navapp.tracking.surface_meter import FREE_CORRELATION_PX, Measurement
+from navapp.values import DisparityMap, PoseEstimate, Stopwatch, TrackedFrame
+from tests.registration.shapes import GEOMETRY, femur
+from tests.tracking.rooms import measured_map
+
+BONE = femur()
+MODEL = RegistrationModel(BONE)
+MAP = measured_map(BONE)
+NO_TARGETS = np.empty((0, 3))
+GOOD_PICTURE = PictureHealth(0.05, 0.0, 0.15)
+GOOD = StereoHealth(GOOD_PICTURE, GOOD_PICTURE)
+
+
+def scene_of(measured: DisparityMap) -> Scene:
+    return Scene.from_stereo(measured.reproject(GEOMETRY, 3), FREE_CORRELATION_PX)
+
+
+class Told:
+    """Checks of a pair that all say the same."""
+
+    def __init__(self, check: PairCheck) -> None:
+        self._check = check
+
+    def check(self, measured: Measurement, pose: RigidTransform) -> SimpleNamespace:
+        return SimpleNamespace(result=lambda: self._check)
+
+
+def altered(checks: PairChecks, fit: Fit, **changes) -> Told:
+    """The check of a fit, its agreement changed."""
+    found = checks.check(fit.measured, fit.pose).result()
+    agreement: Agreement = replace(found.agreement, **changes)
+    return Told(found._replace(agreement=agreement))
+
+
+class SurfaceAlone:
+    """Stands for the meter of the outline: finds none."""
+
+    def __init__(self, moved_mm: float | None = None) -> None:
+        self._moved_mm = moved_mm
+
+    def join(self, pair, fit: Fit, coarse_px, noise2: float = 1.0) -> Fit:
+        covariance = noise2 * fit.estimate.covariance
+        moved_mm = fit.moved_mm if self._moved_mm is None else self._moved_mm
+        return replace(
+            fit, estimate=replace(fit.estimate, covariance=covariance), moved_mm=moved_mm
+        )
+
+
+def judged(
+    estimate: PoseEstimate,
+    measured: DisparityMap = MAP,
+    goal: Goal | None = None,
+    *,
+    model: RegistrationModel = MODEL,
+    quality: RigQuality | None = None,
+    health: StereoHealth = GOOD,
+    predicted: RigidTransform | None = None,
+) -> TrackedFrame:
+    """A pose that was fitted to a free measurement."""
+    meter = SimpleNamespace(model=model, geometry=GEOMETRY)
+    judge = PoseJudge(meter, quality, SurfaceAlone())
+    cloud = measured.reproject(GEOMETRY, 3)
+    fit = Fit(estimate, Measurement(measured, cloud, 1.0, FREE_CORRELATION_PX))
+    frame = Frame(None, estimate.camera_from_bone, Stopwatch())
+    checks = Told(PairCheck(health, None, None))
+    return judge.judge(frame, checks, fit, goal or Goal(NO_TARGETS, 3.0), predicted)

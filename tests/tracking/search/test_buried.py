@@ -1,0 +1,72 @@
+"""A bone that tissue continues."""
+
+from dataclasses import replace
+
+import pytest
+
+from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.frame import Fit, Frame
+from navapp.values import Prior, Status, Stopwatch
+from tests.tracking.rooms import GOAL, Room, room
+
+
+def off(a: Room, twist: tuple[float, ...]) -> Frame:
+    """The first frame, expected beside the truth."""
+    taken = a.frames[0]
+    true = a.truth(taken)
+    rough = true.moved(twist, true.apply(a.tracker.centre_mm))
+    return a.tracker.begin(taken.left, taken.right, rough, Stopwatch())
+
+
+def error_mm(a: Room, fit: Fit) -> float:
+    left_from_rectified = a.tracker.meter.geometry.rectified_from_left.inverse()
+    return a.error_mm(left_from_rectified @ fit.pose, a.frames[0])
+
+
+@pytest.mark.slow
+def test_a_rough_pose_leads_to_the_bone() -> None:
+    a, told = room(), []
+    frame = replace(off(a, (9.0, -8.0, 6.0, 0.1, 0.08, -0.06)), on_progress=told.append)
+    measured = a.tracker.meter.measure_freely(
+        frame.pair, frame.start, a.tracker.settings.near.search
+    )
+    found = a.tracker.buried.find_around(frame, measured)
+    assert error_mm(a, found) < 0.2
+    assert told == sorted(told)
+    assert told[-1] <= 1.0
+
+
+@pytest.mark.slow
+def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
+    a = room()
+    frame = off(a, (1.6, -1.2, 1.4, 0.02, -0.02, 0.01))
+    *rested, best = a.tracker.buried.find(frame)
+    assert error_mm(a, best) < 0.2
+    alone = list(a.tracker.buried.find(replace(frame, searches=False)))
+    assert len(alone) == len(rested)
+
+
+class Asked:
+    """Notes what it is asked for, and finds nothing."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+
+    def find_around(self, frame: Frame, measured) -> None:
+        self.frames.append(frame)
+
+
+def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search() -> None:
+    a, asked = room(), Asked()
+    frame = a.frames[0]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone, buried=asked)
+    answers = tracker.register(frame.left, frame.right, a.prior, GOAL)
+    assert answers[0].verdict.status is Status.OK
+    assert not asked.frames
+    true = a.truth(frame)
+    far_off = true.moved((0.0, 60.0, 0.0, 1.5, 0.0, 0.0), true.apply(tracker.centre_mm))
+    answers = tracker.register(frame.left, frame.right, Prior({"femur": far_off}), GOAL)
+    assert asked.frames
+    orders = [one.verdict.order for one in answers]
+    assert orders == sorted(orders)
+    assert all(one.verdict.status is not Status.OK for one in answers)

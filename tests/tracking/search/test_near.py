@@ -1,0 +1,240 @@
+"""Matching and fitting in turns, near an expected pose."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.scoring import FitScorer
+from navapp.tracking.search.near import NearSearch, NearSettings
+from navapp.tracking.surface_meter import Margins
+from navapp.values import Reason, Stopwatch
+from tests.registration.shapes import TRUE
+from tests.tracking.meters import FakeMeter, Laps, Listening, error_mm, frame_at, moved
+from tests.tracking.rooms import room
+
+FAR = moved((1.0, -1.0, 4.8), (0.0, 5.0, 0.0))
+
+
+def search_of(
+    meter: FakeMeter,
+    settings: NearSettings | None = None,
+    score: Callable[[Fit], float] | None = None,
+) -> NearSearch:
+    by_share = score or (lambda fit: fit.measured.answered_fraction)
+    return NearSearch(meter, by_share, settings or NearSettings())
+
+
+def find(search: NearSearch, start: RigidTransform | Frame) -> Fit | None:
+    """Its one answer."""
+    (fit,) = search.find(start if isinstance(start, Frame) else frame_at(start))
+    return fit
+
+
+@pytest.mark.parametrize(
+    "start", [TRUE, moved((0.3, -0.2, 0.4), (0.2, -0.3, 0.2)), moved((0.5, 0.5, 0.9), (0.0,) * 3)]
+)
+def test_a_pose_that_is_right_stays_on_the_model(start: RigidTransform) -> None:
+    meter = FakeMeter(free_bias_mm=5.0)
+    fit = find(search_of(meter), start)
+    assert "freely" not in meter.asked
+    assert error_mm(fit.pose) < 0.05
+    assert fit.pose.target == "left_rect"
+
+
+@pytest.mark.parametrize("start", [FAR, moved((-2.0, 1.0, -4.5), (-3.0, 3.0, 2.6))])
+def test_a_pose_that_is_far_off_is_found_through_a_free_search(start: RigidTransform) -> None:
+    meter = FakeMeter()
+    fit = find(search_of(meter), start)
+    assert error_mm(start) > 4.0
+    assert meter.asked.count("freely") == 1
+    # At most a first matching tells that it is elsewhere.
+    assert meter.asked.index("freely") <= 1
+    assert error_mm(fit.pose) < 0.05
+
+
+def test_a_search_ends_on_the_model() -> None:
+    """What the free measurement is wrong by is gone: the model's own surface is exact."""
+    meter = FakeMeter(free_bias_mm=0.4)
+    found = search_of(meter).find_freely(frame_at(FAR), NearSettings().search)
+    assert meter.asked[0] == "freely"
+    assert meter.asked[-1] == "on_model"
+    assert meter.asked.count("freely") == 1
+    assert error_mm(found.pose) < 0.05
+
+
+def test_what_does_not_convince_is_searched_from_far_and_nearby() -> None:
+    meter = FakeMeter()
+    meter.share = 0.35
+    find(search_of(meter), moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    followed = [k for k, what in enumerate(meter.asked) if what == "on_model"]
+    first = meter.asked.index("freely")
+    assert meter.asked.count("freely") == 1
+    assert followed[0] < first < followed[-1]
+
+
+def test_out_of_view_there_is_no_fit() -> None:
+    meter = FakeMeter()
+    meter.is_in_view = False
+    search = search_of(meter)
+    assert find(search, TRUE) is None
+    assert set(meter.asked) <= {"freely"}
+    assert search.find_freely(frame_at(TRUE), Margins(60, 35.0)) is None
+
+
+@pytest.mark.parametrize(("sign", "is_search"), [(1.0, True), (-1.0, False)])
+def test_the_better_of_staying_and_searching_wins(sign: float, is_search: bool) -> None:
+    meter = FakeMeter()
+    meter.share = 0.35
+    told: list[Fit] = []
+
+    def score(fit: Fit) -> float:
+        """Who is asked for later is the better, or the worse."""
+        told.append(fit)
+        return sign * len(told)
+
+    fit = find(search_of(meter, score=score), moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    # The search compared its two ways before.
+    stayed, searched = told[-2:]
+    free = meter.asked.index("freely")
+    assert any(one is stayed.measured for one in meter.answers[:free])
+    assert any(one is searched.measured for one in meter.answers[free:])
+    assert fit.estimate is (searched if is_search else stayed).estimate
+
+
+def test_a_bone_half_hidden_where_it_was_expected_is_not_searched() -> None:
+    settings = NearSettings()
+    meter = FakeMeter()
+    meter.share = 0.5 * (settings.hidden_fraction + settings.near_fraction)
+    near = moved((0.0, 0.0, 0.5 * settings.stay_mm), (0.0,) * 3)
+    assert error_mm(find(search_of(meter), near).pose) < 0.05
+    assert "freely" not in meter.asked
+    # The same share after a longer way is not believed.
+    find(search_of(meter), moved((0.0, 0.0, 1.8 * settings.stay_mm), (0.0,) * 3))
+    assert "freely" in meter.asked
+
+
+def test_too_small_an_answer_is_not_followed() -> None:
+    meter = FakeMeter()
+    meter.share = NearSettings().hidden_fraction - 0.01
+    find(search_of(meter), TRUE)
+    assert meter.asked.index("freely") <= 1
+
+
+def test_a_bone_lost_during_the_search_leaves_what_stayed() -> None:
+    class GoesBlind(FakeMeter):
+        def measure_freely(self, *given) -> None:
+            super().measure_freely(*given)
+
+    meter = GoesBlind()
+    meter.share = 0.35
+    fit = find(search_of(meter), moved((1.0, 0.0, 1.0), (0.0,) * 3))
+    assert "freely" in meter.asked
+    assert error_mm(fit.pose) < 0.05
+
+
+def test_a_rest_is_looked_for_on_the_model_and_never_freely() -> None:
+    meter = FakeMeter()
+    sampled, whole = search_of(meter).find_rests(frame_at(moved((0.5, -0.5, 0.8), (0.0,) * 3)))
+    assert error_mm(sampled.pose) < 0.05
+    assert error_mm(whole.pose) < 0.05
+    assert "freely" not in meter.asked
+    meter.share = NearSettings().hidden_fraction - 0.01
+    assert len(list(search_of(meter).find_rests(frame_at(TRUE)))) == 1
+    meter.is_in_view = False
+    assert list(search_of(meter).find_rests(frame_at(TRUE))) == []
+
+
+@pytest.mark.parametrize(
+    ("start", "share"), [(TRUE, None), (FAR, None), (moved((1.0, 0.0, 1.0), (0.0,) * 3), 0.35)]
+)
+@pytest.mark.parametrize("is_free", [False, True])
+def test_the_time_of_every_matching_and_fit_is_told(
+    start: RigidTransform, share: float | None, is_free: bool
+) -> None:
+    """Also that of the path which was not taken."""
+    meter, watch = FakeMeter(), Laps()
+    meter.share = share
+    search, frame = search_of(meter), frame_at(start, watch)
+    if is_free:
+        search.find_freely(frame, NearSettings().search)
+    else:
+        find(search, frame)
+    assert watch.parts.count("stereo") == len(meter.asked)
+    assert watch.parts.count("estimate") >= len(meter.asked)
+    assert watch.parts[-1] == "estimate"
+    timings = watch.timings
+    assert 0.0 < timings.estimate_ms < timings.total_ms
+    assert timings.total_ms == timings.stereo_ms + timings.estimate_ms
+
+
+def test_the_margins_of_tracking_and_of_a_first_search_are_kept_apart() -> None:
+    settings = NearSettings(tracking=Margins(3, 4.0), search=Margins(50, 60.0))
+    meter = FakeMeter()
+    find(search_of(meter, settings), FAR)
+    assert set(meter.margins) == {settings.tracking}
+    meter = FakeMeter()
+    search_of(meter, settings).find_freely(frame_at(FAR), settings.search)
+    assert meter.margins[0] == settings.search
+    assert set(meter.margins[1:]) == {settings.tracking}
+
+
+def test_what_is_measured_next_to_the_expected_pose_is_told() -> None:
+    told = []
+    frame = frame_at(TRUE, on_measured=lambda measured, pose: told.append(measured))
+    fit = find(search_of(FakeMeter()), frame)
+    assert told[-1] is fit.measured
+
+
+# --- simulated pictures -------------------------------------------------------------------------
+
+
+def seen_knee() -> tuple[Frame, NearSearch, list[str]]:
+    """A frame that starts at the truth, a search in it, and what that asks for."""
+    a = room()
+    frame, tracker = a.frames[0], a.tracker
+    begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch())
+    meter = Listening(tracker.meter)
+    search = NearSearch(meter, FitScorer(tracker.meter).score, NearSettings())
+    return begun, search, meter.asked
+
+
+def surface_error_mm(pose: RigidTransform, true: RigidTransform) -> float:
+    points_mm = room().tracker.model.points_mm
+    return float(np.linalg.norm(pose.apply(points_mm) - true.apply(points_mm), axis=1).mean())
+
+
+def test_in_pictures_a_right_pose_stays_on_the_model() -> None:
+    frame, search, asked = seen_knee()
+    fit = find(search, frame)
+    assert set(asked) == {"measure_on_samples", "measure_on_model"}
+    assert surface_error_mm(fit.pose, frame.start) < 0.3
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_in_pictures_a_pose_5_mm_and_5_deg_off_is_found(sign: float) -> None:
+    frame, search, asked = seen_knee()
+    shift, turn = np.array([3.0, -2.0, 3.5]), np.array([0.6, -0.5, 0.62])
+    twist = sign * np.concatenate([shift, np.radians(5.0) * turn / np.linalg.norm(turn)])
+    off = frame.start.moved(twist, frame.start.apply(room().tracker.centre_mm))
+    fit = find(search, replace(frame, start=off))
+    assert asked.count("measure_freely") == 1
+    assert surface_error_mm(off, frame.start) > 3.0
+    assert surface_error_mm(fit.pose, frame.start) < 0.3
+
+
+def test_in_pictures_a_bone_out_of_view_gives_none() -> None:
+    frame, search, _ = seen_knee()
+    away = frame.start.moved((900.0, 0, 0, 0, 0, 0), (0.0,) * 3)
+    assert find(search, replace(frame, start=away)) is None
+
+
+def test_a_dark_pair_gives_no_pose_of_its_own() -> None:
+    frame, search, asked = seen_knee()
+    black = np.zeros_like(frame.pair.left)
+    fit = find(search, replace(frame, pair=replace(frame.pair, left=black, right=black)))
+    assert asked.count("measure_freely") == 1
+    assert Reason.TOO_FEW_POINTS in fit.estimate.reasons

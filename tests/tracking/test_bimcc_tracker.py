@@ -1,0 +1,242 @@
+"""One bone followed from frame to frame by the production tracker."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.geometry.rig import RigQuality
+from navapp.tracking import TrackState
+from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.judging import PoseJudge
+from navapp.tracking.search.near import NearSearch
+from navapp.values import Prior, Reason, Status, TrackedFrame, Verdict
+from tests.tracking.rooms import GOAL, Room, room
+
+
+def follow(a: Room, tracker: BimccTracker, start_off=(0.0,) * 6):
+    """Track through the room's frames, from a pose a little beside the first truth."""
+    truth = a.truth(a.frames[0])
+    start = truth.moved(start_off, truth.apply(tracker.centre_mm))
+    state = TrackState.at_rest(start, a.frames[0].captured_ns)
+    answers = []
+    for frame in a.frames:
+        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answers.append((frame, tracked))
+    return answers, state
+
+
+@pytest.mark.parametrize("motion", ["still", "patient"])
+@pytest.mark.slow
+def test_a_knee_is_followed(motion: str) -> None:
+    a = room(motion)
+    answers, state = follow(a, a.tracker, (1.5, -1.0, 2.0, 0.01, -0.015, 0.01))
+    for frame, tracked in answers:
+        assert tracked.verdict.status is Status.OK
+        assert a.error_mm(tracked.left_from_bone, frame) < 1.2
+        assert tracked.estimate.covariance.shape == (6, 6)
+        assert tracked.left_from_bone.target == "left"
+    assert state.n_lost == 0
+
+
+def test_following_twice_gives_the_same_bits() -> None:
+    a = room()
+    first, second = follow(a, a.tracker)[0], follow(a, a.tracker)[0]
+    for (_, one), (_, other) in zip(first, second, strict=True):
+        assert one.left_from_bone.matrix.tobytes() == other.left_from_bone.matrix.tobytes()
+
+
+@pytest.mark.slow
+def test_grey_pictures_do_as_well() -> None:
+    a = room(is_grey=True, n_frames=2)
+    assert a.frames[0].left.ndim == 2
+    for frame, tracked in follow(a, a.tracker)[0]:
+        assert a.error_mm(tracked.left_from_bone, frame) < 1.2
+
+
+@pytest.mark.parametrize(("shape", "level"), [((720, 1280), 0), ((720, 1280, 3), 255)])
+def test_pictures_without_content_are_lost(shape, level: int) -> None:
+    a = room()
+    flat = np.full(shape, level, dtype=np.uint8)
+    state = TrackState.at_rest(a.truth(a.frames[0]), 0)
+    tracked, after = a.tracker.track(flat, flat, 66_000_000, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+    assert tracked.verdict.reasons
+    assert tracked.left_from_bone is None
+    assert after.left_from_bone is state.left_from_bone
+    found = a.tracker.register(flat, flat, a.prior, GOAL)
+    assert all(one.verdict.status is Status.LOST for one in found)
+    assessed = a.tracker.assess(flat, flat, state.left_from_bone, GOAL)
+    assert assessed.verdict.status is Status.LOST
+
+
+@pytest.mark.parametrize("eye", ["left", "right"])
+def test_one_dark_eye_is_lost(eye: str) -> None:
+    a = room()
+    frame = a.frames[0]
+    dark = replace(frame, **{eye: np.zeros_like(frame.left)})
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    tracked, _ = a.tracker.track(dark.left, dark.right, frame.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+
+
+@pytest.mark.parametrize("shift", [(900.0, 0.0, 0.0), (0.0, -700.0, 0.0), (0.0, 0.0, -1500.0)])
+def test_a_bone_out_of_view_is_lost_and_said_so(shift) -> None:
+    a = room()
+    frame = a.frames[0]
+    away = a.truth(frame).moved((*shift, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    state = TrackState.at_rest(away, frame.captured_ns)
+    tracked, after = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+    assert tracked.verdict.reasons == (Reason.OUT_OF_VIEW,)
+    assert after.n_lost == 1
+    assessed = a.tracker.assess(frame.left, frame.right, away, GOAL)
+    assert assessed.verdict.reasons == (Reason.OUT_OF_VIEW,)
+    found = a.tracker.register(frame.left, frame.right, Prior({"femur": away}), GOAL)
+    assert [f.verdict.status for f in found] == [Status.LOST]
+
+
+def test_a_pose_is_assessed_where_it_stands() -> None:
+    a = room()
+    frame = a.frames[0]
+    truth = a.truth(frame)
+    right = a.tracker.assess(frame.left, frame.right, truth, GOAL)
+    assert right.verdict.status is not Status.LOST
+    np.testing.assert_allclose(right.left_from_bone.matrix, truth.matrix, atol=1e-9)
+    turned = truth.moved((0, 0, 0, 0, np.radians(15.0), 0), truth.apply(a.tracker.centre_mm))
+    wrong = a.tracker.assess(frame.left, frame.right, turned, GOAL)
+    assert wrong.verdict.status is Status.LOST
+
+
+def test_a_rig_that_was_not_accepted_never_gives_ok() -> None:
+    a = room()
+    rig = replace(a.rig, quality=RigQuality(False, ("too few pictures",)))
+    for _, tracked in follow(a, BimccTracker(rig, a.tracker.model.bone))[0]:
+        assert tracked.verdict.status is not Status.OK
+        assert Reason.RIG_NOT_ACCEPTED in tracked.verdict.reasons
+
+
+def lost_far_away(a: Room, n_seen: int = 2) -> TrackState:
+    """Of a bone that was followed, then expected 70 mm from where it is, and lost."""
+    truth = a.truth(a.frames[0])
+    state = TrackState.at_rest(truth, a.frames[0].captured_ns)
+    for frame in a.frames[:n_seen]:
+        _, state = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    away = truth.moved((70.0, 0, 0, 0, 0, 0), truth.apply(a.tracker.centre_mm))
+    return replace(state, left_from_bone=away, n_lost=5)
+
+
+def test_the_box_leads_back_to_a_lost_bone() -> None:
+    a = room()
+    state, frame = lost_far_away(a), a.frames[2]
+    found, after = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    assert a.error_mm(found.left_from_bone, frame) < 1.2
+    # So far from where it was expected, it has to be confirmed by the next frame.
+    assert found.verdict.reasons == (Reason.JUMPED,)
+    assert after.n_lost == 0
+    again, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns + 66_000_000, after, GOAL)
+    assert again.verdict.status is Status.OK
+    boxless = replace(state, box=None)
+    found, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns, boxless, GOAL)
+    assert found.verdict.status is not Status.OK
+
+
+class Never:
+    """Stands for what must not be asked for anything; a part of it may be."""
+
+    def __init__(self, **asked) -> None:
+        self.__dict__.update(asked)
+
+    def __getattr__(self, name: str):
+        return lambda *given, **more: pytest.fail(name)
+
+
+def never_searching(near: NearSearch) -> BimccTracker:
+    """A tracker that fails when it looks for more than where the model rests."""
+    a = room()
+    near = Never(find_rests=near.find_rests)
+    return BimccTracker(
+        a.rig, a.tracker.model.bone, near=near, buried=Never(), after_loss=Never(),
+        diagnosis=Never(),
+    )  # fmt: skip
+
+
+def glance(a: Room, state: TrackState, tracker: BimccTracker | None = None):
+    frame, tracker = a.frames[2], tracker or a.tracker
+    return tracker.glance(frame.left, frame.right, frame.captured_ns, state, GOAL)
+
+
+@pytest.mark.parametrize("n_lost", [0, 1, 5, 10])
+def test_a_glance_does_not_look_further_off(n_lost: int) -> None:
+    a = room()
+    state = replace(lost_far_away(a), n_lost=n_lost, cause=Reason.OTHER_SIDE)
+    found, after = glance(a, state, never_searching(a.tracker.near))
+    assert found.verdict.status is Status.LOST
+    assert found.verdict.reasons[0] is Reason.OTHER_SIDE
+    assert (after.n_lost, after.cause) == (n_lost + 1, Reason.OTHER_SIDE)
+    assert after.left_from_bone is state.left_from_bone
+    # Nor is the box followed.
+    assert after.box is state.box
+
+
+def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
+    """So that the test above would notice."""
+    a = room()
+    state, frame = lost_far_away(a), a.frames[2]
+    with pytest.raises(pytest.fail.Exception):
+        never_searching(a.tracker.near).track(
+            frame.left, frame.right, frame.captured_ns, state, GOAL
+        )
+
+
+@pytest.mark.parametrize("n_lost", [0, 5])
+def test_a_glance_finds_a_bone_near_where_it_is_expected(n_lost: int) -> None:
+    a = room()
+    truth = a.truth(a.frames[2])
+    expected = truth.moved((2.0, -1.5, 2.0, 0.01, -0.01, 0.01), truth.apply(a.tracker.centre_mm))
+    found, after = glance(a, replace(TrackState.at_rest(expected, 0), n_lost=n_lost))
+    assert found.verdict.status is Status.OK
+    assert a.error_mm(found.left_from_bone, a.frames[2]) < 0.4
+    assert after.n_lost == 0
+    assert after.box is not None
+
+
+class Doubting(PoseJudge):
+    """Doubts the place of every pose."""
+
+    def judge(self, *given) -> TrackedFrame:
+        tracked = super().judge(*given)
+        return replace(tracked, verdict=Verdict(Status.DEGRADED, 0.5, (Reason.SURFACE_MISFIT,)))
+
+
+def test_a_doubt_at_a_glance_puts_off_no_search() -> None:
+    a = room()
+    tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=Doubting(a.tracker.meter))
+    state = replace(TrackState.at_rest(a.truth(a.frames[2]), 0), n_doubted=4)
+    found, after = glance(a, state, tracker)
+    assert found.verdict.reasons == (Reason.SURFACE_MISFIT,)
+    assert after.is_search_due
+    assert not state.updated(found, 0, tracker.centre_mm).is_search_due
+
+
+def test_the_box_of_a_pose_is_its_projection() -> None:
+    a = room()
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    tracked, state = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    mesh = a.tracker.model.bone.mesh
+    pixels = a.rig.left.project(tracked.left_from_bone.apply(mesh.vertices_mm))
+    box = state.box.picture_box
+    np.testing.assert_allclose([box.x, box.y], pixels.min(axis=0), atol=0.5)
+    np.testing.assert_allclose([box.width, box.height], np.ptp(pixels, axis=0), atol=0.5)
+
+
+def test_the_time_of_a_frame_is_told_part_by_part() -> None:
+    a = room()
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    tracked, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    timings = tracked.timings
+    parts = (timings.rectify_ms, timings.stereo_ms, timings.estimate_ms, timings.judge_ms)
+    assert min(parts) > 0.0
+    assert timings.total_ms == pytest.approx(sum(parts))

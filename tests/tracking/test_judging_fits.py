@@ -1,0 +1,113 @@
+"""Fits on pictures, joined and weighed before they are judged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.registration import estimate_at
+from navapp.tracking import Goal, TrackState
+from navapp.tracking.agreement import compare_at
+from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.checks import PairChecks
+from navapp.tracking.frame import FREE_FIT, Fit, Frame
+from navapp.tracking.judging import PoseJudge
+from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW
+from navapp.values import Reason, Status, Stopwatch, TrackedFrame
+from tests.tracking.judged import SurfaceAlone, altered
+from tests.tracking.rooms import GOAL, Room, room
+
+
+def judge_with(outline: SurfaceAlone) -> PoseJudge:
+    a = room()
+    return PoseJudge(a.tracker.meter, a.rig.quality, outline)
+
+
+def tracked(a: Room, tracker: BimccTracker) -> TrackedFrame:
+    """Of the first frame, from its truth."""
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    return tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)[0]
+
+
+def found_at_the_truth(a: Room) -> tuple[Frame, PairChecks, Fit]:
+    taken = a.frames[0]
+    frame = a.tracker.begin(taken.left, taken.right, a.truth(taken), Stopwatch(), NEAR_VIEW)
+    (fit,) = a.tracker.near.find(frame)
+    return frame, PairChecks(a.tracker.meter, frame.pair), fit
+
+
+def test_the_outline_enters_the_pose_that_is_handed_out() -> None:
+    a = room()
+    with_it = tracked(a, a.tracker)
+    bone = a.tracker.model.bone
+    without = tracked(a, BimccTracker(a.rig, bone, judge=judge_with(SurfaceAlone())))
+    assert np.trace(with_it.estimate.covariance) < np.trace(without.estimate.covariance)
+    assert with_it.verdict.predicted_tre_mm < without.verdict.predicted_tre_mm
+    error_mm = a.error_mm(with_it.left_from_bone, a.frames[0])
+    assert error_mm < with_it.verdict.predicted_tre_mm
+
+
+def test_the_covariance_turns_with_the_camera_frame() -> None:
+    """Handed out in the left camera before rectification, which is a pure rotation."""
+    a = room()
+    frame, tracker, truth = a.frames[0], a.tracker, a.truth(a.frames[0])
+    estimate = tracker.assess(frame.left, frame.right, truth, GOAL).estimate
+    begun = tracker.begin(frame.left, frame.right, truth, Stopwatch(), WIDE_VIEW)
+    measured = tracker.meter.measure_freely(begun.pair, begun.start, tracker.settings.near.tracking)
+    inside = estimate_at(measured.scene, tracker.model, begun.start, FREE_FIT)
+    turn = np.kron(np.eye(2), tracker.meter.geometry.rectified_from_left.rotation)
+    np.testing.assert_allclose(
+        turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15
+    )
+    assert np.abs(estimate.covariance - inside.covariance).max() > 1e-6
+
+
+@pytest.mark.parametrize(("hidden_share", "noise"), [(0.0, 0.65), (0.9, 1.0)])
+def test_a_claim_is_believed_less_while_the_bone_lies_open(
+    hidden_share: float, noise: float
+) -> None:
+    a = room()
+    frame, checks, fit = found_at_the_truth(a)
+    targets_mm = a.tracker.centre_mm + 30.0 * np.eye(3)
+    told = judge_with(SurfaceAlone()).judge(
+        frame, altered(checks, fit, hidden_share=hidden_share), fit, Goal(targets_mm, 2.0)
+    )
+    claimed_mm = fit.estimate.predicted_tre_mm(a.tracker.centre_mm, targets_mm)
+    assert told.verdict.predicted_tre_mm == pytest.approx(noise * claimed_mm, rel=1e-6)
+
+
+def test_a_model_that_the_fit_moved_is_compared_where_it_came_to_rest() -> None:
+    a = room()
+    frame, checks, fit = found_at_the_truth(a)
+    as_matched = altered(checks, fit, coverage=0.77)
+    for moved_mm, is_as_matched in ((0.04, True), (0.06, False)):
+        judge = judge_with(SurfaceAlone(moved_mm))
+        coverage = judge.judge(frame, as_matched, fit, GOAL).verdict.coverage
+        assert (coverage == 0.77) == is_as_matched
+    coarse_px = as_matched.check(fit.measured, fit.pose).result().coarse_px
+    geometry = a.tracker.meter.geometry
+    there = compare_at(fit.pose, a.tracker.model, fit.measured.disparity, geometry, coarse_px)
+    assert coverage == there.coverage
+
+
+def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> None:
+    """Errors of a free measurement go together anyway."""
+    a = room()
+    frame, checks, fit = found_at_the_truth(a)
+    rough = replace(fit.estimate, rms_mm=0.95 * fit.estimate.expected_rms_mm)
+    on_model = replace(fit, estimate=rough, moved_mm=0.0)
+    free = replace(on_model, measured=replace(fit.measured, view=None))
+    for one, is_misfit in ((fit, False), (on_model, True), (free, False)):
+        verdict = judge_with(SurfaceAlone()).judge(frame, checks, one, GOAL).verdict
+        assert (Reason.SURFACE_MISFIT in verdict.reasons) == is_misfit
+        assert verdict.status is not Status.LOST
+
+
+def test_out_of_view_there_is_nothing_to_judge() -> None:
+    a = room()
+    frame, checks, _ = found_at_the_truth(a)
+    answer = judge_with(SurfaceAlone()).judge(frame, checks, None, GOAL)
+    assert answer.verdict.status is Status.LOST
+    assert answer.verdict.reasons == (Reason.OUT_OF_VIEW,)
+    assert answer.estimate is None

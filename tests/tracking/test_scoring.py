@@ -1,0 +1,62 @@
+"""How much of the model a fit explains, and what that says of several."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.registration import Candidate
+from navapp.tracking.frame import Fit
+from navapp.tracking.scoring import FitScorer, rank_fits, select_poses
+from navapp.tracking.surface_meter import WIDE_VIEW
+from navapp.values import Reason, Stopwatch
+from tests.registration.shapes import TRUE
+from tests.tracking.rooms import room
+
+
+def found_at_the_truth() -> Fit:
+    a = room()
+    frame, tracker = a.frames[0], a.tracker
+    begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch(), WIDE_VIEW)
+    fit = tracker.near.find_freely(begun, tracker.settings.near.tracking)
+    assert fit is not None
+    return fit
+
+
+def turned(fit: Fit, turn_rad: float) -> Fit:
+    pose = fit.pose.moved((0, 0, 0, 0, 0, turn_rad), fit.pose.apply(room().tracker.centre_mm))
+    return replace(fit, estimate=replace(fit.estimate, camera_from_bone=pose))
+
+
+def test_a_different_pose_that_explains_as_much_makes_the_best_a_guess() -> None:
+    model, fit = room().tracker.model, found_at_the_truth()
+    other = turned(fit, 0.4)
+    best, second = rank_fits([other, fit], [0.5, 0.52], model)
+    assert best.pose is fit.pose
+    assert second is other
+    assert Reason.AMBIGUOUS in best.estimate.reasons
+    assert rank_fits([other, fit], [0.3, 0.52], model)[0] is fit
+    assert rank_fits([fit, fit], [0.5, 0.52], model)[0] is fit
+
+
+def test_the_right_pose_explains_most_and_a_wrong_one_is_not_there() -> None:
+    scorer, fit = FitScorer(room().tracker.meter), found_at_the_truth()
+    wrong = turned(fit, 0.4)
+    assert scorer.is_there(fit)
+    assert not scorer.is_there(wrong)
+    assert scorer.score(fit) > 2.0 * scorer.score(wrong)
+    assert scorer.rank([wrong, fit])[0] is fit
+
+
+def test_a_pose_that_nothing_fixes_explains_nothing() -> None:
+    scorer, fit = FitScorer(room().tracker.meter), found_at_the_truth()
+    free = replace(fit.estimate, covariance=np.diag([np.inf] * 6))
+    assert scorer.score(replace(fit, estimate=free)) == 0.0
+    assert scorer.explain(fit.pose, fit.measured) == scorer.score(fit) > 0.0
+
+
+@pytest.mark.parametrize(("most", "expected"), [(1, 1), (3, 2)])
+def test_only_what_explains_enough_beside_the_best_is_refined(most: int, expected: int) -> None:
+    found = [Candidate(TRUE, score) for score in (0.8, 0.5, 0.3)]
+    assert len(select_poses(found, most, 0.5)) == expected
+    assert select_poses([], most, 0.5) == []
