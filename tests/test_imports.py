@@ -84,7 +84,7 @@ BREACHES = [
     ("navapp/tracking/line.py", "import sim_devices.truth", "the pipeline never sees"),
     ("navapp/tracking/line.py", "import pydicom", "only planning reads a CT"),
     ("navapp/tracking/judge.py", "import navapp.overlay", "tracking stands on"),
-    ("navapp/control/pursuit.py", "import sim_devices.world", "control is handed"),
+    ("navapp/control/trackers.py", "import sim_devices.world", "control is handed"),
     ("navapp/control/states.py", "import navapp.inventory.looking", "control is handed"),
     ("navapp/control/sources.py", "import drivers.replay_camera", "control knows the device"),
     ("navapp/ui/app.py", "import navapp.devices", "the screen reads snapshots"),

@@ -17,7 +17,7 @@ from navapp.control.results import FrameResult
 from navapp.control.runner import run_headless
 from navapp.errors import NavappError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
-from navapp.values import Prior, StageSpec
+from navapp.values import Prior
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -65,17 +65,17 @@ def check_not_expired(rig: StereoRig, today: date) -> None:
     )
 
 
-def check_start(prior: Prior, stage: StageSpec) -> None:
+def check_start(prior: Prior, bone: str) -> None:
     """Refuse a session in which nothing could ever be found.
 
     Raises:
-        PriorError: nothing is known of where the stage's bone is.
+        PriorError: nothing is known of where the bone is.
     """
-    if not prior.starts(stage.bone):
+    if not prior.starts(bone):
         raise PriorError(
-            f"nothing is known of where the {stage.bone} is",
+            f"nothing is known of where the {bone} is",
             remedy="give --prior FILE with camera_from_model"
-            + ("" if stage.bone == "femur" else f"_{stage.bone}"),
+            + ("" if bone == "femur" else f"_{bone}"),
         )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
-from navapp.cli.live_session import LiveSession, controller_of, prepared
+from navapp.cli.live_session import LiveSession, make_controller, prepare_session
 from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     check_writable(options.json)
     configuration = _with_options(load(find_file(options.config)), options)
     script = _script(options.operator)
-    session = prepared(configuration, options, diagnostics)
+    session = prepare_session(configuration, options, diagnostics)
     if options.headless:
         return _run_headless(session, script, options, diagnostics)
     return _run_screen(session, options, diagnostics)
@@ -109,7 +109,7 @@ def _run_headless(
     log = FrameLog(options.frames, diagnostics)
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = controller_of(session, is_inline=True, on_frame=[log], undo=undo)
+        controller = make_controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
         seconds = follow(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
@@ -122,7 +122,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
     from navapp.control.stages import stage_of
     from navapp.evaluation import mean_tre_mm
 
-    simulation, plan = session.opened.simulation, session.plan
+    simulation, plan = session.opened.simulation, session.specification.plan
     if simulation is None:
         return {}
     answers = [(result.stage, result.tracked)]
@@ -152,7 +152,7 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
 
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = controller_of(session, is_inline=False, on_frame=[count], undo=undo)
+        controller = make_controller(session, is_inline=False, on_frame=[count], undo=undo)
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()

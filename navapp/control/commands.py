@@ -4,7 +4,7 @@ from navapp.control.camera_link import CameraLink
 from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.rig_watch import RigWatch
-from navapp.control.session import Session, with_bound
+from navapp.control.session import Session
 from navapp.control.stages import stage_by_number
 from navapp.control.states import (
     Accept,
@@ -24,7 +24,7 @@ from navapp.control.states import (
     Show,
 )
 from navapp.errors import UsageError
-from navapp.values import Status
+from navapp.values import Plan, Status
 
 
 class Commands:
@@ -37,12 +37,14 @@ class Commands:
         display: DisplayLink,
         rig: RigWatch,
         slow: SlowDevices,
+        plan: Plan,
     ) -> None:
         self._session = session
         self._camera = camera
         self._display = display
         self._rig = rig
         self._slow = slow
+        self._plan = plan
 
     def handle(self, command: Command) -> None:
         """Do what is asked."""
@@ -67,7 +69,7 @@ class Commands:
                 self._camera.retry_now()
                 self._slow.restore()
             case Interrupt():
-                self._session.lose_sight()
+                self._session.forget_sight()
                 self._session.fall_back("the camera was lost here when this was recorded")
             case DistrustRig():
                 self._rig.distrust(command)
@@ -75,57 +77,39 @@ class Commands:
                 self._on_quit()
 
     def _on_register(self) -> None:
-        session = self._session
-        if not self._can_look("register"):
-            return
-        session.pursuit.drop()
-        session.tracked = None
-        session.change(SessionState.REGISTERING, f"searching for the {session.stage.bone}")
+        if self._can_look("register"):
+            self._session.begin_registration()
 
     def _on_propose(self, command: Propose) -> None:
-        session = self._session
         if not self._can_look("propose"):
             return
-        if command.left_from_bone.source != session.stage.bone:
-            self._refuse("propose", f"the pose is not one of the {session.stage.bone}")
+        bone = self._session.stage.bone
+        if command.left_from_bone.source != bone:
+            self._refuse("propose", f"the pose is not one of the {bone}")
             return
-        session.tracked = None
-        session.pursuit.propose(session.stage, command.left_from_bone, session.clock.now_ns())
-        session.change(SessionState.REVIEW, "a pose was proposed by hand")
+        self._session.propose(command.left_from_bone)
 
     def _on_cancel(self) -> None:
-        session = self._session
-        if session.state is not SessionState.REGISTERING:
+        if self._session.state is not SessionState.REGISTERING:
             self._refuse("cancel", "no registration is running")
             return
-        session.pursuit.drop()
-        session.fall_back("registration cancelled")
+        self._session.cancel_registration()
 
     def _on_accept(self) -> None:
-        session = self._session
-        candidate = session.pursuit.candidate
-        if session.state is not SessionState.REVIEW or candidate is None:
+        candidate = self._session.candidate
+        if self._session.state is not SessionState.REVIEW or candidate is None:
             self._refuse("accept", "no candidate is under review")
             return
-        verdict = candidate.tracked.verdict
-        if verdict.status is Status.LOST:
+        if candidate.tracked.verdict.status is Status.LOST:
             self._refuse("accept", "the judge calls this candidate lost")
             return
-        session.pursuit.accept(session.stage)
-        session.change(SessionState.NAVIGATING, with_bound("registration accepted", verdict))
+        self._session.accept(candidate)
 
     def _on_reject(self) -> None:
-        session = self._session
-        if session.state is not SessionState.REVIEW:
+        if self._session.state is not SessionState.REVIEW:
             self._refuse("reject", "no candidate is under review")
             return
-        rejected = session.pursuit.reject()
-        session.tracked = None
-        text = f"candidate {rejected.number} of {rejected.count} rejected by the operator"
-        if session.pursuit.candidate is None:
-            session.fall_back(text)
-        else:
-            session.event("reject", text)
+        self._session.reject()
 
     def _on_blank(self) -> None:
         self._display.blank()
@@ -137,24 +121,17 @@ class Commands:
             self._session.event("show", "display shown again")
 
     def _on_enter_stage(self, command: EnterStage) -> None:
-        session = self._session
         try:
-            stage = session.pursuit.plan.stage(stage_by_number(command.number))
+            stage = self._plan.stage(stage_by_number(command.number))
         except UsageError as error:
             self._refuse("stage", str(error))
             return
-        if stage.number == session.stage.number:
-            return
-        is_other_bone = stage.bone != session.stage.bone
-        session.enter(stage)
-        if is_other_bone and session.state not in (SessionState.STARTING, SessionState.FAULT):
-            session.pursuit.drop()
-            session.fall_back(f"the {stage.bone} is now the bone to follow")
+        if stage.number != self._session.stage.number:
+            self._session.enter_stage(stage)
 
     def _on_quit(self) -> None:
-        self._session.is_over = True
         self._display.darken()
-        self._session.event("quit", "session ended by the operator")
+        self._session.end("quit", "session ended by the operator")
 
     def _can_look(self, what: str) -> bool:
         session = self._session
@@ -162,7 +139,7 @@ class Commands:
             self._refuse(what, session.rig_error.problem)
         elif session.state is SessionState.FAULT:
             self._refuse(what, "the camera is lost")
-        elif not session.pursuit.is_planned(session.stage):
+        elif session.stage.bone not in self._plan.bones:
             self._refuse(what, f"the plan has no model of the {session.stage.bone}")
         else:
             return True

@@ -124,7 +124,7 @@ class RigWatch:
     def _found(self, why: str) -> None:
         # A replay cannot look again as fast as the session did, or follows otherwise: it is told.
         command = DistrustRig(why)
-        self._session.tell(self._session.hooks.on_command, command, self._session.sequence)
+        self._session.tell_command(command)
         self.distrust(command)
 
     def close(self) -> None:

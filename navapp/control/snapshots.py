@@ -43,7 +43,7 @@ class SnapshotMaker:
     def make(self) -> Snapshot:
         """As of now."""
         session = self.session
-        now_ns = session.clock.now_ns()
+        now_ns = session.now_ns
         tracked = session.tracked
         reports = self.slow.reports
         bone = self.plan.bones.get(session.stage.bone)
@@ -57,10 +57,10 @@ class SnapshotMaker:
             verdict=None if tracked is None else tracked.verdict,
             left_from_bone=None if tracked is None else tracked.left_from_bone,
             is_candidate=session.state is SessionState.REVIEW and tracked is not None,
-            pose_age_ms=None if tracked is None else (now_ns - session.tracked_at_ns) / 1e6,
-            others=session.others.seen(session.stage, now_ns),
+            pose_age_ms=session.pose_age_ms(now_ns),
+            others=session.other_bones(now_ns),
             preview=session.preview,
-            rates=session.meter.rates(self.camera.n_dropped),
+            rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
             events=session.events,
             progress=self._progress(),
@@ -94,12 +94,12 @@ class SnapshotMaker:
         if self.session.rig_error is None and not self.rig_watch.has_board:
             return lines
         problem = "" if self.session.rig_error is None else self.session.rig_error.problem
-        watch, now_ns = self.rig_watch, self.session.clock.now_ns()
+        watch, now_ns = self.rig_watch, self.session.now_ns
         line = rig_line(self.rig.name, problem, watch.length_check, now_ns, watch.unjudged)
         return (*lines, line)
 
     def _progress(self) -> Progress | None:
-        share = self.session.pursuit.progress
+        share = self.session.search_progress
         if share is not None:
             return Progress(f"searching for the {self.session.stage.bone}", share)
         if self.session.state is SessionState.STARTING:

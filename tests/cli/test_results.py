@@ -19,12 +19,12 @@ OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies"}
 TIBIA = answer(Status.DEGRADED, Reason.COVERAGE_LOW, pose=a_pose("tibia", x_mm=4.0))
 
 
-def a_result(monkeypatch, **others) -> FrameResult:
-    return replace(navigating(Bench(monkeypatch)).results[-1], others=others)
+def a_result(**others) -> FrameResult:
+    return replace(navigating(Bench()).results[-1], others=others)
 
 
-def test_another_bone_has_the_keys_of_the_frames_own_pose(monkeypatch) -> None:
-    frame = frame_to_json(a_result(monkeypatch, tibia=TIBIA), {"femur": 0.1, "tibia": 0.7})
+def test_another_bone_has_the_keys_of_the_frames_own_pose() -> None:
+    frame = frame_to_json(a_result(tibia=TIBIA), {"femur": 0.1, "tibia": 0.7})
     tibia = frame["bodies"]["tibia"]
     assert set(tibia) == set(frame) - OF_THE_FRAME
     assert (frame["status"], tibia["status"]) == ("OK", "DEGRADED")
@@ -35,19 +35,19 @@ def test_another_bone_has_the_keys_of_the_frames_own_pose(monkeypatch) -> None:
     assert tibia["predicted_tre_mm"] == TIBIA.verdict.predicted_tre_mm
 
 
-def test_a_frame_in_which_no_other_bone_had_its_turn_says_nothing_of_one(monkeypatch) -> None:
-    frame = frame_to_json(a_result(monkeypatch), {})
+def test_a_frame_in_which_no_other_bone_had_its_turn_says_nothing_of_one() -> None:
+    frame = frame_to_json(a_result(), {})
     assert frame["bodies"] == {}
     assert frame["tre_mm"] is None
 
 
-def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
+def test_the_summary_counts_each_bone_for_itself() -> None:
     lost = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
     results = [
-        a_result(monkeypatch, tibia=TIBIA),
-        a_result(monkeypatch),
-        a_result(monkeypatch, tibia=lost),
-        a_result(monkeypatch, patella=answer(pose=a_pose("patella"))),
+        a_result(tibia=TIBIA),
+        a_result(),
+        a_result(tibia=lost),
+        a_result(patella=answer(pose=a_pose("patella"))),
     ]
     summary = summarise([frame_to_json(result, {}) for result in results], 1.0)
     counted = {key: summary[key] for key in ("frames", "ok", "degraded", "lost")}
@@ -61,13 +61,13 @@ def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
     assert "other bone, tibia: 2 frames: 0 OK, 1 degraded, 1 lost" in lines
 
 
-def test_a_line_a_frame_names_the_other_bones(monkeypatch) -> None:
-    assert frame_text(a_result(monkeypatch, tibia=TIBIA)).endswith(" | tibia DEGRADED 0 ms")
-    assert "tibia" not in frame_text(a_result(monkeypatch))
+def test_a_line_a_frame_names_the_other_bones() -> None:
+    assert frame_text(a_result(tibia=TIBIA)).endswith(" | tibia DEGRADED 0 ms")
+    assert "tibia" not in frame_text(a_result())
 
 
-def test_a_frame_of_a_moved_rig_says_so(monkeypatch) -> None:
-    bench = navigating(Bench(monkeypatch))
+def test_a_frame_of_a_moved_rig_says_so() -> None:
+    bench = navigating(Bench())
     bench.do(DistrustRig("bumped"))
     bench.frames(2)
     frame = frame_to_json(bench.results[-1], {})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.control.session import SessionHooks
+from navapp.control.event_log import SessionHooks
 from navapp.control.states import (
     Accept,
     Blank,
@@ -57,7 +57,8 @@ def test_the_accepted_candidate_is_the_one_under_review(bench: Bench) -> None:
     bench.frames(1)
     bench.do(Reject())
     bench.do(Accept())
-    track = bench.controller._pursuit._tracks["femur"]
+    bench.frames(1)
+    _, track, _ = bench.script.tracks[-1]
     assert track.left_from_bone.translation_mm[0] == 5.0
 
 
@@ -86,8 +87,8 @@ def test_commands_out_of_place_are_refused_and_change_nothing(bench: Bench, comm
     assert type(command).__name__.lower() in bench.refused()
 
 
-def test_a_registration_can_be_cancelled_while_it_hangs(monkeypatch) -> None:
-    with hanging_registration(monkeypatch) as bench:
+def test_a_registration_can_be_cancelled_while_it_hangs() -> None:
+    with hanging_registration() as bench:
         assert bench.do(Cancel()).state.value == "ready"
         assert bench.snapshot.progress is None
         bench.script.gate.set()
@@ -147,15 +148,14 @@ def test_blank_works_while_the_pipeline_hangs_in_a_frame(bench: Bench) -> None:
 
     navigating(bench)
     inside, release = threading.Event(), threading.Event()
-    track = type(bench.controller._pursuit._lines["femur"]).track
 
-    def hanging(self, *arguments):
+    def hanging(*arguments):
         inside.set()
         release.wait(10.0)
-        return track(self, *arguments)
+        return track(*arguments)
 
-    line = bench.controller._pursuit._lines["femur"]
-    line.track = hanging.__get__(line)
+    tracker = bench.trackers["femur"]
+    track, tracker.track = tracker.track, hanging
     thread = threading.Thread(target=bench.controller.step)
     thread.start()
     assert inside.wait(5.0)
@@ -228,8 +228,8 @@ def test_a_stage_that_does_not_exist_is_refused(bench: Bench, number: int) -> No
     assert "stage" in bench.refused()
 
 
-def test_the_room_is_told_of_stages_and_may_not_know_one(monkeypatch) -> None:
-    from navapp.control.controller import SessionHooks
+def test_the_room_is_told_of_stages_and_may_not_know_one() -> None:
+    from navapp.control.event_log import SessionHooks
     from navapp.errors import UsageError
 
     told: list[str] = []
@@ -239,7 +239,7 @@ def test_the_room_is_told_of_stages_and_may_not_know_one(monkeypatch) -> None:
         if name == "implant":
             raise UsageError("the simulator shows no stage 'implant'")
 
-    bench = Bench(monkeypatch, hooks=SessionHooks(on_stage=(tell,)))
+    bench = Bench(hooks=SessionHooks(on_stage=(tell,)))
     bench.frames(1)
     assert bench.do(EnterStage(3)).stage.name == "implant"
     assert told == ["opening", "implant"]
@@ -252,10 +252,10 @@ def test_quit_is_dark_and_over(bench: Bench) -> None:
     assert bench.is_dark
 
 
-def test_commands_are_told_before_they_act_with_their_frame(monkeypatch) -> None:
+def test_commands_are_told_before_they_act_with_their_frame() -> None:
     told: list[tuple[str, int]] = []
     hooks = SessionHooks(on_command=(lambda c, s: told.append((type(c).__name__, s)),))
-    bench = Bench(monkeypatch, hooks=hooks)
+    bench = Bench(hooks=hooks)
     bench.do(Show())
     bench.frames(2)
     bench.do(Register())

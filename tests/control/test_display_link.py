@@ -132,7 +132,7 @@ def test_after_the_end_it_is_not_opened_any_more(cable) -> None:
 def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(
     cable, monkeypatch
 ) -> None:
-    bench = Bench(monkeypatch, make_display=lambda clock, width, height: cable)
+    bench = Bench(make_display=lambda clock, width, height: cable)
     bench.frames(1)
     stopped = threading.Event()
     monkeypatch.setattr(SlowDevices, "close", lambda devices: stopped.set())

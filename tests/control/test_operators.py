@@ -1,9 +1,9 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from navapp.control.event_log import SessionHooks
 from navapp.control.executors import RecordedExecutor, ThreadExecutor
 from navapp.control.operators import (
     RecordedOperator,
@@ -25,8 +25,8 @@ GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
 
 
 @pytest.fixture
-def bench(monkeypatch) -> Bench:
-    return Bench(monkeypatch, camera=FakeCamera(None, n_frames=40))
+def bench() -> Bench:
+    return Bench(camera=FakeCamera(None, n_frames=40))
 
 
 def commands_of(bench: Bench, operator) -> list:
@@ -75,7 +75,7 @@ def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) 
     assert operator.commands(bench.snapshot) == [Reject()]
 
 
-def test_steps_wait_for_their_frame(bench: Bench) -> None:
+def test_steps_wait_for_their_frame() -> None:
     steps = (
         ScriptStep(do="register"),
         ScriptStep(do="blank", at_frame=8),
@@ -83,9 +83,8 @@ def test_steps_wait_for_their_frame(bench: Bench) -> None:
         ScriptStep(do="stage", stage="drilling", at_frame=15),
     )
     dark = []
-    bench.controller._session.hooks = replace(
-        bench.controller._session.hooks, on_frame=(lambda r: dark.append(bench.is_dark),)
-    )
+    hooks = SessionHooks(on_frame=(lambda r: dark.append(bench.is_dark),))
+    bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
     given = commands_of(bench, ScriptedOperator(steps))
     assert given == [Register(), Accept(), Blank(), Show(), EnterStage(2)]
     assert [number for number, is_dark in enumerate(dark) if is_dark] == [9, 10, 11, 12]
@@ -110,27 +109,27 @@ def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
     assert bench.script.calls.count("register femur") >= 39
 
 
-def test_a_recorded_operator_gives_each_command_after_the_same_frame(bench: Bench) -> None:
+def test_a_recorded_operator_gives_each_command_after_the_same_frame() -> None:
     recorded = [(-1, Show()), (2, Register()), (5, Accept()), (5, Blank())]
     told: list[tuple[int, object]] = []
-    bench.controller._session.hooks = replace(
-        bench.controller._session.hooks, on_command=(lambda c, s: told.append((s, c)),)
-    )
+    hooks = SessionHooks(on_command=(lambda c, s: told.append((s, c)),))
+    bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
     run_headless(bench.controller, RecordedOperator(list(recorded)))
     assert told == recorded
 
 
-def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
+def test_a_live_session_replays_with_the_same_states() -> None:
     """Worker, cancelled search and second search included."""
     import threading
 
-    live = Bench(monkeypatch, executor=ThreadExecutor(), camera=FakeCamera(None, n_frames=30))
     told: list[tuple[int, object]] = []
-    live.controller._session.hooks = replace(
-        live.controller._session.hooks, on_command=(lambda c, s: told.append((s, c)),)
+    executor = ThreadExecutor()
+    live = Bench(
+        executor=executor,
+        camera=FakeCamera(None, n_frames=30),
+        hooks=SessionHooks(on_command=(lambda c, s: told.append((s, c)),)),
     )
     from navapp.control.states import Cancel
-    from tests.control.fakes import wait_for
 
     for number in (1, 2):
         live.script.gate = threading.Event()
@@ -144,8 +143,7 @@ def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
             live.script.gate.set()
         else:
             live.script.gate.set()
-            job = live.controller._pursuit._search.job
-            wait_for(lambda job=job: job.is_finished, "the second search")
+            executor.close()
     live.frames(3)
     live.do(Accept())
     live.frames(30)
@@ -153,7 +151,6 @@ def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
     assert live.take_overs
 
     again = Bench(
-        monkeypatch,
         executor=RecordedExecutor(live.take_overs),
         camera=FakeCamera(None, n_frames=30),
     )

@@ -33,8 +33,8 @@ def test_a_picture_is_scaled_as_a_whole_with_black_beside_it(size, display, colu
     assert (out[rows[0] : rows[1], columns[0] : columns[1]] == 200).all()
 
 
-def test_the_banner_says_what_the_picture_is(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_the_banner_says_what_the_picture_is() -> None:
+    bench = Bench()
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - NO GUIDES: no registration has been accepted"
     bench.do(Register())
