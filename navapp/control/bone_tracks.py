@@ -44,12 +44,21 @@ class BoneTracks:
         self._trackers = trackers
         self._tracks: dict[str, TrackState] = {}
         self._candidates: list[Candidate] = []
+        self._n_reviewed = 0
         self.track_number = 0
 
     @property
     def candidate(self) -> Candidate | None:
         """The pose under review."""
         return self._candidates[0] if self._candidates else None
+
+    @property
+    def candidate_id(self) -> int | None:
+        """Of the pose under review, another one for each of a session; None when there is none.
+
+        It counts what came under review, which a replay of a recorded session does in the same way.
+        """
+        return self._n_reviewed if self._candidates else None
 
     @property
     def accepted(self) -> tuple[str, ...]:
@@ -63,6 +72,7 @@ class BoneTracks:
     def offer(self, registration: Registration) -> None:
         """Put the answers of a registration under review, all but the lost ones."""
         self.drop_candidates()
+        self._n_reviewed += 1
         found = [
             (answer, answer.left_from_bone)
             for answer in registration.answers
@@ -83,6 +93,7 @@ class BoneTracks:
     def propose(self, bone: str, pose: RigidTransform, now_ns: int) -> None:
         """Put a pose under review that will be judged as it stands."""
         self.drop_candidates()
+        self._n_reviewed += 1
         track = TrackState.at_rest(pose, now_ns)
         self._candidates = [Candidate(track, _unjudged_frame(bone), is_held=True)]
 
@@ -106,6 +117,7 @@ class BoneTracks:
     def reject(self) -> Candidate:
         """Take the candidate out; the next one, if any, comes under review."""
         self.track_number += 1
+        self._n_reviewed += 1
         return self._candidates.pop(0)
 
     def review(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:

@@ -1,5 +1,6 @@
 """What each of the operator's commands does to the session, its camera and its display."""
 
+from navapp.control.bone_tracks import Candidate
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
@@ -56,9 +57,9 @@ class Commands:
             case Cancel():
                 self._on_cancel()
             case Accept():
-                self._on_accept()
+                self._on_accept(command)
             case Reject():
-                self._on_reject()
+                self._on_reject(command)
             case Blank():
                 self._on_blank()
             case Show():
@@ -95,21 +96,29 @@ class Commands:
             return
         self._session.cancel_registration()
 
-    def _on_accept(self) -> None:
-        candidate = self._session.candidate
-        if self._session.state is not SessionState.REVIEW or candidate is None:
-            self._refuse("accept", "no candidate is under review")
+    def _on_accept(self, command: Accept) -> None:
+        candidate = self._reviewed("accept", command.candidate_id)
+        if candidate is None:
             return
         if candidate.tracked.verdict.status is Status.LOST:
             self._refuse("accept", "the judge calls this candidate lost")
             return
         self._session.accept(candidate)
 
-    def _on_reject(self) -> None:
-        if self._session.state is not SessionState.REVIEW:
-            self._refuse("reject", "no candidate is under review")
-            return
-        self._session.reject()
+    def _on_reject(self, command: Reject) -> None:
+        if self._reviewed("reject", command.candidate_id) is not None:
+            self._session.reject()
+
+    def _reviewed(self, what: str, candidate_id: int | None) -> Candidate | None:
+        """The candidate that a decision is about; None, and refused, when it is not the one."""
+        candidate = self._session.candidate
+        if self._session.state is not SessionState.REVIEW or candidate is None:
+            self._refuse(what, "no candidate is under review")
+            return None
+        if candidate_id not in (None, self._session.candidate_id):
+            self._refuse(what, "another candidate is under review now")
+            return None
+        return candidate
 
     def _on_blank(self) -> None:
         self._display.blank()

@@ -57,7 +57,7 @@ class ReplayOperator:
             return [Register()]
         if snapshot.state is SessionState.REVIEW:
             is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
-            return [Reject() if is_lost else Accept()]
+            return [(Reject if is_lost else Accept)(snapshot.candidate_id)]
         return []
 
 
@@ -138,13 +138,13 @@ class ScriptedOperator:
             self._phase = "proposed"
             turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
             # About a point of the bone: where the model's origin is, in the camera.
-            return [Reject(), Propose(pose.moved(turn, pose.translation_mm))]
+            return [Reject(snapshot.candidate_id), Propose(pose.moved(turn, pose.translation_mm))]
         if snapshot.verdict.status is not Status.OK:
             if self._phase == "proposed":
                 self._next_step()
-            return [Reject()]
+            return [Reject(snapshot.candidate_id)]
         self._next_step()
-        return [Accept()]
+        return [Accept(snapshot.candidate_id)]
 
     def _next_step(self) -> None:
         self._phase = "idle"

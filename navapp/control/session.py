@@ -80,6 +80,11 @@ class Session:
         return self._tracks.candidate
 
     @property
+    def candidate_id(self) -> int | None:
+        """Of the pose under review; None when there is none."""
+        return self._tracks.candidate_id
+
+    @property
     def search_progress(self) -> float | None:
         """Share done of the registration that runs; None when none runs."""
         return self._registration.progress

@@ -45,6 +45,8 @@ class SnapshotMaker:
         session = self.session
         now_ns = session.now_ns
         tracked = session.tracked
+        # A candidate that was not followed into a frame yet is not on the screen.
+        is_candidate = session.state is SessionState.REVIEW and tracked is not None
         reports = self.slow.reports
         bone = self.plan.bones.get(session.stage.bone)
         draft = Snapshot(
@@ -56,7 +58,7 @@ class SnapshotMaker:
             is_blanked=self.display.is_blanked,
             verdict=None if tracked is None else tracked.verdict,
             left_from_bone=None if tracked is None else tracked.left_from_bone,
-            is_candidate=session.state is SessionState.REVIEW and tracked is not None,
+            candidate_id=session.candidate_id if is_candidate else None,
             pose_age_ms=session.pose_age_ms(now_ns),
             others=session.other_bones(now_ns),
             preview=session.preview,

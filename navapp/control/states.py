@@ -43,12 +43,25 @@ class Propose:
 
 @dataclass(frozen=True, slots=True)
 class Accept:
-    """Take the candidate under review."""
+    """Take the candidate that the operator has seen; refused when another one is under review.
+
+    Attributes:
+        candidate_id: as the snapshot tells it; None (of recordings that do not hold it) means
+            whichever is under review.
+    """
+
+    candidate_id: int | None
 
 
 @dataclass(frozen=True, slots=True)
 class Reject:
-    """Refuse the candidate under review."""
+    """Drop the candidate that the operator has seen; refused when another one is under review.
+
+    Attributes:
+        candidate_id: as of `Accept`.
+    """
+
+    candidate_id: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +221,8 @@ class Snapshot:
         reasons: why guides are not shown; empty means navigable.
         verdict: on the newest pose, None before there is one.
         left_from_bone: the newest pose, None when there is none.
-        is_candidate: a pose waits for the operator's decision.
+        candidate_id: of the pose that waits for the operator's decision: another one for every
+            candidate of a session; None when none waits.
         is_simulated: the pictures are not of this world.
         is_recording: the session is kept in a folder.
         pose_age_ms: of that pose, now.
@@ -232,7 +246,7 @@ class Snapshot:
     is_blanked: bool = False
     verdict: Verdict | None = None
     left_from_bone: RigidTransform | None = None
-    is_candidate: bool = False
+    candidate_id: int | None = None
     pose_age_ms: float | None = None
     others: tuple[OtherBone, ...] = ()
     preview: NDArray[np.uint8] | None = None
@@ -258,3 +272,8 @@ class Snapshot:
     def is_navigable(self) -> bool:
         """Guides may be shown."""
         return not self.reasons
+
+    @property
+    def is_candidate(self) -> bool:
+        """The pose waits for the operator's decision."""
+        return self.candidate_id is not None

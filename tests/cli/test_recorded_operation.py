@@ -17,7 +17,7 @@ AFTER = 5
 
 
 def session(*, is_moved: bool = True) -> RecordedSession:
-    commands = [(0, Register()), (1, Accept()), *([(AFTER, FOUND)] if is_moved else [])]
+    commands = [(0, Register()), (1, Accept(None)), *([(AFTER, FOUND)] if is_moved else [])]
     here = Path()
     return RecordedSession(
         here, here, here, "bimcc", "opening", RecordedEvents(commands, [1], True)

@@ -25,7 +25,7 @@ from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
 from navapp.control.results import FrameResult
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Snapshot
+from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Reject, Snapshot
 from navapp.errors import DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
@@ -289,6 +289,14 @@ class Bench:
         self.controller.submit(command)
         return self.controller.step()
 
+    def accept(self) -> Snapshot:
+        """What is under review, whether it was seen or not."""
+        return self.do(Accept(None))
+
+    def reject(self) -> Snapshot:
+        """What is under review, whether it was seen or not."""
+        return self.do(Reject(None))
+
     def refused(self) -> str:
         """What was refused last."""
         return next((e.text for e in reversed(self.events) if e.kind == "refused"), "")
@@ -299,7 +307,7 @@ def navigating(bench: Bench) -> Bench:
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     assert bench.state == "navigating"
     return bench

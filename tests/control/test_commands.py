@@ -41,13 +41,50 @@ def test_several_candidates_are_reviewed_one_after_the_other(bench: Bench) -> No
     bench.do(Register())
     bench.frames(1)
     for number in (1, 2):
-        assert bench.do(Reject()).state.value == "review"
+        assert bench.reject().state.value == "review"
         assert bench.events[-1].text.startswith(f"candidate {number} of 3 rejected")
         assert not bench.snapshot.is_candidate
         assert bench.frames(1).is_candidate
-    assert bench.do(Reject()).state.value == "ready"
-    assert bench.do(Accept()).state.value == "ready"
+    assert bench.reject().state.value == "ready"
+    assert bench.accept().state.value == "ready"
     assert "no candidate" in bench.refused()
+
+
+def test_a_decision_that_crosses_with_a_new_candidate_is_refused(bench: Bench) -> None:
+    """The operator presses the key while the next candidate is already under review."""
+    bench.script.found = [answer(pose=a_pose(x_mm=x)) for x in (0.0, 5.0)]
+    bench.frames(1)
+    bench.do(Register())
+    seen = bench.frames(1).candidate_id
+    bench.do(Reject(seen))
+    for decision in (Accept(seen), Reject(seen)):
+        assert bench.do(decision).state.value == "review"
+        assert "another candidate is under review now" in bench.refused()
+    other = bench.frames(1).candidate_id
+    assert other not in (None, seen)
+    assert bench.do(Accept(seen)).state.value == "review"
+    assert bench.do(Accept(other)).state.value == "navigating"
+
+
+@pytest.mark.parametrize("next_step", [Register(), Propose(a_pose(x_mm=9.0))], ids=str)
+def test_a_decision_of_an_earlier_search_is_refused(bench: Bench, next_step) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    seen = bench.frames(1).candidate_id
+    bench.do(next_step)
+    bench.frames(1)
+    assert bench.do(Accept(seen)).state.value == "review"
+    assert "another candidate" in bench.refused()
+    assert bench.do(Accept(bench.snapshot.candidate_id)).state.value == "navigating"
+    assert bench.snapshot.candidate_id is None
+
+
+def test_the_candidate_keeps_its_identity_from_frame_to_frame(bench: Bench) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    seen = {bench.frames(1).candidate_id for _ in range(4)}
+    assert len(seen) == 1
+    assert None not in seen
 
 
 def test_the_accepted_candidate_is_the_one_under_review(bench: Bench) -> None:
@@ -55,8 +92,8 @@ def test_the_accepted_candidate_is_the_one_under_review(bench: Bench) -> None:
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
-    bench.do(Reject())
-    bench.do(Accept())
+    bench.reject()
+    bench.accept()
     bench.frames(1)
     _, track, _ = bench.script.tracks[-1]
     assert track.left_from_bone.translation_mm[0] == 5.0
@@ -67,7 +104,7 @@ def test_a_candidate_that_was_lost_meanwhile_cannot_be_accepted(bench: Bench) ->
     bench.do(Register())
     bench.script.tracked = LOST
     bench.frames(2)
-    assert bench.do(Accept()).state.value == "review"
+    assert bench.accept().state.value == "review"
     assert "lost" in bench.refused()
 
 
@@ -76,11 +113,11 @@ def test_a_rejected_candidate_leaves_the_screen_at_once(bench: Bench) -> None:
     bench.do(Register())
     bench.frames(1)
     assert bench.shows_guides
-    bench.do(Reject())
+    bench.reject()
     assert not bench.shows_guides
 
 
-@pytest.mark.parametrize("command", [Accept(), Reject(), Cancel()])
+@pytest.mark.parametrize("command", [Accept(None), Reject(None), Cancel()])
 def test_commands_out_of_place_are_refused_and_change_nothing(bench: Bench, command) -> None:
     bench.frames(1)
     assert bench.do(command).state.value == "ready"
@@ -106,7 +143,7 @@ def test_a_proposed_pose_is_judged_as_it_stands(bench: Bench) -> None:
     bench.frames(2)
     assert bench.script.calls == ["assess femur", "assess femur"]
     np.testing.assert_array_equal(bench.snapshot.left_from_bone.matrix, pose.matrix)
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     assert bench.state == "navigating"
     assert bench.script.calls[-1] == "track femur"
@@ -115,7 +152,7 @@ def test_a_proposed_pose_is_judged_as_it_stands(bench: Bench) -> None:
 def test_a_proposed_pose_cannot_be_accepted_before_it_is_judged(bench: Bench) -> None:
     bench.frames(1)
     bench.do(Propose(a_pose()))
-    assert bench.do(Accept()).state.value == "review"
+    assert bench.accept().state.value == "review"
     assert "lost" in bench.refused()
 
 
@@ -124,7 +161,7 @@ def test_a_proposed_pose_that_is_lost_cannot_be_accepted(bench: Bench) -> None:
     bench.frames(1)
     bench.do(Propose(a_pose(turn_deg=15.0)))
     bench.frames(1)
-    assert bench.do(Accept()).state.value == "review"
+    assert bench.accept().state.value == "review"
     assert not bench.snapshot.is_navigable
 
 
@@ -217,7 +254,7 @@ def test_changing_the_bone_during_a_review_drops_the_candidate(bench: Bench) -> 
     bench.do(Register())
     bench.frames(1)
     assert bench.do(EnterStage(5)).state.value == "ready"
-    bench.do(Accept())
+    bench.accept()
     assert "no candidate" in bench.refused()
 
 
@@ -275,7 +312,7 @@ def test_a_candidate_judged_in_another_stage_cannot_be_accepted(bench: Bench) ->
     bench.do(Register())
     bench.frames(1)
     bench.do(EnterStage(2))
-    assert bench.do(Accept()).state.value == "review"
+    assert bench.accept().state.value == "review"
     assert "lost" in bench.refused()
     bench.frames(1)
-    assert bench.do(Accept()).state.value == "navigating"
+    assert bench.accept().state.value == "navigating"

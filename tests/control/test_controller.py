@@ -54,7 +54,7 @@ def test_registering_leads_to_review_and_accepting_to_navigation(bench: Bench) -
     assert bench.snapshot.is_candidate
     assert not bench.snapshot.is_navigable
     assert bench.take_overs == [1]
-    assert bench.do(Accept()).state.value == "navigating"
+    assert bench.accept().state.value == "navigating"
     assert bench.frames(1).is_navigable
     assert bench.shows_guides
 
@@ -209,9 +209,9 @@ ACTIONS = st.lists(
     st.sampled_from(
         [
             *["frame"] * 8, "ok", "doubted", "lost", "nowhere", "late", "silent", "speaks",
-            "unplug", "plug", Register(), Register(), Accept(), Accept(), Reject(), Cancel(),
-            Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), EnterStage(1), EnterStage(2),
-            EnterStage(4), EnterStage(5), Reconnect(),
+            "unplug", "plug", Register(), Register(), Accept(None), Accept(None), Reject(None),
+            Cancel(), Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), EnterStage(1),
+            EnterStage(2), EnterStage(4), EnterStage(5), Reconnect(),
         ]
     ),
     min_size=5,
@@ -249,7 +249,7 @@ def act(bench: Bench, action) -> None:
 @given(actions=ACTIONS)
 def test_guides_are_never_seen_when_they_must_not_be(actions) -> None:
     bench = Bench()
-    for action in ["frame", Register(), "frame", Accept(), "frame", *actions]:
+    for action in ["frame", Register(), "frame", Accept(None), "frame", *actions]:
         act(bench, action)
         snapshot = bench.snapshot
         assert snapshot.reasons == navigable(snapshot)

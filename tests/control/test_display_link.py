@@ -3,13 +3,15 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivers.clock import ManualClock
+from drivers.fixed_mirror import FixedMirror
+from drivers.interfaces import MirrorInfo
 from navapp.control import display_link
-from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
 from navapp.errors import DeviceNotFound
 from sim_devices.display import SimulatedDisplay
@@ -129,13 +131,25 @@ def test_after_the_end_it_is_not_opened_any_more(cable) -> None:
     assert not link._reopening.is_under_way
 
 
-def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(
-    cable, monkeypatch
-) -> None:
-    bench = Bench(make_display=lambda clock, width, height: cable)
+class MovableMirror(FixedMirror):
+    """Stands where it should, and says when it is stopped."""
+
+    def __init__(self) -> None:
+        super().__init__(45.0)
+        self.stopped = threading.Event()
+
+    @property
+    def info(self) -> MirrorInfo:
+        return replace(super().info, is_movable=True)
+
+    def stop(self) -> None:
+        self.stopped.set()
+
+
+def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(cable) -> None:
+    mirror = MovableMirror()
+    bench = Bench(mirror=mirror, make_display=lambda clock, width, height: cable)
     bench.frames(1)
-    stopped = threading.Event()
-    monkeypatch.setattr(SlowDevices, "close", lambda devices: stopped.set())
     cable.unplug()
     cable.gate.clear()
     n_attempts = cable.n_attempts
@@ -143,7 +157,7 @@ def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(
     ending = threading.Thread(target=bench.controller.close)
     ending.start()
     try:
-        assert stopped.wait(2.0)
+        assert mirror.stopped.wait(2.0)
         assert ending.is_alive()
     finally:
         cable.gate.set()

@@ -72,7 +72,7 @@ def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) 
     bench.script.tracked = GONE
     bench.frames(2)
     assert bench.snapshot.left_from_bone is None
-    assert operator.commands(bench.snapshot) == [Reject()]
+    assert operator.commands(bench.snapshot) == [Reject(1)]
 
 
 def test_steps_wait_for_their_frame() -> None:
@@ -86,7 +86,7 @@ def test_steps_wait_for_their_frame() -> None:
     hooks = SessionHooks(on_frame=(lambda r: dark.append(bench.is_dark),))
     bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
     given = commands_of(bench, ScriptedOperator(steps))
-    assert given == [Register(), Accept(), Blank(), Show(), EnterStage(2)]
+    assert given == [Register(), Accept(1), Blank(), Show(), EnterStage(2)]
     assert [number for number, is_dark in enumerate(dark) if is_dark] == [9, 10, 11, 12]
 
 
@@ -100,7 +100,7 @@ def test_a_replays_operator_rejects_a_lost_candidate(bench: Bench) -> None:
     bench.do(Register())
     bench.script.tracked = LOST
     bench.frames(2)
-    assert ReplayOperator().commands(bench.snapshot) == [Reject()]
+    assert ReplayOperator().commands(bench.snapshot) == [Reject(1)]
 
 
 def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
@@ -110,7 +110,7 @@ def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
 
 
 def test_a_recorded_operator_gives_each_command_after_the_same_frame() -> None:
-    recorded = [(-1, Show()), (2, Register()), (5, Accept()), (5, Blank())]
+    recorded = [(-1, Show()), (2, Register()), (5, Accept(None)), (5, Blank())]
     told: list[tuple[int, object]] = []
     hooks = SessionHooks(on_command=(lambda c, s: told.append((s, c)),))
     bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
@@ -131,6 +131,7 @@ def test_a_live_session_replays_with_the_same_states() -> None:
     )
     from navapp.control.states import Cancel
 
+    live.script.found = [answer(), answer(pose=a_pose(x_mm=5.0))]
     for number in (1, 2):
         live.script.gate = threading.Event()
         live.script.started.clear()
@@ -145,7 +146,10 @@ def test_a_live_session_replays_with_the_same_states() -> None:
             live.script.gate.set()
             executor.close()
     live.frames(3)
-    live.do(Accept())
+    live.do(Reject(live.snapshot.candidate_id))
+    live.do(Accept(1))
+    live.frames(1)
+    live.do(Accept(live.snapshot.candidate_id))
     live.frames(30)
     live.controller.close()
     assert live.take_overs
@@ -154,7 +158,9 @@ def test_a_live_session_replays_with_the_same_states() -> None:
         executor=RecordedExecutor(live.take_overs),
         camera=FakeCamera(None, n_frames=30),
     )
+    again.script.found = live.script.found
     run_headless(again.controller, RecordedOperator(told))
+    assert live.refused() == again.refused() != ""
     assert [r.state for r in again.results] == [r.state for r in live.results]
     assert again.take_overs == live.take_overs
 
@@ -165,11 +171,19 @@ def test_events_are_read_back_as_commands_and_take_overs(tmp_path: Path) -> None
         {"type": "command", "sequence": 3, "command": "register"},
         {"type": "take_over", "sequence": 4},
         {"type": "command", "sequence": 6, "command": "stage", "number": 2},
+        {"type": "command", "sequence": 7, "command": "reject"},
+        {"type": "command", "sequence": 8, "command": "accept", "candidate_id": 2},
     ]
     path = tmp_path / "events.jsonl"
     path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     events = read_events(path)
-    assert events.commands == [(3, Register()), (6, EnterStage(2))]
+    assert events.commands == [
+        (3, Register()),
+        (6, EnterStage(2)),
+        # Older recordings do not say which candidate was meant.
+        (7, Reject(None)),
+        (8, Accept(2)),
+    ]
     assert events.take_overs == [4]
 
 

@@ -6,12 +6,10 @@ import pytest
 
 from navapp.control.interlocks import is_current
 from navapp.control.states import (
-    Accept,
     DistrustRig,
     EnterStage,
     OtherBone,
     Register,
-    Reject,
 )
 from navapp.errors import DeviceLost
 from navapp.values import Reason, Status
@@ -31,7 +29,7 @@ def accepted(bench: Bench, *bones: str) -> Bench:
         bench.script.found = [FOUND[bone]]
         bench.do(Register())
         bench.frames(1)
-        bench.do(Accept())
+        bench.accept()
     bench.frames(1)
     assert bench.state == "navigating"
     assert bench.snapshot.stage.bone == bones[-1]
@@ -172,10 +170,10 @@ def test_from_one_candidate_to_the_next_nothing_has_moved(bench: Bench) -> None:
     bench.script.tracked_of = dict(FOUND)
     bench.frames(2)
     assert expected_x_mm(bench, 2.0) == pytest.approx([2.0])
-    bench.do(Reject())
+    bench.reject()
     assert bench.state == "review"
     assert expected_x_mm(bench, 30.0) == pytest.approx([0.0])
-    bench.do(Accept())
+    bench.accept()
     # What was accepted is the candidate that was followed until then.
     assert expected_x_mm(bench, 31.0) == pytest.approx([1.0])
 
@@ -188,7 +186,7 @@ def test_a_new_registration_of_the_active_bone_moves_nothing(bench: Bench) -> No
     bench.script.found = [answer(pose=a_pose("tibia", x_mm=20.0))]
     bench.do(Register())
     bench.frames(1)
-    bench.do(Accept())
+    bench.accept()
     assert expected_x_mm(bench, 20.0, 21.0) == pytest.approx([0.0, 1.0])
 
 

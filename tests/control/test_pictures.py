@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.control.pictures import banner, fitted
-from navapp.control.states import Accept, Register
+from navapp.control.states import Register
 from tests.control.fakes import Bench
 
 
@@ -40,6 +40,6 @@ def test_the_banner_says_what_the_picture_is() -> None:
     bench.do(Register())
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - CANDIDATE, not accepted"
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - NAVIGATING - error <= 0.80 mm"

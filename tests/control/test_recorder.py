@@ -7,7 +7,7 @@ import pytest
 from navapp.control.event_log import SessionHooks
 from navapp.control.operators import read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
-from navapp.control.states import Accept, EnterStage, Propose, Register
+from navapp.control.states import EnterStage, Propose, Register
 from navapp.errors import InputError
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_pose, answer
@@ -62,7 +62,7 @@ def test_a_session_is_recorded_with_all_that_a_replay_needs(tmp_path: Path) -> N
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     bench.script.tracked = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
     bench.frames(1)
@@ -93,7 +93,7 @@ def test_the_other_bones_are_kept_with_the_frame_whose_turn_they_were(tmp_path: 
         bench.do(EnterStage(stage))
         bench.do(Register())
         bench.frames(1)
-        bench.do(Accept())
+        bench.accept()
     bench.frames(4)
     recorder.close()
     poses = lines(tmp_path / "poses.jsonl")[-4:]

@@ -149,7 +149,7 @@ def test_no_good_frame_and_no_command_brings_it_back(moved: Bench) -> None:
     after_rows(moved, GOOD, 30.0)
     assert moved.state == "fault"
     for command in (
-        Register(), Accept(), Propose(a_pose()), Show(), EnterStage(5), EnterStage(1),
+        Register(), Accept(None), Propose(a_pose()), Show(), EnterStage(5), EnterStage(1),
         Reconnect(), Interrupt(), DistrustRig("again"),
     ):  # fmt: skip
         moved.do(command)

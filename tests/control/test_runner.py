@@ -18,7 +18,7 @@ def test_a_runner_turns_the_crank_and_leaves_no_thread() -> None:
     wait_for(lambda: runner.snapshot().state.value == "ready", "readiness")
     runner.submit(Register())
     wait_for(lambda: runner.snapshot().state.value == "review", "review")
-    runner.submit(Accept())
+    runner.submit(Accept(None))
     wait_for(lambda: runner.snapshot().is_navigable, "navigation")
     runner.stop()
     runner.stop()

@@ -40,7 +40,7 @@ def navigating(room: SimulatedRoom) -> SimulatedRoom:
     room.frames(1)
     room.controller.submit(Register())
     room.frames(2)
-    room.controller.submit(Accept())
+    room.controller.submit(Accept(None))
     room.frames(2)
     assert room.state == "navigating"
     return room

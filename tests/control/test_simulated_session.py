@@ -117,7 +117,7 @@ def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
     room.frames(1)
     room.controller.submit(Register())
     room.frames(2)
-    room.controller.submit(Accept())
+    room.controller.submit(Accept(None))
     room.frames(2)
     assert room.state == "navigating"
     while room.state == "navigating":
@@ -144,7 +144,7 @@ def test_a_blackout_suspends_and_light_resumes(undo) -> None:
     room.frames(1)
     room.controller.submit(Register())
     room.frames(2)
-    room.controller.submit(Accept())
+    room.controller.submit(Accept(None))
     room.frames(8)
     assert room.states()[2:4] == ["navigating", "navigating"]
     assert room.states()[4:7] == ["suspended"] * 3
@@ -164,7 +164,7 @@ def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
         lambda: room.state == "review" and runner.snapshot().verdict is not None, "the judge's word"
     )
     assert runner.snapshot().verdict.status is not Status.LOST
-    runner.submit(Accept())
+    runner.submit(Accept(None))
     wait_for(lambda: room.state == "navigating", "navigation")
     runner.submit(Register())
     wait_for(lambda: room.state == "registering", "the search")
