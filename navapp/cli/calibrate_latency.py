@@ -9,7 +9,7 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from calibration.latency.measure import Estimate, EyeLag, Latency
-    from navapp.control.latency.watching import Recording
+    from navapp.control.display_delay.code_recording import CodeRecording
     from navapp.devices import OpenedLatency
 
 _EXAMPLE = """\
@@ -66,20 +66,22 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 def _watched(
     opened: "OpenedLatency", options: argparse.Namespace, diagnostics: Diagnostics
-) -> "Recording":
+) -> "CodeRecording":
     from calibration.latency.code import pauses_ms
-    from navapp.control.latency.player import CodePlayer
-    from navapp.control.latency.watching import watch
+    from navapp.control.display_delay.code_player import CodePlayer
+    from navapp.control.display_delay.code_recording import record_code
 
     # Any seed will do; always the same one makes a simulated measurement repeatable.
     pauses = pauses_ms(options.seconds, seed=0)
     player = CodePlayer(opened.display, opened.clock, pauses)
-    return watch(
+    return record_code(
         opened.camera, player, opened.clock, lambda share: diagnostics.progress("flashing", share)
     )
 
 
-def _content(found: "Latency", recording: "Recording", names: tuple[str, str]) -> dict[str, Any]:
+def _content(
+    found: "Latency", recording: "CodeRecording", names: tuple[str, str]
+) -> dict[str, Any]:
     return {
         "display": names[0],
         "camera": names[1],

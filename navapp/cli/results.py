@@ -105,7 +105,11 @@ def frame_text(result: FrameResult) -> str:
 
 
 def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any]:
-    """The `summary` object."""
+    """The `summary` object.
+
+    Its `latency_ms` holds percentiles of the processing time (`timing_ms.total`): the frames of
+    headless sessions and replays wait to be read and have no latency (docs/conventions.md).
+    """
     totals = [frame["timing_ms"]["total"] for frame in frames if frame["timing_ms"]["total"] > 0]
     # Every pose that was accepted and followed, OK or not: leaving out the doubtful ones would
     # flatter. What was offered for review and refused is no result of tracking.
@@ -161,11 +165,11 @@ def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
     lines = [_counted_text(summary)]
     lines += [f"other bone, {name}: {_counted_text(n)}" for name, n in summary["bodies"].items()]
-    latency, tre = summary["latency_ms"], summary["tre_mm"]
-    if summary["fps"] is not None and latency["p50"] is not None:
+    processing_ms, tre = summary["latency_ms"], summary["tre_mm"]
+    if summary["fps"] is not None and processing_ms["p50"] is not None:
         lines.append(
-            f"{summary['fps']:.1f} frames/s, line {latency['p50']:.0f} ms (median), "
-            f"{latency['p95']:.0f} ms (95 %)"
+            f"{summary['fps']:.1f} frames/s, processing {processing_ms['p50']:.0f} ms (median), "
+            f"{processing_ms['p95']:.0f} ms (95 %)"
         )
     if tre is not None:
         lines.append(

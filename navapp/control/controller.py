@@ -189,10 +189,9 @@ class SessionController:
             snapshot.is_navigable,
             others,
         )
+        # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped
-        session.end_frame(
-            result, result.timings.total_ms if is_stepped else picture.pose_age_ns / 1e6
-        )
+        session.end_frame(result, None if is_stepped else picture.pose_age_ns / 1e6)
 
     def _show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
         """Compose, show until it expires, keep a preview; also how long composing took."""

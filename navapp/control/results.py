@@ -18,7 +18,7 @@ class FrameResult:
         stage: in force.
         tracked: the active bone's pose and verdict; None when nothing was looked for.
         picture: what was made for the display.
-        timings: of the line and the overlay.
+        timings: of tracking and overlay; their sum is the processing time.
         is_navigable: guides are in the picture.
         others: other bones than the active one, whose turn it was in this very frame.
     """

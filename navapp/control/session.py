@@ -164,8 +164,8 @@ class Session:
         """The newest picture, made small."""
         self._preview = preview
 
-    def end_frame(self, result: FrameResult, latency_ms: float) -> None:
-        """Count a frame that was handled, and tell its result."""
+    def end_frame(self, result: FrameResult, latency_ms: float | None) -> None:
+        """Count a frame that was handled, and tell its result; latency as of `RateMeter`."""
         self._meter.add(latency_ms, result.frame.skew_ns)
         self._log.tell_frame(result)
 

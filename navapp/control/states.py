@@ -167,11 +167,12 @@ class DeviceLine:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """How the line runs; None before there is a figure.
+    """How fast frames are handled; None before there is a figure.
 
     Attributes:
         frames_per_s: over the last seconds.
-        latency_ms: capture to result of the newest frame.
+        latency_ms: from the capture of the newest frame until its picture was handed to the
+            display; None of frames that wait to be read (docs/conventions.md).
         fps_history, latency_history_ms: the last values, oldest first, for sparklines.
         n_frames: handled so far.
         n_dropped: replaced by newer ones before the line took them.

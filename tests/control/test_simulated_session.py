@@ -164,6 +164,7 @@ def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
         lambda: room.state == "review" and runner.snapshot().verdict is not None, "the judge's word"
     )
     assert runner.snapshot().verdict.status is not Status.LOST
+    assert runner.snapshot().rates.latency_ms > 0.0
     runner.submit(Accept(None))
     wait_for(lambda: room.state == "navigating", "navigation")
     runner.submit(Register())

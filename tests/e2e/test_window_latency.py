@@ -11,8 +11,8 @@ from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo
 from drivers.window_display import WindowDisplay
 from drivers.window_process import WindowSettings
-from navapp.control.latency.player import CodePlayer
-from navapp.control.latency.watching import watch
+from navapp.control.display_delay.code_player import CodePlayer
+from navapp.control.display_delay.code_recording import record_code
 from tests.x_servers import seen, shot, xvfb
 
 WIDTH, HEIGHT = 320, 200
@@ -56,7 +56,7 @@ def test_a_window_is_seen_some_milliseconds_after_the_call(monkeypatch) -> None:
         try:
             with mss.MSS(display=server) as eye:
                 player = CodePlayer(display, clock, pauses_ms(7.0, 0))
-                recording = watch(ScreenCamera(clock, eye), player, clock, lambda _: None)
+                recording = record_code(ScreenCamera(clock, eye), player, clock, lambda _: None)
             clock.wait_until_ns(clock.now_ns() + 200_000_000)
             assert not seen(server, 0, 0, WIDTH, HEIGHT).any()
         finally:

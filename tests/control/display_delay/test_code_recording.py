@@ -8,11 +8,11 @@ import pytest
 from calibration.latency.code import pauses_ms
 from calibration.latency.judge import WORST_MS, judged_latency
 from calibration.latency.measure import Latency
-from navapp.control.latency.player import CodePlayer
-from navapp.control.latency.watching import Recording, watch
+from navapp.control.display_delay.code_player import CodePlayer
+from navapp.control.display_delay.code_recording import CodeRecording, record_code
 from navapp.errors import DeviceLost, DeviceTimeout, ResultError
 from sim_devices.faults import Fault, FaultKind
-from tests.control.latency.rooms import MS, Breaking, Room
+from tests.control.display_delay.rooms import MS, Breaking, Room
 
 HALF_REFRESH_MS = 500.0 / 59.94
 
@@ -39,7 +39,7 @@ def players() -> list[threading.Thread]:
 )
 def test_the_truth_of_the_room_is_recovered(truth: dict[str, float]) -> None:
     room = Room(**truth)
-    recording = watch(room.camera, player_of(room, 20.0), room.clock, nothing)
+    recording = record_code(room.camera, player_of(room, 20.0), room.clock, nothing)
     found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
     true_late_ms = truth.get("unstamped_skew_ms", 0.0)
     true_offset_ms = true_late_ms + truth.get("skew_ms", 0.0)
@@ -49,11 +49,11 @@ def test_the_truth_of_the_room_is_recovered(truth: dict[str, float]) -> None:
     assert recording.age_ms is None
 
 
-def recorded_and_judged(**truth: float) -> tuple[Recording, Latency]:
+def recorded_and_judged(**truth: float) -> tuple[CodeRecording, Latency]:
     """In real time; again when the judge refuses what a busy machine did to a recording."""
     for is_last in (False, False, True):
         room = Room(is_stepped=False, **truth)
-        recording = watch(room.camera, player_of(room, 8.0), room.clock, nothing)
+        recording = record_code(room.camera, player_of(room, 8.0), room.clock, nothing)
         try:
             found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
         except ResultError:
@@ -80,7 +80,7 @@ def test_frames_that_are_dropped_or_repeated_are_borne() -> None:
         Fault(FaultKind.FREEZE, 6.0, 0.5),
         Fault(FaultKind.DROP, 9.0, 2.0),
     )
-    recording = watch(room.camera, player_of(room, 20.0), room.clock, nothing)
+    recording = record_code(room.camera, player_of(room, 20.0), room.clock, nothing)
     assert (np.diff(recording.left.times_ms) > 0.0).all()
     assert np.diff(recording.left.times_ms).max() > 1900.0
     found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
@@ -89,7 +89,7 @@ def test_frames_that_are_dropped_or_repeated_are_borne() -> None:
 
 def test_progress_rises_to_one_and_the_display_is_dark_at_the_end() -> None:
     room, told = Room(), []
-    watch(room.camera, player_of(room, 3.0), room.clock, told.append)
+    record_code(room.camera, player_of(room, 3.0), room.clock, told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
     assert len(set(told)) > 20
@@ -98,7 +98,7 @@ def test_progress_rises_to_one_and_the_display_is_dark_at_the_end() -> None:
 
 def test_switches_are_the_pauses_of_the_code_and_stand_in_no_step_with_the_frames() -> None:
     room = Room()
-    recording = watch(room.camera, player_of(room, 10.0), room.clock, nothing)
+    recording = record_code(room.camera, player_of(room, 10.0), room.clock, nothing)
     np.testing.assert_allclose(np.diff(recording.switches.times_ms), pauses_ms(10.0, 0), atol=0.01)
     phases = np.exp(2j * np.pi * recording.switches.times_ms / 40.0)
     assert abs(phases.mean()) < 0.3
@@ -113,7 +113,7 @@ def test_an_interrupt_leaves_darkness_and_no_thread(is_stepped: bool) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        watch(Breaking(room.camera, 40, interrupt), player, room.clock, nothing)
+        record_code(Breaking(room.camera, 40, interrupt), player, room.clock, nothing)
     assert 5 < len(player.called_ns) < 40
     assert room.light_from_now() == 0.0
     assert not players()
@@ -124,7 +124,7 @@ def test_a_display_that_is_lost_is_told_and_leaves_no_thread(is_stepped: bool) -
     room = Room(is_stepped=is_stepped)
     camera = Breaking(room.camera, 30, room.display.close)
     with pytest.raises(DeviceLost, match="display"):
-        watch(camera, player_of(room, 20.0), room.clock, nothing)
+        record_code(camera, player_of(room, 20.0), room.clock, nothing)
     assert not players()
 
 
@@ -132,7 +132,7 @@ def test_a_camera_that_falls_silent_or_is_unplugged_is_told() -> None:
     for kind, error in ((FaultKind.DROP, DeviceTimeout), (FaultKind.UNPLUG, DeviceLost)):
         room = Room(Fault(kind, 2.0, 3600.0))
         with pytest.raises(error):
-            watch(room.camera, player_of(room, 20.0), room.clock, nothing)
+            record_code(room.camera, player_of(room, 20.0), room.clock, nothing)
         assert room.light_from_now() == 0.0
 
 

@@ -13,7 +13,7 @@ from calibration.latency.code import Switches
 from drivers.clock import Clock
 from drivers.frames import Image, StereoFrame
 from drivers.interfaces import StereoCamera
-from navapp.control.latency.player import CodePlayer
+from navapp.control.display_delay.code_player import CodePlayer
 from navapp.errors import DeviceTimeout
 from navapp.geometry.rectification import luma
 
@@ -27,7 +27,7 @@ _TIMEOUT_S, _LONGEST_SILENCE_NS = 0.5, 5_000_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+class CodeRecording:
     """What was shown and what was seen, ms since the first switch.
 
     Attributes:
@@ -74,7 +74,7 @@ class _Frames:
         for cells, picture in zip(self._cells, (frame.left, frame.right), strict=True):
             cells.append(_means(picture))
 
-    def watched(self, since_ns: int) -> tuple[Watched, Watched]:
+    def as_watched(self, since_ns: int) -> tuple[Watched, Watched]:
         """Both eyes, in time since then."""
         left_ms = 1e-6 * np.array([time_ns - since_ns for time_ns in self._captured_ns])
         right_ms = left_ms + 1e-6 * np.array(self._skew_ns)
@@ -104,9 +104,9 @@ class _Frames:
         )
 
 
-def watch(
+def record_code(
     camera: StereoCamera, player: CodePlayer, clock: Clock, on_progress: Callable[[float], None]
-) -> Recording:
+) -> CodeRecording:
     """Play the code and read the camera until its end has been seen; the display is dark then.
 
     A camera that runs by itself is read here while a thread plays. One that waits to be read is
@@ -124,17 +124,17 @@ def watch(
     frames = _Frames(camera, clock)
     for _ in range(_N_FIRST):
         frames.read()
-    with _Playing(player, in_thread=not camera.info.is_stepped) as playing:
+    with _CodePlayback(player, in_thread=not camera.info.is_stepped) as playing:
         while not player.is_over or frames.last_ns < player.called_ns[-1] + _TAIL_NS:
             playing.go_on(frames.last_ns + 2 * frames.period_ns)
             frames.read()
             on_progress(min(len(player.called_ns) / player.n_switches, 0.99))
     on_progress(1.0)
-    left, right = frames.watched(player.called_ns[0])
-    return Recording(player.switches, left, right, frames.age_ms)
+    left, right = frames.as_watched(player.called_ns[0])
+    return CodeRecording(player.switches, left, right, frames.age_ms)
 
 
-class _Playing:
+class _CodePlayback:
     """The player at work, in a thread or step by step; whatever happens, dark at the end."""
 
     def __init__(self, player: CodePlayer, *, in_thread: bool) -> None:
@@ -142,7 +142,7 @@ class _Playing:
         self._error: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="code") if in_thread else None
 
-    def __enter__(self) -> "_Playing":
+    def __enter__(self) -> "_CodePlayback":
         self._player.begin()
         if self._thread is not None:
             self._thread.start()
