@@ -166,7 +166,7 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
             raise DeviceError(f"{snapshot.trouble}, but nothing came; {n_kept} pairs are kept")
         if n_waited > _MOST_FRAMES_A_PAIR:
             raise ResultError(
-                f"no wanted view can be taken after {n_kept} pairs ({snapshot.wish})",
+                f"no wanted view can be taken after {n_kept} pairs ({snapshot.instruction})",
                 remedy="use a larger board, or solve what is kept with `navapp calibrate stereo`",
             )
         snapshot = capture.step()

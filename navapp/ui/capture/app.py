@@ -22,8 +22,8 @@ from navapp.ui.capture.panels import (
     CheckLine,
     CoverageMap,
     GaugeLine,
+    InstructionLines,
     SmallCapture,
-    WishLines,
 )
 from navapp.ui.picture_view import HalfBlocks
 from navapp.ui.quiet_app import QuietApp, drive, say
@@ -68,7 +68,7 @@ class CaptureScreen(Screen[None]):
             with Horizontal(id="pictures"):
                 yield HalfBlocks("left")
                 yield HalfBlocks("right")
-            yield WishLines("wish")
+            yield InstructionLines("wish")
             yield CheckLine("checks")
             yield GaugeLine("gauge")
             with Horizontal(id="kept"):

@@ -58,7 +58,7 @@ class CaptureTitle(Lines[CaptureView]):
         return [Content.assemble(left, right)]
 
 
-class WishLines(Lines[CaptureView]):
+class InstructionLines(Lines[CaptureView]):
     """Where the board is wanted, or what became of the solve; first of all a camera's trouble."""
 
     def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
@@ -71,7 +71,7 @@ class WishLines(Lines[CaptureView]):
             first, rest = _broken(text, width - 10)
         else:
             level = Level.OK if view.snapshot.is_enough else Level.ATTENTION
-            first, rest = _broken(view.snapshot.wish, width - 10)
+            first, rest = _broken(view.snapshot.instruction, width - 10)
         head = "outcome " if outcome is not None else "wanted  "
         if view.snapshot.trouble:
             head, level = "camera  ", Level.BAD
@@ -199,7 +199,7 @@ class SmallCapture(Lines[CaptureView]):
         word, level = view.state
         return [
             Content.styled(word, level.value),
-            Content(view.snapshot.wish),
+            Content(view.snapshot.instruction),
             Content(f"{view.snapshot.n_kept} pairs"),
             Content.styled("make the terminal 80 x 24", "$text-muted"),
         ]

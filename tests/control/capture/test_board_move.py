@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from navapp.control.capture.words import way
+from navapp.control.capture.board_move import find_move
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 
 MIDDLE_MM = np.array([80.0, 60.0, 0.0])
@@ -25,7 +25,7 @@ def held(middle_mm=(0.0, 0.0, 450.0), turn_deg=(0.0, 0.0, 0.0)) -> RigidTransfor
     ],
 )
 def test_the_way_is_said_in_words(wanted, text):
-    found = way(held(), wanted, MIDDLE_MM)
+    found = find_move(held(), wanted, MIDDLE_MM)
     assert text in str(found)
     assert found.is_there is (text == "hold it still")
 
@@ -41,5 +41,5 @@ def test_the_words_are_true():
 
 
 def test_only_the_largest_three_parts_are_said():
-    text = str(way(held(), held((100.0, 80.0, 500.0), (28.0, 30.0, 20.0)), MIDDLE_MM))
+    text = str(find_move(held(), held((100.0, 80.0, 500.0), (28.0, 30.0, 20.0)), MIDDLE_MM))
     assert len(text.replace(";", ",").split(",")) == 3

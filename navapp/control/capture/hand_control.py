@@ -1,4 +1,4 @@
-"""A simulated hand that goes where the board is wanted."""
+"""Moves a simulated hand to where the board is wanted."""
 
 from navapp.control.capture.interfaces import BoardHand
 from navapp.geometry.transform import RigidTransform
@@ -7,7 +7,7 @@ from navapp.geometry.transform import RigidTransform
 _PATIENCE_NS, _MOST_TRIES = 3_000_000_000, 2
 
 
-class Following:
+class HandControl:
     """Tells a hand where to go, while it is on.
 
     Args:
@@ -25,7 +25,7 @@ class Following:
         """There is one to be told."""
         return self._hand is not None
 
-    def turn(self, *, is_on: bool) -> None:
+    def switch(self, *, is_on: bool) -> None:
         """Begin, or leave the hand to the keys."""
         self.is_on = is_on
         self.begin()

@@ -1,4 +1,4 @@
-"""Which view is wanted next, from what is kept: a pure function, run in a worker."""
+"""Plans the view of the board that a calibration needs next; run in a worker."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,8 +36,8 @@ _NEARLY_ALL = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Wish:
-    """What is known so far, and what is wanted.
+class NextView:
+    """The view that is wanted next, and the rig as far as it is known.
 
     Attributes:
         left_from_board: where the board should be held; None when no view helps.
@@ -60,14 +60,14 @@ class Wish:
     worst_mm: float | None = None
 
 
-def next_wish(
+def plan_next_view(
     board: Board,
     pairs: Sequence[SeenPair],
     size: tuple[int, int],
     depth_mm: tuple[float, float],
-    last: Wish | None = None,
+    last: NextView | None = None,
     avoid: Sequence[FloatArray] = (),
-) -> Wish:
+) -> NextView:
     """Solve the simplest rig again and ask what it lacks most.
 
     Args:
@@ -80,37 +80,37 @@ def next_wish(
     """
     start = starting_view(board, len(pairs) + len(avoid), depth_mm)
     if len(pairs) < N_STARTING:
-        return Wish(start, nominal_camera(size))
+        return NextView(start, nominal_camera(size))
     try:
-        return _informed(board, pairs, size, depth_mm, last, avoid)
+        return _plan_from_rig(board, pairs, size, depth_mm, last, avoid)
     except (ValueError, np.linalg.LinAlgError):
         # These views explain no rig: more of the starting ones may.
-        return Wish(start, nominal_camera(size))
+        return NextView(start, nominal_camera(size))
 
 
-def _informed(
+def _plan_from_rig(
     board: Board,
     pairs: Sequence[SeenPair],
     size: tuple[int, int],
     depth_mm: tuple[float, float],
-    last: Wish | None,
+    last: NextView | None,
     avoid: Sequence[FloatArray],
-) -> Wish:
-    """The wish of a rig that can be solved."""
-    solved, used, out = _solved(board, pairs, size, last)
+) -> NextView:
+    """The next view for a rig that can be solved."""
+    solved, used, out = _solve(board, pairs, size, last)
     rig = unpacked(solved.model, solved.shared)
     bounds = volume_bounds_mm(solved, depth_mm)
     view = wanted_view(board, solved, noise_px(solved), depth_mm, avoid)
     pose = starting_view(board, 0, depth_mm) if view is None else view
     indices = tuple(pair.index for pair in used)
     if len(bounds) == 0:
-        return Wish(pose, rig.left, rig, solved, indices, tuple(out))
+        return NextView(pose, rig.left, rig, solved, indices, tuple(out))
     middle_mm, worst_mm = float(np.median(bounds)), float(np.quantile(bounds, _NEARLY_ALL))
-    return Wish(pose, rig.left, rig, solved, indices, tuple(out), middle_mm, worst_mm)
+    return NextView(pose, rig.left, rig, solved, indices, tuple(out), middle_mm, worst_mm)
 
 
-def _solved(
-    board: Board, pairs: Sequence[SeenPair], size: tuple[int, int], last: Wish | None
+def _solve(
+    board: Board, pairs: Sequence[SeenPair], size: tuple[int, int], last: NextView | None
 ) -> tuple[Bundle, list[SeenPair], list[DroppedPair]]:
     """The simplest rig of the pairs that fit together."""
     out: list[DroppedPair] = list(last.misfits) if last is not None else []
@@ -132,7 +132,7 @@ def _solved(
     return solved, used, out + more
 
 
-def _poses(board: Board, pairs: Sequence[SeenPair], last: Wish) -> FloatArray:
+def _poses(board: Board, pairs: Sequence[SeenPair], last: NextView) -> FloatArray:
     """Where the last solve had them, and a first guess of new ones."""
     assert last.solved is not None  # noqa: S101 (for the type checker: the caller looked)
     known = dict(zip(last.indices, last.solved.left_from_board, strict=True))
@@ -178,7 +178,7 @@ def nominal_camera(size: tuple[int, int]) -> Camera:
     return Camera(matrix, np.zeros(0), width, height)
 
 
-def measured_pose(board: Board, seen: SeenBoard, camera: Camera) -> RigidTransform | None:
+def measure_pose(board: Board, seen: SeenBoard, camera: Camera) -> RigidTransform | None:
     """Camera from board as one picture tells it; None when it cannot be told."""
     vector = pose_of(board, seen, camera)
     if vector is None:

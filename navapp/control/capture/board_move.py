@@ -1,4 +1,4 @@
-"""The way from where the board is to where it is wanted, in words of who looks at the picture."""
+"""How the board must be moved to where it is wanted, in words for who looks at the picture."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ _TURNS = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Way:
+class BoardMove:
     """From one pose to another.
 
     Attributes:
@@ -53,9 +53,9 @@ class Way:
         return "; ".join(said) if said else "hold it still"
 
 
-def way(
+def find_move(
     now: RigidTransform, wanted: RigidTransform, middle_mm: FloatArray, slack: float = 1.0
-) -> Way:
+) -> BoardMove:
     """How a board gets from one pose to another.
 
     Args:
@@ -68,4 +68,4 @@ def way(
     turn_deg = np.degrees(vector_from_rotation(wanted.rotation @ now.rotation.T))
     near_mm = slack * _NEAR_SHARE * float(np.linalg.norm(wanted.apply(middle_mm)))
     is_turned = bool(np.linalg.norm(turn_deg) < slack * _NEAR_DEG)
-    return Way(shift_mm, turn_deg, is_turned and bool(np.linalg.norm(shift_mm) < near_mm))
+    return BoardMove(shift_mm, turn_deg, is_turned and bool(np.linalg.norm(shift_mm) < near_mm))

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from calibration.rig.judge import occupied
 from calibration.targets.pairs import SeenPair
+from navapp.control.capture.board_view import BoardView
 from navapp.control.capture.interfaces import PairStore
-from navapp.control.capture.looks import Look
 
 
 class KeptPairs:
@@ -31,15 +31,15 @@ class KeptPairs:
         """A list of the caller's own."""
         return list(self._pairs)
 
-    def add(self, look: Look) -> SeenPair | None:
-        """Keep a look; None when one of the cameras does not see the board.
+    def add(self, view: BoardView) -> SeenPair | None:
+        """Keep a view; None when one of the cameras does not see the board.
 
         Raises:
             InputError: the pictures cannot be written; then nothing is kept.
         """
-        pair = look.pair(self._next_index)
+        pair = view.to_pair(self._next_index)
         if pair is not None:
-            self._store.keep(pair.index, look.frame)
+            self._store.keep(pair.index, view.frame)
             self._next_index += 1
             self._pairs.append(pair)
             self.covered = self._cells()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.control.capture.wishes import N_STARTING, next_wish, starting_view
+from navapp.control.capture.next_view import N_STARTING, plan_next_view, starting_view
 from navapp.geometry.transform import rotation_angle_deg
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pairs, drawn_rig, seen_pair
 
@@ -28,25 +28,27 @@ def test_starting_views_differ():
 def test_before_there_is_a_rig_the_starting_views_are_asked_for():
     pairs = drawn_pairs(drawn_rig(np.random.default_rng(1)), np.random.default_rng(1), 3)
     for n in range(N_STARTING):
-        wish = next_wish(BOARD, pairs[:n], SIZE, DEPTH_MM)
-        assert wish.rig is None
-        assert wish.bound_mm is None
-        assert np.array_equal(wish.left_from_board.matrix, starting_view(BOARD, n, DEPTH_MM).matrix)
+        next_view = plan_next_view(BOARD, pairs[:n], SIZE, DEPTH_MM)
+        assert next_view.rig is None
+        assert next_view.bound_mm is None
+        assert np.array_equal(
+            next_view.left_from_board.matrix, starting_view(BOARD, n, DEPTH_MM).matrix
+        )
 
 
 def test_a_wished_view_is_worth_more_than_another_one():
     rng = np.random.default_rng(7)
     rig = drawn_rig(rng)
     pairs = drawn_pairs(rig, rng, 8)
-    wish = next_wish(BOARD, pairs, SIZE, DEPTH_MM)
-    wished = seen_pair(8, rig, wish.left_from_board, rng)
+    next_view = plan_next_view(BOARD, pairs, SIZE, DEPTH_MM)
+    wished = seen_pair(8, rig, next_view.left_from_board, rng)
     again = [*pairs, wished]
-    bound = next_wish(BOARD, again, SIZE, DEPTH_MM, wish).bound_mm
+    bound = plan_next_view(BOARD, again, SIZE, DEPTH_MM, next_view).bound_mm
     others = [
-        next_wish(BOARD, [*pairs, other], SIZE, DEPTH_MM, wish).bound_mm
+        plan_next_view(BOARD, [*pairs, other], SIZE, DEPTH_MM, next_view).bound_mm
         for other in (replaced(one) for one in drawn_pairs(rig, rng, 6))
     ]
-    assert bound < wish.bound_mm
+    assert bound < next_view.bound_mm
     assert bound < np.median(others)
 
 
@@ -57,8 +59,8 @@ def replaced(pair):
 def test_going_on_from_the_last_solve_and_beginning_anew_agree():
     rng = np.random.default_rng(9)
     pairs = drawn_pairs(drawn_rig(rng), rng, 10)
-    last = next_wish(BOARD, pairs[:9], SIZE, DEPTH_MM)
-    on, anew = (next_wish(BOARD, pairs, SIZE, DEPTH_MM, one) for one in (last, None))
+    last = plan_next_view(BOARD, pairs[:9], SIZE, DEPTH_MM)
+    on, anew = (plan_next_view(BOARD, pairs, SIZE, DEPTH_MM, one) for one in (last, None))
     assert on.bound_mm == pytest.approx(anew.bound_mm, rel=1e-3)
     assert on.rig.baseline_mm == pytest.approx(anew.rig.baseline_mm, abs=1e-3)
     assert on.indices == tuple(range(10))
@@ -68,15 +70,15 @@ def test_views_that_explain_no_rig_ask_for_the_starting_views_again():
     rng = np.random.default_rng(2)
     rig = drawn_rig(rng)
     same = [seen_pair(k, rig, starting_view(BOARD, 0, DEPTH_MM), rng) for k in range(4)]
-    wish = next_wish(BOARD, same, SIZE, DEPTH_MM)
-    assert wish.left_from_board is not None
-    assert wish.bound_mm is None or wish.bound_mm > 0.5
+    next_view = plan_next_view(BOARD, same, SIZE, DEPTH_MM)
+    assert next_view.left_from_board is not None
+    assert next_view.bound_mm is None or next_view.bound_mm > 0.5
 
 
 def test_turns_that_cannot_be_had_are_not_asked_for():
     rng = np.random.default_rng(7)
     pairs = drawn_pairs(drawn_rig(rng), rng, 6)
-    wish = next_wish(BOARD, pairs, SIZE, DEPTH_MM)
-    avoid = [wish.left_from_board.rotation]
-    other = next_wish(BOARD, pairs, SIZE, DEPTH_MM, wish, avoid)
-    assert rotation_angle_deg(other.left_from_board, wish.left_from_board) > 10.0
+    next_view = plan_next_view(BOARD, pairs, SIZE, DEPTH_MM)
+    avoid = [next_view.left_from_board.rotation]
+    other = plan_next_view(BOARD, pairs, SIZE, DEPTH_MM, next_view, avoid)
+    assert rotation_angle_deg(other.left_from_board, next_view.left_from_board) > 10.0
