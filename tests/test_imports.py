@@ -86,7 +86,7 @@ BREACHES = [
     ("navapp/tracking/judge.py", "import navapp.overlay", "tracking stands on"),
     ("navapp/control/trackers.py", "import sim_devices.world", "control is handed"),
     ("navapp/control/states.py", "import navapp.inventory.looking", "control is handed"),
-    ("navapp/control/sources.py", "import drivers.replay_camera", "control knows the device"),
+    ("navapp/control/frame_sources.py", "import drivers.replay_camera", "control knows the device"),
     ("navapp/ui/app.py", "import navapp.devices", "the screen reads snapshots"),
     ("drivers/clock.py", "import navapp.cli.main", "only the command line"),
     ("drivers/frames.py", "import navapp.values", "drivers stand on"),

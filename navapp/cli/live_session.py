@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from navapp.control.board_watch import BoardWatch
     from navapp.control.controller import SessionController
     from navapp.control.event_log import SessionHooks
-    from navapp.control.results import FrameListener
+    from navapp.control.frame_result import FrameListener
     from navapp.control.specification import SessionSpecification
     from navapp.devices import OpenedDevices
 

@@ -10,12 +10,15 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from drivers.replay_camera import ReplaySettings
+    from navapp.cli.headless import FrameLog
     from navapp.cli.recorded_operation import MovedRig
     from navapp.config import Configuration
     from navapp.control.executors import Executor
+    from navapp.control.frame_result import FrameListener
     from navapp.control.operators import Operator
-    from navapp.control.results import FrameListener
     from navapp.control.specification import SessionSpecification
+    from navapp.devices import OpenedDevices
+    from navapp.errors import NavappError
     from navapp.values import Plan, StageSpec
 
 _EXAMPLE = """\
@@ -90,12 +93,9 @@ class _Replay:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
-    from navapp.cli.headless import FrameLog, check_accepted, check_start, finish, follow
-    from navapp.cli.overlay_folder import OverlayFolder
-    from navapp.cli.results import frame_to_json, moved_rig_to_json
+    from navapp.cli.headless import FrameLog, check_accepted, check_start, report_result
+    from navapp.cli.results import frame_to_json, rig_alarm_to_json
     from navapp.config import find_file, load
-    from navapp.control.controller import SessionController
-    from navapp.control.event_log import SessionHooks
     from navapp.devices import open_recording
 
     _check(options)
@@ -112,23 +112,36 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             check_start(specification.prior, bone)
     opened = open_recording(options.sequence, settings, rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
+    seconds, failure = _run_session(replay, opened, log, options.overlay)
+    frames = [frame_to_json(result, {}) for result in log.results]
+    moved = replay.rig_moved
+    told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
+    return report_result(frames, seconds, failure, options, diagnostics, told)
+
+
+def _run_session(
+    replay: _Replay, opened: "OpenedDevices", log: "FrameLog", overlay: str | None
+) -> "tuple[float, NavappError | None]":
+    """Handle all frames; the seconds that they took, and the fault in which the session ended."""
+    from navapp.cli.headless import run_session
+    from navapp.cli.overlay_folder import OverlayFolder
+    from navapp.control.controller import SessionController
+    from navapp.control.event_log import SessionHooks
+
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         listeners: list[FrameListener] = [log]
-        if options.overlay is not None:
-            listeners.append(undo.enter_context(OverlayFolder(options.overlay)).add)
+        if overlay is not None:
+            listeners.append(undo.enter_context(OverlayFolder(overlay)).add)
         controller = SessionController(
             opened.devices,
-            specification,
+            replay.specification,
             executor=replay.executor,
             hooks=SessionHooks(on_frame=tuple(listeners)),
         )
         undo.callback(controller.close)
-        seconds = follow(controller, replay.operator, log)
-    frames = [frame_to_json(result, {}) for result in log.results]
-    moved = replay.rig_moved
-    told = None if moved is None else moved_rig_to_json(rig.name, *moved)
-    return finish(frames, seconds, controller.failure, options, diagnostics, told)
+        seconds = run_session(controller, replay.operator, log)
+    return seconds, controller.failure
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -159,7 +172,7 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.prior_files import read_prior
-    from navapp.cli.recorded_operation import moved_rig, operation, warnings
+    from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.operators import RecordedOperator
     from navapp.control.specification import specify_session
@@ -178,7 +191,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
     plan = read_plan(plan_path)
     first, others = _stages(options, plan, stage)
-    operator, executor = operation(session, options)
+    operator, executor = choose_operator(session, options)
     method = options.method or (None if session is None else session.method)
     specification = specify_session(
         configuration,
@@ -195,8 +208,8 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         operator,
         executor,
         isinstance(operator, RecordedOperator),
-        warnings(session, options),
-        moved_rig(session, options),
+        list_warnings(session, options),
+        find_moved_rig(session, options),
     )
 
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from navapp.control.results import FrameResult
-from navapp.control.session import rig_moved_text
+from navapp.control.frame_result import FrameResult
+from navapp.control.session import describe_moved_rig
 from navapp.control.states import DistrustRig, SessionState, Snapshot
 from navapp.values import LineTimings, Reason, Status, TrackedFrame
 
@@ -83,9 +83,9 @@ def rig_to_json(snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def moved_rig_to_json(name: str, after: int, found: DistrustRig) -> dict[str, Any]:
+def rig_alarm_to_json(name: str, after: int, found: DistrustRig) -> dict[str, Any]:
     """The `rig` object of a replay: after which frame the session found the rig moved, and how."""
-    return {"name": name, "alarm": rig_moved_text(found.why), "moved_after_frame": after}
+    return {"name": name, "alarm": describe_moved_rig(found.why), "moved_after_frame": after}
 
 
 def frame_text(result: FrameResult) -> str:
@@ -119,7 +119,7 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
         if frame["tre_mm"] is not None and frame["state"] == SessionState.NAVIGATING.value
     ]
     return {
-        **_counted(frames),
+        **_count(frames),
         "bodies": _others(frames),
         "fps": len(frames) / seconds if seconds > 0 and frames else None,
         "latency_ms": (
@@ -145,16 +145,16 @@ def _others(frames: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
     for frame in frames:
         for name, answer in frame["bodies"].items():
             turns.setdefault(name, []).append(answer)
-    return {name: _counted(answers) for name, answers in turns.items()}
+    return {name: _count(answers) for name, answers in turns.items()}
 
 
-def _counted(answers: Sequence[dict[str, Any]]) -> dict[str, int]:
+def _count(answers: Sequence[dict[str, Any]]) -> dict[str, int]:
     statuses = [answer["status"] for answer in answers]
     counts = {status.value.lower(): statuses.count(status.value) for status in Status}
     return {"frames": len(answers), **counts}
 
 
-def _counted_text(counts: dict[str, int]) -> str:
+def _count_text(counts: dict[str, int]) -> str:
     return (
         f"{counts['frames']} frames: {counts['ok']} OK, {counts['degraded']} degraded, "
         f"{counts['lost']} lost"
@@ -163,8 +163,8 @@ def _counted_text(counts: dict[str, int]) -> str:
 
 def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
-    lines = [_counted_text(summary)]
-    lines += [f"other bone, {name}: {_counted_text(n)}" for name, n in summary["bodies"].items()]
+    lines = [_count_text(summary)]
+    lines += [f"other bone, {name}: {_count_text(n)}" for name, n in summary["bodies"].items()]
     processing_ms, tre = summary["latency_ms"], summary["tre_mm"]
     if summary["fps"] is not None and processing_ms["p50"] is not None:
         lines.append(

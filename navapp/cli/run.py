@@ -13,8 +13,8 @@ from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
+    from navapp.control.frame_result import FrameResult
     from navapp.control.operators import ScriptStep
-    from navapp.control.results import FrameResult
 
 _EXAMPLE = """\
 examples:
@@ -102,7 +102,7 @@ def _run_headless(
     options: argparse.Namespace,
     diagnostics: Diagnostics,
 ) -> int:
-    from navapp.cli.headless import FrameLog, finish, follow
+    from navapp.cli.headless import FrameLog, report_result, run_session
     from navapp.cli.results import frame_to_json, rig_to_json
     from navapp.control.operators import ScriptedOperator
 
@@ -111,10 +111,10 @@ def _run_headless(
         undo.callback(session.opened.devices.close)
         controller = make_controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
-        seconds = follow(controller, ScriptedOperator(script), log)
+        seconds = run_session(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
-    return finish(frames, seconds, controller.failure, options, diagnostics, rig)
+    return report_result(frames, seconds, controller.failure, options, diagnostics, rig)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

@@ -110,13 +110,13 @@ def read_session(folder: str | Path) -> RecordedSession:
         folder / _RIG,
         folder / _PLAN,
         folder / _PRIOR,
-        _known_method(method, folder),
+        _parse_method(method, folder),
         first_stage,
         read_events(events_path),
     )
 
 
-def _known_method(name: str, folder: Path) -> Method:
+def _parse_method(name: str, folder: Path) -> Method:
     for method in _METHODS:
         if method == name:
             return method

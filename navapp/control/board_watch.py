@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from drivers.frames import Image, StereoFrame
 from navapp.control.executors import Executor, Job
-from navapp.control.length_check import MOST_LOOKS, Finding, Length, LengthCheck, pooled
+from navapp.control.length_check import MOST_LOOKS, Finding, Length, LengthCheck, pool_lengths
 
 # Often enough for a board that is shown for some seconds; a slow look takes at most a tenth of the
 # time, so that the line keeps its cores.
@@ -62,7 +62,7 @@ class BoardWatch:
         if self._job is not None or frame.captured_ns < self._due_ns:
             return
         self._began_ns = frame.captured_ns
-        self._job = Job(lambda report: self._timed(frame))
+        self._job = Job(lambda report: self._measure_and_time(frame))
         self._executor.start(self._job)
 
     def take_over(self) -> LengthCheck | None:
@@ -80,26 +80,26 @@ class BoardWatch:
             return None
         period_ns = max(_PERIOD_NS, _LEAST_PERIODS_OF_A_LOOK * job.result.took_ns)
         self._due_ns = self._began_ns + period_ns
-        return None if job.result.length is None else self._added(job.result.length, period_ns)
+        return None if job.result.length is None else self._add(job.result.length, period_ns)
 
     def close(self) -> None:
         """Wait for a look that still runs."""
         self._executor.close()
 
-    def _timed(self, frame: StereoFrame) -> "_Look":
+    def _measure_and_time(self, frame: StereoFrame) -> "_Look":
         # How long its result lies there until a frame takes it over costs nobody anything.
         started_ns = self._now_ns()
         length = self._measure(frame.left, frame.right)
         return _Look(length, self._now_ns() - started_ns)
 
-    def _added(self, length: Length, period_ns: int) -> LengthCheck | None:
+    def _add(self, length: Length, period_ns: int) -> LengthCheck | None:
         last = self.newest
         longest_ns = max(_SHOWING_NS, _SHOWING_PERIODS * period_ns)
         if last is not None and self._began_ns - last.captured_ns > longest_ns:
             self._lengths.clear()
             self._is_told = False
         self._lengths.append(length)
-        self.newest = pooled(tuple(self._lengths), self._began_ns, self._worst)
+        self.newest = pool_lengths(tuple(self._lengths), self._began_ns, self._worst)
         if self.newest.is_judged:
             self.judged = self.newest
         is_news = self.newest.is_judged and not self._is_told

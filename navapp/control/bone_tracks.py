@@ -95,7 +95,7 @@ class BoneTracks:
         self.drop_candidates()
         self._n_reviewed += 1
         track = TrackState.at_rest(pose, now_ns)
-        self._candidates = [Candidate(track, _unjudged_frame(bone), is_held=True)]
+        self._candidates = [Candidate(track, _make_unjudged(bone), is_held=True)]
 
     def drop_candidates(self) -> None:
         """Forget the candidates; accepted tracks stay."""
@@ -105,7 +105,7 @@ class BoneTracks:
     def forget_verdicts(self) -> None:
         """The candidates must be judged anew before one can be accepted."""
         self._candidates = [
-            replace(candidate, tracked=_unjudged_frame(candidate.tracked.bone))
+            replace(candidate, tracked=_make_unjudged(candidate.tracked.bone))
             for candidate in self._candidates
         ]
 
@@ -164,7 +164,7 @@ class BoneTracks:
         For replays, where nobody is there to be asked.
         """
         answers = self._trackers.register(stage, frame)
-        best = answers[0] if answers else _unjudged_frame(stage.bone)
+        best = answers[0] if answers else _make_unjudged(stage.bone)
         pose, verdict = best.left_from_bone, best.verdict
         if pose is not None and verdict.status is not Status.LOST:
             track = TrackState.at_rest(pose, frame.captured_ns, verdict.cause)
@@ -172,6 +172,6 @@ class BoneTracks:
         return best
 
 
-def _unjudged_frame(bone: str) -> TrackedFrame:
+def _make_unjudged(bone: str) -> TrackedFrame:
     """Of a pose that no frame has judged: it counts as lost and cannot be accepted."""
     return TrackedFrame(bone, None, Verdict(Status.LOST), LineTimings())

@@ -19,19 +19,19 @@ from navapp.control.board_watch import BoardWatch
 from navapp.control.bone_motion import BoneMotion
 from navapp.control.bone_tracks import BoneTracks
 from navapp.control.camera_link import CameraLink
-from navapp.control.commands import Commands
-from navapp.control.device_care import MirrorCare, ProjectorCare
-from navapp.control.device_watch import SlowDevices, tell_changes
+from navapp.control.command_handler import CommandHandler
+from navapp.control.device_handlers import MirrorHandler, ProjectorHandler
+from navapp.control.device_monitor import MonitoredDevices, tell_changes
 from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
+from navapp.control.frame_result import FrameResult
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import compose
 from navapp.control.registration_job import RegistrationJob
-from navapp.control.results import FrameResult
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
-from navapp.control.snapshots import SnapshotMaker
+from navapp.control.snapshot_maker import SnapshotMaker
 from navapp.control.specification import SessionSpecification
 from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
@@ -81,15 +81,16 @@ class SessionController:
         self._queue: deque[Command] = deque()
         self._lock = threading.Lock()
         self._session = _make_session(devices.clock, specification, hooks, executor, make_tracker)
-        self._watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
-        self._slow = SlowDevices(
-            ProjectorCare(devices.projector), MirrorCare(devices.mirror, specification.mirror_deg)
+        self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
+        self._monitored = MonitoredDevices(
+            ProjectorHandler(devices.projector),
+            MirrorHandler(devices.mirror, specification.mirror_deg),
         )
-        self._commands = Commands(
-            self._session, self._camera, self._display, self._watch, self._slow, plan
+        self._commands = CommandHandler(
+            self._session, self._camera, self._display, self._rig_watch, self._monitored, plan
         )
         self._maker = SnapshotMaker(
-            self._session, self._camera, self._display, self._slow, rig, self._watch, plan,
+            self._session, self._camera, self._display, self._monitored, rig, self._rig_watch, plan,
             specification.is_recording,
         )  # fmt: skip
         self._snapshot = self._maker.make()
@@ -126,7 +127,7 @@ class SessionController:
             self._commands.handle(command)
         else:
             session.take_over(session.sequence + 1)
-            self._watch.take_over()
+            self._rig_watch.take_over()
             frame = self._next_frame(timeout_s)
             if frame is not None:
                 self._handle_frame(frame)
@@ -141,12 +142,12 @@ class SessionController:
     def close(self) -> None:
         """End everything: dark first, then what moves; safe to call twice."""
         self._display.darken()
-        self._slow.close()
+        self._monitored.close()
         # Last of the three: an attempt to open a lost display may take many seconds.
         self._display.close()
         self._session.close()
         self._executor.close()
-        self._watch.close()
+        self._rig_watch.close()
         self._camera.close()
         self._devices.close()
         self._session.go_offline()
@@ -173,7 +174,7 @@ class SessionController:
         session = self._session
         session.begin_frame(frame)
         session.look_for_bone(frame)
-        self._watch.after(frame)
+        self._rig_watch.check_frame(frame)
         snapshot = self._maker.make()
         picture, overlay_ms = self._show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
@@ -205,7 +206,7 @@ class SessionController:
         # it when what would be seen on it is not what is shown.
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
         if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
-            self._session.event("device", self._display.trouble, EventLevel.ALARM)
+            self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
         self._session.keep_preview(make_preview(image))
         age_ns = self._session.now_ns - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms

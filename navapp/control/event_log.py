@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock
 from navapp.control.camera_link import Reopen
+from navapp.control.frame_result import FrameListener, FrameResult
 from navapp.control.recorder import RecordingStopped
-from navapp.control.results import FrameListener, FrameResult
 from navapp.control.states import Command, Event, EventLevel
 from navapp.errors import UsageError
 

@@ -7,7 +7,7 @@ from navapp.values import Reason, Status
 MAX_POSE_AGE_MS = 500.0
 
 
-def navigable(snapshot: Snapshot) -> tuple[Reason, ...]:
+def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
     """Why guides must not be shown, the most urgent first; empty means they may.
 
     A pure function of the snapshot, whose own `reasons` are not looked at.

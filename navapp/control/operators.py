@@ -61,7 +61,7 @@ class ReplayOperator:
         return []
 
 
-class Together:
+class CombinedOperator:
     """Several operators at one session: what each of them would do, in their order."""
 
     def __init__(self, *operators: Operator) -> None:

@@ -97,13 +97,13 @@ class RigWatch:
         if found is None or session.rig_error is not None:
             return
         if found.finding is Finding.OFF:
-            self._found(str(found))
+            self._tell_moved(str(found))
         elif found.finding is Finding.WITHIN:
-            session.event("rig", f"rig checked: {found}")
+            session.add_event("rig", f"rig checked: {found}")
         else:
-            session.event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)
+            session.add_event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)
 
-    def after(self, frame: StereoFrame) -> None:
+    def check_frame(self, frame: StereoFrame) -> None:
         """After a frame: what its rows say; and another look for the board when it is time."""
         if self._session.rig_error is not None:
             return
@@ -112,7 +112,7 @@ class RigWatch:
         rows = None if tracked is None else tracked.rows
         why = self._rows.add(rows, frame.captured_ns, motion_px)
         if why:
-            self._found(why)
+            self._tell_moved(why)
         elif self._board is not None:
             self._board.look(frame)
 
@@ -121,7 +121,7 @@ class RigWatch:
         self._display.darken()
         self._session.distrust_rig(command.why)
 
-    def _found(self, why: str) -> None:
+    def _tell_moved(self, why: str) -> None:
         # A replay cannot look again as fast as the session did, or follows otherwise: it is told.
         command = DistrustRig(why)
         self._session.tell_command(command)

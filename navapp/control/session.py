@@ -4,11 +4,11 @@ from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from navapp.control.bone_tracks import BoneTracks, Candidate
 from navapp.control.event_log import EventLog
+from navapp.control.frame_result import FrameResult
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import Image
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
-from navapp.control.results import FrameResult
 from navapp.control.states import (
     Command,
     Event,
@@ -188,7 +188,7 @@ class Session:
                 why = failure.verdict.reasons[0].value
             self.fall_back(f"registration failed: {why}", EventLevel.WARNING)
             return failure
-        text = with_bound(f"candidate 1 of {best.count}", best.tracked.verdict)
+        text = add_bound(f"candidate 1 of {best.count}", best.tracked.verdict)
         self.change_state(SessionState.REVIEW, text)
         return best.tracked
 
@@ -221,7 +221,7 @@ class Session:
     def accept(self, candidate: Candidate) -> None:
         """Navigate by the candidate that is under review."""
         self._tracks.accept(self._stage)
-        text = with_bound("registration accepted", candidate.tracked.verdict)
+        text = add_bound("registration accepted", candidate.tracked.verdict)
         self.change_state(SessionState.NAVIGATING, text)
 
     def reject(self) -> None:
@@ -232,7 +232,7 @@ class Session:
         if self._tracks.candidate is None:
             self.fall_back(text)
         else:
-            self.event("reject", text)
+            self.add_event("reject", text)
 
     def lose_camera(self, why: str, *, can_return: bool) -> None:
         """The camera is gone: a fault, and the end of the session unless it can return."""
@@ -251,14 +251,14 @@ class Session:
         """The rig has moved: a fault that does not end."""
         if self._rig_error is not None:
             return
-        self._rig_error = RigError(rig_moved_text(why), remedy=Reason.RIG_MOVED.remedy)
+        self._rig_error = RigError(describe_moved_rig(why), remedy=Reason.RIG_MOVED.remedy)
         self.forget_sight()
         self.change_state(SessionState.FAULT, self._rig_error.problem, EventLevel.ALARM)
 
     def end(self, kind: str, text: str) -> None:
         """Handle nothing any more, and tell why."""
         self._is_over = True
-        self.event(kind, text)
+        self.add_event(kind, text)
 
     def close(self) -> None:
         """End without a word and stop the search."""
@@ -274,7 +274,7 @@ class Session:
     ) -> None:
         """Stand elsewhere from now on, and tell why."""
         self._state = state
-        self.event("state", text, level)
+        self.add_event("state", text, level)
 
     def fall_back(self, text: str, level: EventLevel = EventLevel.INFO) -> None:
         """Go to the state that the session has without a candidate."""
@@ -284,7 +284,7 @@ class Session:
         is_known = self._tracks.is_accepted(self._stage)
         self.change_state(SessionState.SUSPENDED if is_known else SessionState.READY, text, level)
 
-    def event(self, kind: str, text: str, level: EventLevel = EventLevel.INFO) -> None:
+    def add_event(self, kind: str, text: str, level: EventLevel = EventLevel.INFO) -> None:
         """Keep and tell what has just happened."""
         self._log.add(kind, text, level)
 
@@ -297,7 +297,7 @@ class Session:
         # What was judged by the old stage's targets and tolerance says nothing in the new one.
         self._tracked = None
         self._tracks.forget_verdicts()
-        self.event("stage", f"stage {stage.number} {stage.name} entered")
+        self.add_event("stage", f"stage {stage.number} {stage.name} entered")
         self._log.tell_stage(stage.name)
 
     def _look_for_bone(self, frame: StereoFrame) -> TrackedFrame | None:
@@ -317,12 +317,12 @@ class Session:
         self._tracks.drop_candidates()
 
 
-def rig_moved_text(why: str) -> str:
+def describe_moved_rig(why: str) -> str:
     """What is said of a rig that has moved, with how that was found."""
     return f"{Reason.RIG_MOVED.value} ({why})"
 
 
-def with_bound(text: str, verdict: Verdict) -> str:
+def add_bound(text: str, verdict: Verdict) -> str:
     """A text with the predicted error, when there is one."""
     bound_mm = verdict.predicted_tre_mm
     return text if bound_mm is None else f"{text}, predicted error {bound_mm:.2f} mm"

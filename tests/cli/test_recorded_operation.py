@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from navapp.cli.recorded_operation import moved_rig, operation, warnings
+from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
 from navapp.cli.session_folder import RecordedSession
 from navapp.control.operators import RecordedEvents
 from navapp.control.runner import run_headless
@@ -34,7 +34,7 @@ def options(**given) -> argparse.Namespace:
 
 def states(recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
     """Of 20 frames; the numbers of the pictures begin where the replay does."""
-    operator, executor = operation(recorded, given)
+    operator, executor = choose_operator(recorded, given)
     bench = Bench(executor=executor, camera=FakeCamera(None, 20))
     bench.camera._sequence, bench.camera._n_frames = given.start, given.start + 20
     run_headless(bench.controller, operator)
@@ -65,8 +65,8 @@ def test_a_replay_that_starts_after_it_shows_nothing_at_all() -> None:
 
 def test_another_rig_is_not_the_one_that_moved() -> None:
     for given in (options(rig="r.yml"), options(rig="r.yml", method="icp")):
-        assert moved_rig(session(), given) is None
-        operator, executor = operation(session(), given)
+        assert find_moved_rig(session(), given) is None
+        operator, executor = choose_operator(session(), given)
         bench = Bench(executor=executor, camera=FakeCamera(None, 20))
         run_headless(bench.controller, operator)
         assert bench.results[-1].state.value == "navigating"
@@ -74,9 +74,9 @@ def test_another_rig_is_not_the_one_that_moved() -> None:
 
 def test_to_and_fro_it_is_said_instead() -> None:
     given = options(order="pingpong")
-    assert moved_rig(session(), given) == (AFTER, FOUND)
-    (warning,) = warnings(session(), given)
+    assert find_moved_rig(session(), given) == (AFTER, FOUND)
+    (warning,) = list_warnings(session(), given)
     assert "moved after frame 5 (100 mm are 100.13 mm)" in warning
-    assert warnings(session(is_moved=False), given) == ()
-    assert warnings(session(), options(method="icp")) == ()
-    assert warnings(None, given) == ()
+    assert list_warnings(session(is_moved=False), given) == ()
+    assert list_warnings(session(), options(method="icp")) == ()
+    assert list_warnings(None, given) == ()

@@ -5,11 +5,11 @@ from dataclasses import replace
 from navapp.cli.results import (
     frame_text,
     frame_to_json,
-    moved_rig_to_json,
+    rig_alarm_to_json,
     summarise,
     summary_text,
 )
-from navapp.control.results import FrameResult
+from navapp.control.frame_result import FrameResult
 from navapp.control.states import DistrustRig
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
@@ -77,7 +77,7 @@ def test_a_frame_of_a_moved_rig_says_so() -> None:
 
 
 def test_a_replay_says_where_its_session_found_the_rig_moved() -> None:
-    assert moved_rig_to_json("sim", 5, DistrustRig("bumped")) == {
+    assert rig_alarm_to_json("sim", 5, DistrustRig("bumped")) == {
         "name": "sim",
         "alarm": "rig moved, recalibrate (bumped)",
         "moved_after_frame": 5,

@@ -23,7 +23,7 @@ from navapp.control.board_watch import BoardWatch
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
-from navapp.control.results import FrameResult
+from navapp.control.frame_result import FrameResult
 from navapp.control.specification import SessionSpecification
 from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Reject, Snapshot
 from navapp.errors import DeviceLost, DeviceTimeout, EndOfSequence

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import InlineExecutor
-from navapp.control.interlocks import navigable
+from navapp.control.interlocks import check_interlocks
 from navapp.control.recorder import RecordingStopped
 from navapp.control.states import (
     Accept,
@@ -252,7 +252,7 @@ def test_guides_are_never_seen_when_they_must_not_be(actions) -> None:
     for action in ["frame", Register(), "frame", Accept(None), "frame", *actions]:
         act(bench, action)
         snapshot = bench.snapshot
-        assert snapshot.reasons == navigable(snapshot)
+        assert snapshot.reasons == check_interlocks(snapshot)
         if bench.shows_guides:
             is_candidate = snapshot.state.value == "review" and not snapshot.is_blanked
             assert snapshot.is_navigable or is_candidate

@@ -95,7 +95,7 @@ def test_nobody_waits_for_a_display_that_opens_slowly(cable) -> None:
     assert cable.n_attempts == 2
     cable.is_plugged = True
     cable.gate.set()
-    wait_until(lambda: not link._reopening.is_under_way)
+    wait_until(lambda: not link._reopener.is_under_way)
     assert not shown(link)
     link.show_again()
     assert shown(link)
@@ -128,7 +128,7 @@ def test_after_the_end_it_is_not_opened_any_more(cable) -> None:
     link.close()
     assert not shown(link)
     assert cable.n_attempts == 1
-    assert not link._reopening.is_under_way
+    assert not link._reopener.is_under_way
 
 
 class MovableMirror(FixedMirror):

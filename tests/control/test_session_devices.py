@@ -6,7 +6,7 @@ import pytest
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState
 from drivers.no_projector import NoProjector
-from navapp.control.device_care import MIRROR_TOLERANCE_DEG
+from navapp.control.device_handlers import MIRROR_TOLERANCE_DEG
 from navapp.control.states import (
     DeviceHealth,
     DeviceLine,

@@ -131,7 +131,7 @@ def test_a_mirror_that_stalls_on_its_way_back_is_told_and_stays_dark(with_mirror
 @pytest.fixture
 def with_projector(monkeypatch, tmp_path) -> Iterator[Room]:
     """Navigating with a projector whose lamp is on."""
-    monkeypatch.setattr("navapp.control.device_watch.PROJECTOR_TIMES_S", (0.2, 20.0))
+    monkeypatch.setattr("navapp.control.device_monitor.PROJECTOR_TIMES_S", (0.2, 20.0))
     with ExitStack() as stack:
         terminal = stack.enter_context(projector_terminal(tmp_path))
         projector = projector_at(terminal)

@@ -46,7 +46,7 @@ class Room:
 
 @pytest.fixture
 def room(monkeypatch) -> Iterator[Room]:
-    monkeypatch.setattr("navapp.control.device_watch.PROJECTOR_TIMES_S", (0.2, 20.0))
+    monkeypatch.setattr("navapp.control.device_monitor.PROJECTOR_TIMES_S", (0.2, 20.0))
     with ExitStack() as stack:
         made = Room(stack)
         navigating(made.bench)

@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 
 from navapp.control.camera_link import CameraLink
-from navapp.control.device_care import Report
+from navapp.control.device_handlers import DeviceReport
 from navapp.control.device_lines import camera_line, display_line, rig_line
-from navapp.control.device_watch import SlowDevices
+from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
-from navapp.control.interlocks import navigable
+from navapp.control.interlocks import check_interlocks
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.stages import STAGES
@@ -34,7 +34,7 @@ class SnapshotMaker:
     session: Session
     camera: CameraLink
     display: DisplayLink
-    slow: SlowDevices
+    slow: MonitoredDevices
     rig: StereoRig
     rig_watch: RigWatch
     plan: Plan
@@ -80,14 +80,14 @@ class SnapshotMaker:
             length_check=self.rig_watch.length_check,
             is_over=session.is_over,
         )
-        return replace(draft, reasons=navigable(draft))
+        return replace(draft, reasons=check_interlocks(draft))
 
     @property
     def _is_simulated(self) -> bool:
         """The pictures are not of this world; a replayed rig still says so by its name."""
         return self.camera.camera.info.is_simulated or self.rig.name.startswith("sim:")
 
-    def _device_lines(self, reports: tuple[Report, ...]) -> tuple[DeviceLine, ...]:
+    def _device_lines(self, reports: tuple[DeviceReport, ...]) -> tuple[DeviceLine, ...]:
         lines = (
             camera_line(self.camera.camera.info, self.camera.trouble, self.camera.silence),
             display_line(self.display.display.info, self.display.trouble),

@@ -2,7 +2,7 @@
 
 from navapp.control.bone_tracks import Candidate
 from navapp.control.camera_link import CameraLink
-from navapp.control.device_watch import SlowDevices
+from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
@@ -28,7 +28,7 @@ from navapp.errors import UsageError
 from navapp.values import Plan, Status
 
 
-class Commands:
+class CommandHandler:
     """Obeys, or refuses with a reason that the operator reads."""
 
     def __init__(
@@ -37,7 +37,7 @@ class Commands:
         camera: CameraLink,
         display: DisplayLink,
         rig: RigWatch,
-        slow: SlowDevices,
+        slow: MonitoredDevices,
         plan: Plan,
     ) -> None:
         self._session = session
@@ -97,7 +97,7 @@ class Commands:
         self._session.cancel_registration()
 
     def _on_accept(self, command: Accept) -> None:
-        candidate = self._reviewed("accept", command.candidate_id)
+        candidate = self._check_candidate("accept", command.candidate_id)
         if candidate is None:
             return
         if candidate.tracked.verdict.status is Status.LOST:
@@ -106,10 +106,10 @@ class Commands:
         self._session.accept(candidate)
 
     def _on_reject(self, command: Reject) -> None:
-        if self._reviewed("reject", command.candidate_id) is not None:
+        if self._check_candidate("reject", command.candidate_id) is not None:
             self._session.reject()
 
-    def _reviewed(self, what: str, candidate_id: int | None) -> Candidate | None:
+    def _check_candidate(self, what: str, candidate_id: int | None) -> Candidate | None:
         """The candidate that a decision is about; None, and refused, when it is not the one."""
         candidate = self._session.candidate
         if self._session.state is not SessionState.REVIEW or candidate is None:
@@ -122,12 +122,12 @@ class Commands:
 
     def _on_blank(self) -> None:
         self._display.blank()
-        self._session.event("blank", "display blanked by the operator")
+        self._session.add_event("blank", "display blanked by the operator")
 
     def _on_show(self) -> None:
         if self._display.is_blanked:
             self._display.show_again()
-            self._session.event("show", "display shown again")
+            self._session.add_event("show", "display shown again")
 
     def _on_enter_stage(self, command: EnterStage) -> None:
         try:
@@ -155,4 +155,4 @@ class Commands:
         return False
 
     def _refuse(self, what: str, why: str) -> None:
-        self._session.event("refused", f"{what} refused: {why}", EventLevel.WARNING)
+        self._session.add_event("refused", f"{what} refused: {why}", EventLevel.WARNING)

@@ -4,8 +4,13 @@ import threading
 import time
 
 from drivers.clock import Clock, SystemClock
-from navapp.control.device_care import Care, MirrorCare, ProjectorCare, Report
-from navapp.control.pauses import Pauses
+from navapp.control.backoff import Backoff
+from navapp.control.device_handlers import (
+    DeviceHandler,
+    DeviceReport,
+    MirrorHandler,
+    ProjectorHandler,
+)
 from navapp.control.session import Session
 from navapp.control.states import DeviceHealth, DeviceLine, EventLevel, Snapshot
 from navapp.errors import DeviceError
@@ -21,7 +26,7 @@ _LONGEST_END_S, _STOP_PERIOD_S = 20.0, 0.1
 _FAILED = (DeviceHealth.TROUBLE, DeviceHealth.LOST)
 
 
-class DeviceWatch:
+class DeviceMonitor:
     """The newest report of one device; a lost one is opened again, with growing pauses.
 
     The first report is made at once. A device that is not slow is asked for every report; a slow
@@ -29,36 +34,36 @@ class DeviceWatch:
     """
 
     def __init__(
-        self, care: Care, times_s: tuple[float, float], clock: Clock | None = None
+        self, handler: DeviceHandler, times_s: tuple[float, float], clock: Clock | None = None
     ) -> None:
         """Make the first report.
 
         Args:
-            care: of the device.
+            handler: of the device.
             times_s: between two questions; after which a report is stale.
             clock: of the reports' age.
         """
-        self._care = care
+        self._handler = handler
         self._period_s, self._stale_s = times_s
         self._clock: Clock = clock or SystemClock()
-        self._pauses = Pauses(*_PAUSES_S)
+        self._backoff = Backoff(*_PAUSES_S)
         self._wake = threading.Event()
         self._is_over = False
         self._n_asked = self._n_restored = 0
-        self._made = (self._clock.now_ns(), care.report())
+        self._made = (self._clock.now_ns(), handler.report())
         self._thread: threading.Thread | None = None
-        if care.is_slow:
+        if handler.is_slow:
             self._thread = threading.Thread(target=self._run, name="device watch", daemon=True)
             self._thread.start()
 
     @property
-    def report(self) -> Report:
+    def report(self) -> DeviceReport:
         """The newest."""
         if self._thread is None:
-            return self._care.report()
+            return self._handler.report()
         made_ns, report = self._made
-        if self._is_restoring and self._care.restoring:
-            return self._with(report, DeviceHealth.TROUBLE, self._care.restoring)
+        if self._is_restoring and self._handler.restoring:
+            return self._with(report, DeviceHealth.TROUBLE, self._handler.restoring)
         is_lost = report.line.health is DeviceHealth.LOST
         if not is_lost and self._clock.now_ns() - made_ns > self._stale_s * 1e9:
             return self._with(report, DeviceHealth.LOST, "has not answered for a while")
@@ -80,7 +85,7 @@ class DeviceWatch:
         end_s = time.monotonic() + _LONGEST_END_S
         # A motion may be about to begin: one stop could come just before it.
         while self._thread is not None and self._thread.is_alive() and time.monotonic() < end_s:
-            self._care.stop()
+            self._handler.stop()
             self._thread.join(_STOP_PERIOD_S)
 
     def _run(self) -> None:
@@ -90,22 +95,22 @@ class DeviceWatch:
             self._wake.clear()
             if self._is_over:
                 return
-            report = self._asked()
+            report = self._ask()
             self._made = (self._clock.now_ns(), report)
             if report.line.health is DeviceHealth.LOST:
-                pause_s = self._pauses.take_s()
+                pause_s = self._backoff.next_pause_s()
             else:
-                self._pauses.begin_again()
+                self._backoff.reset()
                 pause_s = self._period_s
 
-    def _asked(self) -> Report:
+    def _ask(self) -> DeviceReport:
         n_asked, report = self._n_asked, self._made[1]
         try:
             if report.line.health is DeviceHealth.LOST:
-                self._care.reopen()
+                self._handler.reopen()
             if self._is_restoring:
-                self._care.restore()
-            return self._care.report()
+                self._handler.restore()
+            return self._handler.report()
         except DeviceError as error:
             return self._with(report, DeviceHealth.LOST, str(error))
         except Exception as error:  # noqa: BLE001 (a bug must end as a lost device, not as a silent thread)
@@ -113,26 +118,26 @@ class DeviceWatch:
         finally:
             self._n_restored = n_asked
 
-    def _with(self, report: Report, health: DeviceHealth, detail: str) -> Report:
+    def _with(self, report: DeviceReport, health: DeviceHealth, detail: str) -> DeviceReport:
         line = report.line
-        return Report(DeviceLine(line.kind, line.name, health, detail), self._care.reason)
+        return DeviceReport(DeviceLine(line.kind, line.name, health, detail), self._handler.reason)
 
 
-class SlowDevices:
+class MonitoredDevices:
     """The session's projector and mirror.
 
     The mirror is brought to its calibrated angle when the session begins.
     """
 
-    def __init__(self, projector: ProjectorCare, mirror: MirrorCare) -> None:
+    def __init__(self, projector: ProjectorHandler, mirror: MirrorHandler) -> None:
         self._watches = (
-            DeviceWatch(projector, PROJECTOR_TIMES_S),
-            DeviceWatch(mirror, MIRROR_TIMES_S),
+            DeviceMonitor(projector, PROJECTOR_TIMES_S),
+            DeviceMonitor(mirror, MIRROR_TIMES_S),
         )
         self.restore()
 
     @property
-    def reports(self) -> tuple[Report, ...]:
+    def reports(self) -> tuple[DeviceReport, ...]:
         """Of the projector and of the mirror."""
         return tuple(watch.report for watch in self._watches)
 
@@ -152,7 +157,7 @@ def tell_changes(session: Session, before: Snapshot, after: Snapshot) -> None:
     for reason in after.device_reasons:
         if reason not in before.device_reasons:
             details = "; ".join(line.detail for line in after.devices if line.health in _FAILED)
-            session.event("device", f"dark: {reason.value} ({details})", EventLevel.ALARM)
+            session.add_event("device", f"dark: {reason.value} ({details})", EventLevel.ALARM)
     for reason in before.device_reasons:
         if reason not in after.device_reasons:
-            session.event("device", f"no longer: {reason.value}")
+            session.add_event("device", f"no longer: {reason.value}")

@@ -1,4 +1,4 @@
-"""The watch over slow devices: what it reports, when it tries again, and what it leaves behind."""
+"""The monitor over slow devices: what it reports, when it tries again, and what it leaves behind."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -7,16 +7,16 @@ import pytest
 
 from drivers.clock import ManualClock
 from drivers.interfaces import MirrorInfo, PowerState, ProjectorStatus
-from navapp.control.device_care import MirrorCare, ProjectorCare, Report
-from navapp.control.device_watch import DeviceWatch
-from navapp.control.pauses import Pauses
+from navapp.control.backoff import Backoff
+from navapp.control.device_handlers import DeviceReport, MirrorHandler, ProjectorHandler
+from navapp.control.device_monitor import DeviceMonitor
 from navapp.control.states import DeviceHealth, DeviceLine
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound
 from navapp.values import Reason
 from tests.control.fakes import wait_for
 
 
-class Care:
+class FakeHandler:
     """A device in a test's hands."""
 
     reason = Reason.MIRROR_AWAY
@@ -33,13 +33,13 @@ class Care:
         self.report_error: Exception | None = None
         self.n_asked = self.n_reopened = self.n_begun = self.n_restored = self.n_stopped = 0
 
-    def report(self) -> Report:
+    def report(self) -> DeviceReport:
         self.n_asked += 1
         if not self.is_held_in_restore:
             self.gate.wait()
         if self.report_error is not None:
             raise self.report_error
-        return Report(DeviceLine("mirror", "m", self.health, "detail"))
+        return DeviceReport(DeviceLine("mirror", "m", self.health, "detail"))
 
     def restore(self) -> None:
         self.n_begun += 1
@@ -58,8 +58,8 @@ class Care:
 
 
 @pytest.fixture
-def care() -> Care:
-    return Care()
+def handler() -> FakeHandler:
+    return FakeHandler()
 
 
 @pytest.fixture
@@ -68,118 +68,118 @@ def clock() -> ManualClock:
 
 
 @pytest.fixture
-def watch(care, clock) -> Iterator[DeviceWatch]:
-    made = DeviceWatch(care, (0.01, 1.0), clock)
+def monitor(handler, clock) -> Iterator[DeviceMonitor]:
+    made = DeviceMonitor(handler, (0.01, 1.0), clock)
     yield made
-    care.gate.set()
+    handler.gate.set()
     made.close()
 
 
-def test_the_first_report_is_there_at_once_and_renewed(watch, care) -> None:
-    assert watch.report.line.health is DeviceHealth.OK
-    wait_for(lambda: care.n_asked > 3, "more questions")
+def test_the_first_report_is_there_at_once_and_renewed(monitor, handler) -> None:
+    assert monitor.report.line.health is DeviceHealth.OK
+    wait_for(lambda: handler.n_asked > 3, "more questions")
 
 
 def test_a_device_that_is_not_slow_is_asked_for_every_report() -> None:
-    care = Care()
-    care.is_slow = False
-    watch = DeviceWatch(care, (0.01, 1.0))
-    before = care.n_asked
-    assert watch.report.line.detail == "detail"
-    assert care.n_asked == before + 1
-    watch.close()
+    handler = FakeHandler()
+    handler.is_slow = False
+    monitor = DeviceMonitor(handler, (0.01, 1.0))
+    before = handler.n_asked
+    assert monitor.report.line.detail == "detail"
+    assert handler.n_asked == before + 1
+    monitor.close()
 
 
-def test_an_answer_that_stays_away_makes_the_device_lost(watch, care, clock) -> None:
-    care.gate.clear()
-    wait_for(lambda: watch._made is not None and care.n_asked > 1, "a question")
+def test_an_answer_that_stays_away_makes_the_device_lost(monitor, handler, clock) -> None:
+    handler.gate.clear()
+    wait_for(lambda: monitor._made is not None and handler.n_asked > 1, "a question")
     clock.advance_ns(3 * 10**9)
-    report = watch.report
+    report = monitor.report
     assert report.reason is Reason.MIRROR_AWAY
     assert report.line.health is DeviceHealth.LOST
     assert "has not answered" in report.line.detail
-    care.gate.set()
-    wait_for(lambda: watch.report.line.health is DeviceHealth.OK, "its return")
-    assert watch.report.reason is None
+    handler.gate.set()
+    wait_for(lambda: monitor.report.line.health is DeviceHealth.OK, "its return")
+    assert monitor.report.reason is None
 
 
-def test_a_lost_device_is_opened_again_and_its_error_told(watch, care, clock) -> None:
-    watch._pauses = Pauses(0.01, 8.0)
-    care.error = DeviceNotFound("not plugged in")
-    care.health = DeviceHealth.LOST
-    wait_for(lambda: watch.report.line.detail == "not plugged in", "the error")
-    assert watch.report.reason is Reason.MIRROR_AWAY
+def test_a_lost_device_is_opened_again_and_its_error_told(monitor, handler, clock) -> None:
+    monitor._pauses = Backoff(0.01, 8.0)
+    handler.error = DeviceNotFound("not plugged in")
+    handler.health = DeviceHealth.LOST
+    wait_for(lambda: monitor.report.line.detail == "not plugged in", "the error")
+    assert monitor.report.reason is Reason.MIRROR_AWAY
     clock.advance_ns(10**11)
-    assert watch.report.line.detail == "not plugged in", "however long the pauses become"
-    care.error, care.health = None, DeviceHealth.OK
-    watch.restore()
-    wait_for(lambda: watch.report.line.health is DeviceHealth.OK, "its return")
-    assert care.n_reopened >= 2
+    assert monitor.report.line.detail == "not plugged in", "however long the pauses become"
+    handler.error, handler.health = None, DeviceHealth.OK
+    monitor.restore()
+    wait_for(lambda: monitor.report.line.health is DeviceHealth.OK, "its return")
+    assert handler.n_reopened >= 2
 
 
 @pytest.mark.parametrize("where", ["report_error", "error"])
-def test_a_bug_ends_as_a_lost_device_and_the_thread_goes_on(watch, care, where) -> None:
-    watch._pauses = Pauses(0.01, 0.01)
-    care.health = DeviceHealth.LOST
-    setattr(care, where, RuntimeError("a bug"))
-    wait_for(lambda: "RuntimeError('a bug')" in watch.report.line.detail, "the words")
-    assert watch.report.line.health is DeviceHealth.LOST
-    assert watch.report.reason is Reason.MIRROR_AWAY
-    watch.restore()
-    wait_for(lambda: not watch._is_restoring, "an end of what the operator asked for")
-    setattr(care, where, None)
-    care.health = DeviceHealth.OK
-    wait_for(lambda: watch.report.line.health is DeviceHealth.OK, "its return")
-    assert watch.report.reason is None
+def test_a_bug_ends_as_a_lost_device_and_the_thread_goes_on(monitor, handler, where) -> None:
+    monitor._pauses = Backoff(0.01, 0.01)
+    handler.health = DeviceHealth.LOST
+    setattr(handler, where, RuntimeError("a bug"))
+    wait_for(lambda: "RuntimeError('a bug')" in monitor.report.line.detail, "the words")
+    assert monitor.report.line.health is DeviceHealth.LOST
+    assert monitor.report.reason is Reason.MIRROR_AWAY
+    monitor.restore()
+    wait_for(lambda: not monitor._is_restoring, "an end of what the operator asked for")
+    setattr(handler, where, None)
+    handler.health = DeviceHealth.OK
+    wait_for(lambda: monitor.report.line.health is DeviceHealth.OK, "its return")
+    assert monitor.report.reason is None
 
 
-def test_the_pauses_between_attempts_double(care, clock, monkeypatch) -> None:
+def test_the_pauses_between_attempts_double(handler, clock, monkeypatch) -> None:
     pauses_s = []
-    monkeypatch.setattr("navapp.control.device_watch._PAUSES_S", (0.01, 0.05))
-    care.health, care.error = DeviceHealth.LOST, DeviceLost("gone")
-    watch = DeviceWatch(care, (0.002, 1.0), clock)
-    wait = watch._wake.wait
-    watch._wake.wait = lambda pause_s: pauses_s.append(pause_s) or wait(pause_s)
+    monkeypatch.setattr("navapp.control.device_monitor._PAUSES_S", (0.01, 0.05))
+    handler.health, handler.error = DeviceHealth.LOST, DeviceLost("gone")
+    monitor = DeviceMonitor(handler, (0.002, 1.0), clock)
+    wait = monitor._wake.wait
+    monitor._wake.wait = lambda pause_s: pauses_s.append(pause_s) or wait(pause_s)
     wait_for(lambda: len(pauses_s) > 6, "attempts")
-    watch.close()
+    monitor.close()
     assert set(pauses_s) <= {0.002, 0.01, 0.02, 0.04, 0.05}
     assert pauses_s[-3:] == [0.05] * 3
     assert pauses_s == sorted(pauses_s), "never shorter while it stays away"
 
 
-def test_attempts_become_rarer_and_the_operator_does_not_wait(watch, care) -> None:
-    watch._pauses = Pauses(30.0, 30.0)
-    care.health, care.error = DeviceHealth.LOST, DeviceLost("gone")
-    wait_for(lambda: watch.report.line.health is DeviceHealth.LOST, "the loss")
-    assert care.n_reopened <= 1
-    care.error, care.health = None, DeviceHealth.OK
-    watch.restore()
-    wait_for(lambda: watch.report.line.health is DeviceHealth.OK, "its return")
+def test_attempts_become_rarer_and_the_operator_does_not_wait(monitor, handler) -> None:
+    monitor._pauses = Backoff(30.0, 30.0)
+    handler.health, handler.error = DeviceHealth.LOST, DeviceLost("gone")
+    wait_for(lambda: monitor.report.line.health is DeviceHealth.LOST, "the loss")
+    assert handler.n_reopened <= 1
+    handler.error, handler.health = None, DeviceHealth.OK
+    monitor.restore()
+    wait_for(lambda: monitor.report.line.health is DeviceHealth.OK, "its return")
 
 
-def test_while_it_is_restored_it_is_said_and_closing_stops_it(care, clock) -> None:
-    care.is_held_in_restore = True
-    watch = DeviceWatch(care, (0.01, 1.0), clock)
-    care.gate.clear()
-    watch.restore()
-    assert watch.report.line.detail == "being moved"
-    assert watch.report.reason is Reason.MIRROR_AWAY
-    wait_for(lambda: care.n_begun == 1, "its beginning")
-    watch.close()
-    assert care.n_stopped > 0
+def test_while_it_is_restored_it_is_said_and_closing_stops_it(handler, clock) -> None:
+    handler.is_held_in_restore = True
+    monitor = DeviceMonitor(handler, (0.01, 1.0), clock)
+    handler.gate.clear()
+    monitor.restore()
+    assert monitor.report.line.detail == "being moved"
+    assert monitor.report.reason is Reason.MIRROR_AWAY
+    wait_for(lambda: handler.n_begun == 1, "its beginning")
+    monitor.close()
+    assert handler.n_stopped > 0
 
 
-def test_closing_stops_it_until_it_stands(care, clock) -> None:
+def test_closing_stops_it_until_it_stands(handler, clock) -> None:
     """A stop that comes before a motion begins ends nothing."""
-    care.n_stops_needed = 3
-    care.is_held_in_restore = True
-    watch = DeviceWatch(care, (0.01, 1.0), clock)
-    care.gate.clear()
-    watch.restore()
-    wait_for(lambda: care.n_begun == 1, "its beginning")
-    watch.close()
-    assert care.n_stopped == 3
-    assert care.n_restored == 1
+    handler.n_stops_needed = 3
+    handler.is_held_in_restore = True
+    monitor = DeviceMonitor(handler, (0.01, 1.0), clock)
+    handler.gate.clear()
+    monitor.restore()
+    wait_for(lambda: handler.n_begun == 1, "its beginning")
+    monitor.close()
+    assert handler.n_stopped == 3
+    assert handler.n_restored == 1
 
 
 class Projector:
@@ -209,47 +209,47 @@ class Projector:
 )
 def test_a_projector_that_alters_the_picture_forbids_guides(status, words) -> None:
     projector = Projector(keystone=(126, 126), source="30", flips_horizontally=False)
-    care = ProjectorCare(projector)
-    assert care.report().reason is None
+    handler = ProjectorHandler(projector)
+    assert handler.report().reason is None
     projector.say(**{"keystone": (126, 126), "source": "30", **status})
-    report = care.report()
+    report = handler.report()
     assert report.reason is Reason.PROJECTOR_ALTERS
     assert report.line.health is DeviceHealth.TROUBLE
     assert words in report.line.detail
     projector.say(keystone=(126, 126))
-    assert care.report().reason is None
+    assert handler.report().reason is None
 
 
 def test_a_source_that_changed_while_the_lamp_was_out_forbids_guides() -> None:
     projector = Projector(power=PowerState.WARMING)
-    care = ProjectorCare(projector)
+    handler = ProjectorHandler(projector)
     for source, reason in (("30", None), (None, None), ("A0", Reason.PROJECTOR_ALTERS)):
-        care.report()
+        handler.report()
         projector.say(PowerState.ON if source else PowerState.STANDBY, source=source)
-        assert care.report().reason is reason
+        assert handler.report().reason is reason
 
 
 @pytest.mark.parametrize(
     "power", [PowerState.STANDBY, PowerState.WARMING, PowerState.COOLING, PowerState.UNKNOWN]
 )
 def test_a_lamp_that_is_not_on_is_told(power) -> None:
-    report = ProjectorCare(Projector(power=power)).report()
+    report = ProjectorHandler(Projector(power=power)).report()
     assert (report.line.health, report.line.detail) == (DeviceHealth.TROUBLE, power.value)
     assert report.reason is None, "nobody sees guides that no lamp shows"
-    both = ProjectorCare(Projector(power=power, faults=("filter",))).report().line.detail
+    both = ProjectorHandler(Projector(power=power, faults=("filter",))).report().line.detail
     assert both == f"{power.value}, filter"
 
 
 def test_a_hidden_picture_is_told() -> None:
-    report = ProjectorCare(Projector(is_muted=True, faults=("filter",))).report()
+    report = ProjectorHandler(Projector(is_muted=True, faults=("filter",))).report()
     assert (report.line.health, report.line.detail) == (DeviceHealth.TROUBLE, "muted, filter")
     assert report.reason is None, "nobody sees guides that are hidden"
 
 
 def test_a_fault_of_the_lamp_forbids_guides_and_a_clogged_filter_does_not() -> None:
-    care = ProjectorCare(Projector(power=PowerState.FAULT, faults=("lamp",)))
-    assert care.report().reason is Reason.PROJECTOR_LOST
-    report = ProjectorCare(Projector(faults=("filter",))).report()
+    handler = ProjectorHandler(Projector(power=PowerState.FAULT, faults=("lamp",)))
+    assert handler.report().reason is Reason.PROJECTOR_LOST
+    report = ProjectorHandler(Projector(faults=("filter",))).report()
     assert report.reason is None
     assert (report.line.health, report.line.detail) == (DeviceHealth.TROUBLE, "filter")
 
@@ -289,33 +289,33 @@ class Mount:
 )
 def test_a_mirror_is_brought_to_its_place_only_when_it_is_not_there(angle_deg, done) -> None:
     mount = Mount(angle_deg)
-    care = MirrorCare(mount, 45.0)
-    care.restore()
+    handler = MirrorHandler(mount, 45.0)
+    handler.restore()
     assert mount.done == done
-    assert care.report().reason is None
+    assert handler.report().reason is None
 
 
 def test_what_kept_a_mirror_from_its_place_is_told_until_it_is_there() -> None:
     mount = Mount(44.0)
     mount.error = DeviceError("the mirror stalled")
-    care = MirrorCare(mount, 45.0)
-    assert "44.0 deg, calibrated at 45.0 deg" in care.report().line.detail
-    care.restore()
-    assert care.report().line.detail == "the mirror stalled"
+    handler = MirrorHandler(mount, 45.0)
+    assert "44.0 deg, calibrated at 45.0 deg" in handler.report().line.detail
+    handler.restore()
+    assert handler.report().line.detail == "the mirror stalled"
     mount.angle_deg = 45.0
-    assert care.report().line.health is DeviceHealth.OK
+    assert handler.report().line.health is DeviceHealth.OK
     mount.angle_deg = 44.0
-    assert "calibrated" in care.report().line.detail
-    care.stop()
-    assert care.report().line.detail == "gone"
+    assert "calibrated" in handler.report().line.detail
+    handler.stop()
+    assert handler.report().line.detail == "gone"
 
 
 def test_a_mirror_that_was_stopped_is_not_moved_any_more() -> None:
     mount = Mount(None)
-    care = MirrorCare(mount, 45.0)
-    mount.on_home = care.stop
-    care.restore()
+    handler = MirrorHandler(mount, 45.0)
+    mount.on_home = handler.stop
+    handler.restore()
     assert mount.done == ["home"], "stopped between its two motions"
     mount.angle_deg = None
-    care.restore()
+    handler.restore()
     assert mount.done == ["home"]

@@ -15,7 +15,7 @@ _MOTION_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class DeviceReport:
     """What is known of a device.
 
     Attributes:
@@ -27,7 +27,7 @@ class Report:
     reason: Reason | None = None
 
 
-class Care(Protocol):
+class DeviceHandler(Protocol):
     """Asks one device; used by one thread at a time, but for `stop`."""
 
     @property
@@ -45,7 +45,7 @@ class Care(Protocol):
         """Asking takes longer than a frame may wait; known after the first report."""
         ...
 
-    def report(self) -> Report:
+    def report(self) -> DeviceReport:
         """Ask; never fails."""
         ...
 
@@ -66,7 +66,7 @@ class Care(Protocol):
         ...
 
 
-class ProjectorCare:
+class ProjectorHandler:
     """The projector must show the picture as it comes: neither flipped, bent nor frozen.
 
     Keystone and source are compared with what they were first: the display was calibrated so.
@@ -81,26 +81,26 @@ class ProjectorCare:
         self._source: str | None = None
         self.is_slow = True
 
-    def report(self) -> Report:
+    def report(self) -> DeviceReport:
         """One that does not answer is told, not raised."""
         name = self._projector.name
         try:
             status = self._projector.status()
         except DeviceError as error:
             line = DeviceLine("projector", name, DeviceHealth.LOST, str(error))
-            return Report(line, self.reason)
+            return DeviceReport(line, self.reason)
         self.is_slow = status.power is not PowerState.ABSENT
         if status.power is PowerState.ABSENT:
-            return Report(DeviceLine("projector", name, DeviceHealth.ABSENT, "not used"))
+            return DeviceReport(DeviceLine("projector", name, DeviceHealth.ABSENT, "not used"))
         if changes := self._changes(status):
             line = DeviceLine("projector", name, DeviceHealth.TROUBLE, f"picture {changes}")
-            return Report(line, Reason.PROJECTOR_ALTERS)
+            return DeviceReport(line, Reason.PROJECTOR_ALTERS)
         is_on = status.power is PowerState.ON
         dark = () if is_on else (status.power.value,)
         if told := (*dark, *(("muted",) if status.is_muted else ()), *status.faults):
             line = DeviceLine("projector", name, DeviceHealth.TROUBLE, ", ".join(told))
-            return Report(line, self.reason if status.power is PowerState.FAULT else None)
-        return Report(DeviceLine("projector", name, DeviceHealth.OK, status.power.value))
+            return DeviceReport(line, self.reason if status.power is PowerState.FAULT else None)
+        return DeviceReport(DeviceLine("projector", name, DeviceHealth.OK, status.power.value))
 
     def restore(self) -> None:
         """Its picture is set on the projector, by a person who sees it."""
@@ -127,7 +127,7 @@ class ProjectorCare:
         return ", ".join(name for name, is_found in found.items() if is_found)
 
 
-class MirrorCare:
+class MirrorHandler:
     """The mirror must stand where the display was calibrated."""
 
     reason = Reason.MIRROR_AWAY
@@ -140,24 +140,24 @@ class MirrorCare:
         self.restoring = f"being moved to {calibrated_deg:.1f} deg"
         self.is_slow = mirror.info.is_movable
 
-    def report(self) -> Report:
+    def report(self) -> DeviceReport:
         """One that does not answer is told, not raised."""
         info = self._mirror.info
         try:
             angle_deg = self._mirror.position_deg()
         except DeviceError as error:
-            return Report(
+            return DeviceReport(
                 DeviceLine("mirror", info.name, DeviceHealth.LOST, str(error)), self.reason
             )
         angle = "position unknown" if angle_deg is None else f"{angle_deg:.1f} deg"
         if not self._is_there(angle_deg):
             detail = self._failure or f"{angle}, calibrated at {self._calibrated_deg:.1f} deg"
             line = DeviceLine("mirror", info.name, DeviceHealth.TROUBLE, detail)
-            return Report(line, self.reason)
+            return DeviceReport(line, self.reason)
         self._failure = ""
         if info.is_movable:
-            return Report(DeviceLine("mirror", info.name, DeviceHealth.OK, angle))
-        return Report(DeviceLine("mirror", info.name, DeviceHealth.ABSENT, f"fixed, {angle}"))
+            return DeviceReport(DeviceLine("mirror", info.name, DeviceHealth.OK, angle))
+        return DeviceReport(DeviceLine("mirror", info.name, DeviceHealth.ABSENT, f"fixed, {angle}"))
 
     def restore(self) -> None:
         """Home it unless it knows its place, then move it to its calibrated angle."""
