@@ -1,4 +1,4 @@
-"""A board of known size, looked for beside the frames: what the rig makes of its lengths."""
+"""Measures a board of known size with the session's rig, while frames are handled."""
 
 from collections import deque
 from collections.abc import Callable
@@ -9,10 +9,10 @@ from navapp.control.executors import Executor, Job
 from navapp.control.length_check import MOST_LOOKS, Finding, Length, LengthCheck, pool_lengths
 
 # Often enough for a board that is shown for some seconds; a slow look takes at most a tenth of the
-# time, so that the line keeps its cores.
+# time, so that tracking keeps its cores.
 _PERIOD_NS, _LEAST_PERIODS_OF_A_LOOK = 2_000_000_000, 10
-# Looks of one showing belong together.
-# Nothing seen for so long, or for so many looks, ends it.
+# Looks at a board that is shown belong together until it was not seen for so long, or for so many
+# periods.
 _SHOWING_NS, _SHOWING_PERIODS = 10_000_000_000, 2.5
 
 # Of the left and the right picture; None where not both of them show the board.
@@ -28,7 +28,7 @@ class _Look:
 
 
 class BoardWatch:
-    """One look at a time, in an executor of its own: no frame waits for it.
+    """Looks for the board in one frame at a time, in an executor of its own: no frame waits for it.
 
     Args:
         measure: finds the board in a pair and measures it.
@@ -87,7 +87,7 @@ class BoardWatch:
         self._executor.close()
 
     def _measure_and_time(self, frame: StereoFrame) -> "_Look":
-        # How long its result lies there until a frame takes it over costs nobody anything.
+        # The measurement alone is timed, not the wait until a frame takes its result over.
         started_ns = self._now_ns()
         length = self._measure(frame.left, frame.right)
         return _Look(length, self._now_ns() - started_ns)

@@ -1,4 +1,4 @@
-"""The controller's line to its camera: frames, silence, loss and return."""
+"""Takes frames from the camera, notices its silence and loss, and opens it again."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What each of the operator's commands does to the session, its camera and its display."""
+"""What the operator's commands do to the session, its camera and its display."""
 
 from navapp.control.bone_tracks import Candidate
 from navapp.control.camera_link import CameraLink
@@ -29,7 +29,7 @@ from navapp.values import Plan, Status
 
 
 class CommandHandler:
-    """Obeys, or refuses with a reason that the operator reads."""
+    """Carries commands out, or refuses them with a reason that the operator reads."""
 
     def __init__(
         self,
@@ -37,14 +37,14 @@ class CommandHandler:
         camera: CameraLink,
         display: DisplayLink,
         rig: RigWatch,
-        slow: MonitoredDevices,
+        monitored: MonitoredDevices,
         plan: Plan,
     ) -> None:
         self._session = session
         self._camera = camera
         self._display = display
         self._rig = rig
-        self._slow = slow
+        self._monitored = monitored
         self._plan = plan
 
     def handle(self, command: Command) -> None:
@@ -68,7 +68,7 @@ class CommandHandler:
                 self._on_enter_stage(command)
             case Reconnect():
                 self._camera.retry_now()
-                self._slow.restore()
+                self._monitored.restore()
             case Interrupt():
                 self._session.forget_sight()
                 self._session.fall_back("the camera was lost here when this was recorded")

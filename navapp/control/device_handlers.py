@@ -28,7 +28,7 @@ class DeviceReport:
 
 
 class DeviceHandler(Protocol):
-    """Asks one device; used by one thread at a time, but for `stop`."""
+    """Asks one device and restores it; used by one thread at a time, but for `stop`."""
 
     @property
     def reason(self) -> Reason:
@@ -111,7 +111,7 @@ class ProjectorHandler:
         self._projector.open()
 
     def stop(self) -> None:
-        """Nothing moves."""
+        """Nothing of it moves."""
 
     def _changes(self, status: ProjectorStatus) -> str:
         self._keystone = self._keystone or status.keystone

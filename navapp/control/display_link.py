@@ -1,4 +1,4 @@
-"""The controller's line to its display: blank, withdrawn guides, trouble."""
+"""Shows pictures on the display, blanks it, and opens it again when it is lost."""
 
 import threading
 

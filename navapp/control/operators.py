@@ -36,10 +36,10 @@ _MAX_ATTEMPTS = 8
 
 
 class Operator(Protocol):
-    """Decides."""
+    """Answers snapshots with commands."""
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
-        """What to do now."""
+        """The commands to give now."""
         ...
 
 
@@ -62,13 +62,13 @@ class ReplayOperator:
 
 
 class CombinedOperator:
-    """Several operators at one session: what each of them would do, in their order."""
+    """Several operators of one session: the commands of each, in their order."""
 
     def __init__(self, *operators: Operator) -> None:
         self._operators = operators
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
-        """Of all of them."""
+        """Those of all operators."""
         return [one for operator in self._operators for one in operator.commands(snapshot)]
 
 
@@ -92,7 +92,7 @@ class Script(Section):
     """[[step]] tables, in order."""
 
 
-# Offers a wrong pose first: a judge that takes it is worth nothing.
+# Offers a wrong pose first, which the judge must refuse.
 DEFAULT_SCRIPT = (ScriptStep(do="propose"), ScriptStep(do="register"))
 
 

@@ -1,4 +1,4 @@
-"""The other bones, which are not the stage's: followed at a lower rate, so that none is forgotten.
+"""The other bones, which are not the stage's, are followed at a lower rate.
 
 Once accepted, a bone is followed while another stage is in force, too: one such bone in every
 second frame, after the picture was shown. With three bones the two others take turns.
@@ -32,7 +32,7 @@ class _Sight:
 
 
 class OtherBones:
-    """Whose turn it is, and what was last said of each.
+    """Follows the other bones in turns, and keeps the last verdict on each.
 
     Turns go by the count of handled frames, never by the time: a recorded session replays to them.
 
@@ -78,7 +78,7 @@ class OtherBones:
         return {name: tracked}
 
     def forget(self) -> None:
-        """What was said says nothing any more; the tracks stay."""
+        """Forget the verdicts; the tracks stay."""
         self._sights = {}
 
     def describe(self, stage: StageSpec, now_ns: int) -> tuple[OtherBone, ...]:

@@ -35,7 +35,7 @@ class FrameSink(Protocol):
 
 
 class BackgroundSink:
-    """Hands frames to a sink in a thread of its own: encoding pictures must not slow the line.
+    """Hands frames to a sink in a thread of its own: encoding pictures must not slow tracking.
 
     A full queue makes the caller wait: a recording with holes would not replay to the same poses.
 
@@ -51,7 +51,7 @@ class BackgroundSink:
         self._thread.start()
 
     def add(self, frame: StereoFrame, with_pictures: bool) -> None:
-        """Keep one, soon."""
+        """Queue one; waits while the queue is full."""
         self._raise_error()
         self._waiting.put((frame, with_pictures))
 

@@ -18,13 +18,13 @@ from navapp.values import Plan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SnapshotMaker:
-    """Looks at a session and at the room in which it takes place.
+    """Makes the snapshots of a session and its devices.
 
     Attributes:
         session: what is known.
         camera: in use.
         display: in use.
-        slow: projector and mirror.
+        monitored: projector and mirror.
         rig: of the camera.
         rig_watch: that watches it.
         plan: of the operation.
@@ -34,7 +34,7 @@ class SnapshotMaker:
     session: Session
     camera: CameraLink
     display: DisplayLink
-    slow: MonitoredDevices
+    monitored: MonitoredDevices
     rig: StereoRig
     rig_watch: RigWatch
     plan: Plan
@@ -47,7 +47,7 @@ class SnapshotMaker:
         tracked = session.tracked
         # A candidate that was not followed into a frame yet is not on the screen.
         is_candidate = session.state is SessionState.REVIEW and tracked is not None
-        reports = self.slow.reports
+        reports = self.monitored.reports
         bone = self.plan.bones.get(session.stage.bone)
         draft = Snapshot(
             time_ns=now_ns,

@@ -71,7 +71,7 @@ class Blank:
 
 @dataclass(frozen=True, slots=True)
 class Show:
-    """Leave blank."""
+    """Show pictures on the display again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ Command = (
 
 
 class EventLevel(Enum):
-    """How loud an event is; ALARM rings the terminal's bell once."""
+    """How important an event is; ALARM rings the terminal's bell once."""
 
     INFO = "info"
     WARNING = "warning"
@@ -146,7 +146,7 @@ class Event:
 
 
 class DeviceHealth(Enum):
-    """As shown in the devices panel."""
+    """State of a device, as the devices panel shows it."""
 
     OK = "ok"
     ABSENT = "absent"
@@ -175,7 +175,7 @@ class Rates:
             display; None of frames that wait to be read (docs/conventions.md).
         fps_history, latency_history_ms: the last values, oldest first, for sparklines.
         n_frames: handled so far.
-        n_dropped: replaced by newer ones before the line took them.
+        n_dropped: replaced by newer ones before they were handled.
         skew_ms: between the two cameras, newest frame.
     """
 
@@ -213,7 +213,7 @@ class OtherBone:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """All that a client may show, immutable; the newest wins.
+    """All that a client may show; immutable.
 
     Attributes:
         state: of the session.

@@ -1,5 +1,3 @@
-"""Backoff between attempts."""
-
 from navapp.control.backoff import Backoff
 
 

@@ -1,4 +1,4 @@
-"""The monitor over slow devices: what it reports, when it tries again, and what it leaves behind."""
+"""The monitor of slow devices: what it reports, when it tries again, what it leaves behind."""
 
 import threading
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Small pictures for the screen: what the cameras see, the marks, and where the board is wanted."""
+"""Small pictures for the screen, with the marks that were seen and the wanted view's outline."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""What a capture shows of itself, and what it can be told."""
+"""Commands, phases and snapshots of a guided capture."""
 
 from dataclasses import dataclass
 from enum import Enum, auto

@@ -1,4 +1,4 @@
-"""Reads a camera while a code is played before it."""
+"""Records with a camera the code that a display shows."""
 
 import threading
 from collections.abc import Callable
@@ -135,7 +135,7 @@ def record_code(
 
 
 class _CodePlayback:
-    """The player at work, in a thread or step by step; whatever happens, dark at the end."""
+    """Plays the code in a thread or step by step; the display is dark at the end."""
 
     def __init__(self, player: CodePlayer, *, in_thread: bool) -> None:
         self._player = player
