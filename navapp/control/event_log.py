@@ -32,16 +32,18 @@ class EventLog:
     Args:
         clock: of the session.
         hooks: who is told.
-
-    Attributes:
-        sequence: of the newest handled frame, -1 before the first.
     """
 
     def __init__(self, clock: Clock, hooks: SessionHooks) -> None:
         self._clock = clock
         self._hooks = hooks
         self._events: deque[Event] = deque(maxlen=_EVENTS_SHOWN)
-        self.sequence = -1
+        self._sequence = -1
+
+    @property
+    def sequence(self) -> int:
+        """Of the newest handled frame, -1 before the first."""
+        return self._sequence
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -50,9 +52,13 @@ class EventLog:
 
     def add(self, kind: str, text: str, level: EventLevel = EventLevel.INFO) -> None:
         """Keep and tell what has just happened."""
-        event = Event(self._clock.now_ns(), kind, text, level, self.sequence)
+        event = Event(self._clock.now_ns(), kind, text, level, self._sequence)
         self._events.append(event)
         self._tell(self._hooks.on_event, event)
+
+    def begin_frame(self, sequence: int) -> None:
+        """What happens from now on happens after that frame."""
+        self._sequence = sequence
 
     def tell_frame(self, result: FrameResult) -> None:
         """A frame was handled."""
@@ -60,7 +66,7 @@ class EventLog:
 
     def tell_command(self, command: Command) -> None:
         """A command is about to be handled."""
-        self._tell(self._hooks.on_command, command, self.sequence)
+        self._tell(self._hooks.on_command, command, self._sequence)
 
     def tell_take_over(self, next_sequence: int) -> None:
         """A registration's result is used from that frame on."""

@@ -133,7 +133,7 @@ class Session:
 
     def begin_frame(self, frame: StereoFrame) -> None:
         """A frame is about to be handled; the first one ends the start."""
-        self._log.sequence = frame.sequence
+        self._log.begin_frame(frame.sequence)
         if self._state is SessionState.STARTING:
             self.change_state(SessionState.READY, "pictures arrive")
 
