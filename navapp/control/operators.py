@@ -172,7 +172,7 @@ class RecordedEvents:
     """What `events.jsonl` of a session says.
 
     Attributes:
-        commands: (after which frame, command).
+        commands: (after which frame, command), without those that were refused.
         take_overs: before which frames a registration's result was used.
         is_complete: the recording ran to its end.
     """
@@ -219,6 +219,10 @@ def read_events(path: str | Path) -> RecordedEvents:
             commands.append((sequence, command_from_json(value)))
         elif value.get("type") == "take_over":
             take_overs.append(sequence)
+        elif value.get("kind") == "refused" and commands:
+            # The refusal follows its command at once. What refused it may be missing in a replay,
+            # a lost camera for example, and the command would be carried out.
+            commands.pop()
         is_complete = value.get("type") == "end"
     return RecordedEvents(commands, take_overs, is_complete)
 

@@ -13,12 +13,13 @@ from navapp.control.operators import (
     read_events,
     read_script,
 )
+from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
 from navapp.control.states import Accept, Blank, EnterStage, Propose, Register, Reject, Show
-from navapp.errors import ConfigurationError, SequenceError, UsageError
+from navapp.errors import ConfigurationError, DeviceLost, SequenceError, UsageError
 from navapp.geometry.transform import rotation_angle_deg
 from navapp.values import Reason, Status
-from tests.control.fakes import Bench, FakeCamera, a_pose, answer
+from tests.control.fakes import Bench, FakeCamera, a_pose, answer, navigating
 
 LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
 GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
@@ -36,6 +37,16 @@ def commands_of(bench: Bench, operator) -> list:
     bench.controller.submit = lambda command: (given.append(command), submit(command))
     run_headless(bench.controller, operator)
     return given
+
+
+class NoFrames:
+    """A recorder's sink that keeps nothing."""
+
+    def add(self, frame, with_pictures: bool) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
 
 
 def kinds(commands) -> list[str]:
@@ -185,6 +196,32 @@ def test_events_are_read_back_as_commands_and_take_overs(tmp_path: Path) -> None
         (8, Accept(2)),
     ]
     assert events.take_overs == [4]
+
+
+def test_a_command_that_was_refused_is_not_given_again(tmp_path: Path) -> None:
+    """What refused it, a lost camera, is not there in the replay."""
+    recorder = SessionRecorder(tmp_path, NoFrames())
+    hooks = SessionHooks(
+        on_event=(recorder.on_event,),
+        on_command=(recorder.on_command,),
+        on_take_over=(recorder.on_take_over,),
+    )
+    live = navigating(Bench(camera=FakeCamera(None, n_frames=12), hooks=hooks))
+    live.camera.error = DeviceLost("unplugged")
+    live.frames(1)
+    live.do(Register())
+    assert "the camera is lost" in live.refused()
+    live.do(Blank())
+    live.camera.error = None
+    live.frames(40)
+    recorder.close()
+    events = read_events(tmp_path / "events.jsonl")
+    again = Bench(
+        executor=RecordedExecutor(events.take_overs), camera=FakeCamera(None, n_frames=12)
+    )
+    run_headless(again.controller, RecordedOperator(events.commands))
+    assert [r.state for r in again.results] == [r.state for r in live.results]
+    assert kinds(command for _, command in events.commands)[-1] == "Blank"
 
 
 @pytest.mark.parametrize(
