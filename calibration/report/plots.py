@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from calibration.rig.lengths import epipolar_px
-from calibration.rig.solve import Calibration
+from calibration.rig.rig_solution import Calibration
 from calibration.rig.uncertainty import bounds_mm
 from navapp.geometry.transform import FloatArray
 

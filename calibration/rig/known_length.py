@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.rig.start import matrix_of, pose_of
+from calibration.rig.initial_rig import matrix_of, pose_of
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard, find_board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rectification import Image, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray

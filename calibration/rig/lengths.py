@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from calibration.targets.boards import Board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 

@@ -14,7 +14,7 @@ from calibration.rig.parameters import RigModel, shape_mm
 from calibration.rig.projection import projected
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.transform import FloatArray
 
 # Huber's limit, in robust standard deviations of what is left.

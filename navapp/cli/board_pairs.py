@@ -9,9 +9,9 @@ from navapp.cli.diagnostics import Diagnostics
 from navapp.errors import InputError, SequenceError
 
 if TYPE_CHECKING:
-    from calibration.rig.views import DroppedPair
+    from calibration.rig.dropped_pairs import DroppedPair
     from calibration.targets.boards import Board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from drivers.recorded_sources import PictureFiles
 
 
@@ -68,9 +68,9 @@ def _look(
     beside: ThreadPoolExecutor,
 ) -> "tuple[SeenPair | DroppedPair, tuple[int, int]]":
     """One pair: both pictures at once."""
-    from calibration.rig.views import DroppedPair, Fault
+    from calibration.rig.dropped_pairs import DroppedPair, Fault
     from calibration.targets.detection import find_board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from navapp.geometry.rectification import luma
 
     number = source.numbers[place]

@@ -12,9 +12,9 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import DeviceError, ResultError, UsageError
 
 if TYPE_CHECKING:
-    from calibration.rig.solve import Calibration
+    from calibration.rig.rig_solution import Calibration
     from calibration.targets.boards import Board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from drivers.interfaces import CameraInfo
     from navapp.config import CalibrationSection
     from navapp.control.capture.capture import Capture
@@ -126,9 +126,9 @@ class _Solver:
         self.found: tuple[Calibration, StereoRig] | None = None
 
     def __call__(self, pairs: "list[SeenPair]", report: Callable[[float], None]) -> "Outcome":
-        from calibration.report.html import write_report
-        from calibration.rig.judge import Limits
-        from calibration.rig.solve import solve_rig
+        from calibration.report.html_report import write_report
+        from calibration.rig.acceptance import Limits
+        from calibration.rig.rig_solution import solve_rig
         from navapp.cli.calibrate_stereo import recorded
         from navapp.control.capture.states import Outcome
         from navapp.geometry.rig_files import write_rig

@@ -8,7 +8,7 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
-    from calibration.latency.measure import Estimate, EyeLag, Latency
+    from calibration.latency.measurement import Estimate, EyeLag, Latency
     from navapp.control.latency.watching import Recording
     from navapp.devices import OpenedLatency
 
@@ -42,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Show, watch, solve; the exit code."""
-    from calibration.latency.judge import judged_latency
+    from calibration.latency.acceptance import judged_latency
     from navapp.config import find_file, load
     from navapp.devices import open_latency
 
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 def _watched(
     opened: "OpenedLatency", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> "Recording":
-    from calibration.latency.code import pauses_ms
+    from calibration.latency.light_code import pauses_ms
     from navapp.control.latency.player import CodePlayer
     from navapp.control.latency.watching import watch
 

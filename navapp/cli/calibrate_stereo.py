@@ -14,9 +14,9 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import InputError, ResultError, UsageError
 
 if TYPE_CHECKING:
-    from calibration.rig.solve import Calibration
+    from calibration.rig.rig_solution import Calibration
     from calibration.targets.boards import Board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from navapp.config import CalibrationSection
     from navapp.geometry.rig import StereoRig
     from navapp.geometry.transform import FloatArray
@@ -62,8 +62,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Solve, judge, write; the exit code."""
-    from calibration.rig.judge import Limits
-    from calibration.rig.solve import solve_rig
+    from calibration.rig.acceptance import Limits
+    from calibration.rig.rig_solution import solve_rig
     from calibration.targets.boards import read_board
     from navapp.config import find_file, load
     from navapp.geometry.rig_files import write_rig
@@ -94,7 +94,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if is_accepted or options.force:
         write_rig(options.out, rig)
     if options.report:
-        from calibration.report.html import write_report
+        from calibration.report.html_report import write_report
 
         write_report(options.report, replace(found, rig=rig), limits)
     write_json(options.json, "calibrate stereo", content(found, rig))

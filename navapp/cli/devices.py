@@ -11,7 +11,7 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 
 if TYPE_CHECKING:
     from drivers.discovery import PixelFormat, Unseen
-    from navapp.inventory.looking import Device, Inventory
+    from navapp.inventory.connected_devices import Device, Inventory
 
 _TITLES = {
     "usb_cameras": "USB cameras",
@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it; that nothing is connected is an answer, too."""
-    from navapp.inventory.looking import look
+    from navapp.inventory.connected_devices import look
 
     check_writable(options.json)
     found = look()
@@ -73,7 +73,7 @@ def text(found: "Inventory") -> str:
 
 
 def _device_to_json(device: "Device") -> dict[str, Any]:
-    from navapp.inventory.looking import choosing
+    from navapp.inventory.connected_devices import choosing
 
     keys = {
         key: os.fspath(value) if isinstance(value, Path) else value
@@ -83,7 +83,7 @@ def _device_to_json(device: "Device") -> dict[str, Any]:
 
 
 def _device_text(device: "Device") -> Iterator[str]:
-    from navapp.inventory.looking import choosing
+    from navapp.inventory.connected_devices import choosing
 
     name, facts = _facts(device)
     yield f"  {name}"
@@ -95,7 +95,7 @@ def _device_text(device: "Device") -> Iterator[str]:
 def _facts(device: "Device") -> tuple[str, list[tuple[str, Sequence[str]]]]:
     """A device's name for people, and what else is known of it."""
     from drivers.discovery import FoundPort, OakCamera, UsbCamera
-    from navapp.inventory.installed import InstalledCamera
+    from navapp.inventory.camera_packages import InstalledCamera
 
     match device:
         case UsbCamera():

@@ -65,7 +65,7 @@ def _findings(config: str | None) -> "list[Finding]":
 
 def _device_findings(configuration: "Configuration") -> "list[Finding]":
     from navapp.inventory.configured_checks import configured_findings
-    from navapp.inventory.looking import look
+    from navapp.inventory.connected_devices import look
     from navapp.inventory.system_checks import system_findings
 
     found = look()

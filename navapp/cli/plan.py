@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.plan_contents import add_arguments, completed, content_of, lines_of
+from navapp.cli.plan_content_options import add_arguments, completed, content_of, lines_of
 from navapp.cli.plan_draft import aspects_of, drafted, with_cartilage
 from navapp.errors import UsageError
 

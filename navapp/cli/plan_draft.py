@@ -13,7 +13,7 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.geometry.transform import FloatArray
-    from navapp.preop.drafts import CtSettings, Draft
+    from navapp.preop.plan_drafts import CtSettings, Draft
     from navapp.values import AspectGraph, BoneModel
 
 _CT_ONLY = ("series", "threshold", "seed", "region")
@@ -77,7 +77,7 @@ def aspects_of(
 
 
 def _from_ct(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
-    from navapp.preop.drafts import draft_from_ct
+    from navapp.preop.plan_drafts import draft_from_ct
     from navapp.preop.volume import read_ct
 
     settings = _settings(options)
@@ -96,7 +96,7 @@ def _from_ct(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
 
 
 def _settings(options: argparse.Namespace) -> "CtSettings":
-    from navapp.preop.drafts import CtSettings
+    from navapp.preop.plan_drafts import CtSettings
     from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU
 
     threshold = DEFAULT_THRESHOLD_HU if options.threshold is None else options.threshold
@@ -147,7 +147,7 @@ def _numbers(option: str, text: str, n: int, form: str) -> "FloatArray":
 
 
 def _from_labels(options: argparse.Namespace) -> "Draft":
-    from navapp.preop.drafts import draft_from_labels
+    from navapp.preop.plan_drafts import draft_from_labels
     from navapp.preop.volume import read_labels
 
     values = {}
@@ -166,7 +166,7 @@ def _from_labels(options: argparse.Namespace) -> "Draft":
 
 def _from_surfaces(options: argparse.Namespace) -> "Draft":
     from navapp.preop import PlanOrigin, import_surface
-    from navapp.preop.drafts import Draft
+    from navapp.preop.plan_drafts import Draft
 
     bones = {}
     warnings: list[str] = []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.register_work import (
+from navapp.cli.register_inputs import (
     RegisterWork,
     prepared,
     since_ms,

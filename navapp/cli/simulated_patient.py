@@ -1,6 +1,6 @@
 """What the simulated patient brings along when nothing else is given: a plan and a prior."""
 
-from navapp.cli.simulated_contents import built_in_content
+from navapp.cli.simulated_content import built_in_content
 from navapp.devices import Simulation
 from navapp.geometry.mesh import TriangleMesh
 from navapp.values import BoneModel, Plan, Prior

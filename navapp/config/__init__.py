@@ -1,6 +1,5 @@
 """The TOML configuration; what is wrong with it is told with the nearest known key."""
 
-from navapp.config.checking import checked, parse
 from navapp.config.files import FILE_NAME, find_file, load, toml_content
 from navapp.config.sections import (
     CalibrationSection,
@@ -13,6 +12,7 @@ from navapp.config.sections import (
     SimulationSection,
 )
 from navapp.config.toml_text import as_toml, one_table
+from navapp.config.validation import checked, parse
 
 __all__ = [
     "FILE_NAME",

@@ -5,8 +5,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from navapp.config.checking import parse
 from navapp.config.sections import Configuration
+from navapp.config.validation import parse
 from navapp.errors import ConfigurationError
 
 FILE_NAME = "navapp.toml"

@@ -3,7 +3,7 @@
 from navapp.devices.cameras import real_camera
 from navapp.devices.capture import OpenedCapture, open_capture
 from navapp.devices.latency import OpenedLatency, open_latency
-from navapp.devices.opening import OpenedDevices, open_live, open_recording
+from navapp.devices.session_devices import OpenedDevices, open_live, open_recording
 from navapp.devices.simulated_room import Simulation
 
 __all__ = [

@@ -7,7 +7,7 @@ from drivers.interfaces import StereoCamera
 from drivers.opencv_stereo import OpencvStereo, OpencvStereoSettings
 from drivers.uvc_settings import UvcSettings
 from navapp.config import Configuration
-from navapp.devices.installed import installed_camera
+from navapp.devices.package_camera import installed_camera
 
 
 def real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") -> StereoCamera:

@@ -8,7 +8,7 @@ from drivers.clock import Clock, SystemClock
 from drivers.interfaces import StereoCamera
 from navapp.config import Configuration
 from navapp.devices.cameras import real_camera
-from navapp.devices.fitting import reopener
+from navapp.devices.rig_match import reopener
 from navapp.devices.simulated_board import hand_with, printed
 from navapp.devices.simulated_room import Pace, simulated_camera
 from sim_devices.hand import Hand

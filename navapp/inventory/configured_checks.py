@@ -7,8 +7,8 @@ from drivers.v4l_names import V4lNames
 from drivers.window_outputs import chosen
 from navapp.config import Configuration
 from navapp.errors import NavappError
+from navapp.inventory.connected_devices import Inventory
 from navapp.inventory.finding import Finding, Health, unless
-from navapp.inventory.looking import Inventory
 
 _LOOK = "connect it, or choose another one: navapp devices lists what there is"
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from drivers.discovery.oak_cameras import UDEV_REMEDY, oak_nodes
 from drivers.discovery.permissions import allowing, is_member, joining, may_use
 from navapp.config import Configuration
+from navapp.inventory.connected_devices import Inventory
 from navapp.inventory.finding import Finding, Health, unless
-from navapp.inventory.looking import Inventory
 
 # SDL's X11 driver loads them by these names when it starts.
 _WINDOW_LIBRARIES = (

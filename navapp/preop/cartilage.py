@@ -14,7 +14,7 @@ from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import ends_of
-from navapp.preop.surfaces import MIN_FACES, ImportedSurface, in_lps
+from navapp.preop.surface_import import MIN_FACES, ImportedSurface, in_lps
 from navapp.values import BoneModel
 
 # Thicker is none, and no even thickness may be larger.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
-from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
+from navapp.preop.extreme_points import SURFACE_NOISE_MM, WORST_SD_MM, extreme
 from navapp.values import Landmark, Side
 
 # Levels above the lowest point of a femur, whose condyles are 75 to 95 mm wide.

@@ -16,7 +16,7 @@ from navapp.errors import PlanError
 from navapp.geometry.transform import FloatArray
 from navapp.preop.defects import paint_near, paint_within
 from navapp.preop.markup_files import Markup, read_markup_file
-from navapp.preop.planned import Planned
+from navapp.preop.planned_content import Planned
 from navapp.values import (
     FOLLOWED_BONES,
     BoneModel,

@@ -17,12 +17,12 @@ from navapp.errors import InputError, PlanError
 from navapp.geometry.transform import FloatArray
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.bone_files import read_bone, write_bone
-from navapp.preop.content_files import content_from_json, content_to_json
-from navapp.preop.intact import damaged, sha256_of
+from navapp.preop.bone_preview import draw_preview
+from navapp.preop.plan_content_json import content_from_json, content_to_json
+from navapp.preop.plan_integrity import damaged, sha256_of
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
-from navapp.preop.preview import draw_preview
+from navapp.preop.plan_summary import summary_page
 from navapp.preop.slices import Picture
-from navapp.preop.summary import summary_page
 from navapp.values import AspectGraph, BoneModel, Plan, SurgicalContent
 
 _FILE = "plan.json"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
-from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
+from navapp.preop.extreme_points import SURFACE_NOISE_MM, WORST_SD_MM, extreme
 from navapp.values import Landmark, Side
 
 # Levels below the top of the eminence at which a tibia is as broad as its plateau.

@@ -5,7 +5,7 @@ import pytest
 
 from navapp.geometry.ply import read_ply
 from navapp.geometry.simplify import is_closed
-from navapp.preop.drafts import Draft, draft_from_ct
+from navapp.preop.plan_drafts import Draft, draft_from_ct
 from navapp.preop.volume import read_ct
 from tests.bench.ct_pose_error import pose_errors_mm, surface_error_mm
 from tests.bench.ct_surfaces import BONES, errors_mm

@@ -22,12 +22,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calibration.rig.folds import look_at_rig
+from calibration.rig.held_out_views import look_at_rig
 from calibration.rig.lengths import triangulated_mm
-from calibration.rig.solve import Calibration, solve_rig
+from calibration.rig.rig_solution import Calibration, solve_rig
 from calibration.targets.boards import Board, board_from, read_board
 from calibration.targets.detection import SeenBoard, find_board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from drivers.recorded_sources import PictureFiles, open_folder
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh

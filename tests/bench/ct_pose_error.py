@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.drafts import draft_from_ct
+from navapp.preop.plan_drafts import draft_from_ct
 from navapp.values import BoneModel
 from tests.bench.ct_surfaces import BONES, simulated
 

@@ -23,9 +23,9 @@ from scipy.spatial import cKDTree
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
-from navapp.preop.drafts import CtSettings, Draft, draft_from_ct
+from navapp.preop.plan_drafts import CtSettings, Draft, draft_from_ct
 from navapp.preop.volume import CtVolume, read_ct
-from navapp.preop.volume.reading import CtSource, ReadCt
+from navapp.preop.volume.volume_reading import CtSource, ReadCt
 from sim_devices.anatomy import KneeSpec, make_knee
 from sim_devices.ct_volume import make_ct
 

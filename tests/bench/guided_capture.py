@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.rig.lengths import triangulated_mm
-from calibration.rig.solve import solve_rig
-from calibration.targets.pairs import SeenPair
+from calibration.rig.rig_solution import solve_rig
+from calibration.targets.seen_pairs import SeenPair
 from navapp.control.capture.wishes import next_wish
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform

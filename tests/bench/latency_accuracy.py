@@ -9,7 +9,7 @@ import argparse
 
 import numpy as np
 
-from calibration.latency.judge import judged_latency
+from calibration.latency.acceptance import judged_latency
 from navapp.errors import ResultError
 from tests.calibration.latency.scenes import CASES, drawn_bench
 

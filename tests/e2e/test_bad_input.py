@@ -18,7 +18,7 @@ from navapp.preop import write_plan
 from navapp.values import Plan
 from sim_devices.rigs import default_rig
 from tests.bones import femur_model
-from tests.devices.installed import Entry, announce
+from tests.devices.package_cameras import Entry, announce
 from tests.sim_devices.plain_world import plain_rig
 
 

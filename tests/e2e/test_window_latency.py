@@ -4,8 +4,8 @@ import mss
 import numpy as np
 import pytest
 
-from calibration.latency.code import pauses_ms
-from calibration.latency.judge import judged_latency
+from calibration.latency.acceptance import judged_latency
+from calibration.latency.light_code import pauses_ms
 from drivers.clock import SystemClock
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo

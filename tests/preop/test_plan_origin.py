@@ -5,7 +5,7 @@ import json
 import pytest
 
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
-from navapp.preop.summary import summary_page
+from navapp.preop.plan_summary import summary_page
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.rig.judge import occupied
-from calibration.targets.pairs import SeenPair
+from calibration.rig.acceptance import occupied
+from calibration.targets.seen_pairs import SeenPair
 from navapp.control.capture.interfaces import PairStore
 from navapp.control.capture.looks import Look
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard, find_board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from drivers.frames import StereoFrame
 from navapp.control.capture.states import Check
 from navapp.geometry.bands import beside

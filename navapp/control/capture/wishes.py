@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.bundle import Bundle, solve_bundle
-from calibration.rig.guide import wanted_view
+from calibration.rig.bundle_adjustment import Bundle, solve_bundle
+from calibration.rig.dropped_pairs import DroppedPair, misfits
+from calibration.rig.initial_rig import matrix_of, pose_of, start_poses, start_rig
+from calibration.rig.next_view import wanted_view
 from calibration.rig.parameters import RigModel, packed, unpacked
-from calibration.rig.start import matrix_of, pose_of, start_poses, start_rig
 from calibration.rig.uncertainty import bounds_mm, working_points_mm
-from calibration.rig.views import DroppedPair, misfits
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.latency.area import Watched
-from calibration.latency.code import Switches
+from calibration.latency.display_area import Watched
+from calibration.latency.light_code import Switches
 from drivers.clock import Clock
 from drivers.frames import Image, StereoFrame
 from drivers.interfaces import StereoCamera

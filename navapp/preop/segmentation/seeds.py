@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
+from navapp.preop.segmentation.bone_naming import Named, Part, name_parts
 from navapp.preop.segmentation.masks import LabelArray
-from navapp.preop.segmentation.naming import Named, Part, name_parts
 from navapp.preop.volume import CtVolume
 
 # A core is a bone without its cortex: a point that was clicked on the surface is this far from it.

@@ -2,7 +2,7 @@
 
 from navapp.preop.volume.ct_volume import CtVolume, LabelVolume
 from navapp.preop.volume.dicom_listing import SeriesInfo, list_series
-from navapp.preop.volume.reading import CtSource, ReadCt, read_ct, read_labels
+from navapp.preop.volume.volume_reading import CtSource, ReadCt, read_ct, read_labels
 
 __all__ = [
     "CtSource",

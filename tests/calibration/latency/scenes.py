@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.latency.area import Watched
-from calibration.latency.code import Switches, pauses_ms
+from calibration.latency.display_area import Watched
+from calibration.latency.light_code import Switches, pauses_ms
 
 N_CELLS = 48
 # Cells that see the display.

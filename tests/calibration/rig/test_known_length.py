@@ -9,7 +9,7 @@ import pytest
 from calibration.rig.known_length import LengthMeter, measured_length
 from navapp.geometry.transform import RigidTransform
 from tests.calibration.marks import BOARD, drawn_pairs, drawn_rig
-from tests.calibration.rig.test_check import shifted
+from tests.calibration.rig.test_rig_check import shifted
 
 
 @pytest.fixture(scope="module")

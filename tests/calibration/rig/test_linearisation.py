@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from calibration.rig.initial_rig import vector_of
 from calibration.rig.linearisation import Linearisation, NormalEquations, Views
 from calibration.rig.parameters import RigModel, packed
-from calibration.rig.start import vector_of
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig, seen_pair
 
 

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from calibration.rig.initial_rig import vector_of
 from calibration.rig.parameters import N_COEFFICIENTS, RigModel, packed
 from calibration.rig.projection import projected
-from calibration.rig.start import vector_of
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig
 
 POINTS_MM = BOARD.points_mm[::9] + np.linspace(-1.0, 1.0, 24).reshape(8, 3)

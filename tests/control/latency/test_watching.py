@@ -5,9 +5,9 @@ import threading
 import numpy as np
 import pytest
 
-from calibration.latency.code import pauses_ms
-from calibration.latency.judge import WORST_MS, judged_latency
-from calibration.latency.measure import Latency
+from calibration.latency.acceptance import WORST_MS, judged_latency
+from calibration.latency.light_code import pauses_ms
+from calibration.latency.measurement import Latency
 from navapp.control.latency.player import CodePlayer
 from navapp.control.latency.watching import Recording, watch
 from navapp.errors import DeviceLost, DeviceTimeout, ResultError

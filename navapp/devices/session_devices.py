@@ -1,0 +1,106 @@
+"""Opened devices, from a configuration or a recording."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from calibration.targets.boards import Board
+from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.interfaces import DeviceSet, StereoCamera
+from drivers.replay_camera import ReplayCamera, ReplaySettings
+from navapp.config import Configuration
+from navapp.devices.cameras import real_camera
+from navapp.devices.peripherals import device_set
+from navapp.devices.rig_match import configured_rig, open_fitting, reopener
+from navapp.devices.simulated_room import (
+    Pace,
+    Simulation,
+    scenario_of,
+    simulated_camera,
+    simulation_of,
+    with_board,
+)
+from navapp.errors import DeviceError
+from navapp.geometry import StereoRig
+from sim_devices.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedDevices:
+    """Opened devices with the rig that took the pictures."""
+
+    devices: DeviceSet
+    rig: StereoRig
+    reopen_camera: Callable[[], StereoCamera]
+    simulation: Simulation | None = None
+
+
+def open_live(
+    configuration: Configuration, *, is_headless: bool, board: Board | None = None
+) -> OpenedDevices:
+    """Open the configured devices.
+
+    Args:
+        configuration: in force.
+        board: that is held into a simulated view, when the configuration says so.
+        is_headless: nobody watches; a simulated camera then waits to be read.
+
+    Raises:
+        DeviceError, RigError, ConfigurationError.
+    """
+    if configuration.camera.backend == "simulated":
+        return _open_simulated(configuration, board, is_headless=is_headless)
+    return _open_real(configuration)
+
+
+def open_recording(
+    source: str, settings: ReplaySettings, rig: StereoRig, configuration: Configuration
+) -> OpenedDevices:
+    """Open a recorded source as the camera of a stepped session.
+
+    Raises:
+        SequenceError: the source; RigError: pictures of another size than the rig's.
+    """
+    clock = ManualClock()
+    camera = ReplayCamera(source, clock, settings, rig_id=rig.rig_id)
+    open_fitting(camera, rig)
+    devices = device_set(configuration, camera, clock, rig, is_live=False)
+    return OpenedDevices(devices, rig, _no_reopening)
+
+
+def _open_simulated(
+    configuration: Configuration, board: Board | None, *, is_headless: bool
+) -> OpenedDevices:
+    settings = configuration.camera.simulated
+    world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=is_headless)
+    scene = with_board(world, board, settings)
+    camera = simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
+    if configuration.camera.rig is not None:
+        rig = configured_rig(configuration)
+    else:
+        rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
+    simulation = simulation_of(world, camera)
+    return _opened(configuration, camera, pace.clock, rig, simulation)
+
+
+def _open_real(configuration: Configuration) -> OpenedDevices:
+    clock = SystemClock()
+    rig = configured_rig(configuration)
+    camera = real_camera(configuration, clock, rig.rig_id)
+    return _opened(configuration, camera, clock, rig)
+
+
+def _opened(
+    configuration: Configuration,
+    camera: StereoCamera,
+    clock: Clock,
+    rig: StereoRig,
+    simulation: Simulation | None = None,
+) -> OpenedDevices:
+    open_fitting(camera, rig)
+    reopen = reopener(camera, lambda: open_fitting(camera, rig))
+    devices = device_set(configuration, camera, clock, rig)
+    return OpenedDevices(devices, rig, reopen, simulation)
+
+
+def _no_reopening() -> StereoCamera:
+    raise DeviceError("a recording cannot be reopened")

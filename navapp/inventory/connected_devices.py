@@ -1,0 +1,73 @@
+"""All that is connected, and how each device is chosen in the configuration."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from drivers.discovery import (
+    FoundPort,
+    Listing,
+    OakCamera,
+    UsbCamera,
+    list_oak_cameras,
+    list_screens,
+    list_serial_ports,
+    list_usb_cameras,
+)
+from drivers.v4l_names import V4lNames
+from drivers.window_outputs import Output
+from navapp.config import one_table
+from navapp.inventory.camera_packages import InstalledCamera, list_installed
+
+Device = UsbCamera | OakCamera | InstalledCamera | FoundPort | Output
+
+
+@dataclass(frozen=True, slots=True)
+class Inventory:
+    """What one look at the computer gave."""
+
+    usb_cameras: Listing[UsbCamera]
+    oak_cameras: Listing[OakCamera]
+    installed_cameras: Listing[InstalledCamera]
+    serial_ports: Listing[FoundPort]
+    displays: Listing[Output]
+
+
+def look(names: V4lNames | None = None) -> Inventory:
+    """Look; nothing is streamed, booted, moved or sent.
+
+    Args:
+        names: where USB cameras are looked up.
+    """
+    return Inventory(
+        list_usb_cameras(names or V4lNames()),
+        list_oak_cameras(),
+        list_installed(),
+        list_serial_ports(),
+        list_screens(),
+    )
+
+
+def choosing(device: Device) -> str:
+    """TOML that chooses a device; empty when it cannot be chosen."""
+    match device:
+        case UsbCamera(chosen_by=""):
+            return ""
+        case UsbCamera(chosen_by=name):
+            eye = one_table("camera.opencv", {"left": name})
+            other = one_table("camera.opencv", {"right": name}).splitlines()[1]
+            return f"{_camera('opencv')}\n{eye}\n# {other}"
+        case OakCamera(device_id=name):
+            return f"{_camera('depthai')}\n{one_table('camera.depthai', {'device': name})}"
+        case InstalledCamera(backend=name):
+            return _camera(name)
+        case FoundPort(path=path):
+            keys: Mapping[str, Any] = {"backend": "escvp21", "port": path}
+            return f'{one_table("projector", keys)}\n# or [mirror] with backend = "zaber"'
+        case Output(name=name, width=width, height=height):
+            keys = {"backend": "window", "output": name, "size_px": (width, height)}
+            return one_table("display", keys)
+
+
+def _camera(backend: str) -> str:
+    return one_table("camera", {"backend": backend})
