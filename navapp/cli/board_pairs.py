@@ -54,7 +54,7 @@ def read_pairs(folder: str, board: "Board", diagnostics: Diagnostics) -> BoardPa
             found, size = _look(source, place, board, size, beside)
             (seen if hasattr(found, "left") else unseen).append(found)  # type: ignore[arg-type]
             diagnostics.progress("pictures", (place + 1) / len(source.numbers))
-            diagnostics.detail(f"pair {number}: {_told(found)}")
+            diagnostics.detail(f"pair {number}: {_describe(found)}")
     if size is None:
         raise SequenceError(f"folder {folder} holds no pairs", subject=folder, remedy="add some")
     return BoardPairs(seen, unseen, size)
@@ -95,6 +95,6 @@ def _look(
     return SeenPair(number, views["left"], views["right"]), size  # type: ignore[return-value]
 
 
-def _told(found: "SeenPair | DroppedPair") -> str:
+def _describe(found: "SeenPair | DroppedPair") -> str:
     reason = getattr(found, "reason", None)
     return str(reason) if reason else f"{len(found.left.ids)} and {len(found.right.ids)} marks"  # type: ignore[union-attr]

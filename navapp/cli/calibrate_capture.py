@@ -129,7 +129,7 @@ class _Solver:
         from calibration.report.html_report import write_report
         from calibration.rig.acceptance import Limits
         from calibration.rig.rig_solution import solve_rig
-        from navapp.cli.calibrate_stereo import recorded
+        from navapp.cli.calibrate_stereo import with_record
         from navapp.control.capture.states import Outcome
         from navapp.geometry.rig_files import write_rig
 
@@ -137,7 +137,7 @@ class _Solver:
         limits = Limits(accept_mm=section.accept_mm, depth_mm=section.working_depth_mm)
         size = (info.width, info.height)
         found = solve_rig(self.board, pairs, size, limits=limits, on_progress=report)
-        rig = replace(recorded(found, section, folder.name), serials=info.serials)
+        rig = replace(with_record(found, section, folder.name), serials=info.serials)
         write_report(folder / "report.html", replace(found, rig=rig), limits)
         is_accepted = rig.quality is not None and rig.quality.is_accepted
         path = folder / "rig.yml"

@@ -56,7 +56,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         opened = open_latency(configuration)
         undo.callback(opened.close)
         names = (opened.display.info.name, opened.camera.info.name)
-        recording = _watched(opened, options, diagnostics)
+        recording = _watch(opened, options, diagnostics)
     found = judged_latency(recording.switches, recording.left, recording.right, options.refresh_hz)
     write_json(options.json, "calibrate latency", _content(found, recording, names))
     if options.json != "-":
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def _watched(
+def _watch(
     opened: "OpenedLatency", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> "Recording":
     from calibration.latency.light_code import pauses_ms

@@ -89,7 +89,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         on_progress=lambda share: diagnostics.progress("solving", share),
     )  # fmt: skip
     found = replace(found, dropped=sorted([*pairs.unseen, *found.dropped], key=lambda d: d.index))
-    rig = recorded(found, section, Path(options.out).stem)
+    rig = with_record(found, section, Path(options.out).stem)
     is_accepted = rig.quality is not None and rig.quality.is_accepted
     if is_accepted or options.force:
         write_rig(options.out, rig)
@@ -131,7 +131,7 @@ def _aside(
     return pairs.seen
 
 
-def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> "StereoRig":
+def with_record(found: "Calibration", section: "CalibrationSection", name: str) -> "StereoRig":
     """The rig with its name and all that its file should say of it."""
     assert found.rig.quality is not None  # noqa: S101 (for the type checker: it always has one)
     today = date.today()

@@ -73,23 +73,23 @@ def text(found: "Inventory") -> str:
 
 
 def _device_to_json(device: "Device") -> dict[str, Any]:
-    from navapp.inventory.connected_devices import choosing
+    from navapp.inventory.connected_devices import make_choice_toml
 
     keys = {
         key: os.fspath(value) if isinstance(value, Path) else value
         for key, value in asdict(device).items()
     }
-    return {**keys, "configuration": choosing(device) or None}
+    return {**keys, "configuration": make_choice_toml(device) or None}
 
 
 def _device_text(device: "Device") -> Iterator[str]:
-    from navapp.inventory.connected_devices import choosing
+    from navapp.inventory.connected_devices import make_choice_toml
 
     name, facts = _facts(device)
     yield f"  {name}"
     for label, lines in facts:
-        yield from _labelled(label, lines)
-    yield from _labelled("choose", choosing(device).splitlines())
+        yield from _label_lines(label, lines)
+    yield from _label_lines("choose", make_choice_toml(device).splitlines())
 
 
 def _facts(device: "Device") -> tuple[str, list[tuple[str, Sequence[str]]]]:
@@ -138,6 +138,6 @@ def _unseen_text(one: "Unseen") -> Iterator[str]:
     yield f"    -> {one.remedy}"
 
 
-def _labelled(label: str, lines: Sequence[str]) -> Iterator[str]:
+def _label_lines(label: str, lines: Sequence[str]) -> Iterator[str]:
     for number, line in enumerate(lines):
         yield f"    {label:<{len(_INDENT) - 4}} {line}" if number == 0 else f"{_INDENT} {line}"

@@ -64,14 +64,14 @@ def _findings(config: str | None) -> "list[Finding]":
 
 
 def _device_findings(configuration: "Configuration") -> "list[Finding]":
-    from navapp.inventory.configured_checks import configured_findings
+    from navapp.inventory.configured_checks import check_configured_devices
     from navapp.inventory.connected_devices import look
-    from navapp.inventory.system_checks import system_findings
+    from navapp.inventory.system_checks import check_system
 
     found = look()
     return [
-        *system_findings(configuration, found),
-        *configured_findings(configuration, found),
+        *check_system(configuration, found),
+        *check_configured_devices(configuration, found),
     ]
 
 

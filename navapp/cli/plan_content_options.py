@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def completed(plan: "Plan", options: argparse.Namespace) -> "tuple[Plan, list[str]]":
+def complete_plan(plan: "Plan", options: argparse.Namespace) -> "tuple[Plan, list[str]]":
     """The plan with its surgical content, and what there is to warn of.
 
     Raises:
@@ -36,13 +36,13 @@ def completed(plan: "Plan", options: argparse.Namespace) -> "tuple[Plan, list[st
     from navapp.preop.contents_file import read_contents
     from navapp.preop.markups import read_markups
     from navapp.preop.plan_completion import complete
-    from navapp.preop.planned_content import Planned
+    from navapp.preop.planned_content import PlannedContent
 
-    planned = Planned()
+    planned = PlannedContent()
     if options.contents is not None:
-        planned = planned.joined(read_contents(options.contents, plan.bones))
+        planned = planned.union(read_contents(options.contents, plan.bones))
     for path in options.markups:
-        planned = planned.joined(read_markups(path, plan.bones))
+        planned = planned.union(read_markups(path, plan.bones))
     return complete(plan, planned)
 
 

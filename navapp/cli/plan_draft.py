@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics
-from navapp.cli.plan_options import by_bone, covered
+from navapp.cli.plan_options import add_cartilage, by_bone
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _NO_CARTILAGE = (
 _N_STEPS = 21
 
 
-def drafted(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
+def make_draft(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
     """Bones from what the options name."""
     if options.ct is None:
         for option in _CT_ONLY:
@@ -50,7 +50,7 @@ def with_cartilage(draft: "Draft", entries: list[str]) -> "Draft":
                 f"--cartilage names the {name}, which has no surface",
                 remedy=f"add --surface {name}=FILE",
             )
-        imported = covered(bones[name], text)
+        imported = add_cartilage(bones[name], text)
         bones[name] = imported.bone
         warnings += imported.warnings
     bare = [name for name in bones if name not in texts]

@@ -31,7 +31,7 @@ def by_bone(option: str, entries: list[str], value: str, example: str) -> dict[s
     return found
 
 
-def covered(bone: "BoneModel", text: str) -> "ImportedSurface":
+def add_cartilage(bone: "BoneModel", text: str) -> "ImportedSurface":
     """The bone with the cartilage of a file, or of MEAN_MM:SD_MM."""
     from navapp.preop import ImportedSurface, even_cartilage, import_cartilage
     from navapp.preop.cartilage import LARGEST_MM

@@ -23,7 +23,7 @@ _SMALLEST_MM, _LARGEST_MM = 5.0, 5000.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RegisterWork:
+class RegisterInputs:
     """What is registered, and the way back to the files' unit.
 
     Attributes:
@@ -54,7 +54,7 @@ class RegisterWork:
         return None if length_mm is None else length_mm / self.factor
 
 
-def prepared(options: argparse.Namespace) -> RegisterWork:
+def read_inputs(options: argparse.Namespace) -> RegisterInputs:
     """Both files and the start, in mm, ready to be registered.
 
     Raises:
@@ -83,7 +83,7 @@ def prepared(options: argparse.Namespace) -> RegisterWork:
     seen = Scene(factor * scene.points, camera_mm=camera_mm)
     prepare_ms = since_ms(started)
     warnings = tuple(_warnings(scene, model, options))
-    return RegisterWork(seen, ready, model, start, factor, warnings, read_ms, prepare_ms)
+    return RegisterInputs(seen, ready, model, start, factor, warnings, read_ms, prepare_ms)
 
 
 def _warnings(scene: "SceneFile", model: "ModelFile", options: argparse.Namespace) -> list[str]:

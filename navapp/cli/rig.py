@@ -132,10 +132,10 @@ def text(rig: "StereoRig", today: date) -> str:
     ]
     if rig.quality is None:
         return "\n".join([*lines, "  no quality record: nobody says how good it is"])
-    return "\n".join(lines + _told(rig.quality, today))
+    return "\n".join(lines + _describe_quality(rig.quality, today))
 
 
-def _told(quality: "RigQuality", today: date) -> list[str]:
+def _describe_quality(quality: "RigQuality", today: date) -> list[str]:
     if quality.is_accepted:
         lines = ["  accepted by its calibration"]
     else:

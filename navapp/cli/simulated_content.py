@@ -31,7 +31,7 @@ _HIP_ABOVE, _ANKLE_BELOW = 5.4, 4.6
 _UP, _BACK = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 
 
-def built_in_content(simulation: Simulation) -> SurgicalContent:
+def make_built_in_content(simulation: Simulation) -> SurgicalContent:
     """All that a plan can hold, of the simulated patient."""
     points = {name: np.asarray(point) for name, point in simulation.targets.items()}
     planes = _planes(points)

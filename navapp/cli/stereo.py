@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.stereo_pair import Pair, expected_px, read_pair, searched_band
+from navapp.cli.stereo_pair import Pair, find_band, read_pair, render_expected_px
 from navapp.errors import ResultError, UsageError
 
 if TYPE_CHECKING:
@@ -127,9 +127,12 @@ def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
     fills = options.fill == "wls"
     if options.model:
         return match_on_support(
-            pair.rectified, expected_px(pair, options), fills=fills, max_gap_px=_METRIC_GAP_PX
+            pair.rectified,
+            render_expected_px(pair, options),
+            fills=fills,
+            max_gap_px=_METRIC_GAP_PX,
         )
-    band = searched_band(pair, options)
+    band = find_band(pair, options)
     try:
         if options.matcher == "gradient":
             return match_baseline(pair.rectified, band)
@@ -148,7 +151,7 @@ def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> N
 
     import cv2
 
-    from navapp.cli.stereo_files import cloud_ply, coloured
+    from navapp.cli.stereo_files import cloud_ply, draw_disparity
     from navapp.geometry.whole_files import write_whole
 
     found = answer.disparity
@@ -159,7 +162,7 @@ def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> N
             write_whole(path, buffer.getvalue())
     for path, image in ((options.origin, found.origin), (options.picture, None)):
         if path:
-            shown = coloured(found) if image is None else image
+            shown = draw_disparity(found) if image is None else image
             write_whole(path, cv2.imencode(".png", shown)[1].tobytes())
     if options.cloud:
         write_whole(options.cloud, cloud_ply(found, pair.rectified.geometry))

@@ -11,7 +11,7 @@ _ALL = (Origin.MATCHED, Origin.FILLED_BORDER, Origin.FILLED_INTERIOR, Origin.MIS
 _HATCH_PX = 6
 
 
-def coloured(disparity_map: DisparityMap) -> NDArray[np.uint8]:
+def draw_disparity(disparity_map: DisparityMap) -> NDArray[np.uint8]:
     """(h, w, 3) BGR: near is warm, far is cold, unknown black; filled pixels are hatched."""
     import cv2
 

@@ -38,7 +38,7 @@ def read_pair(options: argparse.Namespace) -> Pair:
     Raises:
         InputError: missing, damaged, or no pair of this rig.
     """
-    return _rectified(_read(options.left), _read(options.right), options)
+    return _rectify(_read(options.left), _read(options.right), options)
 
 
 def _read(path: str) -> Image:
@@ -63,7 +63,7 @@ def _read(path: str) -> Image:
     return np.asarray(picture[..., :3] if picture.ndim == 3 else picture, dtype=np.uint8)
 
 
-def _rectified(left: Image, right: Image, options: argparse.Namespace) -> Pair:
+def _rectify(left: Image, right: Image, options: argparse.Namespace) -> Pair:
     """Both pictures grey and rectified; without a rig they are taken as they are."""
     import time
 
@@ -99,7 +99,7 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> Pair:
     return Pair(pair, rectifier, (time.perf_counter() - started) * 1e3)
 
 
-def searched_band(pair: Pair, options: argparse.Namespace) -> tuple[float, float]:
+def find_band(pair: Pair, options: argparse.Namespace) -> tuple[float, float]:
     """Smallest and largest disparity, px: as asked for, else of the configured depth range.
 
     Raises:
@@ -123,7 +123,7 @@ def searched_band(pair: Pair, options: argparse.Namespace) -> tuple[float, float
     return band
 
 
-def expected_px(pair: Pair, options: argparse.Namespace) -> NDArray[np.float32]:
+def render_expected_px(pair: Pair, options: argparse.Namespace) -> NDArray[np.float32]:
     """(h, w) disparity of the expected surface over the whole rectified left view.
 
     Raises:

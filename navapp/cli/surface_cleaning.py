@@ -24,7 +24,7 @@ class Mended:
     notes: tuple[str, ...]
 
 
-def mended(mesh: TriangleMesh) -> Mended:
+def mend(mesh: TriangleMesh) -> Mended:
     """A triangle mesh without repeated vertices, strays and inward normals.
 
     Vertices at exactly the same place become one; triangles without area or of the same corners as
@@ -54,7 +54,7 @@ def mended(mesh: TriangleMesh) -> Mended:
     return Mended(whole, tuple(notes))
 
 
-def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
+def thin(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     """About the same surface with at most about so many vertices, evenly spread.
 
     Even, because points pair with vertices: fewer where it is flat would leave gaps.
@@ -78,7 +78,7 @@ def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     return TriangleMesh(middles[used], kept, normals[used])
 
 
-def estimated_normals(points: FloatArray) -> FloatArray:
+def estimate_normals(points: FloatArray) -> FloatArray:
     """(N, 3) unit normals of a cloud, alike along each connected part of it, and outward.
 
     Outward means away from the cloud's mean, over a part as a whole.
@@ -95,7 +95,7 @@ def estimated_normals(points: FloatArray) -> FloatArray:
     offset = points[near] - points[near].mean(axis=1, keepdims=True)
     _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))
     normals: FloatArray = vectors[:, :, 0]
-    sign, part = _turned_alike(normals, near[:, 1:])
+    sign, part = _find_agreeing_signs(normals, near[:, 1:])
     normals *= sign[:, None]
     outward = np.einsum("ij,ij->i", normals, points - points.mean(axis=0))
     normals *= np.where(np.bincount(part, outward) < 0.0, -1.0, 1.0)[part][:, None]
@@ -158,7 +158,7 @@ def _of_faces(vertices: FloatArray, faces: NDArray[np.int64]) -> TriangleMesh:
     return TriangleMesh(vertices[used], index.reshape(-1, 3).astype(np.int32))
 
 
-def _turned_alike(
+def _find_agreeing_signs(
     normals: FloatArray, near: NDArray[np.integer]
 ) -> tuple[FloatArray, NDArray[np.int32]]:
     """(N,) signs that make neighbours' normals agree, and which connected part each point is of."""

@@ -12,7 +12,7 @@ from navapp.config.sections import (
     SimulationSection,
 )
 from navapp.config.toml_text import as_toml, one_table
-from navapp.config.validation import checked, parse
+from navapp.config.validation import parse, validate
 
 __all__ = [
     "FILE_NAME",
@@ -25,10 +25,10 @@ __all__ = [
     "Section",
     "SimulationSection",
     "as_toml",
-    "checked",
     "find_file",
     "load",
     "one_table",
     "parse",
     "toml_content",
+    "validate",
 ]

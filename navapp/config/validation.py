@@ -14,14 +14,14 @@ M = TypeVar("M", bound=BaseModel)
 
 def parse(content: Mapping[str, Any], name: str) -> Configuration:
     """Check the content of a configuration file."""
-    configuration = checked(Configuration, content, name)
+    configuration = validate(Configuration, content, name)
     for key, value in (configuration.camera.model_extra or {}).items():
         if not isinstance(value, Mapping):
             raise _unknown_key(Configuration, ["camera", key], name)
     return configuration
 
 
-def checked(model: type[M], content: Mapping[str, Any], name: str) -> M:
+def validate(model: type[M], content: Mapping[str, Any], name: str) -> M:
     """What a TOML file holds, as a model.
 
     Raises:
@@ -58,7 +58,7 @@ def _one_sentence(model: type[BaseModel], error: ValidationError, name: str) -> 
 
 def _unknown_key(model: type[BaseModel], path: list[str], name: str) -> ConfigurationError:
     key = ".".join(path)
-    known = _known_keys(model, path[:-1])
+    known = _list_known_keys(model, path[:-1])
     near = difflib.get_close_matches(path[-1], known, 1)
     remedy = (
         f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known) or 'nothing'}"
@@ -66,7 +66,7 @@ def _unknown_key(model: type[BaseModel], path: list[str], name: str) -> Configur
     return ConfigurationError(f"{name}: unknown key '{key}'", subject=key, remedy=remedy)
 
 
-def _known_keys(model: type[BaseModel], path: list[str]) -> list[str]:
+def _list_known_keys(model: type[BaseModel], path: list[str]) -> list[str]:
     for part in path:
         if part.isdigit():  # the place in a list of tables
             continue

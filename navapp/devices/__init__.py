@@ -1,6 +1,6 @@
 """Composition root: the only place that turns a configuration into opened devices."""
 
-from navapp.devices.cameras import real_camera
+from navapp.devices.cameras import make_real_camera
 from navapp.devices.capture import OpenedCapture, open_capture
 from navapp.devices.latency import OpenedLatency, open_latency
 from navapp.devices.session_devices import OpenedDevices, open_live, open_recording
@@ -11,9 +11,9 @@ __all__ = [
     "OpenedDevices",
     "OpenedLatency",
     "Simulation",
+    "make_real_camera",
     "open_capture",
     "open_latency",
     "open_live",
     "open_recording",
-    "real_camera",
 ]

@@ -10,7 +10,7 @@ from navapp.errors import ConfigurationError, DeviceError, NavappError
 from navapp.inventory.camera_packages import GROUP, KIND
 
 
-def installed_camera(backend: str, settings: Mapping[str, Any], clock: Clock) -> StereoCamera:
+def make_package_camera(backend: str, settings: Mapping[str, Any], clock: Clock) -> StereoCamera:
     """A camera of the group, not opened yet.
 
     Args:

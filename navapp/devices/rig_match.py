@@ -8,7 +8,7 @@ from navapp.errors import ConfigurationError, RigError, WrongDevice
 from navapp.geometry import Rectifier, StereoRig, read_rig
 
 
-def configured_rig(configuration: Configuration) -> StereoRig:
+def read_configured_rig(configuration: Configuration) -> StereoRig:
     """The rig file that the configuration names.
 
     Raises:
@@ -21,7 +21,7 @@ def configured_rig(configuration: Configuration) -> StereoRig:
     return read_rig(configuration.camera.rig)
 
 
-def open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
+def open_matching(camera: StereoCamera, rig: StereoRig) -> None:
     """Open a camera; it is closed again when it is not the one that the rig was made with."""
     Rectifier(rig)  # refuses cameras that do not stand side by side, before anything is opened
     camera.open()
@@ -44,7 +44,9 @@ def open_fitting(camera: StereoCamera, rig: StereoRig) -> None:
         )
 
 
-def reopener(camera: StereoCamera, open_again: Callable[[], None]) -> Callable[[], StereoCamera]:
+def make_reopener(
+    camera: StereoCamera, open_again: Callable[[], None]
+) -> Callable[[], StereoCamera]:
     """Opens the camera again; refuses another one in its place, or other pictures of the same."""
     first = camera.info
 

@@ -8,14 +8,14 @@ from drivers.clock import Clock, ManualClock, SystemClock
 from drivers.interfaces import DeviceSet, StereoCamera
 from drivers.replay_camera import ReplayCamera, ReplaySettings
 from navapp.config import Configuration
-from navapp.devices.cameras import real_camera
-from navapp.devices.peripherals import device_set
-from navapp.devices.rig_match import configured_rig, open_fitting, reopener
+from navapp.devices.cameras import make_real_camera
+from navapp.devices.peripherals import make_device_set
+from navapp.devices.rig_match import make_reopener, open_matching, read_configured_rig
 from navapp.devices.simulated_room import (
     Pace,
     Simulation,
+    make_simulated_camera,
     scenario_of,
-    simulated_camera,
     simulation_of,
     with_board,
 )
@@ -62,8 +62,8 @@ def open_recording(
     """
     clock = ManualClock()
     camera = ReplayCamera(source, clock, settings, rig_id=rig.rig_id)
-    open_fitting(camera, rig)
-    devices = device_set(configuration, camera, clock, rig, is_live=False)
+    open_matching(camera, rig)
+    devices = make_device_set(configuration, camera, clock, rig, is_live=False)
     return OpenedDevices(devices, rig, _no_reopening)
 
 
@@ -73,32 +73,32 @@ def _open_simulated(
     settings = configuration.camera.simulated
     world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=is_headless)
     scene = with_board(world, board, settings)
-    camera = simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
+    camera = make_simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
     if configuration.camera.rig is not None:
-        rig = configured_rig(configuration)
+        rig = read_configured_rig(configuration)
     else:
         rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
     simulation = simulation_of(world, camera)
-    return _opened(configuration, camera, pace.clock, rig, simulation)
+    return _open_devices(configuration, camera, pace.clock, rig, simulation)
 
 
 def _open_real(configuration: Configuration) -> OpenedDevices:
     clock = SystemClock()
-    rig = configured_rig(configuration)
-    camera = real_camera(configuration, clock, rig.rig_id)
-    return _opened(configuration, camera, clock, rig)
+    rig = read_configured_rig(configuration)
+    camera = make_real_camera(configuration, clock, rig.rig_id)
+    return _open_devices(configuration, camera, clock, rig)
 
 
-def _opened(
+def _open_devices(
     configuration: Configuration,
     camera: StereoCamera,
     clock: Clock,
     rig: StereoRig,
     simulation: Simulation | None = None,
 ) -> OpenedDevices:
-    open_fitting(camera, rig)
-    reopen = reopener(camera, lambda: open_fitting(camera, rig))
-    devices = device_set(configuration, camera, clock, rig)
+    open_matching(camera, rig)
+    reopen = make_reopener(camera, lambda: open_matching(camera, rig))
+    devices = make_device_set(configuration, camera, clock, rig)
     return OpenedDevices(devices, rig, reopen, simulation)
 
 

@@ -13,7 +13,7 @@ from sim_devices.sheet import PrintedSheet
 _SHEET_PX_PER_MM, _MOST_SHEET_PX, _SHEET_MARGIN_MM = 12.0, 6000.0, 8.0
 
 
-def printed(board: Board) -> PrintedSheet:
+def print_board(board: Board) -> PrintedSheet:
     """The board on a sheet of paper."""
     drawing = drawn(board)
     px_per_mm = min(_SHEET_PX_PER_MM, _MOST_SHEET_PX / max(board.size_mm))
@@ -22,7 +22,7 @@ def printed(board: Board) -> PrintedSheet:
     return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
 
 
-def hand_with(board: Board, seed: int) -> Hand:
+def make_hand(board: Board, seed: int) -> Hand:
     """A hand that holds the board's middle in front of the left camera."""
     middle_mm = board.points_mm.mean(axis=0)
     place_mm = np.array([0.0, 0.0, WORKING_DISTANCE_MM]) - middle_mm

@@ -13,7 +13,7 @@ from navapp.inventory.finding import Finding, Health, unless
 _LOOK = "connect it, or choose another one: navapp devices lists what there is"
 
 
-def configured_findings(
+def check_configured_devices(
     configuration: Configuration, found: Inventory, names: V4lNames | None = None
 ) -> list[Finding]:
     """Camera, display, projector and mirror of the configuration."""
@@ -36,7 +36,7 @@ def _camera(configuration: Configuration, found: Inventory, names: V4lNames) -> 
         ]
     if section.backend == "depthai":
         return [_oak_camera(section.depthai.device, found)]
-    return [_installed_camera(section.backend, found)]
+    return [_check_package_camera(section.backend, found)]
 
 
 def _usb_camera(name: str, wanted: str, names: V4lNames) -> Finding:
@@ -67,7 +67,7 @@ def _oak_camera(wanted: str, found: Inventory) -> Finding:
     return Finding("camera", Health.FAILED, detail, _LOOK)
 
 
-def _installed_camera(backend: str, found: Inventory) -> Finding:
+def _check_package_camera(backend: str, found: Inventory) -> Finding:
     for camera in found.installed_cameras.found:
         if camera.backend == backend:
             detail = f"'{backend}' is brought by {camera.package}, which alone knows its devices"

@@ -48,7 +48,7 @@ def look(names: V4lNames | None = None) -> Inventory:
     )
 
 
-def choosing(device: Device) -> str:
+def make_choice_toml(device: Device) -> str:
     """TOML that chooses a device; empty when it cannot be chosen."""
     match device:
         case UsbCamera(chosen_by=""):

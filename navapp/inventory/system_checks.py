@@ -26,7 +26,7 @@ _RULE_FOLDERS = tuple(
 )
 
 
-def system_findings(configuration: Configuration, found: Inventory) -> list[Finding]:
+def check_system(configuration: Configuration, found: Inventory) -> list[Finding]:
     """Every check that applies."""
     is_usb = configuration.camera.backend == "opencv"
     cameras = [camera.node for camera in found.usb_cameras.found]

@@ -76,7 +76,7 @@ def build_aspects(
             views[number] = look.at(directions[number])
 
     run_both(lambda: run(0), lambda: run(1))
-    kept = _merged(directions, [view for view in views if view is not None], settings)
+    kept = _select_distinct(directions, [view for view in views if view is not None], settings)
     on_progress(1.0)
     seen = [view for view in (views[k] for k in kept) if view is not None]
     if not seen:
@@ -127,12 +127,12 @@ class _Look:
         middles, tangents = np.empty((2, len(self._faces), 3))
         vertices = np.array(self._mesh.vertices_mm)
         n = contour_segments(vertices, self._faces, facing, middles, tangents)
-        outline = self._seen(middles[:n], pose, depth)
+        outline = self._find_visible(middles[:n], pose, depth)
         crease = self._creases
         towards = camera_mm - crease.points_mm
         cosine = np.einsum("ij,ij->i", crease.normals, towards) / np.linalg.norm(towards, axis=1)
         turned = np.flatnonzero(cosine > _CREASE_COSINE)
-        turned = turned[self._seen(crease.points_mm[turned], pose, depth)]
+        turned = turned[self._find_visible(crease.points_mm[turned], pose, depth)]
         most = self._settings.n_points
         n_creases = min(len(turned), int(_CREASE_SHARE * most))
         chosen = _spread(middles[:n][outline], most - n_creases)
@@ -142,7 +142,7 @@ class _Look:
         order = _spread(points, len(points))
         return points[order], along[order]
 
-    def _seen(
+    def _find_visible(
         self, points_mm: FloatArray, pose: RigidTransform, depth_mm: NDArray[np.float32]
     ) -> NDArray[np.bool_]:
         """(n,) whether something around each point is no nearer than the point itself."""
@@ -167,7 +167,7 @@ def _spread(points_mm: FloatArray, n: int) -> NDArray[np.int64]:
     return order[: spread_out(np.ascontiguousarray(points_mm), order)]
 
 
-def _merged(
+def _select_distinct(
     directions: FloatArray, views: list[tuple[FloatArray, FloatArray]], settings: AspectSettings
 ) -> list[int]:
     """The views that are left when each repeats no neighbour that was kept before it."""

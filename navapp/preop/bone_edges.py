@@ -46,7 +46,7 @@ def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
         is_wanted: (V,) where creases are looked for.
     """
     edges, _ = face_pairs(mesh.faces)
-    normals = _smoothed(mesh, edges)
+    normals = _smooth_normals(mesh, edges)
     offset = mesh.vertices_mm[edges[:, 1]] - mesh.vertices_mm[edges[:, 0]]
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
     turn = (normals[edges[:, 1]] - normals[edges[:, 0]]) / length[:, None]
@@ -71,7 +71,7 @@ def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
     return Crease(mesh.vertices_mm[is_sharp], tangents, np.asarray(mesh.normals)[is_sharp])
 
 
-def _smoothed(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
+def _smooth_normals(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
     """(V, 3) normals averaged over neighbours, over about the same length for every mesh."""
     from scipy.sparse import coo_matrix, identity
 

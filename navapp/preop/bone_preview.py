@@ -30,7 +30,7 @@ def draw_preview(mesh: TriangleMesh, slices: Picture | None = None) -> bytes:
 
     pictures = []
     for title, rotation in _VIEWS:
-        picture = _shaded(mesh, np.array(rotation, dtype=np.float64))
+        picture = _render_shaded(mesh, np.array(rotation, dtype=np.float64))
         cv2.putText(picture, title, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.6, (220, 220, 220), 1)
         pictures.append(picture)
     picture = np.hstack(pictures)
@@ -43,7 +43,7 @@ def draw_preview(mesh: TriangleMesh, slices: Picture | None = None) -> bytes:
     return encoded.tobytes()
 
 
-def _shaded(mesh: TriangleMesh, rotation: np.ndarray) -> np.ndarray:
+def _render_shaded(mesh: TriangleMesh, rotation: np.ndarray) -> np.ndarray:
     extent_mm = float(np.linalg.norm(mesh.size_mm))
     distance_mm = _DISTANCE * extent_mm
     focal_px = 0.95 * _SIZE_PX * _DISTANCE

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from navapp.config import checked, toml_content
+from navapp.config import toml_content, validate
 from navapp.errors import ConfigurationError, PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
@@ -19,7 +19,7 @@ from navapp.preop.contents_file_tables import (
     RiskTable,
 )
 from navapp.preop.defects import paint_near, paint_within
-from navapp.preop.planned_content import Planned
+from navapp.preop.planned_content import PlannedContent
 from navapp.preop.surface_import import in_lps
 from navapp.values import (
     ANKLE_CENTRE,
@@ -37,7 +37,7 @@ from navapp.values.contents import PartKind
 T = TypeVar("T")
 
 
-def read_contents(path: str | Path, bones: Mapping[str, BoneModel]) -> Planned:
+def read_contents(path: str | Path, bones: Mapping[str, BoneModel]) -> PlannedContent:
     """Read a contents file for the bones of a plan; file names in it are relative to its folder.
 
     Raises:
@@ -57,17 +57,19 @@ def read_contents(path: str | Path, bones: Mapping[str, BoneModel]) -> Planned:
     risks = [(one.name, _risk(one, path, warnings)) for one in tables.risk]
     defects = [(one.name, _defect(one, bones[one.bone], path)) for one in tables.defect]
     content = SurgicalContent(
-        planes=_named(path, "plane", [(one.name, one.value()) for one in tables.plane]),
-        drills=_named(path, "drill", [(one.name, one.value()) for one in tables.drill]),
-        parts=_named(path, "part", parts),
-        risks=_named(path, "risk", risks),
-        landmarks=_named(path, "landmark", _landmarks(tables)),
-        defects=_named(path, "defect", defects),
+        planes=_index_by_name(path, "plane", [(one.name, one.value()) for one in tables.plane]),
+        drills=_index_by_name(path, "drill", [(one.name, one.value()) for one in tables.drill]),
+        parts=_index_by_name(path, "part", parts),
+        risks=_index_by_name(path, "risk", risks),
+        landmarks=_index_by_name(path, "landmark", _landmarks(tables)),
+        defects=_index_by_name(path, "defect", defects),
         stages={name: one.value() for name, one in tables.stage if one is not None},
     )
-    return Planned(
+    return PlannedContent(
         content,
-        _named(path, "target", [(one.name, np.array(one.points_mm)) for one in tables.target]),
+        _index_by_name(
+            path, "target", [(one.name, np.array(one.points_mm)) for one in tables.target]
+        ),
         {one.name: np.array(one.curve_mm) for one in tables.risk if one.curve_mm is not None},
         tuple(name for name, centre in _centres(tables) if centre is not None and centre.absent),
         tuple(warnings),
@@ -76,7 +78,7 @@ def read_contents(path: str | Path, bones: Mapping[str, BoneModel]) -> Planned:
 
 def _tables(path: Path) -> ContentsTables:
     try:
-        return checked(ContentsTables, toml_content(path, "contents file"), str(path))
+        return validate(ContentsTables, toml_content(path, "contents file"), str(path))
     except ConfigurationError as error:
         # It is an input like a surface is, and no configuration.
         raise PlanError(error.problem, subject=error.subject, remedy=error.remedy) from error
@@ -94,7 +96,7 @@ def _check_bones(tables: ContentsTables, bones: Mapping[str, BoneModel], path: P
                 )
 
 
-def _named(path: Path, kind: str, entries: Iterable[tuple[str, T]]) -> dict[str, T]:
+def _index_by_name(path: Path, kind: str, entries: Iterable[tuple[str, T]]) -> dict[str, T]:
     """By name, each once."""
     found: dict[str, T] = {}
     for name, value in entries:

@@ -10,7 +10,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.default_targets import with_defaults
 from navapp.preop.landmarks import estimate_landmarks
-from navapp.preop.planned_content import Planned
+from navapp.preop.planned_content import PlannedContent
 from navapp.preop.side_estimate import SideEstimate, estimate_side
 from navapp.values import ANKLE_CENTRE, HIP_CENTRE, BoneModel, Plan, Side
 
@@ -35,10 +35,12 @@ def with_side(
     """
     estimate = estimate_side(bones, fibula)
     side = given or estimate.side
-    return {name: replace(bone, side=side) for name, bone in bones.items()}, _said(estimate, given)
+    return {name: replace(bone, side=side) for name, bone in bones.items()}, _make_side_warnings(
+        estimate, given
+    )
 
 
-def complete(plan: Plan, planned: Planned) -> tuple[Plan, list[str]]:
+def complete(plan: Plan, planned: PlannedContent) -> tuple[Plan, list[str]]:
     """The plan with what was planned; landmarks and targets from the surfaces where it has none.
 
     Given landmarks replace estimated ones of the same name.
@@ -71,7 +73,7 @@ def complete(plan: Plan, planned: Planned) -> tuple[Plan, list[str]]:
         raise PlanError(str(error), remedy="give it, or leave its name out") from error
 
 
-def _said(estimate: SideEstimate, given: Side | None) -> list[str]:
+def _make_side_warnings(estimate: SideEstimate, given: Side | None) -> list[str]:
     why = ", ".join(estimate.reasons)
     if given is not None:
         if estimate.certainty == "certain" and estimate.side != given:
@@ -87,7 +89,7 @@ def _said(estimate: SideEstimate, given: Side | None) -> list[str]:
     ]
 
 
-def _far_from_bones(planned: Planned, bones: Mapping[str, BoneModel]) -> list[str]:
+def _far_from_bones(planned: PlannedContent, bones: Mapping[str, BoneModel]) -> list[str]:
     """What lies further from its bone than it can, and whether RAS would explain it."""
     from scipy.spatial import cKDTree
 
@@ -104,7 +106,7 @@ def _far_from_bones(planned: Planned, bones: Mapping[str, BoneModel]) -> list[st
     return warnings
 
 
-def _points_of(planned: Planned) -> list[tuple[str, str, FloatArray]]:
+def _points_of(planned: PlannedContent) -> list[tuple[str, str, FloatArray]]:
     """What, its bone, and a point (3,) of it that lies on or near that bone."""
     content = planned.content
     points = [(f"plane '{name}'", one.bone, one.point_mm) for name, one in content.planes.items()]

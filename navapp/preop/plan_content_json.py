@@ -10,7 +10,7 @@ import numpy as np
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply, write_ply
 from navapp.geometry.transform import RigidTransform
-from navapp.preop.plan_integrity import damaged, sha256_of
+from navapp.preop.plan_integrity import make_damage_error, sha256_of
 from navapp.values import (
     Box,
     Cylinder,
@@ -104,5 +104,5 @@ def _risk(entry: Mapping[str, Any], folder: Path) -> RiskStructure:
 def _surface(entry: Mapping[str, Any], folder: Path) -> TriangleMesh:
     path = folder / entry["file"]
     if not path.is_file() or sha256_of(path) != entry["sha256"]:
-        raise damaged(folder, f"{entry['file']} is missing, changed or cut short")
+        raise make_damage_error(folder, f"{entry['file']} is missing, changed or cut short")
     return read_ply(path)[0]

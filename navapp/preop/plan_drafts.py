@@ -161,4 +161,4 @@ def _within(ct: CtVolume, region_mm: tuple[float, ...]) -> CtVolume:
             "--region lies outside the CT",
             remedy="its middle is at " + ", ".join(f"{value:.0f}" for value in middle) + " (LPS)",
         )
-    return ct.cropped(lower, upper)
+    return ct.crop(lower, upper)

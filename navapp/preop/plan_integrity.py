@@ -11,7 +11,7 @@ def sha256_of(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def damaged(folder: Path, why: str) -> PlanError:
+def make_damage_error(folder: Path, why: str) -> PlanError:
     """What is raised of a plan's folder that was changed, or cannot be read."""
     return PlanError(
         f"plan {folder} is damaged: {why}",

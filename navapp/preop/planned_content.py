@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Planned:
+class PlannedContent:
     """Surgical content, targets and curves (as `Plan` has them) with what was assumed.
 
     Attributes:
@@ -25,7 +25,7 @@ class Planned:
     absent: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
-    def joined(self, other: "Planned") -> "Planned":
+    def union(self, other: "PlannedContent") -> "PlannedContent":
         """Both together.
 
         Raises:
@@ -37,7 +37,7 @@ class Planned:
             )
             for one in fields(SurgicalContent)
         }
-        return Planned(
+        return PlannedContent(
             SurgicalContent(**kinds),
             _union("targets", self.targets, other.targets),
             _union("curves", self.curves, other.curves),

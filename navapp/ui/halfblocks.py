@@ -37,7 +37,7 @@ def area_resized(picture: NDArray[np.uint8], height: int, width: int) -> FloatAr
     return _mean_over_parts(rows.swapaxes(0, 1), width).swapaxes(0, 1)
 
 
-def fitted_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[int, int]:
+def fit_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[int, int]:
     """Width in columns and height in half rows of the largest picture that fits, height even."""
     h, w = picture.shape[:2]
     scale = min(columns / w, 2 * rows / h)
@@ -54,7 +54,7 @@ def cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[n
         columns: of cells, at least 1.
         rows: of cells, at least 1.
     """
-    width, height = fitted_size(picture, columns, rows)
+    width, height = fit_size(picture, columns, rows)
     levels = np.rint(area_resized(picture, height, width) * (_LEVELS / 255.0)).astype(np.int32)
     colours = (levels[:, :, 2] << 8) | (levels[:, :, 1] << 4) | levels[:, :, 0]
     canvas = np.zeros((2 * rows, columns), dtype=np.int32)

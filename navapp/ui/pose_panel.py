@@ -94,8 +94,8 @@ def _middle(view: View, width: int) -> tuple[list[Content], list[Content]]:
     needed = [
         Content(""),
         _figure("age", Number.WHOLE, snapshot.pose_age_ms, "ms"),
-        _figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"),
-        _figure("occluded", Number.WHOLE, _occluded_percent(snapshot), "%"),
+        _figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"),
+        _figure("occluded", Number.WHOLE, _compute_occluded_percent(snapshot), "%"),
     ]
     return needed, _fit(snapshot)
 
@@ -128,7 +128,7 @@ def _candidate(view: View, width: int) -> list[Content]:
     status = Status.LOST if verdict is None else verdict.status
     level = _STATUS_LEVELS[status]
     lines = [Content.styled(f"{level.mark(view.symbols)} judged {status.value}", level.value)]
-    figures = [_figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"), *_fit(snapshot)]
+    figures = [_figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"), *_fit(snapshot)]
     accept = ("a", "bold $foreground"), " accept   "
     asks = [
         Content.assemble(*(accept if is_acceptable(snapshot) else ()), ("r", "bold"), " reject")
@@ -156,11 +156,11 @@ def _figure(name: str, number: Number, value: float | None, unit: str) -> Conten
     )
 
 
-def _seen_percent(snapshot: Snapshot) -> float | None:
+def _compute_seen_percent(snapshot: Snapshot) -> float | None:
     return None if snapshot.verdict is None else 100.0 * snapshot.verdict.coverage
 
 
-def _occluded_percent(snapshot: Snapshot) -> float | None:
+def _compute_occluded_percent(snapshot: Snapshot) -> float | None:
     return None if snapshot.verdict is None else 100.0 * snapshot.verdict.occluded_share
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from navapp.cli.main import run
-from navapp.cli.simulated_patient import built_in_plan
+from navapp.cli.simulated_patient import make_built_in_plan
 from navapp.config import SimulationSection
 from navapp.control.stages import STAGES
-from navapp.devices.simulated_room import Pace, scenario_of, simulated_camera, simulation_of
+from navapp.devices.simulated_room import Pace, make_simulated_camera, scenario_of, simulation_of
 from navapp.geometry.ply import write_ply
 from navapp.preop import read_plan, write_plan
 from navapp.values import ANKLE_CENTRE, HIP_CENTRE, Plan
@@ -89,8 +89,8 @@ def test_show_takes_no_contents(tmp_path) -> None:
 def built_in(request) -> Plan:
     settings = SimulationSection(side=request.param)
     world = World(scenario_of(settings))
-    camera = simulated_camera(world, settings, Pace.of(settings, is_headless=True), 15.0)
-    return built_in_plan(simulation_of(world, camera))
+    camera = make_simulated_camera(world, settings, Pace.of(settings, is_headless=True), 15.0)
+    return make_built_in_plan(simulation_of(world, camera))
 
 
 def test_the_built_in_plan_has_something_of_everything_and_reads_back(built_in, tmp_path) -> None:

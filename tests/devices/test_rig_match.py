@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.interfaces import CameraInfo
-from navapp.devices.rig_match import reopener
+from navapp.devices.rig_match import make_reopener
 from navapp.errors import WrongDevice
 
 
@@ -33,7 +33,7 @@ class Changing:
 )
 def test_only_the_camera_that_it_was_comes_back(changed, words) -> None:
     camera = Changing()
-    reopen = reopener(camera, camera.open)
+    reopen = make_reopener(camera, camera.open)
     camera.close()
     camera.info = replace(camera.info, **changed)
     if not words:

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from drivers.clock import ManualClock
-from navapp.devices.package_camera import installed_camera
+from navapp.devices.package_camera import make_package_camera
 from navapp.errors import ConfigurationError, DeviceError, UsageError
 from navapp.inventory import camera_packages
 from navapp.inventory.camera_packages import InstalledCamera, list_installed
@@ -94,23 +94,23 @@ def test_of_two_packages_of_one_name_none_is_used(site):
     assert listing.found == ()
     assert [why.problem.split()[5] for why in listing.unseen] == ["acme", "copycat"]
     with pytest.raises(ConfigurationError, match="2 installed packages bring a camera backend"):
-        installed_camera("acme", {}, ManualClock())
+        make_package_camera("acme", {}, ManualClock())
 
 
 def test_a_factory_is_given_its_table_and_the_clock(site):
     put(site, "gamma", "camera.gamma", GOOD)
     clock = ManualClock()
-    assert installed_camera("gamma", {"port": 7}, clock) == ({"port": 7}, clock)
+    assert make_package_camera("gamma", {"port": 7}, clock) == ({"port": 7}, clock)
 
 
 def test_a_factory_that_fails_is_one_sentence(site):
     put(site, "delta", "camera.delta", "def make(settings, clock): return settings['port']")
     with pytest.raises(DeviceError, match=r"'delta' cannot be loaded \(KeyError: 'port'\)"):
-        installed_camera("delta", {}, ManualClock())
+        make_package_camera("delta", {}, ManualClock())
 
 
 def test_a_factory_may_refuse_its_settings_in_navapps_words(site):
     source = "from navapp.errors import UsageError\ndef make(s, c): raise UsageError('no port')"
     put(site, "epsilon", "camera.epsilon", source)
     with pytest.raises(UsageError, match="no port"):
-        installed_camera("epsilon", {}, ManualClock())
+        make_package_camera("epsilon", {}, ManualClock())

@@ -3,7 +3,7 @@ import tomllib
 import pytest
 
 from navapp.config import parse
-from navapp.inventory.connected_devices import choosing
+from navapp.inventory.connected_devices import make_choice_toml
 from tests.inventory.inventories import ACME, BEAMER, DESK, EVERYTHING, OAK, PORT, USB
 
 
@@ -19,22 +19,22 @@ from tests.inventory.inventories import ACME, BEAMER, DESK, EVERYTHING, OAK, POR
     ],
 )
 def test_what_chooses_a_device_is_a_valid_configuration_that_names_it(device, table, keys):
-    section = getattr(parse(tomllib.loads(choosing(device)), "x"), table)
+    section = getattr(parse(tomllib.loads(make_choice_toml(device)), "x"), table)
     assert {key: getattr(section, key) for key in keys} == keys
 
 
 def test_cameras_are_chosen_by_what_stays():
-    cameras = [parse(tomllib.loads(choosing(one)), "x").camera for one in (USB, OAK)]
+    cameras = [parse(tomllib.loads(make_choice_toml(one)), "x").camera for one in (USB, OAK)]
     assert cameras[0].opencv.left == "A1"
     assert cameras[1].depthai.device == OAK.device_id
 
 
 def test_a_commented_line_becomes_the_right_eye_or_the_mirror():
-    right = choosing(USB).splitlines()[-1].removeprefix("# ")
+    right = make_choice_toml(USB).splitlines()[-1].removeprefix("# ")
     configuration = parse(tomllib.loads(f'[camera.opencv]\nleft = "L"\n{right}'), "x")
     assert configuration.camera.opencv.right == "A1"
-    assert choosing(PORT).splitlines()[-1] == '# or [mirror] with backend = "zaber"'
+    assert make_choice_toml(PORT).splitlines()[-1] == '# or [mirror] with backend = "zaber"'
 
 
 def test_a_camera_without_a_lasting_name_is_not_chosen():
-    assert choosing(EVERYTHING.usb_cameras.found[1]) == ""
+    assert make_choice_toml(EVERYTHING.usb_cameras.found[1]) == ""

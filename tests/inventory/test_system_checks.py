@@ -11,7 +11,7 @@ from drivers.discovery.oak_cameras import UDEV_RULE
 from navapp.config import Configuration, parse
 from navapp.inventory import system_checks
 from navapp.inventory.finding import Health
-from navapp.inventory.system_checks import system_findings
+from navapp.inventory.system_checks import check_system
 from tests.inventory.inventories import BEAMER, EVERYTHING, NOTHING, PORT, USB
 
 USB_PAIR = parse({"camera": {"backend": "opencv", "opencv": {"left": "A1"}}}, "x")
@@ -31,7 +31,7 @@ def _stranger(monkeypatch):
 
 
 def finding(name, configuration=None, found=NOTHING):
-    findings = system_findings(configuration or Configuration(), found)
+    findings = check_system(configuration or Configuration(), found)
     return {one.name: one for one in findings}.get(name)
 
 

@@ -6,7 +6,7 @@ import pytest
 from navapp.errors import PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.preop.plan_completion import complete, with_side
-from navapp.preop.planned_content import Planned
+from navapp.preop.planned_content import PlannedContent
 from navapp.values import (
     BoneModel,
     DrillAxis,
@@ -28,7 +28,7 @@ def plan() -> Plan:
 
 
 def test_a_plan_of_surfaces_gets_landmarks_targets_and_stages(plan) -> None:
-    whole, warnings = complete(plan, Planned())
+    whole, warnings = complete(plan, PlannedContent())
     assert whole.digest != plan.digest
     assert whole.content.landmarks["femur/medial_condyle"].source == "surface"
     assert set(whole.content.stages) == {"opening", "drilling", "implant", "patella", "spacer"}
@@ -39,7 +39,7 @@ def test_a_plan_of_surfaces_gets_landmarks_targets_and_stages(plan) -> None:
 def test_what_is_given_replaces_what_is_estimated(plan) -> None:
     given = Landmark(np.array([1.0, 2.0, 3.0]), None, "contents")
     centres = {"femur/hip_centre": given, "femur/medial_condyle": given}
-    planned = Planned(SurgicalContent(landmarks=centres), absent=("tibia/ankle_centre",))
+    planned = PlannedContent(SurgicalContent(landmarks=centres), absent=("tibia/ankle_centre",))
     whole, warnings = complete(plan, planned)
     assert whole.content.landmarks["femur/medial_condyle"] is given
     assert whole.content.landmarks["femur/lateral_condyle"].source == "surface"
@@ -57,7 +57,7 @@ def test_what_lies_far_from_its_bone_is_told_and_so_is_ras() -> None:
     beyond = DrillAxis("femur", entry + 200.0, Z, 20.0, 8.0)
     here = DrillAxis("femur", entry, Z, 20.0, 8.0)
     drills = {"ras": in_ras, "far": beyond, "here": here}
-    _, warnings = complete(plan, Planned(SurgicalContent(drills=drills)))
+    _, warnings = complete(plan, PlannedContent(SurgicalContent(drills=drills)))
     about = {name: [w for w in warnings if f"drill '{name}'" in w] for name in drills}
     assert "looks like RAS" in about["ras"][0]
     assert "mm from the femur" in about["far"][0]
@@ -68,17 +68,19 @@ def test_what_lies_far_from_its_bone_is_told_and_so_is_ras() -> None:
 def test_a_stage_that_names_what_nobody_gave_is_refused(plan) -> None:
     stages = {"drilling": StageContent("femur", drills=("guide",))}
     with pytest.raises(PlanError, match=r"stage drilling.*'guide'.*give it"):
-        complete(plan, Planned(SurgicalContent(stages=stages)))
+        complete(plan, PlannedContent(SurgicalContent(stages=stages)))
 
 
 def test_a_stage_may_name_what_another_file_gives(plan) -> None:
-    stages = Planned(SurgicalContent(stages={"drilling": StageContent("femur", drills=("a",))}))
+    stages = PlannedContent(
+        SurgicalContent(stages={"drilling": StageContent("femur", drills=("a",))})
+    )
     entry = KNEE.landmarks["femur/notch"]
-    drill = Planned(SurgicalContent(drills={"a": DrillAxis("femur", entry, Z, 20.0, 8.0)}))
-    whole, _ = complete(plan, stages.joined(drill))
+    drill = PlannedContent(SurgicalContent(drills={"a": DrillAxis("femur", entry, Z, 20.0, 8.0)}))
+    whole, _ = complete(plan, stages.union(drill))
     assert whole.content.stages["drilling"].drills == ("a",)
     with pytest.raises(PlanError, match="given twice"):
-        drill.joined(drill)
+        drill.union(drill)
 
 
 @pytest.fixture
@@ -129,5 +131,5 @@ def test_a_plan_of_what_is_no_knee_is_made_all_the_same(name, names) -> None:
     """Whoever gives such a surface sees it in the pictures; nothing may stumble over it."""
     bones, said = with_side({bone: BoneModel(bone, ODD[name]) for bone in names}, None)
     assert all("certain" not in sentence for sentence in said)
-    whole, _ = complete(Plan(bones), Planned())
+    whole, _ = complete(Plan(bones), PlannedContent())
     assert set(whole.bones) == set(names)

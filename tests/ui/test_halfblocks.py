@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from navapp.ui.halfblocks import area_resized, cell_codes, fitted_size, row_strip
+from navapp.ui.halfblocks import area_resized, cell_codes, fit_size, row_strip
 from navapp.ui.symbols import ASCII
 
 
@@ -26,7 +26,7 @@ def test_enlarging_by_a_whole_factor_repeats_pixels() -> None:
 
 @pytest.mark.parametrize(("columns", "rows"), [(52, 15), (114, 30), (3, 40), (1, 1)])
 def test_the_picture_fits_its_box_and_keeps_its_aspect(columns: int, rows: int) -> None:
-    width, height = fitted_size(np.zeros((90, 160, 3), dtype=np.uint8), columns, rows)
+    width, height = fit_size(np.zeros((90, 160, 3), dtype=np.uint8), columns, rows)
     assert 1 <= width <= columns
     assert 2 <= height <= 2 * rows
     if columns > 10:

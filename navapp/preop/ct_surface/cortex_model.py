@@ -91,7 +91,7 @@ def fit_edges(
     n_used = int((positions <= until_mm + 1e-9).sum())
     model = _model(n_used, round(blur_mm, 3), scan.fading_mm, scan.cortex_hu, reach_mm)
     parts = [
-        _fitted(model, profiles_hu[first : first + _CHUNK, :n_used], scan)
+        _fit_model(model, profiles_hu[first : first + _CHUNK, :n_used], scan)
         for first in range(0, len(profiles_hu), _CHUNK)
     ]
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
@@ -142,7 +142,7 @@ def _model(
     )
 
 
-def _fitted(model: _Model, profiles_hu: FloatArray, scan: Scan) -> tuple[FloatArray, ...]:
+def _fit_model(model: _Model, profiles_hu: FloatArray, scan: Scan) -> tuple[FloatArray, ...]:
     known = np.full((len(profiles_hu), 1), scan.soft_hu * _NOISE_HU / _SOFT_SD_HU)
     values = np.hstack([profiles_hu, known])
     left = (values**2).sum(axis=1)[:, None] - 2.0 * values @ model.plates.T

@@ -58,17 +58,17 @@ def refine_surface(
         reach_mm: how far off the mesh may be.
     """
     neighbours = neighbours_of(mesh.faces, len(mesh.vertices_mm))
-    offset, weight = _measured(mesh, ct, is_other, density, scan, reach_mm)
+    offset, weight = _measure_offsets(mesh, ct, is_other, density, scan, reach_mm)
     weight[is_cut] = 0.0
     is_measured = weight > 0.0
-    even = _evened(offset, weight, neighbours)
+    even = _smooth_offsets(offset, weight, neighbours)
     even += np.where(is_measured, blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
     even[is_cut] = 0.0
     mesh = TriangleMesh(mesh.vertices_mm + even[:, None] * mesh.normals, mesh.faces)
     return Refined(mesh, is_measured)
 
 
-def _measured(
+def _measure_offsets(
     mesh: TriangleMesh,
     ct: CtVolume,
     is_other: NDArray[np.bool_],
@@ -109,7 +109,7 @@ def _until_class(mesh: TriangleMesh, ct: CtVolume, is_other: NDArray[np.bool_]) 
     return np.maximum(np.searchsorted(_UNTIL_MM, half_mm, side="right") - 1, 0)
 
 
-def _evened(values: FloatArray, weight: FloatArray, neighbours: csr_array) -> FloatArray:
+def _smooth_offsets(values: FloatArray, weight: FloatArray, neighbours: csr_array) -> FloatArray:
     """(V,) weighted means over neighbours; what has no weight follows them."""
     degree = np.maximum(neighbours.sum(axis=1), 1.0)
     for _ in range(_EVENING_ROUNDS):

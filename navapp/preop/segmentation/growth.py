@@ -10,7 +10,7 @@ from navapp.preop.segmentation.masks import (
     LabelArray,
     as_image,
     bounds,
-    closed,
+    close_gaps,
     depth_mm,
     largest,
 )
@@ -40,7 +40,7 @@ def grow(
 
     Source: Meyer 1991, watershed by flooding from markers.
     """
-    basins = _flooded(-hu, _up_to_plates(cores, plates, solid, spacing_mm), solid, spacing_mm)
+    basins = _flood(-hu, _up_to_plates(cores, plates, solid, spacing_mm), solid, spacing_mm)
     bones = np.zeros(cores.shape, dtype=np.uint8)
     for bone in range(1, int(cores.max()) + 1):
         _put_bone(bones, bone, basins, (hu > threshold_hu) | (cores == bone), spacing_mm)
@@ -54,7 +54,7 @@ def _up_to_plates(
     plate = solid & is_ridge(plates)
     away_mm = -depth_mm(cores > 0, spacing_mm)
     free = solid & ~plate & (away_mm < _TO_PLATE_MM)
-    grown = _flooded(away_mm, cores.astype(np.uint8), free, spacing_mm)
+    grown = _flood(away_mm, cores.astype(np.uint8), free, spacing_mm)
     grown[grown == _OUTSIDE] = 0
     inner = grown.copy()
     for axis in range(3):
@@ -79,7 +79,7 @@ def _nearest_core(cores: LabelArray, spacing_mm: FloatArray) -> NDArray[np.uint8
     return nearest
 
 
-def _flooded(
+def _flood(
     height: NDArray[np.float32], markers: NDArray[np.uint8], free: BoolArray, spacing_mm: FloatArray
 ) -> NDArray[np.uint8]:
     """Basins of the markers within what is free; `_OUTSIDE` elsewhere."""
@@ -100,7 +100,7 @@ def _put_bone(
     margin = np.ceil(2.0 * _CLOSING_MM / spacing_mm[::-1]).astype(np.intp)
     box = bounds(basins == bone, margin)
     mine = basins[box] == bone
-    whole = closed(mine & is_bony[box], spacing_mm, _CLOSING_MM)
+    whole = close_gaps(mine & is_bony[box], spacing_mm, _CLOSING_MM)
     # Closing must not reach into a neighbour.
     whole &= mine | (basins[box] == _OUTSIDE)
     bones[box][largest(whole, spacing_mm)] = bone

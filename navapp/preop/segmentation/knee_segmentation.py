@@ -66,7 +66,7 @@ def segment(
     tell("finding plates of cortex")
     plates = find_plates(hu, ct.spacing_mm, solid)
     tell("telling bones apart")
-    cores, named = _named_cores(plates, solid, ct, seeds)
+    cores, named = _find_named_cores(plates, solid, ct, seeds)
     tell("growing bones up to the joint")
     bones = grow(cores, hu, plates, solid, ct.spacing_mm, threshold_hu)
     missing = [name for name in BONES if name not in named.bones]
@@ -115,11 +115,11 @@ def _around_solids(
             remedy="lower --threshold, or give another series",
         )
     box = bounds(solid, np.ceil(_MARGIN_MM / ct.spacing_mm[::-1]).astype(np.intp))
-    cut = ct.cropped([edge.start for edge in box[::-1]], [edge.stop for edge in box[::-1]])
+    cut = ct.crop([edge.start for edge in box[::-1]], [edge.stop for edge in box[::-1]])
     return cut, np.ascontiguousarray(hu[box]), np.ascontiguousarray(solid[box])
 
 
-def _named_cores(
+def _find_named_cores(
     plates: Plates, solid: NDArray[np.bool_], ct: CtVolume, seeds: Mapping[str, FloatArray]
 ) -> tuple[LabelArray, Named]:
     """The coarsest cores among which all three bones of the joint are found, else the best."""

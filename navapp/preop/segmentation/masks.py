@@ -46,7 +46,7 @@ def largest(mask: BoolArray, spacing_mm: FloatArray) -> BoolArray:
     return part
 
 
-def closed(mask: BoolArray, spacing_mm: FloatArray, radius_mm: float) -> BoolArray:
+def close_gaps(mask: BoolArray, spacing_mm: FloatArray, radius_mm: float) -> BoolArray:
     """The mask with gaps closed that are narrower than twice a radius, and its holes filled.
 
     Where the mask ends at the volume's end, as a cut shaft does, what it encloses there in that

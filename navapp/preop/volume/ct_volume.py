@@ -63,13 +63,13 @@ class _Placed:
 
     def points_lps_mm(self, indices_ijk: ArrayLike) -> FloatArray:
         """(N, 3) LPS points of (N, 3) indices, which need not be whole."""
-        return _mapped(self.lps_from_index, indices_ijk)
+        return _map_points(self.lps_from_index, indices_ijk)
 
     def indices_of(self, points_lps_mm: ArrayLike) -> FloatArray:
         """(N, 3) fractional indices i, j, k of (N, 3) LPS points; also outside the volume."""
-        return _mapped(self.index_from_lps, points_lps_mm)
+        return _map_points(self.index_from_lps, points_lps_mm)
 
-    def cropped(self, lower_ijk: ArrayLike, upper_ijk: ArrayLike) -> Self:
+    def crop(self, lower_ijk: ArrayLike, upper_ijk: ArrayLike) -> Self:
         """A copy of the voxels from `lower_ijk` up to, without, `upper_ijk`, at the same place.
 
         Raises:
@@ -162,7 +162,7 @@ def is_invertible(lps_from_index: FloatArray) -> bool:
     return bool(volume_mm3 > 1e-3 * float(steps_mm(lps_from_index).prod()) > 0.0)
 
 
-def _mapped(matrix: FloatArray, points: ArrayLike) -> FloatArray:
+def _map_points(matrix: FloatArray, points: ArrayLike) -> FloatArray:
     rows = np.asarray(points, dtype=np.float64)
     mapped: FloatArray = rows @ matrix[:3, :3].T + matrix[:3, 3]
     return mapped

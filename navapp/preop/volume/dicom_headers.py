@@ -115,10 +115,10 @@ def read_header(file: Path) -> tuple[SliceHeader | OtherFile, set[str]]:
             return OtherFile(file, NO_UID, f"it cannot be opened ({error.strerror})"), set()
         except Exception:  # noqa: BLE001 (as in _understood)
             return OtherFile(file, NO_UID, "its header is damaged"), set()
-        return _understood(file, header), names
+        return _parse_header(file, header), names
 
 
-def _understood(file: Path, header: Any) -> SliceHeader | OtherFile:
+def _parse_header(file: Path, header: Any) -> SliceHeader | OtherFile:
     # Values are converted when they are asked for, and pydicom raises whatever wrong bytes lead to.
     with suppress(Exception):
         return _slice(file, header)

@@ -17,7 +17,7 @@ _SHORT = 3
 
 
 class Identity:
-    """The words that identify a patient; `hidden_in` takes them out of a text."""
+    """The words that identify a patient; `hide_in` takes them out of a text."""
 
     def __init__(self, values: Iterable[str] = ()) -> None:
         texts = {value.strip() for value in values}
@@ -27,7 +27,7 @@ class Identity:
         patterns = [_pattern(word) for word in ordered]
         self._any_word = re.compile("|".join(patterns), re.IGNORECASE) if patterns else None
 
-    def hidden_in(self, text: object) -> str:
+    def hide_in(self, text: object) -> str:
         """The text without any of the words."""
         return self._any_word.sub(_HIDDEN, str(text)) if self._any_word else str(text)
 

@@ -95,7 +95,7 @@ def _without_duplicates(
         is_shifted = np.abs(header.position_mm - kept[-1].position_mm).max() >= 0.01
         if is_shifted or not np.array_equal(one, other):
             place = "({:.2f}, {:.2f}, {:.2f})".format(*header.position_mm)
-            raise folder.refused(
+            raise folder.make_error(
                 f"holds two different slices at {place}: two recordings are mixed under one UID",
                 "separate them into folders of their own, or export the series again",
             )
@@ -119,7 +119,7 @@ def _slice_hu(folder: Folder, header: SliceHeader, has_complained: _HasComplaine
         # Its text may quote anything from the file.
         hu = None
     if hu is None or hu.shape != (1, header.rows, header.columns) or has_complained():
-        raise folder.refused(
+        raise folder.make_error(
             f"holds the file {folder.name_of(header.file)}, whose picture is damaged, cut short "
             "or in an encoding that is not known",
             "export the series again, uncompressed if it still fails",

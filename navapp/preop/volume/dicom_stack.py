@@ -36,18 +36,18 @@ def in_order(folder: Folder, slices: Sequence[SliceHeader]) -> list[SliceHeader]
     first = slices[0]
     for name, of in (("modalities", _modality), ("frames of reference", _frame)):
         if len({of(header) for header in slices}) > 1:
-            raise _mixed(folder, name)
+            raise _make_mixed_error(folder, name)
     if len({(header.rows, header.columns) for header in slices}) > 1:
-        raise _mixed(folder, "picture sizes")
+        raise _make_mixed_error(folder, "picture sizes")
     if any(not np.allclose(header.pixel_mm, first.pixel_mm, rtol=1e-4) for header in slices):
-        raise _mixed(folder, "pixel spacings")
+        raise _make_mixed_error(folder, "pixel spacings")
     for name in ("row", "column"):
         directions = np.array([getattr(header, name) for header in slices])
         if np.abs(directions - directions[0]).max() > _SAME_DIRECTION:
-            raise _mixed(folder, "directions")
+            raise _make_mixed_error(folder, "directions")
     lengths = np.linalg.norm([first.row, first.column], axis=1)
     if np.abs(lengths - 1.0).max() > _UNIT or abs(float(first.row @ first.column)) > _UNIT:
-        raise folder.refused("has a damaged direction tag (ImageOrientationPatient)", _AGAIN)
+        raise folder.make_error("has a damaged direction tag (ImageOrientationPatient)", _AGAIN)
     return sorted(slices, key=lambda header: float(header.position_mm @ first.normal))
 
 
@@ -63,7 +63,7 @@ def stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
         InputError: one slice only, slices missing, or steps that are not equal.
     """
     if len(ordered) < 2:
-        raise folder.refused("holds a single slice, which is no volume", _AGAIN)
+        raise folder.make_error("holds a single slice, which is no volume", _AGAIN)
     first = ordered[0]
     positions = np.array([header.position_mm for header in ordered])
     steps = np.diff(positions, axis=0)
@@ -78,7 +78,7 @@ def stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
     off = np.maximum(np.abs(steps - step).max(axis=1), np.abs(positions - line).max(axis=1)[1:])
     if off.max() > tolerance:
         at = int(off.argmax())
-        raise folder.refused(
+        raise folder.make_error(
             f"has slices that are shifted against each other, by up to {off[at]:.2f} mm "
             f"between {_at(positions[at])} and {_at(positions[at + 1])}",
             _AGAIN,
@@ -129,7 +129,9 @@ def tilt_warnings(folder: Folder, ordered: Sequence[SliceHeader], matrix: FloatA
     if tag_deg > _TILT_DEG and abs(tag_deg - lean_deg) > _SAME_TILT_DEG:
         said = f"a gantry tilt of {tag_deg:.1f} degrees in its tag and {lean_deg:.1f} by positions"
         if "DERIVED" not in ordered[0].image_type:
-            raise folder.refused(f"has {said}", "get the series as it was recorded, or resampled")
+            raise folder.make_error(
+                f"has {said}", "get the series as it was recorded, or resampled"
+            )
         warnings.append(f"{said}: these pictures are derived, positions are taken")
     return warnings
 
@@ -142,8 +144,8 @@ def _frame(header: SliceHeader) -> str:
     return header.frame_uid
 
 
-def _mixed(folder: Folder, what: str) -> InputError:
-    return folder.refused(
+def _make_mixed_error(folder: Folder, what: str) -> InputError:
+    return folder.make_error(
         f"holds two series mixed under one UID: their {what} differ",
         "separate them into folders of their own, or export the series again",
     )
@@ -166,12 +168,12 @@ def _uneven(
     )
     if n_missing >= 1 and is_whole:
         what = "1 slice is" if n_missing == 1 else f"{n_missing} slices are"
-        return folder.refused(
+        return folder.make_error(
             f"is not complete: {what} missing {where}{more} "
             f"(a step of {heights[at]:.4g} mm, {typical:.4g} mm elsewhere)",
             _AGAIN,
         )
-    return folder.refused(
+    return folder.make_error(
         f"has uneven slices: a step of {heights[at]:.4g} mm {where}{more}, "
         f"{typical:.4g} mm elsewhere",
         _AGAIN,

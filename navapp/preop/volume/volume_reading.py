@@ -61,7 +61,7 @@ def read_ct(path: str | Path, series_uid: str | None = None) -> ReadCt:
             series.thickness_tag_mm,
             series.side,
         )
-        return _judged(series.shown, series.volume, series.warnings, source)
+        return _check_volume(series.shown, series.volume, series.warnings, source)
     if series_uid is not None:
         raise UsageError("--series is for a DICOM folder", remedy="leave it out, or name a folder")
     found = read_file(path)
@@ -71,7 +71,7 @@ def read_ct(path: str | Path, series_uid: str | None = None) -> ReadCt:
         steps_mm(found.lps_from_index),
     )
     source = CtSource(found.suffix, "", volume.size[2])
-    return _judged(str(path), volume, found.warnings, source)
+    return _check_volume(str(path), volume, found.warnings, source)
 
 
 def read_labels(path: str | Path) -> LabelVolume:
@@ -92,7 +92,9 @@ def read_labels(path: str | Path) -> LabelVolume:
     return LabelVolume(labels, found.lps_from_index, steps_mm(found.lps_from_index))
 
 
-def _judged(shown: str, volume: CtVolume, warnings: tuple[str, ...], source: CtSource) -> ReadCt:
+def _check_volume(
+    shown: str, volume: CtVolume, warnings: tuple[str, ...], source: CtSource
+) -> ReadCt:
     """The result, with what its content says; a refusal does not lose the warnings so far."""
     refusal = refusal_of(volume)
     if refusal is not None:

@@ -68,21 +68,21 @@ class WishLines(Lines[CaptureView]):
             level = Level.OK if outcome.is_accepted else Level.BAD
             what = "accepted: rig.yml and report.html are written" if outcome.is_accepted else "no:"
             text = " ".join([what, *outcome.sentences])
-            first, rest = _broken(text, width - 10)
+            first, rest = _break_line(text, width - 10)
         else:
             level = Level.OK if view.snapshot.is_enough else Level.ATTENTION
-            first, rest = _broken(view.snapshot.wish, width - 10)
+            first, rest = _break_line(view.snapshot.wish, width - 10)
         head = "outcome " if outcome is not None else "wanted  "
         if view.snapshot.trouble:
             head, level = "camera  ", Level.BAD
-            first, rest = _broken(view.snapshot.trouble, width - 10)
+            first, rest = _break_line(view.snapshot.trouble, width - 10)
         return [
             Content.assemble((f" {head}", "$text-muted"), (first, level.value)),
             Content.assemble("         ", (cut(rest, max(width - 10, 0), symbols), level.value)),
         ]
 
 
-def _broken(text: str, width: int) -> tuple[str, str]:
+def _break_line(text: str, width: int) -> tuple[str, str]:
     """The words that fit into a line, and the others."""
     if len(text) <= width:
         return text, ""

@@ -44,7 +44,7 @@ def test_two_cameras_say_what_they_are_and_can(bus):
 
 def test_what_is_listed_chooses_the_camera(bus):
     for camera in list_usb_cameras(bus.names).found:
-        text = connected_devices.choosing(camera)
+        text = connected_devices.make_choice_toml(camera)
         wanted = parse(tomllib.loads(text), "x").camera
         assert wanted.backend == "opencv"
         assert bus.names.find(wanted.opencv.left).node == camera.node

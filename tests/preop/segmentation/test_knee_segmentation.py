@@ -120,7 +120,7 @@ def test_two_knees_are_refused_until_one_is_chosen():
         segment(ct)
     assert "--region" in refusal.value.remedy
     chosen = MIDDLES_MM["femur"] + [80.0, 0.0, 1.0]
-    right = ct.cropped((0, 0, 0), (80, 66, 88))
+    right = ct.crop((0, 0, 0), (80, 66, 88))
     assert {"femur", "tibia"} <= set(segment(right).names)
     seeds = {"femur": chosen, "tibia": MIDDLES_MM["tibia"] + [80.0, 0.0, 0.0]}
     named = segment(ct, seeds=seeds)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from navapp.preop.segmentation.masks import bounds, closed, components, depth_mm, largest
+from navapp.preop.segmentation.masks import bounds, close_gaps, components, depth_mm, largest
 
 SPACING_MM = np.array([0.5, 0.7, 1.2])
 HALF_MM = np.full(3, 0.5)
@@ -52,7 +52,7 @@ def test_components_hang_together_by_faces_alone():
 def test_a_gap_of_twice_the_radius_is_closed_and_no_wider_one(gap, is_shut):
     mask = np.zeros((24, 24, 30), dtype=bool)
     mask[4:20, 4:20, 4:10] = mask[4:20, 4:20, 10 + gap : 26] = True
-    shut = closed(mask, HALF_MM, 1.5)
+    shut = close_gaps(mask, HALF_MM, 1.5)
     assert shut[12, 12, 4:26].all() == is_shut
     assert shut[mask].all()
     assert not shut[:4].any()
@@ -63,7 +63,7 @@ def test_holes_are_filled():
     mask = np.zeros((30, 30, 30), dtype=bool)
     mask[3:27, 3:27, 3:27] = True
     mask[8:22, 8:22, 8:22] = False
-    shut = closed(mask, HALF_MM, 1.0)
+    shut = close_gaps(mask, HALF_MM, 1.0)
     assert shut[3:27, 3:27, 3:27].all()
     assert shut.sum() == 24**3
 
@@ -71,7 +71,7 @@ def test_holes_are_filled():
 def test_what_is_outside_at_the_volumes_end_stays_outside():
     mask = np.zeros((20, 30, 30), dtype=bool)
     mask[:, 5:25, 5:10] = mask[:, 5:25, 20:25] = True
-    assert (closed(mask, HALF_MM, 1.5) == mask).all()
+    assert (close_gaps(mask, HALF_MM, 1.5) == mask).all()
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -81,7 +81,7 @@ def test_the_hollow_of_a_shaft_that_the_volume_cuts_is_filled(axis, end):
     shaft[5:, 5:25, 5:25] = True
     shaft[9:, 9:21, 9:21] = False
     shaft = np.moveaxis(shaft[::-1] if end == 0 else shaft, 0, axis)
-    shut = closed(shaft, HALF_MM, 1.0)
+    shut = close_gaps(shaft, HALF_MM, 1.0)
     assert shut.sum() == 15 * 20 * 20
 
 
@@ -89,7 +89,7 @@ def test_a_groove_that_the_volume_cuts_stays_open():
     mask = np.zeros((20, 30, 30), dtype=bool)
     mask[5:, 5:25, 5:25] = True
     mask[5:, 12:18, 12:] = False
-    assert (closed(mask, HALF_MM, 1.0) == mask).all()
+    assert (close_gaps(mask, HALF_MM, 1.0) == mask).all()
 
 
 def test_bounds_hold_what_is_set_and_stop_at_the_volume():
