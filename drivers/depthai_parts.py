@@ -57,7 +57,7 @@ def open_parts(settings: DepthaiSettings) -> DepthaiParts:
         DeviceError: it has no mono pair, or refuses the pipeline.
     """
     dai = depthai()
-    info = _found(settings.device)
+    info = _find_device(settings.device)
     begin_s = time.monotonic()
     with ExitStack() as undo:
         try:
@@ -93,7 +93,7 @@ def open_parts(settings: DepthaiSettings) -> DepthaiParts:
             ) from error
 
 
-def _found(device_id: str) -> Any:
+def _find_device(device_id: str) -> Any:
     """Description of the wanted camera on USB; the network is never searched."""
     dai = depthai()
     try:

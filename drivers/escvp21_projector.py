@@ -75,7 +75,7 @@ class EscVp21Projector:
         """
         deadline_ns = self._deadline_ns(timeout_s)
         wanted = PowerState.ON if is_on else PowerState.STANDBY
-        power = self._settled_power(deadline_ns)
+        power = self._wait_for_power(deadline_ns)
         if power in _PASSING:
             raise DeviceTimeout(
                 f"the projector is still {power.value}", subject="projector", remedy="wait for it"
@@ -84,7 +84,7 @@ class EscVp21Projector:
         if power is not wanted:
             command = "PWR ON" if is_on else "PWR OFF"
             self._talk.tell(command, self._talk.line.remaining_s(deadline_ns))
-            power = self._settled_power(deadline_ns)
+            power = self._wait_for_power(deadline_ns)
             serial = self._read_serial() if power is PowerState.ON else serial
         if power is not wanted:
             is_out = not is_on and power is PowerState.COOLING
@@ -157,7 +157,7 @@ class EscVp21Projector:
     def _power(self) -> PowerState:
         return power_state(self._talk.ask("PWR", _HEX))
 
-    def _settled_power(self, deadline_ns: int) -> PowerState:
+    def _wait_for_power(self, deadline_ns: int) -> PowerState:
         """The state once it is neither warming nor cooling, or at the end of the time."""
         while (power := self._power()) in _PASSING:
             now_ns = self._clock.now_ns()
@@ -199,7 +199,7 @@ class EscVp21Projector:
         Raises:
             WrongDevice: not the bound one. The line is closed: nothing may be told to a stranger.
         """
-        serial = self._told_serial()
+        serial = self._ask_serial()
         self._serial = self._serial or serial
         if serial not in ("", self._serial):
             self.close()
@@ -210,7 +210,7 @@ class EscVp21Projector:
             )
         return serial
 
-    def _told_serial(self) -> str:
+    def _ask_serial(self) -> str:
         """One that is not expected must be told twice in a row; empty when none is."""
         before = ""
         for _ in range(3):

@@ -15,7 +15,7 @@ from drivers.pjlink_messages import (
     PasswordRefused,
     Reply,
     digest,
-    parsed_reply,
+    parse_reply,
     request,
     salt_of,
 )
@@ -105,8 +105,8 @@ class PjlinkLine:
         try:
             self._connection.send(line.encode())
         except OSError as error:
-            raise _lost(_cause(error)) from error
-        return parsed_reply(self._line(), command)
+            raise _make_lost_error(_cause(error)) from error
+        return parse_reply(self._line(), command)
 
     def close(self) -> None:
         """Hang up."""
@@ -145,9 +145,9 @@ class PjlinkLine:
         except TimeoutError as error:
             raise _silent() from error
         except OSError as error:
-            raise _lost(_cause(error)) from error
+            raise _make_lost_error(_cause(error)) from error
         if not data:
-            raise _lost(_HUNG_UP)
+            raise _make_lost_error(_HUNG_UP)
         return data
 
 
@@ -164,5 +164,5 @@ def _cause(error: OSError) -> str:
     return _HUNG_UP if isinstance(error, ConnectionError) else str(error)
 
 
-def _lost(why: str) -> DeviceLost:
+def _make_lost_error(why: str) -> DeviceLost:
     return DeviceLost(f"the connection to the projector is lost ({why})", subject="projector")

@@ -74,7 +74,7 @@ def request(command: str, parameter: str) -> str:
     return f"%1{command} {parameter}\r"
 
 
-def parsed_reply(line: str, command: str) -> Reply:
+def parse_reply(line: str, command: str) -> Reply:
     """The answer to that command.
 
     Raises:

@@ -219,15 +219,15 @@ class PjlinkProjector:
             )
         if answer.error == "ERR3":
             if wish.command != "POWR" and line.ask("POWR").value == STANDBY:
-                raise self._refused(wish, "in standby", "switch it on first")
+                raise self._make_refusal(wish, "in standby", "switch it on first")
             return False
         if answer.error:
-            raise self._refused(wish, f"({answer.error})", "see its manual for what it has")
+            raise self._make_refusal(wish, f"({answer.error})", "see its manual for what it has")
         raise DeviceProtocolError(
             f"the projector answers {answer.value[:40]!r} to {wish.command}", subject=self.name
         )
 
-    def _refused(self, wish: _Wish, how: str, remedy: str) -> UnsupportedControl:
+    def _make_refusal(self, wish: _Wish, how: str, remedy: str) -> UnsupportedControl:
         return UnsupportedControl(
             f"{self.name} does not take its {wish.name} to be set {how}",
             subject=self.name,

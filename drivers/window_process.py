@@ -59,7 +59,7 @@ class WindowProcess:
             os.set_blocking(self._wake, False)
             undo.callback(os.close, self._wake)
             try:
-                self._process = _started(settings, descriptor, woken)
+                self._process = _start(settings, descriptor, woken)
             finally:
                 os.close(woken)
             undo.callback(_end, self._process)
@@ -110,7 +110,7 @@ class WindowProcess:
                 self._process.kill()
 
 
-def _started(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess.Popen[bytes]":
+def _start(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-P", "-m", "drivers.window_child"]
     numbers = (settings.width, settings.height)
     return subprocess.Popen(

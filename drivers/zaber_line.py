@@ -141,7 +141,7 @@ class ZaberLine:
             packet = self.line.next(deadline_ns)
             if packet is None:
                 break
-            text = self._unwrapped(packet.decode("latin-1"))
+            text = self._unwrap(packet.decode("latin-1"))
             if text.startswith("!"):
                 self._hear(text)
             elif (match := _REPLY.fullmatch(text)) is None:
@@ -156,7 +156,7 @@ class ZaberLine:
         if match is not None and (int(match[1]), int(match[2])) == (self._device, self._axis):
             self._on_alert(match[4].replace(_NO_WARNING, ""))
 
-    def _unwrapped(self, text: str) -> str:
+    def _unwrap(self, text: str) -> str:
         """A packet from its first character on, without checksum; empty when that is wrong."""
         text = text.rstrip("\r")
         text = text[max(0, *(text.rfind(mark) for mark in "@#!")) :]

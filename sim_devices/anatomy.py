@@ -84,7 +84,7 @@ class KneeAnatomy:
 def make_knee(spec: KneeSpec = KneeSpec()) -> KneeAnatomy:
     """The knee of a spec: deterministic; a left knee is the mirrored right one."""
     if spec.side == "left":
-        return _mirrored_knee(make_knee(replace(spec, side="right")))
+        return _mirror_knee(make_knee(replace(spec, side="right")))
     rng = np.random.default_rng([spec.seed, 1])
     shape = draw_shape(rng)
     scale = _draw_scale(rng, spec.sex)
@@ -100,12 +100,12 @@ def make_knee(spec: KneeSpec = KneeSpec()) -> KneeAnatomy:
     )
 
 
-def _mirrored_knee(knee: KneeAnatomy) -> KneeAnatomy:
+def _mirror_knee(knee: KneeAnatomy) -> KneeAnatomy:
     """The left knee of a right one."""
     still = np.zeros(3)
     return KneeAnatomy(
         replace(knee.spec, side="left"),
-        MappingProxyType({name: mirrored(mesh) for name, mesh in knee.bones.items()}),
+        MappingProxyType({name: mirror_mesh(mesh) for name, mesh in knee.bones.items()}),
         MappingProxyType({name: point * MIRROR for name, point in knee.landmarks.items()}),
         MappingProxyType({name: curve * MIRROR for name, curve in knee.curves.items()}),
         MappingProxyType({name: Scaled(f, MIRROR, still) for name, f in knee.solids.items()}),
@@ -114,7 +114,7 @@ def _mirrored_knee(knee: KneeAnatomy) -> KneeAnatomy:
     )
 
 
-def mirrored(mesh: TriangleMesh) -> TriangleMesh:
+def mirror_mesh(mesh: TriangleMesh) -> TriangleMesh:
     """The mesh of the other side of the body, its normals still outward."""
     return TriangleMesh(mesh.vertices_mm * MIRROR, mesh.faces[:, ::-1], mesh.normals * MIRROR)
 
@@ -138,7 +138,7 @@ def _right_bones(
     def add(name: str, proportions: Field, lower: list[float], upper: list[float]) -> None:
         rng = np.random.default_rng([spec.seed, 2, len(solids)])
         solid = Scaled(proportions, scale, np.zeros(3))
-        solids[name] = _weathered(solid, name, spec, rng, scale)
+        solids[name] = _add_relief(solid, name, spec, rng, scale)
         bones[name] = mesh_solid(
             solids[name], np.array(lower) * scale, np.array(upper) * scale, CELL_MM
         )
@@ -174,7 +174,7 @@ def _settling_mm(femur: TriangleMesh, bone: TriangleMesh, away: FloatArray) -> f
     return move
 
 
-def _weathered(
+def _add_relief(
     solid: Field, name: str, spec: KneeSpec, rng: np.random.Generator, scale: FloatArray
 ) -> Field:
     """The solid with relief, and with osteophytes when old."""

@@ -82,7 +82,7 @@ def cartilage_thickness_mm(
     return thickness
 
 
-def worn(
+def wear_patch(
     mesh: TriangleMesh, thickness_mm: FloatArray, centre_mm: FloatArray, radius_mm: float
 ) -> FloatArray:
     """(V,) thickness with a bare patch of the given radius, sloping at its border."""
@@ -102,4 +102,4 @@ def with_defect(
     mesh: TriangleMesh, thickness_mm: FloatArray, centre_mm: FloatArray, radius_mm: float
 ) -> TriangleMesh:
     """The surface of cartilage that is worn off around a point of the bone."""
-    return with_cartilage(mesh, worn(mesh, thickness_mm, centre_mm, radius_mm))
+    return with_cartilage(mesh, wear_patch(mesh, thickness_mm, centre_mm, radius_mm))

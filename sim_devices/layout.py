@@ -40,7 +40,7 @@ def nominal_table_from_femur() -> RigidTransform:
     return RigidTransform.from_parts("table", "femur", rotation, _FEMUR_ON_TABLE_MM)
 
 
-def misplaced(nominal: RigidTransform, seed: int) -> RigidTransform:
+def misplace(nominal: RigidTransform, seed: int) -> RigidTransform:
     """The femur as it really lies: 6 to 9 deg and 6 to 10 mm off."""
     rng = np.random.default_rng([seed, 41])
     turn, shift = rng.standard_normal((2, 3))
@@ -49,7 +49,7 @@ def misplaced(nominal: RigidTransform, seed: int) -> RigidTransform:
     return nominal.moved(np.concatenate([shift, turn]), nominal.translation_mm)
 
 
-def flexed(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
+def flex_knee(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
     """femur_from_tibia of the bent knee: turned about the condyles, then set at the joint gap."""
     bottom = femur.vertices_mm[:, 2].min()
     condyles = femur.vertices_mm[femur.vertices_mm[:, 2] < bottom + 40.0]

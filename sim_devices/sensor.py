@@ -53,7 +53,7 @@ class SensorModel:
         if not (self.read_noise_e >= 0.0 and self.psf_sigma_px >= 0.0 and self.seed >= 0):
             raise ValueError("read noise, blur and seed of a sensor cannot be negative")
 
-    def adjusted(self, exposure_factor: float, gain_db: float) -> "SensorModel":
+    def with_exposure(self, exposure_factor: float, gain_db: float) -> "SensorModel":
         """The same sensor exposed longer or shorter, its amplifiers turned up."""
         gain = 10.0 ** (gain_db / 20.0)
         return replace(

@@ -176,7 +176,7 @@ def _blend(attributes: Floats, a: int, b: int, c: int, column: int, weights: Flo
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _bumped_normal(
+def _bump_normal(
     attributes: Floats,
     a: int,
     b: int,
@@ -324,7 +324,7 @@ def shade(
             mark = _blend(attributes, a, b, c, 3, weights)
             albedo_at(materials, row, fine, coarse, mark, colour)
             bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])
-            _bumped_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
+            _bump_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
             wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
             light_at(lamps, part, normal, point, eye, wrap, shininess, sums)
             exposure = _blend(attributes, a, b, c, 4, weights)

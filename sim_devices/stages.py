@@ -88,7 +88,7 @@ def _surroundings(site: Site) -> tuple[Part, ...]:
     )
 
 
-def worn_patch(femur: TriangleMesh, centre_mm: FloatArray, radius_mm: float) -> FloatArray:
+def make_worn_patch(femur: TriangleMesh, centre_mm: FloatArray, radius_mm: float) -> FloatArray:
     """(V,) 0 to 1: an irregular worn patch round a point of the surface."""
     offset = femur.vertices_mm - centre_mm
     ragged = 1.0 + 0.25 * smooth_noise(femur.vertices_mm, 13.0, 5)

@@ -68,7 +68,7 @@ def sample(field: Field, grid: Grid, stride: int = 4, chunk: int = 1 << 16) -> F
     near_node = np.abs(coarse) < limit
     near_block = np.zeros([n - 1 for n in counts], dtype=bool)
     for corner in CORNERS:
-        near_block |= near_node[_shifted(corner, near_block.shape)]
+        near_block |= near_node[_shift_slices(corner, near_block.shape)]
     values = coarse
     block_of = []
     for axis, n in enumerate(grid.shape):
@@ -87,7 +87,7 @@ def sample(field: Field, grid: Grid, stride: int = 4, chunk: int = 1 << 16) -> F
     return flat.reshape(grid.shape)
 
 
-def _shifted(corner: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[slice, ...]:
+def _shift_slices(corner: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[slice, ...]:
     return tuple(slice(int(c), int(c) + n) for c, n in zip(corner, shape, strict=True))
 
 
@@ -116,7 +116,7 @@ def cell_codes(inside: BoolArray) -> NDArray[np.uint8]:
     cells = tuple(n - 1 for n in inside.shape)
     codes = np.zeros(cells, dtype=np.uint8)
     for bit, corner in enumerate(CORNERS):
-        codes |= inside[_shifted(corner, cells)].astype(np.uint8) << np.uint8(bit)
+        codes |= inside[_shift_slices(corner, cells)].astype(np.uint8) << np.uint8(bit)
     return codes
 
 
@@ -193,11 +193,11 @@ def mesh_solid(
     """Closed manifold mesh of the largest piece of a solid, its vertices on the surface."""
     grid = grid_around(lower_mm, upper_mm, cell_mm)
     mesh = surface_net(sample(field, grid), grid).largest_component()
-    vertices = relaxed(mesh.vertices_mm, mesh.faces)
+    vertices = relax(mesh.vertices_mm, mesh.faces)
     return TriangleMesh(onto_surface(field, vertices, cell_mm), mesh.faces)
 
 
-def relaxed(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def relax(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Vertices moved to the middle between themselves and the mean of their neighbours, twice."""
     starts, ends = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     count = np.bincount(starts, minlength=len(vertices))[:, None]

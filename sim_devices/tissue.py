@@ -77,7 +77,7 @@ def make_tissue(
     return Sheet(grid.mesh(height), skin.ravel(), exposure.ravel())
 
 
-def trimmed(sheet: Sheet) -> Sheet:
+def trim(sheet: Sheet) -> Sheet:
     """What of the tissue can ever show from under the drape."""
     mesh = sheet.mesh
     near = np.hypot(mesh.vertices_mm[:, 0], mesh.vertices_mm[:, 1]) < SHEET_RADIUS_MM
@@ -114,7 +114,7 @@ def make_drape(tissue: Sheet, skin_height_mm: float, seed: int) -> Sheet:
     roll = 4.5 * np.exp(-(((distance - 4.0) / 4.0) ** 2)) - 4.0 * np.exp(-distance / 1.5)
     slope = -0.22 * distance - 0.0004 * distance**2
     height = skin_height_mm + 7.0 + roll + calm * (folds + creases) + small * calm + slope
-    lifted = np.maximum(height, _raised(tissue, flat) + roll)
+    lifted = np.maximum(height, _raise_height(tissue, flat) + roll)
     vertices = np.column_stack([flat, -lifted])
     mesh = TriangleMesh(vertices, _ring_faces(rows, columns))
     stain = smooth_noise(flat, 50.0, seed + 5) - 1.9 + 0.7 * np.exp(-distance / 40.0)
@@ -143,7 +143,7 @@ class _Grid:
         return TriangleMesh(vertices, faces)
 
 
-def _raised(tissue: Sheet, places: FloatArray) -> FloatArray:
+def _raise_height(tissue: Sheet, places: FloatArray) -> FloatArray:
     """(N,) the tissue's greatest height near places (x, y), some millimetres up; -inf beyond it."""
     import cv2
     from scipy.ndimage import map_coordinates

@@ -37,7 +37,7 @@ def tube(centres: FloatArray, radii: FloatArray, columns: int = 24) -> TriangleM
     return TriangleMesh(vertices, np.concatenate([*sides, *caps]).astype(np.int32))
 
 
-def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
+def merge_meshes(meshes: list[TriangleMesh]) -> TriangleMesh:
     """Several meshes as one."""
     starts = np.cumsum([0, *(len(mesh.vertices_mm) for mesh in meshes)])
     return TriangleMesh(
@@ -91,7 +91,7 @@ def hand_meshes() -> tuple[TriangleMesh, TriangleMesh]:
     pieces.append(_limb([wrist - 20.0 * axis, wrist, wrist + np.array([60.0, 60.0, -4.0])], 23.0))
     sleeve = [wrist + np.array([40.0, 42.0, -4.0]), wrist + np.array([330.0, 260.0, 20.0])]
     pieces.append(_limb(sleeve, 27.0))
-    return joined(pieces), tool
+    return merge_meshes(pieces), tool
 
 
 def _limb(knots: list[FloatArray], radius: float) -> TriangleMesh:

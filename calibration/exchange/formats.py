@@ -83,7 +83,7 @@ def write_as(form: Format, path: str | Path, rig: StereoRig) -> None:
         write_rig(path, rig)
 
 
-def lost(rig: StereoRig, form: Format) -> list[str]:
+def list_losses(rig: StereoRig, form: Format) -> list[str]:
     """What a format cannot say of a rig, one sentence each."""
     if form in ("opencv-yaml", "opencv-xml"):
         return []

@@ -142,14 +142,14 @@ def _content(side: str, camera: Camera, turn: Any, projection: Any) -> dict[str,
         "image_width": camera.width,
         "image_height": camera.height,
         "camera_name": side,
-        "camera_matrix": _written(camera.matrix),
+        "camera_matrix": _matrix_to_yaml(camera.matrix),
         "distortion_model": model,
-        "distortion_coefficients": _written(found.reshape(1, -1)),
-        "rectification_matrix": _written(turn),
-        "projection_matrix": _written(projection),
+        "distortion_coefficients": _matrix_to_yaml(found.reshape(1, -1)),
+        "rectification_matrix": _matrix_to_yaml(turn),
+        "projection_matrix": _matrix_to_yaml(projection),
     }
 
 
-def _written(matrix: Any) -> dict[str, Any]:
+def _matrix_to_yaml(matrix: Any) -> dict[str, Any]:
     rows, columns = np.shape(matrix)
     return {"rows": rows, "cols": columns, "data": np.ravel(matrix).astype(float).tolist()}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibration.latency.display_area import Watched, surely_seen
+from calibration.latency.display_area import Watched, compute_seen_deviations
 from calibration.latency.light_code import LONGEST_PAUSE_MS, SHORTEST_PAUSE_MS, Switches
 from calibration.latency.measurement import Estimate, EyeLag, Latency, measure_latency
 from navapp.errors import ResultError
@@ -23,7 +23,9 @@ _SIGMAS = 2.5
 _LEAST_WIDTH = 0.6
 
 
-def judged_latency(switches: Switches, left: Watched, right: Watched, refresh_hz: float) -> Latency:
+def measure_accepted_latency(
+    switches: Switches, left: Watched, right: Watched, refresh_hz: float
+) -> Latency:
     """Measure, and refuse what cannot be believed.
 
     Args:
@@ -77,7 +79,7 @@ def _is_seen(switches: Switches, watched: Watched) -> bool:
     n = len(watched.times_ms)
     is_first = np.arange(n) < n // 2
     parts = (np.ones(n, dtype=bool), is_first, ~is_first)
-    return any(surely_seen(switches, watched.only(part)) >= _SURELY for part in parts)
+    return any(compute_seen_deviations(switches, watched.only(part)) >= _SURELY for part in parts)
 
 
 def _check_fit(name: str, eye: EyeLag) -> None:

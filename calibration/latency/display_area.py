@@ -51,7 +51,7 @@ class Area:
 def find_area(switches: Switches, watched: Watched) -> Area:
     """The cells that swing with the code, at the lag at which all together swing most."""
     lags_ms = coarse_lags_ms()
-    shares = switches.lit_shares(watched.times_ms, lags_ms, COARSE_WIDTH_MS)
+    shares = switches.compute_lit_fractions(watched.times_ms, lags_ms, COARSE_WIDTH_MS)
     shares = shares - shares.mean(axis=0)
     cells = watched.cells - watched.cells.mean(axis=0)
     squares = np.maximum((shares**2).sum(axis=0), 1e-9)
@@ -60,7 +60,7 @@ def find_area(switches: Switches, watched: Watched) -> Area:
     return Area(swings[best] >= _LEAST_SWING * swings[best].max(), float(lags_ms[best]))
 
 
-def surely_seen(switches: Switches, watched: Watched) -> float:
+def compute_seen_deviations(switches: Switches, watched: Watched) -> float:
     """By how many standard deviations the code is seen.
 
     Among hundreds of cells some follow any code by chance. So the area is found in the frames of
@@ -72,7 +72,7 @@ def surely_seen(switches: Switches, watched: Watched) -> float:
         return 0.0
     area = find_area(switches, finding)
     lag_ms = np.array([area.lag_ms])
-    share = switches.lit_shares(asked.times_ms, lag_ms, COARSE_WIDTH_MS)[:, 0]
+    share = switches.compute_lit_fractions(asked.times_ms, lag_ms, COARSE_WIDTH_MS)[:, 0]
     grey = area.series(asked)
     scatter = float(share.std() * grey.std())
     if scatter == 0.0:

@@ -37,7 +37,7 @@ class BlockSums:
     share_share: FloatArray
     grey_grey: FloatArray
 
-    def explained(self, counts: FloatArray) -> FloatArray:
+    def compute_explained(self, counts: FloatArray) -> FloatArray:
         """(r, k) share of the grey values' squares that the code explains; upside down it is 0.
 
         Args:
@@ -49,7 +49,7 @@ class BlockSums:
 
     def best_lags_ms(self, counts: FloatArray) -> FloatArray:
         """(r,) that explain most; the middle of them where several do."""
-        explained = self.explained(counts)
+        explained = self.compute_explained(counts)
         is_best = explained >= explained.max(axis=1, keepdims=True) - _SAME
         return np.asarray((is_best * self.lags_ms).sum(axis=1) / is_best.sum(axis=1))
 

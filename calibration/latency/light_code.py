@@ -38,7 +38,9 @@ class Switches:
 
     times_ms: FloatArray
 
-    def lit_shares(self, times_ms: FloatArray, lags_ms: FloatArray, width_ms: float) -> FloatArray:
+    def compute_lit_fractions(
+        self, times_ms: FloatArray, lags_ms: FloatArray, width_ms: float
+    ) -> FloatArray:
         """(n, k) share of light in a window around each time, for each lag of the display.
 
         Args:

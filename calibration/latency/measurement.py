@@ -141,7 +141,7 @@ class _Eye:
         self._once, self._draws = np.ones((1, n_blocks)), draws(n_blocks)
         lags_ms = fine_lags_ms(self._area.lag_ms)
         by_width = [(self._sums(lags_ms, width_ms), width_ms) for width_ms in WIDTHS_MS]
-        best = max(by_width, key=lambda one: one[0].explained(self._once).max())
+        best = max(by_width, key=lambda one: one[0].compute_explained(self._once).max())
         self._best, self._width_ms = best
         self.lag_ms = float(self._best.best_lags_ms(self._once)[0])
         self.drawn_lags_ms = self._best.best_lags_ms(self._draws)
@@ -149,7 +149,7 @@ class _Eye:
     def lag(self) -> EyeLag:
         """What is said of this eye."""
         lags_ms = np.array([self.lag_ms])
-        share = self._switches.lit_shares(self._times_ms, lags_ms, self._width_ms)[:, 0]
+        share = self._switches.compute_lit_fractions(self._times_ms, lags_ms, self._width_ms)[:, 0]
         is_dark, is_lit = share < _WHOLE, share > 1.0 - _WHOLE
         dark, lit = _median(self._grey[is_dark]), _median(self._grey[is_lit])
         is_light = self._grey > 0.5 * (dark + lit)
@@ -160,13 +160,13 @@ class _Eye:
             drift=self._drift(),
             swing=lit - dark,
             area_share=float(self._area.is_in.mean()),
-            explained=float(self._best.explained(self._once).max()),
+            explained=float(self._best.compute_explained(self._once).max()),
             wrong_share=float(is_wrong.mean()),
             other_peak_share=self._other_peak_share(),
         )
 
     def _sums(self, lags_ms: FloatArray, width_ms: float) -> BlockSums:
-        shares = self._switches.lit_shares(self._times_ms, lags_ms, width_ms)
+        shares = self._switches.compute_lit_fractions(self._times_ms, lags_ms, width_ms)
         return block_sums(shares, self._grey, self._blocks, lags_ms)
 
     def _drift(self) -> Estimate:

@@ -25,10 +25,10 @@ svg { max-width: 100%; height: auto; } p.note { color: #4a5568; max-width: 48em;
 
 def write_report(path: str | Path, found: Calibration, limits: Limits) -> None:
     """Write the report, whole or not at all."""
-    write_whole(path, page(found, limits).encode("utf-8"))
+    write_whole(path, make_page(found, limits).encode("utf-8"))
 
 
-def page(found: Calibration, limits: Limits) -> str:
+def make_page(found: Calibration, limits: Limits) -> str:
     """The report as HTML."""
     name = escape(found.rig.name or "stereo rig")
     parts = [
@@ -56,7 +56,7 @@ def page(found: Calibration, limits: Limits) -> str:
             f"{found.covered.tilts_deg.max():.0f} deg at most."
         ),
         "<h2>Pairs that are not used</h2>",
-        _dropped(found),
+        _make_dropped_table(found),
         "<h2>The rig</h2>",
         _table(_numbers(found)),
         "<h2>What this cannot see</h2>",
@@ -155,7 +155,7 @@ def _record(rig: StereoRig) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _dropped(found: Calibration) -> str:
+def _make_dropped_table(found: Calibration) -> str:
     if not found.dropped:
         return _note("None.")
     rows = [(f"pair {one.index}", escape(one.reason), "") for one in found.dropped]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from calibration.rig.bundle_adjustment import Bundle
 from calibration.rig.initial_rig import matrix_of
-from calibration.rig.parameters import placement, shape_mm, unpacked
+from calibration.rig.parameters import placement, shape_mm, unpack
 from calibration.rig.uncertainty import working_points_mm
 from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
@@ -65,7 +65,9 @@ class Coverage:
     tilts_deg: FloatArray
 
 
-def shown_depth_mm(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> tuple[float, float]:
+def compute_shown_depth_mm(
+    board: Board, pairs: Sequence[SeenPair], solved: Bundle
+) -> tuple[float, float]:
     """Nearest and farthest mark that the left camera saw."""
     depths = [
         (board.points_mm[pair.left.ids] @ pose[:3, :3].T + pose[:3, 3])[:, 2]
@@ -79,24 +81,26 @@ def coverage(
 ) -> Coverage:
     """How well the views cover what the rig will be used for."""
     size = (solved.model.width, solved.model.height)
-    rig = unpacked(solved.model, solved.shared)
+    rig = unpack(solved.model, solved.shared)
     points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm, _FINENESS)
     needed = (rig.left.project(points_mm), rig.right.project(rig.right_from_left.apply(points_mm)))
     shares, bare = [], []
     for side, wanted in zip(("left", "right"), needed, strict=True):
-        asked = occupied(wanted, size)
-        marked = occupied(np.vstack([getattr(pair, side).pixels for pair in pairs]), size)
+        asked = find_occupied_cells(wanted, size)
+        marked = find_occupied_cells(
+            np.vstack([getattr(pair, side).pixels for pair in pairs]), size
+        )
         shares.append(float((marked & asked).sum() / max(asked.sum(), 1)))
         bare.append(asked & ~marked)
     # The board's normal in the left camera; both axes are the last rows of their rotations.
     normals = np.array([matrix_of(vector)[:3, 2] for vector in solved.left_from_board])
     axes = np.array([[0.0, 0.0, 1.0], rig.right_from_left.rotation[2]])
     tilts = np.degrees(np.arccos(np.minimum(np.abs(normals @ axes.T).max(axis=1), 1.0)))
-    shown_mm = shown_depth_mm(board, pairs, solved)
+    shown_mm = compute_shown_depth_mm(board, pairs, solved)
     return Coverage(shares[0], shares[1], np.array(bare), shown_mm, tilts)
 
 
-def occupied(pixels: FloatArray, size: tuple[int, int]) -> NDArray[np.bool_]:
+def find_occupied_cells(pixels: FloatArray, size: tuple[int, int]) -> NDArray[np.bool_]:
     """(6, 8) bool: cells of a picture with at least one of the pixels (n, 2) in them."""
     cells = np.zeros((_CELLS_Y, _CELLS_X), dtype=bool)
     pixels = pixels[np.isfinite(pixels).all(axis=1)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.equilibration import equilibrated, unit_sizes
+from calibration.rig.equilibration import equilibrate, unit_sizes
 from calibration.rig.linearisation import Linearisation, NormalEquations, Views
 from calibration.rig.parameters import RigModel
 from calibration.targets.boards import Board
@@ -45,9 +45,9 @@ class Bundle:
     def covariance(self) -> FloatArray:
         """(n_shared, n_shared) of the shared numbers."""
         sizes = unit_sizes(self.normal)
-        scaled = equilibrated(self.normal, sizes)
+        scaled = equilibrate(self.normal, sizes)
         inverse = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True)
-        return equilibrated(inverse, sizes) * self.scale**2
+        return equilibrate(inverse, sizes) * self.scale**2
 
     @property
     def rig_covariance(self) -> FloatArray:
@@ -107,6 +107,6 @@ def solve_bundle(
     # What was solved for takes its part of the noise with it.
     scale = here.scale * (n / max(n - n_solved, 1)) ** 0.5
     return Bundle(
-        model, here.shared, here.left_from_board, normal.reduced(), scale, here.residuals_px,
-        is_settled,
+        model, here.shared, here.left_from_board, normal.compute_reduced_normal(), scale,
+        here.residuals_px, is_settled,
     )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from calibration.rig.bundle_adjustment import Bundle
 from calibration.rig.initial_rig import matrix_of, pose_of
-from calibration.rig.parameters import unpacked
+from calibration.rig.parameters import unpack
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
 from calibration.targets.seen_pairs import SeenPair
@@ -53,7 +53,7 @@ class DroppedPair:
     reason: str
 
 
-def blurred_pairs(pairs: Sequence[SeenPair]) -> list[DroppedPair]:
+def find_blurred_pairs(pairs: Sequence[SeenPair]) -> list[DroppedPair]:
     """Pairs of which a picture is far less sharp than is usual for its camera."""
     dropped: dict[int, DroppedPair] = {}
     if not pairs:
@@ -75,15 +75,15 @@ def misfits(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> list[Dro
     suspects = np.flatnonzero(rms > max(_TOO_FAR * usual, _LEAST_MISFIT_PX))
     if len(suspects) == 0:
         return []
-    rig = unpacked(solved.model, solved.shared)
+    rig = unpack(solved.model, solved.shared)
     poses = [(_alone(board, p.left, rig.left), _alone(board, p.right, rig.right)) for p in pairs]
     return [
-        _explained(pairs, poses, int(view), float(rms[view]), usual, rig.right_from_left.matrix)
+        _find_reason(pairs, poses, int(view), float(rms[view]), usual, rig.right_from_left.matrix)
         for view in suspects
     ]
 
 
-def _explained(
+def _find_reason(
     pairs: Sequence[SeenPair],
     poses: Sequence[tuple["_Alone", "_Alone"]],
     view: int,

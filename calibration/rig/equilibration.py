@@ -18,7 +18,7 @@ def unit_sizes(normal: FloatArray) -> FloatArray:
     return sizes
 
 
-def equilibrated(matrix: NDArray[np.floating[Any]], sizes: FloatArray) -> FloatArray:
+def equilibrate(matrix: NDArray[np.floating[Any]], sizes: FloatArray) -> FloatArray:
     """Rows and columns of (n, n) times (n,); once more brings its inverse back to the units."""
     scaled: FloatArray = matrix * sizes[:, None] * sizes[None, :]
     return scaled

@@ -7,7 +7,7 @@ import numpy as np
 
 from calibration.rig.bundle_adjustment import Bundle, solve_bundle
 from calibration.rig.initial_rig import start_poses
-from calibration.rig.parameters import N_COEFFICIENTS, RigModel, packed
+from calibration.rig.parameters import N_COEFFICIENTS, RigModel, pack
 from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rig import StereoRig
@@ -102,6 +102,6 @@ def look_at_rig(board: Board, pairs: Sequence[SeenPair], rig: StereoRig) -> floa
     n_used = max(rig.left.distortion.size, rig.right.distortion.size)
     n = next(one for one in N_COEFFICIENTS if one >= n_used)
     model = RigModel(n, 0, rig.width, rig.height)
-    shared = packed(model, rig)
+    shared = pack(model, rig)
     poses = start_poses(board, pairs, model, shared)
     return solve_bundle(board, pairs, model, shared, poses, is_fixed=True).rms_px

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from calibration.rig.parameters import RigModel, unpacked
+from calibration.rig.parameters import RigModel, unpack
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
 from calibration.targets.seen_pairs import SeenPair
@@ -51,7 +51,7 @@ def start_poses(
     board: Board, pairs: Sequence[SeenPair], model: RigModel, shared: FloatArray
 ) -> FloatArray:
     """(V, 6) left_from_board of each view under a rig, as one picture tells it."""
-    rig = unpacked(model, shared)
+    rig = unpack(model, shared)
     left_from_right = np.linalg.inv(rig.right_from_left.matrix)
     poses = []
     for pair in pairs:

@@ -53,10 +53,10 @@ class LengthMeter:
             return None
         if in_left is None or in_right is None:
             return None
-        return measured_length(self.board, self.rig, SeenPair(0, in_left, in_right))
+        return measure_length(self.board, self.rig, SeenPair(0, in_left, in_right))
 
 
-def measured_length(board: Board, rig: StereoRig, pair: SeenPair) -> MeasuredLength | None:
+def measure_length(board: Board, rig: StereoRig, pair: SeenPair) -> MeasuredLength | None:
     """The size at which a board fits a pair best, its pose and its size solved for.
 
     One camera cannot tell a large board from a near one; two can, as far as their places are known.

@@ -26,7 +26,7 @@ def epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
     return np.concatenate(distances)
 
 
-def triangulated_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
+def triangulate_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
     """(n, 3) points in the left camera's frame, half-way between both rays."""
     a = rig.left.rays(left_px)
     b = rig.right_from_left.inverse().rotate(rig.right.rays(right_px))
@@ -46,7 +46,7 @@ def length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> Fl
         ids, left, right = pair.common()
         if len(ids) < 4:
             continue
-        true_mm, found_mm = board.points_mm[ids], triangulated_mm(rig, left, right)
+        true_mm, found_mm = board.points_mm[ids], triangulate_mm(rig, left, right)
         x, y = true_mm[:, 0], true_mm[:, 1]
         far = {
             int(np.argmin(x + y)),

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.equilibration import equilibrated, unit_sizes
+from calibration.rig.equilibration import equilibrate, unit_sizes
 from calibration.rig.parameters import RigModel, shape_mm
-from calibration.rig.projection import projected
+from calibration.rig.projection import project
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
 from calibration.targets.seen_pairs import SeenPair
@@ -86,7 +86,7 @@ class Linearisation:
         self.views, self.shared, self.left_from_board = views, shared, left_from_board
         self.pictures = [
             [
-                self._linearised(seen, sigma_px, pose, number)
+                self._linearise_picture(seen, sigma_px, pose, number)
                 for number, (seen, sigma_px) in enumerate(view)
             ]
             for view, pose in zip(views.pictures, left_from_board, strict=True)
@@ -127,7 +127,7 @@ class Linearisation:
         sigma_mm = np.tile(expected_mm, model.n_marks)
         return sigma_mm, self.shared[model.n_rig :] / sigma_mm
 
-    def _linearised(
+    def _linearise_picture(
         self, seen: SeenBoard, sigma_px: FloatArray, left_from_board: FloatArray, number: int
     ) -> _PictureLinearisation:
         """One picture: of the left camera (0) or the right one (1)."""
@@ -135,7 +135,7 @@ class Linearisation:
         points_mm = self.views.board.points_mm[seen.ids]
         if model.n_marks:
             points_mm = points_mm + shape_mm(model, self.shared)[seen.ids]
-        pixels, by_rig, by_pose, by_point = projected(
+        pixels, by_rig, by_pose, by_point = project(
             points_mm, left_from_board, model, self.shared, number
         )
         by_shared = np.zeros((len(by_rig), model.n_shared))
@@ -196,14 +196,14 @@ class NormalEquations:
             inverses.append(inverse)
             reduced -= mixed @ inverse @ mixed.T
             right -= mixed @ inverse @ own_right
-        step = np.zeros(n) if is_fixed else _solved(reduced, right)
+        step = np.zeros(n) if is_fixed else _solve_symmetric(reduced, right)
         poses = [
             inverse @ (own_right - mixed.T @ step)
             for inverse, (mixed, _, own_right) in zip(inverses, self._view_normals, strict=True)
         ]
         return step, np.array(poses)
 
-    def reduced(self) -> FloatArray:
+    def compute_reduced_normal(self) -> FloatArray:
         """(n_shared, n_shared) information about the shared numbers alone."""
         reduced = self._shared_normal.copy()
         for mixed, own, _ in self._view_normals:
@@ -211,10 +211,10 @@ class NormalEquations:
         return 0.5 * (reduced + reduced.T)
 
 
-def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
+def _solve_symmetric(normal: FloatArray, right: FloatArray) -> FloatArray:
     """Solution of a symmetric system whose numbers have very different units."""
     sizes = unit_sizes(normal)
-    scaled = equilibrated(normal, sizes)
+    scaled = equilibrate(normal, sizes)
     scaled[np.diag_indices_from(scaled)] += _RIDGE
     solution: FloatArray = sizes * np.linalg.solve(scaled, sizes * right)
     return solution

@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 
 from calibration.rig.bundle_adjustment import Bundle
-from calibration.rig.equilibration import equilibrated, unit_sizes
+from calibration.rig.equilibration import equilibrate, unit_sizes
 from calibration.rig.initial_rig import matrix_of, vector_of
 from calibration.rig.parameters import RigModel
-from calibration.rig.projection import projected
+from calibration.rig.projection import project
 from calibration.rig.uncertainty import triangulation_slopes, working_points_mm
 from calibration.targets.boards import Board
 from navapp.geometry.transform import (
@@ -31,7 +31,7 @@ _LEAST_SEEN, _EDGE_PX = 0.6, 12.0
 _SAME_RAD = 0.2
 
 
-def wanted_view(
+def find_next_view(
     board: Board,
     solved: Bundle,
     sigma_px: float,
@@ -59,16 +59,16 @@ def wanted_view(
     sizes = unit_sizes(solved.normal)
     normal = solved.normal / max(solved.scale, 1e-6) ** 2
     best: tuple[float, FloatArray] | None = None
-    for pose in candidates(board, model, shared, depth_mm):
+    for pose in list_candidates(board, model, shared, depth_mm):
         rotation = matrix_of(pose)[:3, :3]
         if any(angle_between_rad(rotation, turn) < _SAME_RAD for turn in avoid):
             continue
-        told = information(board, pose, model, shared, sigma_px)
+        told = compute_information(board, pose, model, shared, sigma_px)
         if told is None:
             continue
-        scaled = equilibrated(normal + told, sizes)
+        scaled = equilibrate(normal + told, sizes)
         scaled[np.diag_indices_from(scaled)] += 1e-14 * np.trace(scaled)
-        covariance = equilibrated(np.linalg.inv(scaled), sizes)
+        covariance = equilibrate(np.linalg.inv(scaled), sizes)
         cost = float(np.einsum("ij,jk,ik->", slopes, covariance, slopes))
         if best is None or cost < best[0]:
             best = (cost, pose)
@@ -77,7 +77,7 @@ def wanted_view(
     return RigidTransform("left", "board", matrix_of(best[1]))
 
 
-def information(
+def compute_information(
     board: Board, left_from_board: FloatArray, model: RigModel, shared: FloatArray, sigma_px: float
 ) -> FloatArray | None:
     """(n_rig, n_rig) what one view would tell of the rig, its own pose eliminated.
@@ -87,7 +87,7 @@ def information(
     n = model.n_rig
     normal, mixed, own = np.zeros((n, n)), np.zeros((n, 6)), np.zeros((6, 6))
     for number in range(2):
-        pixels, by_rig, by_pose, _ = projected(
+        pixels, by_rig, by_pose, _ = project(
             board.points_mm, left_from_board, model, shared, number
         )
         limit = (model.width - _EDGE_PX, model.height - _EDGE_PX)
@@ -103,7 +103,7 @@ def information(
     return reduced
 
 
-def candidates(
+def list_candidates(
     board: Board, model: RigModel, shared: FloatArray, depth_mm: tuple[float, float]
 ) -> list[FloatArray]:
     """(6,) left_from_board all over the working volume, tilted to all sides."""

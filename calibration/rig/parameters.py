@@ -55,7 +55,7 @@ class RigModel:
         return f"{self.n_coefficients} coefficients, {board}"
 
 
-def packed(model: RigModel, rig: StereoRig) -> FloatArray:
+def pack(model: RigModel, rig: StereoRig) -> FloatArray:
     """(n_shared,) numbers of a rig, with a board as it should be."""
     shared = np.zeros(model.n_shared)
     for number, camera in enumerate((rig.left, rig.right)):
@@ -70,7 +70,7 @@ def packed(model: RigModel, rig: StereoRig) -> FloatArray:
     return shared
 
 
-def unpacked(model: RigModel, shared: FloatArray) -> StereoRig:
+def unpack(model: RigModel, shared: FloatArray) -> StereoRig:
     """The rig of such numbers.
 
     Raises:

@@ -9,7 +9,7 @@ from calibration.rig.parameters import RigModel, lens, placement
 from navapp.geometry.transform import FloatArray
 
 
-def projected(
+def project(
     points_mm: FloatArray,
     left_from_board: FloatArray,
     model: RigModel,

@@ -5,13 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.rig.acceptance import Coverage, Limits, coverage, refusals, shown_depth_mm
+from calibration.rig.acceptance import Coverage, Limits, compute_shown_depth_mm, coverage, refusals
 from calibration.rig.bundle_adjustment import Bundle, solve_bundle
-from calibration.rig.dropped_pairs import FAULTS_OF_CAPTURE, DroppedPair, blurred_pairs, misfits
+from calibration.rig.dropped_pairs import (
+    FAULTS_OF_CAPTURE,
+    DroppedPair,
+    find_blurred_pairs,
+    misfits,
+)
 from calibration.rig.held_out_views import N_FOLDS, HeldOut, hold_out, is_better, look_at
 from calibration.rig.initial_rig import start_poses, start_rig
 from calibration.rig.lengths import epipolar_px, length_ratios
-from calibration.rig.parameters import RigModel, packed, unpacked
+from calibration.rig.parameters import RigModel, pack, unpack
 from calibration.rig.uncertainty import bounds_mm, triangulation_slopes, working_points_mm
 from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
@@ -89,11 +94,11 @@ def solve_rig(
     """
     limits = limits or Limits()
     work = _Work(board, size, on_progress)
-    dropped = blurred_pairs(pairs)
-    kept, solved, more = work.cleaned(_without(pairs, dropped))
+    dropped = find_blurred_pairs(pairs)
+    kept, solved, more = work.drop_misfits(_without(pairs, dropped))
     dropped += more
-    solved, held_out = work.chosen(kept, solved)
-    depth_mm = limits.depth_mm or shown_depth_mm(board, kept, solved)
+    solved, held_out = work.choose_model(kept, solved)
+    depth_mm = limits.depth_mm or compute_shown_depth_mm(board, kept, solved)
     points_mm = working_points_mm(solved.model, solved.shared, depth_mm)
     bounds = _bounds(solved, held_out, points_mm)
     covered = coverage(board, kept, solved, depth_mm)
@@ -105,7 +110,7 @@ def solve_rig(
     reasons += refusals(
         board, len(kept), solved, covered, judged, worst_mm, limits, known_distance_mm
     )
-    rig = unpacked(solved.model, solved.shared)
+    rig = unpack(solved.model, solved.shared)
     quality = RigQuality(not reasons, tuple(reasons), worst_mm)
     epipolar, ratios = epipolar_px(rig, kept), length_ratios(board, rig, kept)
     on_progress(1.0)
@@ -128,7 +133,9 @@ class _Work:
         self._n_done += 1
         self._on_progress(min(self._n_done / self._n_all, 0.99))
 
-    def cleaned(self, pairs: list[SeenPair]) -> tuple[list[SeenPair], Bundle, list[DroppedPair]]:
+    def drop_misfits(
+        self, pairs: list[SeenPair]
+    ) -> tuple[list[SeenPair], Bundle, list[DroppedPair]]:
         """The simplest model, without the pairs that do not belong."""
         dropped: list[DroppedPair] = []
         solved = self._first(pairs)
@@ -151,10 +158,10 @@ class _Work:
             )
         model = RigModel(_COEFFICIENTS[0], 0, *self._size)
         try:
-            shared = packed(model, start_rig(self._board, pairs, self._size))
+            shared = pack(model, start_rig(self._board, pairs, self._size))
             poses = start_poses(self._board, pairs, model, shared)
             solved = solve_bundle(self._board, pairs, model, shared, poses)
-            unpacked(model, solved.shared)
+            unpack(model, solved.shared)
         except (ValueError, np.linalg.LinAlgError) as error:
             raise ResultError(
                 f"no rig explains these views ({error})",
@@ -162,9 +169,9 @@ class _Work:
             ) from error
         return solved
 
-    def chosen(self, pairs: list[SeenPair], solved: Bundle) -> tuple[Bundle, HeldOut]:
+    def choose_model(self, pairs: list[SeenPair], solved: Bundle) -> tuple[Bundle, HeldOut]:
         """The richest model that predicts held-out views better than simpler ones."""
-        best, best_out = solved, self._held_out(pairs, solved)
+        best, best_out = solved, self._hold_out(pairs, solved)
         shaped = self._richer(pairs, best, len(self._board.points_mm), _COEFFICIENTS[0])
         best, best_out = self._better(pairs, best, best_out, shaped)
         for n_coefficients in _COEFFICIENTS[1:]:
@@ -172,7 +179,7 @@ class _Work:
             best, best_out = self._better(pairs, best, best_out, richer)
         return best, best_out
 
-    def _held_out(self, pairs: list[SeenPair], solved: Bundle) -> HeldOut:
+    def _hold_out(self, pairs: list[SeenPair], solved: Bundle) -> HeldOut:
         return hold_out(self._board, pairs, solved, on_fold=self._step)
 
     def _richer(
@@ -180,7 +187,7 @@ class _Work:
     ) -> Bundle:
         model = RigModel(n_coefficients, n_marks, *self._size)
         shared = np.concatenate(
-            [packed(model, unpacked(solved.model, solved.shared))[: model.n_rig],
+            [pack(model, unpack(solved.model, solved.shared))[: model.n_rig],
              np.zeros(model.n_shared - model.n_rig)]
         )  # fmt: skip
         richer = solve_bundle(self._board, pairs, model, shared, solved.left_from_board)
@@ -192,7 +199,7 @@ class _Work:
     ) -> tuple[Bundle, HeldOut]:
         if not richer.is_settled:
             return simple, simple_out
-        richer_out = self._held_out(pairs, richer)
+        richer_out = self._hold_out(pairs, richer)
         return (richer, richer_out) if is_better(simple_out, richer_out) else (simple, simple_out)
 
 

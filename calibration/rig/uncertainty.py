@@ -7,8 +7,8 @@ expect.
 
 import numpy as np
 
-from calibration.rig.parameters import RigModel, unpacked
-from calibration.rig.projection import projected
+from calibration.rig.parameters import RigModel, unpack
+from calibration.rig.projection import project
 from navapp.geometry.transform import FloatArray
 
 _COLUMNS, _ROWS, _DEPTHS = 7, 5, 3
@@ -27,7 +27,7 @@ def working_points_mm(
         depth_mm: nearest and farthest surface; the volume is what both cameras see between them.
         fineness: so many times as many points along x and y.
     """
-    rig = unpacked(model, shared)
+    rig = unpack(model, shared)
     n_x, n_y = fineness * _COLUMNS, fineness * _ROWS
     x, y = np.meshgrid(
         (np.arange(n_x) + 0.5) / n_x * model.width, (np.arange(n_y) + 0.5) / n_y * model.height
@@ -48,7 +48,7 @@ def triangulation_slopes(model: RigModel, shared: FloatArray, points_mm: FloatAr
     """
     by_rig, by_point = [], []
     for number in range(2):
-        _, a, _, b = projected(points_mm, np.zeros(6), model, shared, number)
+        _, a, _, b = project(points_mm, np.zeros(6), model, shared, number)
         by_rig.append(a.reshape(-1, 2, model.n_rig))
         by_point.append(b.reshape(-1, 2, 3))
     rig, point = np.concatenate(by_rig, axis=1), np.concatenate(by_point, axis=1)

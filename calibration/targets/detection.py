@@ -59,7 +59,7 @@ def find_board(picture: Image, board: Board) -> SeenBoard | None:
     ids, rough = found
     order = np.argsort(ids)
     ids, rough = ids[order], rough[order]
-    told = (_fitted_corners if board.has_squares else _fitted_circles)(picture, board, ids, rough)
+    told = (_locate_corners if board.has_squares else _locate_circles)(picture, board, ids, rough)
     shift_px = np.linalg.norm(told[:, :2] - rough, axis=1)
     good = (shift_px < _MOST_SHIFT_PX) & (told[:, 4] > _LEAST_CONTRAST)
     if np.count_nonzero(good) < _FEWEST_MARKS:
@@ -71,7 +71,7 @@ def find_board(picture: Image, board: Board) -> SeenBoard | None:
 def _find_charuco(picture: Image, board: Board) -> tuple[NDArray[np.intp], FloatArray] | None:
     detector = cv2.aruco.CharucoDetector(board.charuco)
     corners, ids, _, _ = detector.detectBoard(picture)
-    return None if corners is None else (_flat_ids(ids), _refined(picture, corners))
+    return None if corners is None else (_flat_ids(ids), _refine_corners(picture, corners))
 
 
 def _find_chessboard(picture: Image, board: Board) -> tuple[NDArray[np.intp], FloatArray] | None:
@@ -85,7 +85,7 @@ def _find_chessboard(picture: Image, board: Board) -> tuple[NDArray[np.intp], Fl
         )
     if not is_found or not _are_inside(picture, corners):
         return None
-    corners = _refined(picture, corners)
+    corners = _refine_corners(picture, corners)
     if _is_turned(picture, board, corners):
         corners = corners[::-1]
     return np.arange(len(corners)), corners
@@ -119,7 +119,7 @@ def _flat_ids(ids: Any) -> NDArray[np.intp]:
     return np.asarray(ids, dtype=np.intp).reshape(-1)
 
 
-def _refined(picture: Image, corners: Any) -> FloatArray:
+def _refine_corners(picture: Image, corners: Any) -> FloatArray:
     """OpenCV's refinement: near enough for ours."""
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
     corners = np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2).copy()
@@ -146,7 +146,7 @@ def _is_turned(picture: Image, board: Board, corners: FloatArray) -> bool:
     return bool(grey[is_even].mean() > grey[~is_even].mean())
 
 
-def _fitted_corners(
+def _locate_corners(
     picture: Image, board: Board, ids: NDArray[np.intp], rough: FloatArray
 ) -> FloatArray:
     """(n, 5) as `fit_corner` tells."""
@@ -168,7 +168,7 @@ def _fitted_corners(
     return told
 
 
-def _fitted_circles(
+def _locate_circles(
     picture: Image, board: Board, ids: NDArray[np.intp], rough: FloatArray
 ) -> FloatArray:
     """(n, 5) as `fit_circle` tells, with the centres where perspective has them."""

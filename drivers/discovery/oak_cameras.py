@@ -51,7 +51,7 @@ def list_oak_cameras(
     try:
         infos = dai.Device.getAllAvailableDevices()
     except RuntimeError as error:
-        return Listing((), (*forbidden, _unsearched(error)))
+        return Listing((), (*forbidden, _make_unsearched(error)))
     booted = dai.XLinkDeviceState.X_LINK_BOOTED
     cameras = [OakCamera(i.getDeviceId(), i.name, i.state == booted) for i in infos]
     # A camera that may not be opened does not tell its id.
@@ -83,7 +83,7 @@ def _forbidden(node: Path) -> Unseen:
     return Unseen(str(node), problem, UDEV_REMEDY)
 
 
-def _unsearched(error: RuntimeError) -> Unseen:
+def _make_unsearched(error: RuntimeError) -> Unseen:
     return Unseen(
         "usb",
         f"the USB bus cannot be searched for OAK cameras ({error})",

@@ -42,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Show, watch, solve; the exit code."""
-    from calibration.latency.acceptance import judged_latency
+    from calibration.latency.acceptance import measure_accepted_latency
     from navapp.config import find_file, load
     from navapp.devices import open_latency
 
@@ -57,7 +57,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         undo.callback(opened.close)
         names = (opened.display.info.name, opened.camera.info.name)
         recording = _watch(opened, options, diagnostics)
-    found = judged_latency(recording.switches, recording.left, recording.right, options.refresh_hz)
+    found = measure_accepted_latency(
+        recording.switches, recording.left, recording.right, options.refresh_hz
+    )
     write_json(options.json, "calibrate latency", _content(found, recording, names))
     if options.json != "-":
         _tell(found, names, diagnostics)

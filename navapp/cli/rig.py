@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 
 def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from calibration.exchange.formats import format_of_name, lost, read_any, write_as
+    from calibration.exchange.formats import format_of_name, list_losses, read_any, write_as
 
     form = options.to or format_of_name(options.out)
     # A ROS pair is a folder, which its writer looks at.
@@ -82,7 +82,7 @@ def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             remedy="calibrate again, or add --force",
         )
     write_as(form, options.out, rig)
-    warnings = lost(rig, form)
+    warnings = list_losses(rig, form)
     for warning in warnings:
         diagnostics.warn(warning)
     result = {"from": before, "to": form, "out": options.out, "rig_id": rig.rig_id}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from calibration.targets.boards import Board
-from calibration.targets.drawing import drawn, rastered
+from calibration.targets.drawing import make_drawing, rasterise
 from navapp.geometry import RigidTransform
 from sim_devices.hand import Hand
 from sim_devices.rigs import WORKING_DISTANCE_MM
@@ -15,10 +15,10 @@ _SHEET_PX_PER_MM, _MOST_SHEET_PX, _SHEET_MARGIN_MM = 12.0, 6000.0, 8.0
 
 def print_board(board: Board) -> PrintedSheet:
     """The board on a sheet of paper."""
-    drawing = drawn(board)
+    drawing = make_drawing(board)
     px_per_mm = min(_SHEET_PX_PER_MM, _MOST_SHEET_PX / max(board.size_mm))
     left_mm, top_mm = drawing.low_mm - _SHEET_MARGIN_MM
-    white = rastered(drawing, px_per_mm, _SHEET_MARGIN_MM)
+    white = rasterise(drawing, px_per_mm, _SHEET_MARGIN_MM)
     return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
 
 

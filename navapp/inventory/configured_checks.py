@@ -4,7 +4,7 @@ from pathlib import Path
 
 from drivers.discovery.permissions import allowing, may_use
 from drivers.v4l_names import V4lNames
-from drivers.window_outputs import chosen
+from drivers.window_outputs import choose_output
 from navapp.config import Configuration
 from navapp.errors import NavappError
 from navapp.inventory.connected_devices import Inventory
@@ -87,7 +87,7 @@ def _display(configuration: Configuration, found: Inventory) -> Finding:
         if not found.displays.found:
             return Finding("display", Health.FAILED, why.problem, why.remedy)
     try:
-        output = chosen(found.displays.found, section.output, *section.size_px)
+        output = choose_output(found.displays.found, section.output, *section.size_px)
     except NavappError as error:
         return Finding("display", Health.FAILED, error.problem, error.remedy)
     return Finding("display", Health.OK, f"{output} is connected")

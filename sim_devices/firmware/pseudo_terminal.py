@@ -63,7 +63,7 @@ class PseudoTerminal:
                 with self._lock:
                     if data:
                         self._wire.receive(data)
-                    out = self._wire.arrived()
+                    out = self._wire.take_arrived()
                 if out:
                     os.write(master, out)
         finally:

@@ -134,7 +134,7 @@ class StageFirmware:
     def _stall(self) -> None:
         self.flags.add("FS")
 
-    def _found_home(self) -> None:
+    def _mark_home(self) -> None:
         self._zero = 0.0
         self._place = 0.0
         self.flags -= {"WR", "WH"}
@@ -183,7 +183,7 @@ class StageFirmware:
                 return False, self.rejections.pop(0)
             case ["home"]:
                 self._forget()
-                self._set_off(0.0, self._found_home)
+                self._set_off(0.0, self._mark_home)
                 return True, "0"
             case ["move", ("abs" | "rel" | "min" | "max") as kind, *rest]:
                 return self._move(kind, rest)

@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 
 from calibration.rig.held_out_views import look_at_rig
-from calibration.rig.lengths import triangulated_mm
+from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import Calibration, solve_rig
 from calibration.targets.boards import Board, board_from, read_board
 from calibration.targets.detection import SeenBoard, find_board
@@ -210,7 +210,7 @@ def off_mm(solved: StereoRig, true: StereoRig, points_mm: FloatArray) -> FloatAr
     """(n, 3) triangulated by the solved rig less true."""
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    return triangulated_mm(solved, left, right) - points_mm
+    return triangulate_mm(solved, left, right) - points_mm
 
 
 def bone(folder: Path) -> FloatArray:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from calibration.targets.boards import Board, board_from
-from calibration.targets.drawing import drawn, rastered
+from calibration.targets.drawing import make_drawing, rasterise
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from sim_devices.rigs import default_rig
 from sim_devices.sensor import Eye, SensorModel
@@ -63,8 +63,8 @@ def photograph(folder: Path, poses: Sequence[RigidTransform], board: Board = BOA
 
 def _scene(board: Board, poses: Sequence[RigidTransform]) -> SheetScene:
     """The n-th pose at the n-th ns."""
-    drawing = drawn(board)
-    white = rastered(drawing, _PX_PER_MM, _MARGIN_MM)
+    drawing = make_drawing(board)
+    white = rasterise(drawing, _PX_PER_MM, _MARGIN_MM)
     left_mm, top_mm = drawing.low_mm - _MARGIN_MM
     sheet = PrintedSheet(white, _PX_PER_MM, float(left_mm), float(top_mm))
     return SheetScene(sheet, lambda number: poses[number])

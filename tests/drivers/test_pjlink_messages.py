@@ -34,24 +34,24 @@ def test_other_greetings_are_refused(greeting) -> None:
 
 @pytest.mark.parametrize("line", ["PJLINK ERRA", "pjlink erra"])
 def test_a_refused_password_is_named_wherever_it_is_told(line) -> None:
-    for take in (messages.salt_of, lambda line: messages.parsed_reply(line, "POWR")):
+    for take in (messages.salt_of, lambda line: messages.parse_reply(line, "POWR")):
         with pytest.raises(messages.PasswordRefused, match="refuses the password"):
             take(line)
 
 
 def test_replies() -> None:
-    assert messages.parsed_reply("%1POWR=1", "POWR") == messages.Reply("1")
-    assert messages.parsed_reply("%1powr=ok", "POWR") == messages.Reply("ok")
-    assert messages.parsed_reply("%1NAME=", "NAME") == messages.Reply("")
-    assert messages.parsed_reply("%1INF1=ACME", "INF1") == messages.Reply("ACME")
+    assert messages.parse_reply("%1POWR=1", "POWR") == messages.Reply("1")
+    assert messages.parse_reply("%1powr=ok", "POWR") == messages.Reply("ok")
+    assert messages.parse_reply("%1NAME=", "NAME") == messages.Reply("")
+    assert messages.parse_reply("%1INF1=ACME", "INF1") == messages.Reply("ACME")
     for error in ("ERR1", "ERR2", "ERR3", "ERR4"):
-        assert messages.parsed_reply(f"%1INPT={error}", "INPT") == messages.Reply("", error)
+        assert messages.parse_reply(f"%1INPT={error}", "INPT") == messages.Reply("", error)
 
 
 @pytest.mark.parametrize("line", ["", "%1POWR", "%2POWR=1", "%1AVMT=31", "POWR=1", "%1POWR=\x00"])
 def test_other_replies_are_refused(line) -> None:
     with pytest.raises(DeviceProtocolError, match="to POWR"):
-        messages.parsed_reply(line, "POWR")
+        messages.parse_reply(line, "POWR")
 
 
 def test_values() -> None:

@@ -4,7 +4,7 @@ import mss
 import numpy as np
 import pytest
 
-from calibration.latency.acceptance import judged_latency
+from calibration.latency.acceptance import measure_accepted_latency
 from calibration.latency.light_code import pauses_ms
 from drivers.clock import SystemClock
 from drivers.frames import StereoFrame
@@ -62,6 +62,6 @@ def test_a_window_is_seen_some_milliseconds_after_the_call(monkeypatch) -> None:
         finally:
             display.close()
     # This screen has no refresh to wait for.
-    found = judged_latency(recording.switches, recording.left, recording.right, 1000.0)
+    found = measure_accepted_latency(recording.switches, recording.left, recording.right, 1000.0)
     assert 0.0 < found.delay.value_ms < 40.0
     assert found.late.value_ms == pytest.approx(RIGHT_LATE_NS * 1e-6, abs=3.0)

@@ -7,9 +7,9 @@ from sim_devices.cartilage import (
     articular_weight,
     cartilage_thickness_mm,
     smoothstep,
+    wear_patch,
     with_cartilage,
     with_defect,
-    worn,
 )
 
 BONES = ("femur", "tibia", "patella")
@@ -88,7 +88,7 @@ def test_a_defect_is_bare_in_its_middle_and_whole_beyond_its_border(knee):
     mesh, centre = knee.bones["femur"], knee.landmarks["femur/medial_condyle"]
     thickness = cartilage_thickness_mm(knee, "femur", 2.0, 1)
     distance = np.linalg.norm(mesh.vertices_mm - centre, axis=1)
-    left_over = worn(mesh, thickness, centre, 10.0)
+    left_over = wear_patch(mesh, thickness, centre, 10.0)
     assert (left_over[distance < 8.0] == 0.0).all()
     np.testing.assert_array_equal(left_over[distance > 12.0], thickness[distance > 12.0])
     surface = with_defect(mesh, thickness, centre, 10.0)

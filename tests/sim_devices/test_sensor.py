@@ -85,17 +85,19 @@ def test_right_eye_is_four_percent_brighter():
 
 
 def test_exposure_and_gain_brighten_up_to_saturation():
-    assert QUIET.adjusted(2.0, 0.0).picture(flat(0.2), "left", 0)[0, 0, 0] == round(grey_value(0.4))
+    assert QUIET.with_exposure(2.0, 0.0).picture(flat(0.2), "left", 0)[0, 0, 0] == round(
+        grey_value(0.4)
+    )
     doubled = 20.0 * np.log10(2.0)
-    assert QUIET.adjusted(1.0, doubled).picture(flat(0.2), "left", 0)[0, 0, 0] == round(
+    assert QUIET.with_exposure(1.0, doubled).picture(flat(0.2), "left", 0)[0, 0, 0] == round(
         grey_value(0.4)
     )
     assert SensorModel(exposure=8.0).picture(flat(0.5), "left", 0).min() == 255
 
 
 def test_gain_raises_noise_that_exposure_would_not():
-    exposed = SensorModel().adjusted(4.0, 0.0).picture(flat(0.1), "left", 0).astype(float)
-    amplified = SensorModel().adjusted(1.0, 12.041).picture(flat(0.1), "left", 0).astype(float)
+    exposed = SensorModel().with_exposure(4.0, 0.0).picture(flat(0.1), "left", 0).astype(float)
+    amplified = SensorModel().with_exposure(1.0, 12.041).picture(flat(0.1), "left", 0).astype(float)
     assert amplified.mean() == pytest.approx(exposed.mean(), abs=0.5)
     assert amplified.std() > 1.5 * exposed.std()
 

@@ -8,7 +8,7 @@ import pytest
 
 from calibration.targets.boards import board_from
 from calibration.targets.detection import find_board
-from calibration.targets.drawing import drawn, rastered
+from calibration.targets.drawing import make_drawing, rasterise
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from sim_devices.rigs import default_rig
 from sim_devices.sensor import SensorModel
@@ -50,8 +50,8 @@ def off_px(eye: str, pose: RigidTransform, take) -> np.ndarray:
 
 
 def sheet_of(board=BOARD, px_per_mm: float = 12.0) -> PrintedSheet:
-    drawing = drawn(board)
-    white = rastered(drawing, px_per_mm, MARGIN_MM)
+    drawing = make_drawing(board)
+    white = rasterise(drawing, px_per_mm, MARGIN_MM)
     left_mm, top_mm = drawing.low_mm - MARGIN_MM
     return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
 

@@ -3,7 +3,13 @@ import pytest
 
 from navapp.geometry.mesh import TriangleMesh
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.stages import HOLE_DEPTH_MM, HOLE_RADIUS_MM, drill_hole, entry_point, worn_patch
+from sim_devices.stages import (
+    HOLE_DEPTH_MM,
+    HOLE_RADIUS_MM,
+    drill_hole,
+    entry_point,
+    make_worn_patch,
+)
 from sim_devices.tools import across, chuck_mesh, drill_mesh, hand_meshes
 
 AXIS = np.array([0.0, np.sin(0.1), np.cos(0.1)])
@@ -77,7 +83,7 @@ def test_a_line_beside_the_bone_has_no_entry_point(femur):
 
 def test_the_worn_patch_is_round_its_centre_and_nowhere_else(femur):
     centre = make_knee(KneeSpec(1)).landmarks["femur/medial_condyle"]
-    worn = worn_patch(femur, centre, 9.0)
+    worn = make_worn_patch(femur, centre, 9.0)
     distance = np.linalg.norm(femur.vertices_mm - centre, axis=1)
     assert worn[distance < 3.0].min() == 1.0
     assert worn[distance > 30.0].max() == 0.0

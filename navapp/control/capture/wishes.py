@@ -8,8 +8,8 @@ import numpy as np
 from calibration.rig.bundle_adjustment import Bundle, solve_bundle
 from calibration.rig.dropped_pairs import DroppedPair, misfits
 from calibration.rig.initial_rig import matrix_of, pose_of, start_poses, start_rig
-from calibration.rig.next_view import wanted_view
-from calibration.rig.parameters import RigModel, packed, unpacked
+from calibration.rig.next_view import find_next_view
+from calibration.rig.parameters import RigModel, pack, unpack
 from calibration.rig.uncertainty import bounds_mm, working_points_mm
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
@@ -98,9 +98,9 @@ def _informed(
 ) -> Wish:
     """The wish of a rig that can be solved."""
     solved, used, out = _solved(board, pairs, size, last)
-    rig = unpacked(solved.model, solved.shared)
+    rig = unpack(solved.model, solved.shared)
     bounds = volume_bounds_mm(solved, depth_mm)
-    view = wanted_view(board, solved, noise_px(solved), depth_mm, avoid)
+    view = find_next_view(board, solved, noise_px(solved), depth_mm, avoid)
     pose = starting_view(board, 0, depth_mm) if view is None else view
     indices = tuple(pair.index for pair in used)
     if len(bounds) == 0:
@@ -117,7 +117,7 @@ def _solved(
     used = [pair for pair in pairs if pair.index not in {one.index for one in out}]
     model = RigModel(_SIMPLEST, 0, *size)
     if last is None or last.solved is None:
-        shared = packed(model, start_rig(board, used, size))
+        shared = pack(model, start_rig(board, used, size))
         poses = start_poses(board, used, model, shared)
     else:
         shared, poses = last.solved.shared, _poses(board, used, last)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibration.latency.acceptance import WORST_MS, judged_latency
+from calibration.latency.acceptance import WORST_MS, measure_accepted_latency
 from calibration.latency.display_area import Watched
 from navapp.errors import ResultError
 from tests.calibration.latency.scenes import CASES, Bench, drawn_bench
@@ -16,7 +16,7 @@ GOOD = (
 
 def judged(bench: Bench, seed: int):
     # A display without refresh is one of very many.
-    return judged_latency(*bench.record(seed), refresh_hz=bench.refresh_hz or 240.0)
+    return measure_accepted_latency(*bench.record(seed), refresh_hz=bench.refresh_hz or 240.0)
 
 
 @pytest.mark.parametrize("name", GOOD)
@@ -86,7 +86,7 @@ def test_light_that_goes_with_darkness_is_refused() -> None:
     switches, left, right = drawn_bench(2).record(2)
     inverted = Watched(left.times_ms, 255.0 - left.cells)
     with pytest.raises(ResultError, match="left camera"):
-        judged_latency(switches, inverted, right, refresh_hz=59.94)
+        measure_accepted_latency(switches, inverted, right, refresh_hz=59.94)
 
 
 def test_a_result_that_may_be_off_by_more_than_is_promised_is_refused() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibration.latency.display_area import Watched, find_area, surely_seen
+from calibration.latency.display_area import Watched, compute_seen_deviations, find_area
 from tests.calibration.latency.scenes import AREA, N_CELLS, drawn_bench
 
 
@@ -28,7 +28,9 @@ def test_noise_is_not_seen_however_many_cells_there_are() -> None:
     switches, left, _ = drawn_bench(0).record(0)
     rng = np.random.default_rng(0)
     looks = [
-        surely_seen(switches, Watched(left.times_ms, rng.normal(0, 5, (len(left.times_ms), 576))))
+        compute_seen_deviations(
+            switches, Watched(left.times_ms, rng.normal(0, 5, (len(left.times_ms), 576)))
+        )
         for _ in range(20)
     ]
     # Standard deviations, as of drawn numbers: neither all the same nor large.
@@ -38,4 +40,4 @@ def test_noise_is_not_seen_however_many_cells_there_are() -> None:
 
 def test_a_display_that_is_there_is_surely_seen() -> None:
     switches, left, _ = drawn_bench(2).record(2)
-    assert surely_seen(switches, left) > 10.0
+    assert compute_seen_deviations(switches, left) > 10.0

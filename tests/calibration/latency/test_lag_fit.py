@@ -14,22 +14,22 @@ ONCE = np.ones((1, len(BLOCKS)))
 
 
 def seen(lag_ms: float) -> np.ndarray:
-    return 20.0 + 90.0 * TOLD.lit_shares(TIMES, np.array([lag_ms]), 16.0)[:, 0]
+    return 20.0 + 90.0 * TOLD.compute_lit_fractions(TIMES, np.array([lag_ms]), 16.0)[:, 0]
 
 
 def sums_of(grey: np.ndarray):
-    return block_sums(TOLD.lit_shares(TIMES, LAGS, 16.0), grey, BLOCKS, LAGS)
+    return block_sums(TOLD.compute_lit_fractions(TIMES, LAGS, 16.0), grey, BLOCKS, LAGS)
 
 
 @pytest.mark.parametrize("lag_ms", [12.0, 47.75, 101.5])
 def test_the_true_lag_explains_everything(lag_ms: float) -> None:
     sums = sums_of(seen(lag_ms))
     assert sums.best_lags_ms(ONCE)[0] == pytest.approx(lag_ms, abs=0.01)
-    assert sums.explained(ONCE).max() == pytest.approx(1.0)
+    assert sums.compute_explained(ONCE).max() == pytest.approx(1.0)
 
 
 def test_an_upside_down_code_explains_nothing() -> None:
-    assert sums_of(-seen(50.0)).explained(ONCE)[0, len(LAGS) // 2] == 0.0
+    assert sums_of(-seen(50.0)).compute_explained(ONCE)[0, len(LAGS) // 2] == 0.0
 
 
 def test_light_that_changes_slowly_moves_no_lag() -> None:

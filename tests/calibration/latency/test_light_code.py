@@ -22,7 +22,7 @@ def test_a_code_looks_like_itself_at_one_delay_only() -> None:
     told = np.concatenate([[0.0], np.cumsum(pauses_ms(30.0, 0))])
     times = np.arange(0.0, told[-1], 3.0)
     lags = np.arange(-800.0, 801.0, 4.0)
-    shares = Switches(told).lit_shares(times, lags, 20.0)
+    shares = Switches(told).compute_lit_fractions(times, lags, 20.0)
     correlations = np.corrcoef(shares.T)[len(lags) // 2]
     far = np.abs(lags) > SHORTEST_PAUSE_MS
     assert correlations[~far].max() == pytest.approx(1.0)
@@ -34,7 +34,7 @@ def test_lit_shares_are_what_counting_instants_gives() -> None:
     rng = np.random.default_rng(3)
     told = np.concatenate([[0.0], np.cumsum(pauses_ms(2.0, 1))])
     times, lags, width = rng.uniform(-100.0, 2200.0, 50), np.array([-30.0, 0.0, 45.5]), 24.0
-    shares = Switches(told).lit_shares(times, lags, width)
+    shares = Switches(told).compute_lit_fractions(times, lags, width)
     inside = (np.arange(4000) + 0.5) / 4000 - 0.5
     for k, lag in enumerate(lags):
         instants = times[:, None] - lag + width * inside

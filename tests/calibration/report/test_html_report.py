@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from calibration.report.html_report import page, write_report
+from calibration.report.html_report import make_page, write_report
 from calibration.rig.acceptance import Limits
 from calibration.rig.dropped_pairs import DroppedPair, Fault
 from calibration.rig.rig_solution import Calibration, solve_rig
@@ -26,7 +26,7 @@ def found() -> Calibration:
 
 @pytest.fixture(scope="module")
 def text(found: Calibration) -> str:
-    return page(found, Limits())
+    return make_page(found, Limits())
 
 
 class Reader(HTMLParser):
@@ -120,7 +120,7 @@ def judged(found: Calibration, **changes) -> Calibration:
 
 def test_a_refused_rig_says_why(found) -> None:
     reasons = ("only 6 pairs can be used, 8 are needed", "the board was shown frontally")
-    text = page(judged(found, is_accepted=False, reasons=reasons), Limits())
+    text = make_page(judged(found, is_accepted=False, reasons=reasons), Limits())
     words = " ".join(Reader(text).words)
     assert f"Not accepted. {' '.join(reasons)}" in words
     assert "Accepted." not in words
@@ -132,7 +132,7 @@ def test_what_a_user_named_is_escaped(found) -> None:
     named = replace(
         judged(found, is_accepted=False, reasons=(name,)), dropped=[*found.dropped, pair]
     )
-    text = page(replace(named, rig=replace(named.rig, name=name)), Limits())
+    text = make_page(replace(named, rig=replace(named.rig, name=name)), Limits())
     words = " ".join(Reader(text).words)
     assert "<script" not in text
     assert f"Calibration of {name}" in words
@@ -142,7 +142,7 @@ def test_what_a_user_named_is_escaped(found) -> None:
 
 def test_a_recorded_rig_says_when_it_ends(found) -> None:
     day = {"made_on": date(2026, 3, 1), "expires_on": date(2026, 8, 28)}
-    words = " ".join(Reader(page(judged(found, **day), Limits())).words)
+    words = " ".join(Reader(make_page(judged(found, **day), Limits())).words)
     assert "made on 2026-03-01 expires on 2026-08-28" in words
 
 
@@ -151,7 +151,7 @@ def test_a_rig_without_a_common_volume_has_a_report_too(found) -> None:
         judged(found, is_accepted=False, reasons=("no part",)),
         bounds_mm=np.empty(0), points_mm=np.empty((0, 3)),
     )  # fmt: skip
-    words = " ".join(Reader(page(nothing, Limits())).words)
+    words = " ".join(Reader(make_page(nothing, Limits())).words)
     assert "no part of the working volume is seen by both cameras" in words
     assert "predicted error at the working volume unknown" in words
 

@@ -5,7 +5,7 @@ import pytest
 
 from calibration.rig.bundle_adjustment import solve_bundle
 from calibration.rig.initial_rig import vector_of
-from calibration.rig.parameters import RigModel, packed
+from calibration.rig.parameters import RigModel, pack
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig, seen_pair
 
 N_DRAWS = 50
@@ -17,7 +17,7 @@ def test_the_covariance_is_that_of_answers_to_other_noise() -> None:
     model = RigModel(5, 0, WIDTH, HEIGHT)
     poses = [drawn_pose(rng, tilt_deg=40.0) for _ in range(8)]
     start = np.array([vector_of(pose.matrix) for pose in poses])
-    shared = packed(model, true)
+    shared = pack(model, true)
     offs, told = [], []
     for _ in range(N_DRAWS):
         pairs = [seen_pair(i, true, pose, rng) for i, pose in enumerate(poses)]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibration.rig.equilibration import equilibrated, unit_sizes
+from calibration.rig.equilibration import equilibrate, unit_sizes
 
 
 def test_the_diagonal_becomes_one_and_the_inverse_comes_back_to_the_units() -> None:
@@ -10,7 +10,7 @@ def test_the_diagonal_becomes_one_and_the_inverse_comes_back_to_the_units() -> N
     mixed = np.array([[2.0, 0.3, 0.1], [0.3, 1.0, 0.2], [0.1, 0.2, 3.0]])
     normal = mixed * np.outer(units, units)
     sizes = unit_sizes(normal)
-    scaled = equilibrated(normal, sizes)
+    scaled = equilibrate(normal, sizes)
     np.testing.assert_allclose(np.diag(scaled), 1.0, rtol=1e-12)
-    inverse = equilibrated(np.linalg.inv(scaled), sizes)
+    inverse = equilibrate(np.linalg.inv(scaled), sizes)
     np.testing.assert_allclose(inverse * np.outer(units, units), np.linalg.inv(mixed), rtol=1e-10)

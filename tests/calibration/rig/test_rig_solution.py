@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.rig.acceptance import occupied
+from calibration.rig.acceptance import find_occupied_cells
 from calibration.rig.dropped_pairs import Fault
-from calibration.rig.lengths import triangulated_mm
+from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import solve_rig
 from calibration.rig.uncertainty import working_points_mm
 from calibration.targets.boards import board_from
@@ -29,7 +29,7 @@ SIZE = (WIDTH, HEIGHT)
 def triangulation_error_mm(solved, true, points_mm):
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    return np.linalg.norm(triangulated_mm(solved, left, right) - points_mm, axis=1)
+    return np.linalg.norm(triangulate_mm(solved, left, right) - points_mm, axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,9 @@ def test_a_board_that_stays_in_the_middle_is_refused(world):
     assert any("one part of the left picture" in reason for reason in reasons)
     # What both cameras see for certain is asked for without a hole.
     for number, side in enumerate(("left", "right")):
-        marked = occupied(np.vstack([getattr(pair, side).pixels for pair in found.pairs]), SIZE)
+        marked = find_occupied_cells(
+            np.vstack([getattr(pair, side).pixels for pair in found.pairs]), SIZE
+        )
         assert (found.covered.bare[number] | marked)[1:5, 2:6].all()
         assert not (found.covered.bare[number] & marked).any()
 

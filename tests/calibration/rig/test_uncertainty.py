@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from calibration.rig.parameters import RigModel, packed, unpacked
+from calibration.rig.parameters import RigModel, pack, unpack
 from calibration.rig.uncertainty import bounds_mm, triangulation_slopes, working_points_mm
 from tests.calibration.marks import HEIGHT, WIDTH, drawn_rig
 
 MODEL = RigModel(5, 0, WIDTH, HEIGHT)
-SHARED = packed(MODEL, drawn_rig(np.random.default_rng(21)))
+SHARED = pack(MODEL, drawn_rig(np.random.default_rng(21)))
 POINTS_MM = working_points_mm(MODEL, SHARED, (350.0, 550.0))[::7].copy()
 
 
 def pixels_of(shared: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
     """(n, 4) in both pictures."""
-    rig = unpacked(MODEL, shared)
+    rig = unpack(MODEL, shared)
     right = rig.right.project(rig.right_from_left.apply(points_mm))
     return np.hstack([rig.left.project(points_mm), right])
 

@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from calibration.latency.acceptance import WORST_MS, judged_latency
+from calibration.latency.acceptance import WORST_MS, measure_accepted_latency
 from calibration.latency.light_code import pauses_ms
 from calibration.latency.measurement import Latency
 from navapp.control.latency.player import CodePlayer
@@ -40,7 +40,7 @@ def players() -> list[threading.Thread]:
 def test_the_truth_of_the_room_is_recovered(truth: dict[str, float]) -> None:
     room = Room(**truth)
     recording = watch(room.camera, player_of(room, 20.0), room.clock, nothing)
-    found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+    found = measure_accepted_latency(recording.switches, recording.left, recording.right, 59.94)
     true_late_ms = truth.get("unstamped_skew_ms", 0.0)
     true_offset_ms = true_late_ms + truth.get("skew_ms", 0.0)
     assert found.delay.value_ms == pytest.approx(truth["delay_ms"] + HALF_REFRESH_MS, abs=WORST_MS)
@@ -55,7 +55,9 @@ def recorded_and_judged(**truth: float) -> tuple[Recording, Latency]:
         room = Room(is_stepped=False, **truth)
         recording = watch(room.camera, player_of(room, 8.0), room.clock, nothing)
         try:
-            found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+            found = measure_accepted_latency(
+                recording.switches, recording.left, recording.right, 59.94
+            )
         except ResultError:
             if is_last:
                 raise
@@ -83,7 +85,7 @@ def test_frames_that_are_dropped_or_repeated_are_borne() -> None:
     recording = watch(room.camera, player_of(room, 20.0), room.clock, nothing)
     assert (np.diff(recording.left.times_ms) > 0.0).all()
     assert np.diff(recording.left.times_ms).max() > 1900.0
-    found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+    found = measure_accepted_latency(recording.switches, recording.left, recording.right, 59.94)
     assert found.delay.value_ms == pytest.approx(40.0 + HALF_REFRESH_MS, abs=WORST_MS)
 
 
