@@ -83,10 +83,11 @@ def _is_seen(switches: Switches, watched: Watched) -> bool:
 
 
 def _check_fit(name: str, eye: EyeLag) -> None:
-    if eye.other_peak_share > _MOST_OTHER_PEAKS:
+    if eye.other_peak_fraction > _MOST_OTHER_PEAKS:
         raise ResultError(
-            f"several delays fit what the {name} camera saw: in {100 * eye.other_peak_share:.0f} % "
-            "of resampled recordings another one fits better",
+            f"several delays fit what the {name} camera saw: "
+            f"in {100 * eye.other_peak_fraction:.0f} % of resampled recordings "
+            "another one fits better",
             remedy="measure longer (--seconds); stop what else uses the display or the computer",
         )
     if eye.explained < _LEAST_EXPLAINED:
@@ -118,10 +119,11 @@ def _check_steady(name: str, eye: EyeLag) -> None:
             f"{drift.value_ms:+.1f} ms later than the first",
             remedy="wait until display and camera have settled, and measure again",
         )
-    if eye.wrong_share > _MOST_WRONG:
+    if eye.wrong_fraction > _MOST_WRONG:
         raise ResultError(
-            f"the delay is not steady: {100 * eye.wrong_share:.0f} % of the {name} camera's frames "
-            f"saw light for darkness or the reverse, {100 * _MOST_WRONG:.0f} % are allowed",
+            f"the delay is not steady: {100 * eye.wrong_fraction:.0f} % "
+            f"of the {name} camera's frames saw light for darkness or the reverse, "
+            f"{100 * _MOST_WRONG:.0f} % are allowed",
             remedy="stop what else uses the display or the computer; a faint display does this, "
             "too: make it brighter",
         )

@@ -28,13 +28,13 @@ class BlockSums:
 
     Attributes:
         lags_ms: (k,).
-        share_grey, share_share: (b, k) of lit share and grey value, of lit share and itself.
+        lit_grey, lit_lit: (b, k) of lit share and grey value, of lit share and itself.
         grey_grey: (b,).
     """
 
     lags_ms: FloatArray
-    share_grey: FloatArray
-    share_share: FloatArray
+    lit_grey: FloatArray
+    lit_lit: FloatArray
     grey_grey: FloatArray
 
     def compute_explained(self, counts: FloatArray) -> FloatArray:
@@ -43,8 +43,8 @@ class BlockSums:
         Args:
             counts: (r, b) how often each block counts.
         """
-        together = np.maximum(counts @ self.share_grey, 0.0)
-        apart = (counts @ self.share_share) * (counts @ self.grey_grey)[:, None]
+        together = np.maximum(counts @ self.lit_grey, 0.0)
+        apart = (counts @ self.lit_lit) * (counts @ self.grey_grey)[:, None]
         return np.asarray(together**2 / np.maximum(apart, 1e-9))
 
     def best_lags_ms(self, counts: FloatArray) -> FloatArray:

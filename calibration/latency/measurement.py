@@ -56,20 +56,20 @@ class EyeLag:
         width_ms: of the window in which a switch is seen: exposure and spread together.
         drift: how much later the second half of the frames saw it than the first.
         swing: grey values between darkness and light.
-        area_share: of the picture.
+        area_fraction: of the picture.
         explained: share of the area's changes that the code explains.
-        wrong_share: of the frames that saw light where the code says darkness, or the reverse.
-        other_peak_share: of resampled recordings that another delay fits better.
+        wrong_fraction: of the frames that saw light where the code says darkness, or the reverse.
+        other_peak_fraction: of resampled recordings that another delay fits better.
     """
 
     lag: Estimate
     width_ms: float
     drift: Estimate
     swing: float
-    area_share: float
+    area_fraction: float
     explained: float
-    wrong_share: float
-    other_peak_share: float
+    wrong_fraction: float
+    other_peak_fraction: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,10 +159,10 @@ class _Eye:
             width_ms=self._width_ms,
             drift=self._drift(),
             swing=lit - dark,
-            area_share=float(self._area.is_in.mean()),
+            area_fraction=float(self._area.is_in.mean()),
             explained=float(self._best.compute_explained(self._once).max()),
-            wrong_share=float(is_wrong.mean()),
-            other_peak_share=self._other_peak_share(),
+            wrong_fraction=float(is_wrong.mean()),
+            other_peak_fraction=self._other_peak_fraction(),
         )
 
     def _sums(self, lags_ms: FloatArray, width_ms: float) -> BlockSums:
@@ -182,7 +182,7 @@ class _Eye:
         drawn_ms = self._best.best_lags_ms(draws(len(self._blocks), is_half))
         return Estimate(float(found_ms), float(np.std(drawn_ms)))
 
-    def _other_peak_share(self) -> float:
+    def _other_peak_fraction(self) -> float:
         sums = self._sums(coarse_lags_ms(), COARSE_WIDTH_MS)
         away_ms = np.abs(sums.best_lags_ms(self._draws) - self._area.lag_ms)
         return float(np.mean(away_ms > _SAME_PEAK_MS))

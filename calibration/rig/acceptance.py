@@ -32,7 +32,7 @@ class Limits:
         worst_rms_px: of what is left.
         worst_held_out: held-out over solved residuals.
         accept_mm: largest predicted 95 % error in the working volume.
-        known_share: largest difference from a length that is known.
+        known_fraction: largest difference from a length that is known.
         depth_mm: nearest and farthest surface of the working volume; None: where the board was.
     """
 
@@ -42,7 +42,7 @@ class Limits:
     worst_rms_px: float = 0.6
     worst_held_out: float = 1.5
     accept_mm: float = 0.40
-    known_share: float = 0.005
+    known_fraction: float = 0.005
     depth_mm: tuple[float, float] | None = (350.0, 550.0)
 
 
@@ -149,7 +149,7 @@ def refusals(
         *_of_sides(solved),
         *_of_views(covered, limits),
         *_of_prediction(solved, held_out_rms_px, bound_mm, limits),
-        *_of_known_distance(board, solved, known_distance_mm, limits.known_share),
+        *_of_known_distance(board, solved, known_distance_mm, limits.known_fraction),
     ]
 
 

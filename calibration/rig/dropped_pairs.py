@@ -20,7 +20,7 @@ _TOO_BLURRED, _TOO_FAR = 1.8, 3.0
 # What a hand that is not quite still costs, and what pictures of two instants leave.
 _LEAST_MISFIT_PX, _OTHER_INSTANT_PX = 0.05, 1.0
 # Poses this near are the same, in parts of the board's distance and in rad.
-_SAME_SHARE, _SAME_RAD = 0.01, 0.02
+_SAME_FRACTION, _SAME_RAD = 0.01, 0.02
 
 
 class Fault(StrEnum):
@@ -145,4 +145,4 @@ def _rms(residual_px: FloatArray) -> float:
 def _is_same(a: FloatArray, b: FloatArray) -> bool:
     turn_rad = angle_between_rad(a[:3, :3], b[:3, :3])
     apart_mm = np.linalg.norm(a[:3, 3] - b[:3, 3])
-    return bool(turn_rad < _SAME_RAD and apart_mm < _SAME_SHARE * np.linalg.norm(a[:3, 3]))
+    return bool(turn_rad < _SAME_RAD and apart_mm < _SAME_FRACTION * np.linalg.norm(a[:3, 3]))

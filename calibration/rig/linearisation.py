@@ -24,7 +24,7 @@ _MAD_TO_SIGMA = 1.4826
 _RIDGE = 1e-12
 # A printed mark lies where it should to so much of the distance to the next one, along x, y and z
 # (one standard deviation): paper shrinks, and a plate bends more than a print is off.
-_EXPECTED_SHARE_OFF = (0.01, 0.01, 0.05)
+_EXPECTED_FRACTION_OFF = (0.01, 0.01, 0.05)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +123,7 @@ class Linearisation:
     def marks_off(self) -> tuple[FloatArray, FloatArray]:
         """Of 3 `n_marks` coordinates: standard deviation mm, and how many of them each is off."""
         model = self.views.model
-        expected_mm = np.array(_EXPECTED_SHARE_OFF) * self.views.board.spacing_mm
+        expected_mm = np.array(_EXPECTED_FRACTION_OFF) * self.views.board.spacing_mm
         sigma_mm = np.tile(expected_mm, model.n_marks)
         return sigma_mm, self.shared[model.n_rig :] / sigma_mm
 

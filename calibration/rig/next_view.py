@@ -21,7 +21,7 @@ from navapp.geometry.transform import (
 
 # Where, how far and how turned a view may be asked for.
 _PLACES = (-0.55, 0.0, 0.55)
-_DEPTH_SHARES = (0.0, 1.0)
+_DEPTH_FRACTIONS = (0.0, 1.0)
 _TILTS_DEG = (45.0,)
 _N_DIRECTIONS = 8
 _ROLL_DEG = (0.0, 90.0)
@@ -109,7 +109,7 @@ def list_candidates(
     """(6,) left_from_board all over the working volume, tilted to all sides."""
     middle = board.points_mm.mean(axis=0)
     poses = []
-    for share in _DEPTH_SHARES:
+    for share in _DEPTH_FRACTIONS:
         depth = depth_mm[0] + share * (depth_mm[1] - depth_mm[0])
         seen = working_points_mm(model, shared, (depth, depth))
         if len(seen) == 0:

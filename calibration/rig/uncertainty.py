@@ -13,7 +13,7 @@ from navapp.geometry.transform import FloatArray
 
 _COLUMNS, _ROWS, _DEPTHS = 7, 5, 3
 _N_DRAWN, _SEED = 1024, 20
-_SHARE = 0.95
+_FRACTION = 0.95
 
 
 def working_points_mm(
@@ -72,5 +72,5 @@ def bounds_mm(
     values, axes = np.linalg.eigh(spread)
     roots = axes * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     drawn = np.random.default_rng(_SEED).standard_normal((3, _N_DRAWN))
-    bounds: FloatArray = np.quantile(np.linalg.norm(roots @ drawn, axis=1), _SHARE, axis=1)
+    bounds: FloatArray = np.quantile(np.linalg.norm(roots @ drawn, axis=1), _FRACTION, axis=1)
     return bounds

@@ -14,7 +14,7 @@ from calibration.targets.mark_kernels import N_TOLD
 from navapp.geometry.transform import FloatArray
 
 # Edges are straight over so much of a square, and lenses bend no line within so many pixels.
-_SHARE_OF_SQUARE, _MOST_RADIUS_PX, _LEAST_RADIUS_PX = 0.45, 16.0, 3.0
+_RADIUS_PER_SQUARE, _MOST_RADIUS_PX, _LEAST_RADIUS_PX = 0.45, 16.0, 3.0
 # A mark farther from where the detector put it is another one.
 _MOST_SHIFT_PX = 3.0
 _ROUGH_WINDOW_PX = 4
@@ -153,7 +153,7 @@ def _locate_corners(
     maps = _local_maps(board.points_mm[ids, :2], rough)
     scale = np.sqrt(np.abs(np.linalg.det(maps)))
     square_px = scale * board.spacing_mm
-    radius = np.clip(_SHARE_OF_SQUARE * square_px, _LEAST_RADIUS_PX, _MOST_RADIUS_PX)
+    radius = np.clip(_RADIUS_PER_SQUARE * square_px, _LEAST_RADIUS_PX, _MOST_RADIUS_PX)
     along = np.full(len(ids), board.spacing_mm)
     # Blurred marks shine into the clear strip.
     aside = np.full(len(ids), board.clear_mm)

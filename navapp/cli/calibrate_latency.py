@@ -109,9 +109,9 @@ def _eye(eye: "EyeLag") -> dict[str, Any]:
         "drift_ms": eye.drift.value_ms,
         "width_ms": eye.width_ms,
         "swing": eye.swing,
-        "area_share": eye.area_share,
+        "area_share": eye.area_fraction,
         "explained": eye.explained,
-        "wrong_share": eye.wrong_share,
+        "wrong_share": eye.wrong_fraction,
     }
 
 
@@ -127,8 +127,8 @@ def _tell(found: "Latency", names: tuple[str, str], diagnostics: Diagnostics) ->
     )
     diagnostics.say(
         f"{found.n_switches} switches in {found.n_frames} frames; the display fills "
-        f"{100 * found.left.area_share:.0f} % of the left picture and "
-        f"{100 * found.right.area_share:.0f} % of the right one, "
+        f"{100 * found.left.area_fraction:.0f} % of the left picture and "
+        f"{100 * found.right.area_fraction:.0f} % of the right one, "
         f"{found.left.swing:.0f} and {found.right.swing:.0f} grey values from dark to light"
     )
     if abs(found.late.value_ms) > found.late.bound_ms:

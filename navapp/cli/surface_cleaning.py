@@ -10,9 +10,9 @@ from navapp.geometry.surface_files import merged_rows
 from navapp.geometry.transform import FloatArray
 
 # Pieces of fewer triangles than this share of the largest one's are strays.
-_TINY_SHARE = 0.01
+_TINY_FRACTION = 0.01
 # A surface whose openings are this share of it still has an inside.
-_OPEN_SHARE = 0.25
+_OPEN_FRACTION = 0.25
 _NORMAL_NEIGHBOURS = 16
 
 
@@ -46,7 +46,7 @@ def mend(mesh: TriangleMesh) -> Mended:
     whole = _of_faces(vertices, faces[~is_stray])
     if whole.volume_mm3() < 0.0:
         vectors, double_area = _areas(whole.vertices_mm, whole.faces)
-        if np.linalg.norm(vectors.sum(axis=0)) < _OPEN_SHARE * double_area.sum():
+        if np.linalg.norm(vectors.sum(axis=0)) < _OPEN_FRACTION * double_area.sum():
             whole = whole.flipped()
             notes.append("its normals pointed inwards and were turned")
         else:
@@ -148,7 +148,7 @@ def _strays(n_vertices: int, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     _, piece_of_vertex = connected_components(graph, directed=False)
     piece = piece_of_vertex[faces[:, 0]]
     counts = np.bincount(piece)
-    is_stray: NDArray[np.bool_] = (counts < _TINY_SHARE * counts.max())[piece]
+    is_stray: NDArray[np.bool_] = (counts < _TINY_FRACTION * counts.max())[piece]
     return is_stray
 
 

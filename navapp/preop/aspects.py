@@ -20,10 +20,10 @@ from navapp.preop.bone_edges import Crease, creases, near_ends
 from navapp.values import AspectGraph, BoneModel
 
 # Two views of which so much agrees are one: pairs of edges as near and as parallel as this.
-_SAME_SHARE, _SAME_MM, _SAME_COSINE = 0.95, 1.5, 0.966
+_SAME_FRACTION, _SAME_MM, _SAME_COSINE = 0.95, 1.5, 0.966
 # A point so far behind what is seen around it is hidden.
 _HIDDEN_MM = 1.5
-_CREASE_SHARE = 0.35
+_CREASE_FRACTION = 0.35
 _CREASE_COSINE = 0.3
 _MARGIN_MM = 6.0
 
@@ -134,7 +134,7 @@ class _Look:
         turned = np.flatnonzero(cosine > _CREASE_COSINE)
         turned = turned[self._find_visible(crease.points_mm[turned], pose, depth)]
         most = self._settings.n_points
-        n_creases = min(len(turned), int(_CREASE_SHARE * most))
+        n_creases = min(len(turned), int(_CREASE_FRACTION * most))
         chosen = _spread(middles[:n][outline], most - n_creases)
         also = _spread(crease.points_mm[turned], n_creases)
         points = np.concatenate([middles[:n][outline][chosen], crease.points_mm[turned][also]])
@@ -186,7 +186,7 @@ def _select_distinct(
             distance, index = trees[other].query(points_mm)
             parallel = np.abs(np.einsum("ij,ij->i", tangents, views[other][1][index]))
             agrees = np.asarray(distance < _SAME_MM) & (parallel > _SAME_COSINE)
-            is_new &= float(agrees.mean()) < _SAME_SHARE
+            is_new &= float(agrees.mean()) < _SAME_FRACTION
         if is_new:
             kept.append(k)
             trees[k] = cKDTree(points_mm)

@@ -28,7 +28,7 @@ _REACH_MM = 6.0
 # Nearer than this two surfaces are the same one.
 _COINCIDES_MM = 0.05
 # Two segmentations cross where there is no cartilage; deeper, or more often, one of them is wrong.
-_DIPS_MM, _DIPS_SHARE = 0.5, 0.02
+_DIPS_MM, _DIPS_FRACTION = 0.5, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,7 @@ def _check_outside(bone: BoneModel, distance_mm: FloatArray, path: Path) -> None
     """Refuse a surface that is not the outer one of this bone's cartilage."""
     is_hit = np.isfinite(distance_mm)
     is_inside = is_hit & (distance_mm < -_DIPS_MM)
-    if is_inside.sum() > _DIPS_SHARE * is_hit.sum():
+    if is_inside.sum() > _DIPS_FRACTION * is_hit.sum():
         raise PlanError(
             f"cartilage {path} lies inside the {bone.name}, by up to "
             f"{-np.nanmin(distance_mm):.1f} mm",

@@ -19,7 +19,7 @@ _STRIP_MM = 2.0
 # The notch of a knee is 10 to 25 mm deep seen from behind and below.
 _LEAST_NOTCH_MM = 3.0
 # A shaft is less than this share of the condyles' width, for at least this length.
-_SHAFT_SHARE, _LEAST_SHAFT_MM, _SLICE_MM = 0.55, 25.0, 2.5
+_SHAFT_FRACTION, _LEAST_SHAFT_MM, _SLICE_MM = 0.55, 25.0, 2.5
 
 DOWN, BACK = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
 BEHIND_AND_BELOW = (DOWN + BACK) / np.sqrt(2.0)
@@ -129,7 +129,7 @@ def _shaft_axis(femur: TriangleMesh) -> Iterator[tuple[str, Landmark]]:
     middles = []
     for level in np.arange(highest - _SLICE_MM, lowest + _CONDYLES_MM, -_SLICE_MM):
         piece = vertices[np.abs(vertices[:, 2] - level) < 0.5 * _SLICE_MM]
-        if len(piece) < 8 or np.ptp(piece[:, 0]) > _SHAFT_SHARE * widest:
+        if len(piece) < 8 or np.ptp(piece[:, 0]) > _SHAFT_FRACTION * widest:
             break
         middles.append(0.5 * (piece.min(axis=0) + piece.max(axis=0)))
     centres = np.array(middles).reshape(-1, 3)

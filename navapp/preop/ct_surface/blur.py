@@ -13,7 +13,7 @@ _SHARPEST_PER_MM = 0.25
 _CURVATURE_ROUNDS = 5
 
 
-def axial_share(ct: CtVolume, normals: FloatArray) -> FloatArray:
+def compute_axial_fractions(ct: CtVolume, normals: FloatArray) -> FloatArray:
     """(N,) cosine between normals and the slices' normal."""
     i, j = ct.lps_from_index[:3, 0], ct.lps_from_index[:3, 1]
     across = np.cross(i, j)
@@ -30,7 +30,7 @@ def blur_shift_mm(
     variance times the mean curvature.
     """
     curvature = _mean_curvature(mesh, neighbours)
-    shift: FloatArray = scan.blur_mm(axial_share(ct, mesh.normals)) ** 2 * curvature
+    shift: FloatArray = scan.blur_mm(compute_axial_fractions(ct, mesh.normals)) ** 2 * curvature
     return shift
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import simplified
 from navapp.geometry.transform import FloatArray
-from navapp.preop.ct_surface.blur import axial_share
+from navapp.preop.ct_surface.blur import compute_axial_fractions
 from navapp.preop.ct_surface.cortex_model import Scan, sample_positions_mm
 from navapp.preop.ct_surface.isosurface import surface_around
 from navapp.preop.ct_surface.profiles import along, cubic
@@ -122,7 +122,7 @@ def _scan(
     normals = np.concatenate([bone.mesh.normals[~bone.is_cut] for bone in bones.values()])
     every = np.linspace(0, len(points) - 1, min(_N_PROFILES, len(points))).astype(np.intp)
     profiles = along(points[every], normals[every], sample_positions_mm(), density)
-    return estimate_scan(profiles, axial_share(ct, normals[every]), reach_mm, start)
+    return estimate_scan(profiles, compute_axial_fractions(ct, normals[every]), reach_mm, start)
 
 
 def _is_cut(mesh: TriangleMesh, volume: CtVolume | LabelVolume) -> NDArray[np.bool_]:

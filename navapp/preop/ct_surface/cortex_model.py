@@ -44,10 +44,11 @@ class Scan:
     blur_axial_mm: float
     fading_mm: float = 0.0
 
-    def blur_mm(self, axial_share: FloatArray) -> FloatArray:
+    def blur_mm(self, axial_fraction: FloatArray) -> FloatArray:
         """(N,) blur along directions whose cosine with the slices' normal is given."""
-        plane2, axial2 = self.blur_in_plane_mm**2, self.blur_axial_mm**2
-        result: FloatArray = np.sqrt(plane2 + (axial2 - plane2) * axial_share**2)
+        plane_squared, axial_squared = self.blur_in_plane_mm**2, self.blur_axial_mm**2
+        squared = plane_squared + (axial_squared - plane_squared) * axial_fraction**2
+        result: FloatArray = np.sqrt(squared)
         return result
 
 

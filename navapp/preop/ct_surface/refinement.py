@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.ct_surface.blur import axial_share, blur_shift_mm, neighbours_of
+from navapp.preop.ct_surface.blur import blur_shift_mm, compute_axial_fractions, neighbours_of
 from navapp.preop.ct_surface.cortex_model import Scan, fit_edges, sample_positions_mm
 from navapp.preop.ct_surface.profiles import along
 from navapp.preop.volume import CtVolume
@@ -79,7 +79,7 @@ def _measure_offsets(
     """Offset and weight of each vertex."""
     positions = sample_positions_mm()
     profiles = along(mesh.vertices_mm, mesh.normals, positions, density)
-    blur = scan.blur_mm(axial_share(ct, mesh.normals))
+    blur = scan.blur_mm(compute_axial_fractions(ct, mesh.normals))
     blur_class = np.digitize(blur, np.linspace(blur.min(), blur.max(), _BLUR_CLASSES + 1)[1:-1])
     until_class = _until_class(mesh, ct, is_other)
     offset, weight = (np.zeros(len(blur)) for _ in range(2))

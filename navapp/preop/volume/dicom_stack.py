@@ -15,7 +15,7 @@ from navapp.preop.volume.dicom_headers import SliceHeader
 from navapp.preop.volume.dicom_listing import Folder
 
 # Steps may differ by this share of a step, or by this much: rounding of the position tags.
-_STEP_SHARE, _STEP_MM = 0.01, 0.01
+_STEP_FRACTION, _STEP_MM = 0.01, 0.01
 # Directions: written with six digits, and 1e-4 moves a corner of a large picture by 0.03 mm.
 _SAME_DIRECTION = 1e-4
 # Directions of no unit length or not at right angles by more than this are damaged, not rounded.
@@ -69,7 +69,7 @@ def stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
     steps = np.diff(positions, axis=0)
     heights = steps @ first.normal
     typical = float(np.median(heights))
-    tolerance = max(_STEP_SHARE * typical, _STEP_MM)
+    tolerance = max(_STEP_FRACTION * typical, _STEP_MM)
     odd = np.flatnonzero(np.abs(heights - typical) > tolerance)
     if len(odd):
         raise _uneven(folder, positions, heights, typical, odd)
@@ -98,7 +98,7 @@ def thickness_warnings(ordered: Sequence[SliceHeader], matrix: FloatArray) -> li
     """What the thickness tag says otherwise than the positions, which are taken."""
     height = float(matrix[:3, 2] @ ordered[0].normal)
     tag = ordered[0].thickness_mm
-    if tag is None or abs(tag - height) <= max(_STEP_SHARE * height, _STEP_MM):
+    if tag is None or abs(tag - height) <= max(_STEP_FRACTION * height, _STEP_MM):
         return []
     what = "they overlap" if tag > height else "tissue between them was not recorded"
     return [
@@ -164,7 +164,7 @@ def _uneven(
     more = f" and at {len(odd) - 1} further places" if len(odd) > 1 else ""
     n_missing = round(float(heights[at]) / typical) - 1
     is_whole = abs(heights[at] - (n_missing + 1) * typical) <= max(
-        _STEP_SHARE * heights[at], _STEP_MM
+        _STEP_FRACTION * heights[at], _STEP_MM
     )
     if n_missing >= 1 and is_whole:
         what = "1 slice is" if n_missing == 1 else f"{n_missing} slices are"
