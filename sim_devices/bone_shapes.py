@@ -113,8 +113,8 @@ def trochlea_roller(d: ShapeDraws) -> Roller:
     return Roller(discs, d.groove_x, 0.0, 18.0, 8.0, 0.0)
 
 
-def femur_shape(d: ShapeDraws) -> Field:
-    """Distal femur with about 100 mm of shaft above the epicondyles."""
+def _femur_column(d: ShapeDraws) -> Field:
+    """Shaft and metaphysis of the femur, without the condyles."""
     # z, centre x, centre y, radius lateral, medial, anterior, posterior
     shaft = loft(
         [
@@ -134,9 +134,25 @@ def femur_shape(d: ShapeDraws) -> Field:
     )
     bottom = Below(lambda p: np.full(len(p), -10.0), axis=2, upwards=False)
     top = Below(lambda p: np.full(len(p), 100.0), axis=2)
-    column = Intersection(Intersection(shaft, bottom, 12.0), top, 2.0)
+    return Intersection(Intersection(shaft, bottom, 12.0), top, 2.0)
+
+
+def _trochlea_groove(d: ShapeDraws) -> Field:
+    """What is missing in front: from the front of the shaft down into the notch."""
+    x, y = d.groove_x, -25.0 + d.groove_depth - 12.0
+    return Union(
+        Cone((x, y - 4.0, 26.0, 11.0), (x, y, 6.0, 12.0)),
+        (
+            (Cone((x, y, 6.0, 12.0), (x, y + 6.0, -13.0, 12.0)), 3.0),
+            (Cone((x, y + 6.0, -13.0, 12.0), (x + 1.0, y + 24.0, -32.0, 11.0)), 3.0),
+        ),
+    )
+
+
+def femur_shape(d: ShapeDraws) -> Field:
+    """Distal femur with about 100 mm of shaft above the epicondyles."""
     solid = Union(
-        column,
+        _femur_column(d),
         (
             (medial_roller(d), 10.0),
             (lateral_roller(d), 10.0),
@@ -151,18 +167,9 @@ def femur_shape(d: ShapeDraws) -> Field:
         Cone((-1.0, 12.0, -26.0, r), (-1.0, 37.0, 12.0, r)),
         ((Cone((-1.0, 23.0, -34.0, r), (-1.0, 52.0, 6.0, r)), 4.0),),
     )
-    # The trochlear groove: from the front of the shaft down into the notch.
-    x, y = d.groove_x, -25.0 + d.groove_depth - 12.0
-    trochlea = Union(
-        Cone((x, y - 4.0, 26.0, 11.0), (x, y, 6.0, 12.0)),
-        (
-            (Cone((x, y, 6.0, 12.0), (x, y + 6.0, -13.0, 12.0)), 3.0),
-            (Cone((x, y + 6.0, -13.0, 12.0), (x + 1.0, y + 24.0, -32.0, 11.0)), 3.0),
-        ),
-    )
     # The popliteus groove below the lateral epicondyle.
     groove = Cone((-40.0, 9.0, -10.0, 4.5), (-38.5, 22.0, 0.0, 4.5))
-    carved = Difference(Difference(solid, trochlea, 9.0), notch, 5.0)
+    carved = Difference(Difference(solid, _trochlea_groove(d), 9.0), notch, 5.0)
     return Difference(carved, groove, 5.0)
 
 

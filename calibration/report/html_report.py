@@ -22,6 +22,13 @@ table { border-collapse: collapse; } td, th { padding: .2em .9em .2em 0; text-al
 svg { max-width: 100%; height: auto; } p.note { color: #4a5568; max-width: 48em; }
 """
 
+_NOT_SEEN = (
+    "All lengths hang on the board's: a board that is printed 0.1 % too large makes "
+    "everything 0.1 % too large. Cameras that turn against each other sideways after this "
+    "day change every depth and leave no trace in the pictures of a bone: check the rig "
+    "with the board before each session. Research software, not for clinical use."
+)
+
 
 def write_report(path: str | Path, found: Calibration, limits: Limits) -> None:
     """Write the report, whole or not at all."""
@@ -60,12 +67,7 @@ def make_page(found: Calibration, limits: Limits) -> str:
         "<h2>The rig</h2>",
         _table(_numbers(found)),
         "<h2>What this cannot see</h2>",
-        _note(
-            "All lengths hang on the board's: a board that is printed 0.1 % too large makes "
-            "everything 0.1 % too large. Cameras that turn against each other sideways after this "
-            "day change every depth and leave no trace in the pictures of a bone: check the rig "
-            "with the board before each session. Research software, not for clinical use."
-        ),
+        _note(_NOT_SEEN),
     ]
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name}</title>'

@@ -1,15 +1,14 @@
 """The TOML configuration; what is wrong with it is told with the nearest known key."""
 
+from navapp.config.camera_sections import FaultSection, SimulationSection
 from navapp.config.files import FILE_NAME, find_file, load, toml_content
+from navapp.config.section import Section
 from navapp.config.sections import (
     CalibrationSection,
     Configuration,
     DisplaySection,
-    FaultSection,
     MirrorSection,
     ProjectorSection,
-    Section,
-    SimulationSection,
 )
 from navapp.config.toml_text import as_toml, one_table
 from navapp.config.validation import parse, validate
