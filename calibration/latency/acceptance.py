@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibration.latency.display_area import Watched, compute_seen_deviations
+from calibration.latency.display_area import WatchedCells, compute_seen_deviations
 from calibration.latency.light_code import LONGEST_PAUSE_MS, SHORTEST_PAUSE_MS, Switches
 from calibration.latency.measurement import Estimate, EyeLag, Latency, measure_latency
 from navapp.errors import ResultError
@@ -24,7 +24,7 @@ _LEAST_WIDTH = 0.6
 
 
 def measure_accepted_latency(
-    switches: Switches, left: Watched, right: Watched, refresh_hz: float
+    switches: Switches, left: WatchedCells, right: WatchedCells, refresh_hz: float
 ) -> Latency:
     """Measure, and refuse what cannot be believed.
 
@@ -50,7 +50,7 @@ def measure_accepted_latency(
     return found
 
 
-def _check_frames(switches: Switches, left: Watched) -> None:
+def _check_frames(switches: Switches, left: WatchedCells) -> None:
     n, lasts_s = len(left.times_ms), 1e-3 * float(switches.times_ms[-1] - switches.times_ms[0])
     if n < FEWEST_FRAMES:
         raise ResultError(
@@ -59,7 +59,7 @@ def _check_frames(switches: Switches, left: Watched) -> None:
         )
 
 
-def _check_seen(switches: Switches, left: Watched, right: Watched) -> None:
+def _check_seen(switches: Switches, left: WatchedCells, right: WatchedCells) -> None:
     is_seen = [_is_seen(switches, watched) for watched in (left, right)]
     if not any(is_seen):
         raise ResultError(
@@ -74,7 +74,7 @@ def _check_seen(switches: Switches, left: Watched, right: Watched) -> None:
         )
 
 
-def _is_seen(switches: Switches, watched: Watched) -> bool:
+def _is_seen(switches: Switches, watched: WatchedCells) -> bool:
     """In all frames or in half of them: a delay that jumps may hide the code from all."""
     n = len(watched.times_ms)
     is_first = np.arange(n) < n // 2

@@ -15,7 +15,7 @@ _TURN_MS = 1000.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Watched:
+class WatchedCells:
     """What one eye saw.
 
     Attributes:
@@ -26,9 +26,9 @@ class Watched:
     times_ms: FloatArray
     cells: NDArray[np.float32]
 
-    def only(self, is_in: NDArray[np.bool_]) -> "Watched":
+    def only(self, is_in: NDArray[np.bool_]) -> "WatchedCells":
         """Some (n,) of its frames."""
-        return Watched(self.times_ms[is_in], self.cells[is_in])
+        return WatchedCells(self.times_ms[is_in], self.cells[is_in])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,12 +43,12 @@ class Area:
     is_in: NDArray[np.bool_]
     lag_ms: float
 
-    def series(self, watched: Watched) -> FloatArray:
+    def series(self, watched: WatchedCells) -> FloatArray:
         """(n,) their mean grey value."""
         return np.asarray(watched.cells[:, self.is_in].mean(axis=1), dtype=np.float64)
 
 
-def find_area(switches: Switches, watched: Watched) -> Area:
+def find_area(switches: Switches, watched: WatchedCells) -> Area:
     """The cells that swing with the code, at the lag at which all together swing most."""
     lags_ms = coarse_lags_ms()
     shares = switches.compute_lit_fractions(watched.times_ms, lags_ms, COARSE_WIDTH_MS)
@@ -60,7 +60,7 @@ def find_area(switches: Switches, watched: Watched) -> Area:
     return Area(swings[best] >= _LEAST_SWING * swings[best].max(), float(lags_ms[best]))
 
 
-def compute_seen_deviations(switches: Switches, watched: Watched) -> float:
+def compute_seen_deviations(switches: Switches, watched: WatchedCells) -> float:
     """By how many standard deviations the code is seen.
 
     Among hundreds of cells some follow any code by chance. So the area is found in the frames of

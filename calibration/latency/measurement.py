@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.latency.display_area import Area, Watched, find_area
+from calibration.latency.display_area import Area, WatchedCells, find_area
 from calibration.latency.lag_fit import (
     COARSE_WIDTH_MS,
     WIDTHS_MS,
@@ -102,7 +102,7 @@ class Latency:
         return Estimate(self.stamped_ms + self.late.value_ms, self.late.sigma_ms)
 
 
-def measure_latency(switches: Switches, left: Watched, right: Watched) -> Latency:
+def measure_latency(switches: Switches, left: WatchedCells, right: WatchedCells) -> Latency:
     """Fit the code to what both eyes saw of it.
 
     A frame's brightness is that of the display over a window around its stamp, some lag before.
@@ -131,7 +131,7 @@ def measure_latency(switches: Switches, left: Watched, right: Watched) -> Latenc
 class _Eye:
     """One eye's area, its brightness, and the sums at the width that explains most."""
 
-    def __init__(self, switches: Switches, watched: Watched) -> None:
+    def __init__(self, switches: Switches, watched: WatchedCells) -> None:
         n_blocks = max(min(_MOST_BLOCKS, len(watched.times_ms) // _FRAMES_A_BLOCK), 2)
         self._switches, self._times_ms = switches, watched.times_ms
         self._area: Area = find_area(switches, watched)

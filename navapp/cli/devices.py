@@ -38,10 +38,10 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it; that nothing is connected is an answer, too."""
-    from navapp.inventory.connected_devices import look
+    from navapp.inventory.connected_devices import list_all_devices
 
     check_writable(options.json)
-    found = look()
+    found = list_all_devices()
     write_json(options.json, "devices", to_json(found))
     if options.json != "-":
         diagnostics.say(text(found))

@@ -65,10 +65,10 @@ def _findings(config: str | None) -> "list[Finding]":
 
 def _device_findings(configuration: "Configuration") -> "list[Finding]":
     from navapp.inventory.configured_checks import check_configured_devices
-    from navapp.inventory.connected_devices import look
+    from navapp.inventory.connected_devices import list_all_devices
     from navapp.inventory.system_checks import check_system
 
-    found = look()
+    found = list_all_devices()
     return [
         *check_system(configuration, found),
         *check_configured_devices(configuration, found),

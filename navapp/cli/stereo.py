@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.stereo_pair import Pair, find_band, read_pair, render_expected_px
+from navapp.cli.stereo_pair import StereoPair, find_band, read_pair, render_expected_px
 from navapp.errors import ResultError, UsageError
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _check(options: argparse.Namespace) -> None:
     check_writable(options.json)
 
 
-def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
+def _match(pair: StereoPair, options: argparse.Namespace) -> "StereoAnswer":
     from navapp.stereo import (
         match_baseline,
         match_on_support,
@@ -145,7 +145,7 @@ def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
         raise UsageError(str(error), remedy="ask for fewer --disparities") from error
 
 
-def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
+def _write(pair: StereoPair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
     """Every file that was asked for."""
     import io
 
@@ -168,7 +168,7 @@ def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> N
         write_whole(options.cloud, cloud_ply(found, pair.rectified.geometry))
 
 
-def _content(pair: Pair, answer: "StereoAnswer") -> dict[str, Any]:
+def _content(pair: StereoPair, answer: "StereoAnswer") -> dict[str, Any]:
     from navapp.values import Origin
 
     origin = answer.disparity.origin

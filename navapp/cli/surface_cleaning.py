@@ -17,14 +17,14 @@ _NORMAL_NEIGHBOURS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mended:
+class MendedSurface:
     """A surface, and what was done to it in words for people."""
 
     mesh: TriangleMesh
     notes: tuple[str, ...]
 
 
-def mend(mesh: TriangleMesh) -> Mended:
+def mend(mesh: TriangleMesh) -> MendedSurface:
     """A triangle mesh without repeated vertices, strays and inward normals.
 
     Vertices at exactly the same place become one; triangles without area or of the same corners as
@@ -39,7 +39,7 @@ def mend(mesh: TriangleMesh) -> Mended:
     faces = faces[double_area > 0.0]
     faces = faces[merged_rows(np.sort(faces, axis=1))[0]]
     if len(faces) == 0:
-        return Mended(TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32)), ())
+        return MendedSurface(TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32)), ())
     is_stray = _strays(len(vertices), faces)
     if is_stray.any():
         notes.append(f"{is_stray.sum()} triangles of tiny separate pieces were left out")
@@ -51,7 +51,7 @@ def mend(mesh: TriangleMesh) -> Mended:
             notes.append("its normals pointed inwards and were turned")
         else:
             notes.append("it is open, and its normals may point inwards; they were not turned")
-    return Mended(whole, tuple(notes))
+    return MendedSurface(whole, tuple(notes))
 
 
 def thin(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:

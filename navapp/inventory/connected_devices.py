@@ -33,7 +33,7 @@ class Inventory:
     displays: Listing[Output]
 
 
-def look(names: V4lNames | None = None) -> Inventory:
+def list_all_devices(names: V4lNames | None = None) -> Inventory:
     """Look; nothing is streamed, booted, moved or sent.
 
     Args:

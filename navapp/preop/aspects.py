@@ -66,7 +66,7 @@ def build_aspects(
     settings = settings or AspectSettings()
     cone = ViewCone(None if axis is None else np.asarray(axis, dtype=np.float64), half_angle_deg)
     directions = cone.directions(settings.step_deg)
-    look = _Look(bone, settings)
+    look = _AspectView(bone, settings)
     views: list[tuple[FloatArray, FloatArray] | None] = [None] * len(directions)
 
     def run(first: int) -> None:
@@ -95,7 +95,7 @@ def build_aspects(
     )
 
 
-class _Look:
+class _AspectView:
     """One bone, looked at from anywhere."""
 
     def __init__(self, bone: BoneModel, settings: AspectSettings) -> None:

@@ -35,7 +35,7 @@ _SAME_MM, _SAME_COSINE = 0.1, 0.9999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Named:
+class _NamedMarkup:
     """A markup and what its name says."""
 
     markup: Markup
@@ -77,7 +77,7 @@ def read_markups(path: str | Path, bones: Mapping[str, BoneModel]) -> PlannedCon
     return found.union(PlannedContent(warnings=tuple(warnings)))
 
 
-def _parse_name(markup: Markup, file: Path) -> _Named:
+def _parse_name(markup: Markup, file: Path) -> _NamedMarkup:
     text = " ".join(markup.name.lower().replace("_", " ").split())
     length = _LENGTH.search(text)
     words = (text[: length.start()] if length else text).split(" ")
@@ -85,7 +85,7 @@ def _parse_name(markup: Markup, file: Path) -> _Named:
     bone = rest.pop(0) if rest and rest[0] in FOLLOWED_BONES else "femur"
     # Of a vessel, its kind is part of its name: it says the colour.
     name = "_".join([word, *rest] if word in _RISKS else rest) or bone
-    return _Named(markup, word, bone, name, float(length[1]) if length else None, file)
+    return _NamedMarkup(markup, word, bone, name, float(length[1]) if length else None, file)
 
 
 def _landmarks(markup: Markup, bones: Mapping[str, BoneModel]) -> PlannedContent | None:
@@ -100,7 +100,7 @@ def _landmarks(markup: Markup, bones: Mapping[str, BoneModel]) -> PlannedContent
     return PlannedContent(SurgicalContent(landmarks=found)) if found else None
 
 
-def _drill(named: _Named, bone: BoneModel) -> PlannedContent:
+def _drill(named: _NamedMarkup, bone: BoneModel) -> PlannedContent:
     """A line from the entry to the bottom."""
     points = named.markup.points_mm
     depth_mm = float(np.linalg.norm(points[1] - points[0])) if len(points) == 2 else 0.0
@@ -112,7 +112,7 @@ def _drill(named: _Named, bone: BoneModel) -> PlannedContent:
     return PlannedContent(SurgicalContent(drills={named.name: axis}))
 
 
-def _plane(named: _Named, bone: BoneModel) -> PlannedContent:
+def _plane(named: _NamedMarkup, bone: BoneModel) -> PlannedContent:
     """A cut; turned so that the smaller part of the bone is what is removed."""
     point, normal = _place_of(named)
     beyond = ((bone.mesh.vertices_mm - point) @ normal > 0.0).mean()
@@ -122,7 +122,7 @@ def _plane(named: _Named, bone: BoneModel) -> PlannedContent:
     return PlannedContent(SurgicalContent(planes={named.name: plane}))
 
 
-def _place_of(named: _Named) -> tuple[FloatArray, FloatArray]:
+def _place_of(named: _NamedMarkup) -> tuple[FloatArray, FloatArray]:
     """Point and unit normal; from three points, from what the file stores, or both if they agree.
 
     Raises:
@@ -144,7 +144,7 @@ def _place_of(named: _Named) -> tuple[FloatArray, FloatArray]:
     return middle, unit
 
 
-def _risk(named: _Named, bone: BoneModel) -> PlannedContent:
+def _risk(named: _NamedMarkup, bone: BoneModel) -> PlannedContent:
     if len(named.markup.points_mm) < 2:
         raise named.make_error("has fewer than two points", "place more, or leave it out")
     warnings: tuple[str, ...] = ()
@@ -161,27 +161,27 @@ def _risk(named: _Named, bone: BoneModel) -> PlannedContent:
     )
 
 
-def _target(named: _Named, bone: BoneModel) -> PlannedContent:
+def _target(named: _NamedMarkup, bone: BoneModel) -> PlannedContent:
     if len(named.markup.points_mm) == 0:
         raise named.make_error("has no points", "place some, or leave it out")
     return PlannedContent(targets={f"{bone.name}/{named.name}": named.markup.points_mm})
 
 
-def _spots(named: _Named, bone: BoneModel) -> PlannedContent:
+def _spots(named: _NamedMarkup, bone: BoneModel) -> PlannedContent:
     points = named.markup.points_mm
     if len(points) == 0:
         raise named.make_error("has no points", "place some, or leave it out")
     return _plan_defect(named, Defect(bone.name, paint_near(bone.mesh, points)))
 
 
-def _outline(named: _Named, bone: BoneModel) -> PlannedContent:
+def _outline(named: _NamedMarkup, bone: BoneModel) -> PlannedContent:
     points = named.markup.points_mm
     if len(points) < 3:
         raise named.make_error("has fewer than three points", "place more, or leave it out")
     return _plan_defect(named, Defect(bone.name, paint_within(bone.mesh, points)))
 
 
-def _plan_defect(named: _Named, defect: Defect) -> PlannedContent:
+def _plan_defect(named: _NamedMarkup, defect: Defect) -> PlannedContent:
     if not len(defect.vertices):
         raise named.make_error(
             f"paints nothing of the {defect.bone}", "check its coordinate system"
@@ -189,7 +189,7 @@ def _plan_defect(named: _Named, defect: Defect) -> PlannedContent:
     return PlannedContent(SurgicalContent(defects={named.name: defect}))
 
 
-_READERS: Mapping[tuple[str, str], Callable[[_Named, BoneModel], PlannedContent]] = {
+_READERS: Mapping[tuple[str, str], Callable[[_NamedMarkup, BoneModel], PlannedContent]] = {
     ("drill", "line"): _drill,
     ("resection", "plane"): _plane,
     ("target", "fiducial"): _target,

@@ -48,7 +48,7 @@ SERIAL_PORT = """\
 
 
 def told(monkeypatch, capsys, found, *options):
-    monkeypatch.setattr(connected_devices, "look", lambda: found)
+    monkeypatch.setattr(connected_devices, "list_all_devices", lambda: found)
     assert run(["devices", *options]) == 0
     return capsys.readouterr().out
 

@@ -25,7 +25,7 @@ _MOST_WEIGHT = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Refined:
+class RefinedSurface:
     """A surface on the edges of its cortex.
 
     Attributes:
@@ -45,7 +45,7 @@ def refine_surface(
     density: Callable[[FloatArray], FloatArray],
     scan: Scan,
     reach_mm: float,
-) -> Refined:
+) -> RefinedSurface:
     """Move each vertex along its normal to the edge in its profile.
 
     Args:
@@ -65,7 +65,7 @@ def refine_surface(
     even += np.where(is_measured, blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
     even[is_cut] = 0.0
     mesh = TriangleMesh(mesh.vertices_mm + even[:, None] * mesh.normals, mesh.faces)
-    return Refined(mesh, is_measured)
+    return RefinedSurface(mesh, is_measured)
 
 
 def _measure_offsets(

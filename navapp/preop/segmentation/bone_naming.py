@@ -43,7 +43,7 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class NamedParts:
     """Bones found: name -> number of the part.
 
     Attributes:
@@ -85,7 +85,7 @@ def _boxes(labels: LabelArray) -> list[tuple[slice, ...] | None]:
     return list(find_objects(labels))
 
 
-def name_parts(parts: list[Part], seeded: Mapping[str, int] = NOT_SEEDED) -> Named:
+def name_parts(parts: list[Part], seeded: Mapping[str, int] = NOT_SEEDED) -> NamedParts:
     """The bones of one knee among the parts; those that are not found are not named.
 
     Args:
@@ -99,7 +99,7 @@ def name_parts(parts: list[Part], seeded: Mapping[str, int] = NOT_SEEDED) -> Nam
     )
     pairs = _pairs(parts, large, seeded)
     if not pairs:
-        return Named(bones)
+        return NamedParts(bones)
     femur, tibia = max(pairs, key=lambda pair: _rank(pair, parts, seeded))
     bones |= {"femur": femur.number, "tibia": tibia.number}
     rest = [part for part in parts if part.number not in bones.values()]
@@ -112,7 +112,7 @@ def name_parts(parts: list[Part], seeded: Mapping[str, int] = NOT_SEEDED) -> Nam
     if fibula is not None and "fibula" not in bones:
         bones["fibula"] = fibula.number
     others = [part for part in large if part.number not in bones.values()]
-    return Named(bones, any(_is_of_other_leg(part, femur, tibia) for part in others))
+    return NamedParts(bones, any(_is_of_other_leg(part, femur, tibia) for part in others))
 
 
 def _pairs(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.errors import PlanError
 from navapp.geometry.transform import FloatArray
-from navapp.preop.segmentation.bone_naming import BONES, Named, parts_of
+from navapp.preop.segmentation.bone_naming import BONES, NamedParts, parts_of
 from navapp.preop.segmentation.cores import find_cores
 from navapp.preop.segmentation.growth import grow
 from navapp.preop.segmentation.masks import LabelArray, bounds, depth_mm
@@ -121,16 +121,16 @@ def _around_solids(
 
 def _find_named_cores(
     plates: Plates, solid: NDArray[np.bool_], ct: CtVolume, seeds: Mapping[str, FloatArray]
-) -> tuple[LabelArray, Named]:
+) -> tuple[LabelArray, NamedParts]:
     """The coarsest cores among which all three bones of the joint are found, else the best."""
-    best: tuple[LabelArray, Named] | None = None
+    best: tuple[LabelArray, NamedParts] | None = None
     for cores in find_cores(plates, solid, ct.spacing_mm):
         named = with_seeds(parts_of(cores, ct.lps_from_index), cores, ct, seeds)
         if best is None or len(named.bones) > len(best[1].bones):
             best = cores, named
         if named.is_whole and set(seeds) <= set(named.bones):
             break
-    cores, named = best if best is not None else (np.zeros(solid.shape, np.int32), Named({}))
+    cores, named = best if best is not None else (np.zeros(solid.shape, np.int32), NamedParts({}))
     for name in seeds:
         if name not in named.bones:
             raise PlanError(

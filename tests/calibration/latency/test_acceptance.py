@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibration.latency.acceptance import WORST_MS, measure_accepted_latency
-from calibration.latency.display_area import Watched
+from calibration.latency.display_area import WatchedCells
 from navapp.errors import ResultError
 from tests.calibration.latency.scenes import CASES, Bench, drawn_bench
 
@@ -84,7 +84,7 @@ def test_a_display_that_is_hardly_brighter_than_noise_is_refused() -> None:
 
 def test_light_that_goes_with_darkness_is_refused() -> None:
     switches, left, right = drawn_bench(2).record(2)
-    inverted = Watched(left.times_ms, 255.0 - left.cells)
+    inverted = WatchedCells(left.times_ms, 255.0 - left.cells)
     with pytest.raises(ResultError, match="left camera"):
         measure_accepted_latency(switches, inverted, right, refresh_hz=59.94)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibration.latency.display_area import Watched, compute_seen_deviations, find_area
+from calibration.latency.display_area import WatchedCells, compute_seen_deviations, find_area
 from tests.calibration.latency.scenes import AREA, N_CELLS, drawn_bench
 
 
@@ -20,7 +20,7 @@ def test_something_else_that_moves_more_is_not_the_display() -> None:
     switches, left, _ = drawn_bench(1, contrast=20.0).record(1)
     cells = left.cells.copy()
     cells[:, 30:40] += 60.0 * np.sin(2 * np.pi * left.times_ms / 311.0)[:, None]
-    area = find_area(switches, Watched(left.times_ms, cells.astype(np.float32)))
+    area = find_area(switches, WatchedCells(left.times_ms, cells.astype(np.float32)))
     assert np.array_equal(np.flatnonzero(area.is_in), np.arange(N_CELLS)[AREA])
 
 
@@ -29,7 +29,7 @@ def test_noise_is_not_seen_however_many_cells_there_are() -> None:
     rng = np.random.default_rng(0)
     looks = [
         compute_seen_deviations(
-            switches, Watched(left.times_ms, rng.normal(0, 5, (len(left.times_ms), 576)))
+            switches, WatchedCells(left.times_ms, rng.normal(0, 5, (len(left.times_ms), 576)))
         )
         for _ in range(20)
     ]
