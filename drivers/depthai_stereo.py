@@ -8,7 +8,7 @@ from datetime import timedelta
 from typing import Any
 
 from drivers.clock import Clock
-from drivers.depthai_calibration import factory_rig
+from drivers.depthai_calibration import make_factory_rig
 from drivers.depthai_messages import DepthaiPair, pair_of
 from drivers.depthai_parts import DepthaiParts, open_parts
 from drivers.depthai_settings import DepthaiSettings
@@ -203,7 +203,7 @@ class DepthaiStereo:
         if parts.usb_speed not in _FAST:
             notes.append("the link is slow: use a USB 3 port and cable")
         try:
-            self._rig = factory_rig(
+            self._rig = make_factory_rig(
                 parts.calibration, self._settings.width, self._settings.height, self._device_id
             )
         except RigError as error:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from drivers.clock import Clock
-from drivers.escvp21_codes import faults, power_state
+from drivers.escvp21_codes import parse_faults, parse_power_state
 from drivers.escvp21_line import EscVp21Line
 from drivers.interfaces import CommandResult, PowerState, ProjectorStatus
 from drivers.serial_port import Address
@@ -128,8 +128,8 @@ class EscVp21Projector:
             if not self._talk.is_silent:
                 raise
             return ProjectorStatus(PowerState.FAULT, faults=(SILENT,))
-        power = power_state(code)
-        broken = faults(self._talk.ask("ERR", _HEX))
+        power = parse_power_state(code)
+        broken = parse_faults(self._talk.ask("ERR", _HEX))
         if power is PowerState.FAULT:
             broken = (*broken, f"power state {code or 'not told'}")
         if power is not PowerState.ON:
@@ -155,7 +155,7 @@ class EscVp21Projector:
         return self._talk.line.deadline_ns(timeout_s)
 
     def _power(self) -> PowerState:
-        return power_state(self._talk.ask("PWR", _HEX))
+        return parse_power_state(self._talk.ask("PWR", _HEX))
 
     def _wait_for_power(self, deadline_ns: int) -> PowerState:
         """The state once it is neither warming nor cooling, or at the end of the time."""

@@ -14,9 +14,9 @@ from drivers.pjlink_messages import (
     MOST_REPLY_BYTES,
     PasswordRefused,
     Reply,
-    digest,
+    compute_digest,
+    make_request,
     parse_reply,
-    request,
     salt_of,
 )
 from navapp.errors import DeviceLost, DeviceNotFound, DeviceProtocolError, DeviceTimeout
@@ -100,7 +100,7 @@ class PjlinkLine:
 
     def ask(self, command: str, parameter: str = "?") -> Reply:
         """Send one request and wait for its answer."""
-        line = self._prefix + request(command, parameter)
+        line = self._prefix + make_request(command, parameter)
         self._prefix = ""
         try:
             self._connection.send(line.encode())
@@ -120,7 +120,7 @@ class PjlinkLine:
                 subject="projector",
                 remedy="write the one of its network menu into [projector] password_file",
             )
-        return digest(salt, password) if salt else ""
+        return compute_digest(salt, password) if salt else ""
 
     def _line(self) -> str:
         """The next line that the projector says."""

@@ -15,8 +15,8 @@ import time
 from collections.abc import Sequence
 from contextlib import closing
 
-from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, memory_bytes
-from drivers.window_outputs import Output, choose_output, outputs, start_sdl
+from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, count_memory_bytes
+from drivers.window_outputs import Output, choose_output, list_outputs, start_sdl
 from navapp.errors import DeviceError
 
 # What X11 takes for a window manager to put the window where it belongs.
@@ -35,7 +35,7 @@ class Window:
         # The operator's keys go to the terminal, not to the overlay.
         os.environ.setdefault("SDL_WINDOW_NO_ACTIVATION_WHEN_SHOWN", "1")
         self._pygame = pygame = start_sdl()
-        self.output: Output = choose_output(outputs(), output_name, width, height)
+        self.output: Output = choose_output(list_outputs(), output_name, width, height)
         self._screen = pygame.display.set_mode(
             (width, height), pygame.NOFRAME, 32, display=self.output.index
         )
@@ -167,7 +167,7 @@ def main(arguments: Sequence[str]) -> None:
     except DeviceError as error:
         _tell({"error": type(error).__name__, "problem": error.problem, "remedy": error.remedy})
         return
-    os.ftruncate(memory_descriptor, memory_bytes(width, height))
+    os.ftruncate(memory_descriptor, count_memory_bytes(width, height))
     with closing(WindowMemory(memory_descriptor, width, height)) as memory:
         memory.fields[Field.WINDOW_BEAT_NS] = time.monotonic_ns()
         memory.fields[Field.APPLICATION_BEAT_NS] = time.monotonic_ns()

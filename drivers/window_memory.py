@@ -44,7 +44,7 @@ class WindowMemory:
 
     def __init__(self, descriptor: int, width: int, height: int) -> None:
         n_bytes = 4 * width * height
-        self._map = mmap.mmap(descriptor, memory_bytes(width, height))
+        self._map = mmap.mmap(descriptor, count_memory_bytes(width, height))
         self._view = memoryview(self._map)
         self.fields = self._view[:_HEADER_BYTES].cast("q")
         self.pictures = tuple(
@@ -63,6 +63,6 @@ class WindowMemory:
         self._map.close()
 
 
-def memory_bytes(width: int, height: int) -> int:
+def count_memory_bytes(width: int, height: int) -> int:
     """Size of the memory for pictures of that size."""
     return _HEADER_BYTES + 2 * 4 * width * height

@@ -53,7 +53,7 @@ def start_sdl() -> Any:
     return pygame
 
 
-def outputs() -> list[Output]:
+def list_outputs() -> list[Output]:
     """All outputs; `start_sdl` must have been called.
 
     pygame tells neither names nor places, the SDL inside it does.

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import IO, cast
 
-from drivers.child_python import child_environment
+from drivers.child_python import make_child_environment
 from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound, DeviceTimeout, WrongDevice
 
@@ -119,7 +119,7 @@ def _start(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         pass_fds=(descriptor, woken),
-        env=child_environment(),
+        env=make_child_environment(),
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.clock import Clock
-from drivers.zaber_line import Reply, ZaberLine, rejection
+from drivers.zaber_line import Reply, ZaberLine, make_rejection
 from drivers.zaber_warnings import costs_reference, describe, is_harmless
 from navapp.errors import DeviceError, DeviceProtocolError, DeviceTimeout
 
@@ -149,7 +149,7 @@ class ZaberAxis:
         deadline_ns = self.talk.line.deadline_ns(_RETRY_S)
         while not (reply := self._give(command, give, what)).is_accepted:
             if reply.data not in _LATER or self._clock.now_ns() >= deadline_ns:
-                raise rejection(command, reply.data)
+                raise make_rejection(command, reply.data)
             self._clock.wait_until_ns(self._clock.now_ns() + _RETRY_NS)
 
     def _give(self, command: str, give: Callable[[str], Reply], what: str) -> Reply:

@@ -17,7 +17,7 @@ _PLACEMENT_DEG = (6.0, 9.0)
 _PLACEMENT_MM = (6.0, 10.0)
 
 
-def nearer(bone: TriangleMesh, level_mm: float, sign: float) -> TriangleMesh:
+def select_side(bone: TriangleMesh, level_mm: float, sign: float) -> TriangleMesh:
     """The faces of a bone on one side of a level of its z."""
     beyond = sign * (bone.vertices_mm[:, 2] - level_mm) > 0.0
     return TriangleMesh(bone.vertices_mm, bone.faces[beyond[bone.faces].all(axis=1)], bone.normals)

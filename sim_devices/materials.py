@@ -189,7 +189,7 @@ _BLOODY = {
 }
 
 
-def material_table(contrast: float, blood: float) -> NDArray[np.float32]:
+def make_material_table(contrast: float, blood: float) -> NDArray[np.float32]:
     """(materials, columns) float32 for the shading kernel.
 
     Args:

@@ -51,7 +51,7 @@ class Surfaces:
     """What a rendering is made of besides shapes.
 
     Attributes:
-        materials: table of `materials.material_table`.
+        materials: table of `materials.make_material_table`.
         tile: the solid noise.
         lamps: (L, 4) direction towards the lamp in the lamps' frame, strength. Operating lamps
             hang a metre away and are broad: over the site their direction is constant.

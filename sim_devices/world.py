@@ -11,22 +11,22 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 from sim_devices.anatomy import KneeAnatomy, make_knee, mirror_mesh
-from sim_devices.cartilage import cartilage_thickness_mm, wear_patch, with_cartilage
+from sim_devices.cartilage import make_cartilage_thickness_mm, wear_patch, with_cartilage
 from sim_devices.layout import (
     flex_knee,
     left_from_table,
     misplace,
-    nearer,
     nominal_table_from_femur,
+    select_side,
 )
-from sim_devices.materials import material_table
-from sim_devices.motion import LegMotion, drill_motion, sweep_offset_mm
+from sim_devices.materials import make_material_table
+from sim_devices.motion import LegMotion, compute_drill_motion, compute_sweep_offset_mm
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
-from sim_devices.rigs import NO_TURN, Turn, camera_from_left, default_rig
+from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import Eye
-from sim_devices.stages import STAGES, Site, entry_point, make_worn_patch
-from sim_devices.textures import noise_tile
+from sim_devices.stages import STAGES, Site, find_entry_point, make_worn_patch
+from sim_devices.textures import make_noise_tile
 from sim_devices.tissue import SKIN_BELOW_TOP_MM, make_drape, make_tissue, trim
 
 _TISSUE_FOLLOWS = 0.9
@@ -63,7 +63,7 @@ class World:
 
     def __init__(self, scenario: Scenario, rig: StereoRig | None = None) -> None:
         self.scenario = scenario
-        self.rig: StereoRig = rig or default_rig()
+        self.rig: StereoRig = rig or make_default_rig()
         self.anatomy: KneeAnatomy = make_knee(scenario.knee)
         self._is_left = scenario.side == "left"
         right = {
@@ -76,8 +76,8 @@ class World:
         self._motion = LegMotion(scenario.motion, scenario.seed)
         self._site = self._make_site(right)
         self._surfaces = Surfaces(
-            material_table(scenario.contrast, scenario.blood),
-            noise_tile(scenario.seed),
+            make_material_table(scenario.contrast, scenario.blood),
+            make_noise_tile(scenario.seed),
             _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
         )
         self._lock = threading.Lock()
@@ -151,7 +151,7 @@ class World:
             UsageError: the anatomy has no such bone.
         """
         mean_mm, seed = self.scenario.cartilage_mm, self.scenario.seed
-        thickness = cartilage_thickness_mm(self.anatomy, bone, mean_mm, seed)
+        thickness = make_cartilage_thickness_mm(self.anatomy, bone, mean_mm, seed)
         if bone == "femur":
             mesh = self.anatomy.bones[bone]
             thickness = wear_patch(mesh, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
@@ -202,7 +202,7 @@ class World:
         if scale >= 0.8:
             return self._surfaces
         blur = 0.6 * (1.0 / scale - 1.0)
-        tile = noise_tile(self.scenario.seed, round(blur, 1))
+        tile = make_noise_tile(self.scenario.seed, round(blur, 1))
         return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
 
     def _poses(
@@ -233,14 +233,16 @@ class World:
         if body == "drape":
             return RigidTransform.identity("table", "drape")
         if body == "hand":
-            offset = sweep_offset_mm(self.scenario.instrument, time_s)
+            offset = compute_sweep_offset_mm(self.scenario.instrument, time_s)
             height = float(self._site.tissue.mesh.vertices_mm[:, 2].min()) - _HAND_ABOVE_MM
             return RigidTransform.from_parts(
                 "table", "hand", np.eye(3), offset + np.array([0.0, 0.0, height])
             )
         if body in ("drill", "chuck"):
             site = self._site
-            tool = drill_motion(site.entry_mm, site.entry_axis, time_s, turns=body == "drill")
+            tool = compute_drill_motion(
+                site.entry_mm, site.entry_axis, time_s, turns=body == "drill"
+            )
             return femur @ RigidTransform("femur", body, tool)
         raise UsageError(
             f"there is no body {body!r} in the simulated world",
@@ -290,10 +292,10 @@ class World:
         laid = {"femur": femur, "tibia": femur @ self._femur_from_tibia}
         on_table = [right[name].transformed(pose) for name, pose in laid.items()]
         bare = [
-            nearer(
+            select_side(
                 right["femur"], float(right["femur"].vertices_mm[:, 2].min()) + _BARE_FEMUR_MM, -1.0
             ),
-            nearer(
+            select_side(
                 right["tibia"], float(right["tibia"].vertices_mm[:, 2].max()) - _BARE_TIBIA_MM, 1.0
             ),
         ]
@@ -309,6 +311,6 @@ class World:
             is_covered=self.scenario.cartilage_mm > 0.0,
             tissue=trim(tissue),
             drape=make_drape(tissue, top - SKIN_BELOW_TOP_MM - 11.0, self.scenario.seed),
-            entry_mm=entry_point(right["femur"], notch + np.array([0.0, -10.0, 0.0]), axis),
+            entry_mm=find_entry_point(right["femur"], notch + np.array([0.0, -10.0, 0.0]), axis),
             entry_axis=axis,
         )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.latency.lag_fit import COARSE_WIDTH_MS, coarse_lags_ms
+from calibration.latency.lag_fit import COARSE_WIDTH_MS, list_coarse_lags_ms
 from calibration.latency.light_code import Switches
 from navapp.geometry.transform import FloatArray
 
@@ -50,7 +50,7 @@ class Area:
 
 def find_area(switches: Switches, watched: WatchedCells) -> Area:
     """The cells that swing with the code, at the lag at which all together swing most."""
-    lags_ms = coarse_lags_ms()
+    lags_ms = list_coarse_lags_ms()
     shares = switches.compute_lit_fractions(watched.times_ms, lags_ms, COARSE_WIDTH_MS)
     shares = shares - shares.mean(axis=0)
     cells = watched.cells - watched.cells.mean(axis=0)

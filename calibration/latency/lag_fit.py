@@ -54,7 +54,7 @@ class BlockSums:
         return np.asarray((is_best * self.lags_ms).sum(axis=1) / is_best.sum(axis=1))
 
 
-def block_sums(
+def compute_block_sums(
     shares: FloatArray, grey: FloatArray, blocks: Sequence[slice], lags_ms: FloatArray
 ) -> BlockSums:
     """Of (n, k) lit shares and (n,) grey values."""
@@ -70,18 +70,18 @@ def block_sums(
     )
 
 
-def coarse_lags_ms() -> FloatArray:
+def list_coarse_lags_ms() -> FloatArray:
     """(k,) of the whole range."""
     return np.arange(*_COARSE_MS, _COARSE_STEP_MS)
 
 
-def fine_lags_ms(around_ms: float) -> FloatArray:
+def list_fine_lags_ms(around_ms: float) -> FloatArray:
     """(k,) around one of them."""
     n = round(_FINE_REACH_MS / _FINE_STEP_MS)
     return np.asarray(around_ms + _FINE_STEP_MS * np.arange(-n, n + 1))
 
 
-def draws(n_blocks: int, is_drawn: NDArray[np.bool_] | None = None) -> FloatArray:
+def draw_counts(n_blocks: int, is_drawn: NDArray[np.bool_] | None = None) -> FloatArray:
     """(r, b) how often each block counts in recordings that are drawn from this one.
 
     Blocks, not frames, because neighbouring frames see the same switch.

@@ -11,7 +11,7 @@ from navapp.geometry.transform import FloatArray
 SHORTEST_PAUSE_MS, LONGEST_PAUSE_MS = 40.0, 100.0
 
 
-def pauses_ms(duration_s: float, seed: int) -> FloatArray:
+def draw_pauses_ms(duration_s: float, seed: int) -> FloatArray:
     """(n,) times between the switches, n odd: it begins and ends dark.
 
     Drawn evenly from 40 to 100 ms, all different: no rate of a camera or of a display is in step

@@ -12,10 +12,10 @@ from calibration.latency.lag_fit import (
     COARSE_WIDTH_MS,
     WIDTHS_MS,
     BlockSums,
-    block_sums,
-    coarse_lags_ms,
-    draws,
-    fine_lags_ms,
+    compute_block_sums,
+    draw_counts,
+    list_coarse_lags_ms,
+    list_fine_lags_ms,
 )
 from calibration.latency.light_code import SHORTEST_PAUSE_MS, Switches
 from navapp.geometry.transform import FloatArray
@@ -138,8 +138,8 @@ class _Eye:
         self._grey = self._area.series(watched)
         ends = np.linspace(0, len(self._times_ms), n_blocks + 1).astype(int)
         self._blocks = [slice(a, b) for a, b in pairwise(ends)]
-        self._once, self._draws = np.ones((1, n_blocks)), draws(n_blocks)
-        lags_ms = fine_lags_ms(self._area.lag_ms)
+        self._once, self._draws = np.ones((1, n_blocks)), draw_counts(n_blocks)
+        lags_ms = list_fine_lags_ms(self._area.lag_ms)
         by_width = [(self._sums(lags_ms, width_ms), width_ms) for width_ms in WIDTHS_MS]
         best = max(by_width, key=lambda one: one[0].compute_explained(self._once).max())
         self._best, self._width_ms = best
@@ -167,7 +167,7 @@ class _Eye:
 
     def _sums(self, lags_ms: FloatArray, width_ms: float) -> BlockSums:
         shares = self._switches.compute_lit_fractions(self._times_ms, lags_ms, width_ms)
-        return block_sums(shares, self._grey, self._blocks, lags_ms)
+        return compute_block_sums(shares, self._grey, self._blocks, lags_ms)
 
     def _drift(self) -> Estimate:
         """Second half less first half."""
@@ -179,11 +179,11 @@ class _Eye:
 
     def _half(self, is_half: NDArray[np.bool_]) -> Estimate:
         found_ms = self._best.best_lags_ms(is_half[None].astype(np.float64))[0]
-        drawn_ms = self._best.best_lags_ms(draws(len(self._blocks), is_half))
+        drawn_ms = self._best.best_lags_ms(draw_counts(len(self._blocks), is_half))
         return Estimate(float(found_ms), float(np.std(drawn_ms)))
 
     def _other_peak_fraction(self) -> float:
-        sums = self._sums(coarse_lags_ms(), COARSE_WIDTH_MS)
+        sums = self._sums(list_coarse_lags_ms(), COARSE_WIDTH_MS)
         away_ms = np.abs(sums.best_lags_ms(self._draws) - self._area.lag_ms)
         return float(np.mean(away_ms > _SAME_PEAK_MS))
 

@@ -46,15 +46,15 @@ def make_page(found: Calibration, limits: Limits) -> str:
         "<h2>What a point in space is worth</h2>",
         _uncertainty(found),
         "<h2>What is left at the marks</h2>",
-        plots.residuals(found),
+        plots.draw_residuals(found),
         _note(
             "Arrows should point anywhere. Arrows of a common direction in one part of a picture "
             "say that the lens, or the board, is not as it was modelled."
         ),
-        plots.views(found),
-        plots.epipolar(found),
+        plots.draw_views(found),
+        plots.draw_epipolar(found),
         "<h2>Where the board was shown</h2>",
-        plots.coverage(found),
+        plots.draw_coverage(found),
         _note(
             "Cells without a mark, where the working volume is seen, are orange. "
             f"Marks lay between {found.covered.depth_mm[0]:.0f} and "
@@ -90,7 +90,7 @@ def _verdict(found: Calibration) -> str:
 def _uncertainty(found: Calibration) -> str:
     if len(found.bounds_mm) == 0:
         return _note("Nothing: no part of the working volume is seen by both cameras.")
-    return plots.uncertainty(found, float(np.mean(found.depth_mm))) + _note(
+    return plots.draw_uncertainty(found, float(np.mean(found.depth_mm))) + _note(
         "Predicted error that 95 % of triangulated points stay below, from the covariance of "
         "the solved rig. Most of it is one common shift of everything that is seen."
     )

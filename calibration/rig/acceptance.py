@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from calibration.rig.bundle_adjustment import Bundle
 from calibration.rig.initial_rig import matrix_of
-from calibration.rig.parameters import placement, shape_mm, unpack
-from calibration.rig.uncertainty import working_points_mm
+from calibration.rig.parameters import unpack, unpack_placement, unpack_shape_mm
+from calibration.rig.uncertainty import make_working_points_mm
 from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.transform import FloatArray
@@ -76,13 +76,13 @@ def compute_shown_depth_mm(
     return float(min(one.min() for one in depths)), float(max(one.max() for one in depths))
 
 
-def coverage(
+def compute_coverage(
     board: Board, pairs: Sequence[SeenPair], solved: Bundle, working_depth_mm: tuple[float, float]
 ) -> Coverage:
     """How well the views cover what the rig will be used for."""
     size = (solved.model.width, solved.model.height)
     rig = unpack(solved.model, solved.shared)
-    points_mm = working_points_mm(solved.model, solved.shared, working_depth_mm, _FINENESS)
+    points_mm = make_working_points_mm(solved.model, solved.shared, working_depth_mm, _FINENESS)
     needed = (rig.left.project(points_mm), rig.right.project(rig.right_from_left.apply(points_mm)))
     shares, bare = [], []
     for side, wanted in zip(("left", "right"), needed, strict=True):
@@ -111,7 +111,7 @@ def find_occupied_cells(pixels: FloatArray, size: tuple[int, int]) -> NDArray[np
     return cells
 
 
-def refusals(
+def list_refusals(
     board: Board,
     n_pairs: int,
     solved: Bundle,
@@ -154,7 +154,7 @@ def refusals(
 
 
 def _of_sides(solved: Bundle) -> list[str]:
-    _, translation_mm = placement(solved.model, solved.shared)
+    _, translation_mm = unpack_placement(solved.model, solved.shared)
     if translation_mm[0] <= 0.0:
         return []
     return ["the right camera stands left of the left one: left and right pictures are swapped"]
@@ -209,9 +209,13 @@ def _of_known_distance(
     if known_mm is None:
         return []
     model = solved.model
-    baseline_mm = float(np.linalg.norm(placement(model, solved.shared)[1]))
+    baseline_mm = float(np.linalg.norm(unpack_placement(model, solved.shared)[1]))
     row = board.points_mm[: board.columns - int(board.has_squares)]
-    off = shape_mm(model, solved.shared)[: len(row)] if model.n_marks else np.zeros((len(row), 3))
+    off = (
+        unpack_shape_mm(model, solved.shared)[: len(row)]
+        if model.n_marks
+        else np.zeros((len(row), 3))
+    )
     row_mm = float(np.linalg.norm((row + off)[-1] - (row + off)[0]))
     found = {"the cameras' centres are": baseline_mm, "the board's first row is": row_mm}
     name = min(found, key=lambda key: abs(np.log(found[key] / known_mm)))

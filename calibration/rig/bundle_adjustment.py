@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.equilibration import equilibrate, unit_sizes
+from calibration.rig.equilibration import compute_unit_sizes, equilibrate
 from calibration.rig.linearisation import Linearisation, NormalEquations, Views
 from calibration.rig.parameters import RigModel
 from calibration.targets.boards import Board
@@ -44,7 +44,7 @@ class Bundle:
     @property
     def covariance(self) -> FloatArray:
         """(n_shared, n_shared) of the shared numbers."""
-        sizes = unit_sizes(self.normal)
+        sizes = compute_unit_sizes(self.normal)
         scaled = equilibrate(self.normal, sizes)
         inverse = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True)
         return equilibrate(inverse, sizes) * self.scale**2

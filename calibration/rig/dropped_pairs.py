@@ -68,7 +68,7 @@ def find_blurred_pairs(pairs: Sequence[SeenPair]) -> list[DroppedPair]:
     return list(dropped.values())
 
 
-def misfits(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> list[DroppedPair]:
+def find_misfits(board: Board, pairs: Sequence[SeenPair], solved: Bundle) -> list[DroppedPair]:
     """Pairs that leave far more than is usual in a solved rig, and why."""
     rms = np.array([_rms(np.vstack(left)) for left in solved.residuals_px])
     usual = float(np.median(rms))

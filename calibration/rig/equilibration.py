@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from navapp.geometry.transform import FloatArray
 
 
-def unit_sizes(normal: FloatArray) -> FloatArray:
+def compute_unit_sizes(normal: FloatArray) -> FloatArray:
     """(n,) factors that bring the diagonal of a normal matrix (n, n) to one."""
     sizes: FloatArray = 1.0 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     return sizes

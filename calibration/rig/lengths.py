@@ -11,7 +11,7 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 
 
-def epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
+def compute_epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
     """(N,) signed distances of the right marks from the lines of the left ones, px."""
     rotation, t = rig.right_from_left.rotation, rig.right_from_left.translation_mm
     cross = np.array([[0.0, -t[2], t[1]], [t[2], 0.0, -t[0]], [-t[1], t[0], 0.0]])
@@ -39,7 +39,7 @@ def triangulate_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) ->
     return middle
 
 
-def length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
+def compute_length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
     """Triangulated over true distance, for the far corners of what is seen of the board."""
     ratios = []
     for pair in pairs:

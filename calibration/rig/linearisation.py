@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.equilibration import equilibrate, unit_sizes
-from calibration.rig.parameters import RigModel, shape_mm
+from calibration.rig.equilibration import compute_unit_sizes, equilibrate
+from calibration.rig.parameters import RigModel, unpack_shape_mm
 from calibration.rig.projection import project
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
@@ -134,7 +134,7 @@ class Linearisation:
         model = self.views.model
         points_mm = self.views.board.points_mm[seen.ids]
         if model.n_marks:
-            points_mm = points_mm + shape_mm(model, self.shared)[seen.ids]
+            points_mm = points_mm + unpack_shape_mm(model, self.shared)[seen.ids]
         pixels, by_rig, by_pose, by_point = project(
             points_mm, left_from_board, model, self.shared, number
         )
@@ -213,7 +213,7 @@ class NormalEquations:
 
 def _solve_symmetric(normal: FloatArray, right: FloatArray) -> FloatArray:
     """Solution of a symmetric system whose numbers have very different units."""
-    sizes = unit_sizes(normal)
+    sizes = compute_unit_sizes(normal)
     scaled = equilibrate(normal, sizes)
     scaled[np.diag_indices_from(scaled)] += _RIDGE
     solution: FloatArray = sizes * np.linalg.solve(scaled, sizes * right)

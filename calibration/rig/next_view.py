@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 
 from calibration.rig.bundle_adjustment import Bundle
-from calibration.rig.equilibration import equilibrate, unit_sizes
+from calibration.rig.equilibration import compute_unit_sizes, equilibrate
 from calibration.rig.initial_rig import matrix_of, vector_of
 from calibration.rig.parameters import RigModel
 from calibration.rig.projection import project
-from calibration.rig.uncertainty import triangulation_slopes, working_points_mm
+from calibration.rig.uncertainty import compute_triangulation_slopes, make_working_points_mm
 from calibration.targets.boards import Board
 from navapp.geometry.transform import (
     FloatArray,
@@ -52,11 +52,11 @@ def find_next_view(
         both cameras.
     """
     model, shared = solved.model, solved.shared
-    points_mm = working_points_mm(model, shared, depth_mm)
+    points_mm = make_working_points_mm(model, shared, depth_mm)
     if len(points_mm) == 0:
         return None
-    slopes = triangulation_slopes(model, shared, points_mm).reshape(-1, model.n_rig)
-    sizes = unit_sizes(solved.normal)
+    slopes = compute_triangulation_slopes(model, shared, points_mm).reshape(-1, model.n_rig)
+    sizes = compute_unit_sizes(solved.normal)
     normal = solved.normal / max(solved.scale, 1e-6) ** 2
     best: tuple[float, FloatArray] | None = None
     for pose in list_candidates(board, model, shared, depth_mm):
@@ -111,7 +111,7 @@ def list_candidates(
     poses = []
     for share in _DEPTH_FRACTIONS:
         depth = depth_mm[0] + share * (depth_mm[1] - depth_mm[0])
-        seen = working_points_mm(model, shared, (depth, depth))
+        seen = make_working_points_mm(model, shared, (depth, depth))
         if len(seen) == 0:
             continue
         low, high = seen.min(axis=0), seen.max(axis=0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.rig.held_out_views import look_at_rig
-from calibration.rig.lengths import epipolar_px, length_ratios
+from calibration.rig.lengths import compute_epipolar_px, compute_length_ratios
 from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.errors import ResultError
@@ -61,8 +61,8 @@ def check_rig(
             remedy="compare the board with its file, and show it whole and sharp",
         )
     rms_px = look_at_rig(board, pairs, rig)
-    across = epipolar_px(rig, pairs)
-    ratios = length_ratios(board, rig, pairs)
+    across = compute_epipolar_px(rig, pairs)
+    ratios = compute_length_ratios(board, rig, pairs)
     mean = float(np.mean(ratios)) if len(ratios) else float("nan")
     # Lengths of one view share its errors: as many are independent as there are views.
     error = float(np.std(ratios)) / len(pairs) ** 0.5 if len(ratios) else float("nan")

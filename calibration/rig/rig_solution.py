@@ -5,19 +5,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.rig.acceptance import Coverage, Limits, compute_shown_depth_mm, coverage, refusals
+from calibration.rig.acceptance import (
+    Coverage,
+    Limits,
+    compute_coverage,
+    compute_shown_depth_mm,
+    list_refusals,
+)
 from calibration.rig.bundle_adjustment import Bundle, solve_bundle
 from calibration.rig.dropped_pairs import (
     FAULTS_OF_CAPTURE,
     DroppedPair,
     find_blurred_pairs,
-    misfits,
+    find_misfits,
 )
 from calibration.rig.held_out_views import N_FOLDS, HeldOut, hold_out, is_better, look_at
 from calibration.rig.initial_rig import start_poses, start_rig
-from calibration.rig.lengths import epipolar_px, length_ratios
+from calibration.rig.lengths import compute_epipolar_px, compute_length_ratios
 from calibration.rig.parameters import RigModel, pack, unpack
-from calibration.rig.uncertainty import bounds_mm, triangulation_slopes, working_points_mm
+from calibration.rig.uncertainty import (
+    compute_bounds_mm,
+    compute_triangulation_slopes,
+    make_working_points_mm,
+)
 from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.errors import ResultError
@@ -99,20 +109,20 @@ def solve_rig(
     dropped += more
     solved, held_out = work.choose_model(kept, solved)
     depth_mm = limits.depth_mm or compute_shown_depth_mm(board, kept, solved)
-    points_mm = working_points_mm(solved.model, solved.shared, depth_mm)
+    points_mm = make_working_points_mm(solved.model, solved.shared, depth_mm)
     bounds = _bounds(solved, held_out, points_mm)
-    covered = coverage(board, kept, solved, depth_mm)
+    covered = compute_coverage(board, kept, solved, depth_mm)
     judged = look_at(board, aside, solved).rms_px if aside else held_out.rms_px
     worst_mm = float(np.quantile(bounds, 0.95)) if len(bounds) else None
     reasons = [
         f"pair {one.index}: {one.reason}" for one in dropped if one.fault in FAULTS_OF_CAPTURE
     ]
-    reasons += refusals(
+    reasons += list_refusals(
         board, len(kept), solved, covered, judged, worst_mm, limits, known_distance_mm
     )
     rig = unpack(solved.model, solved.shared)
     quality = RigQuality(not reasons, tuple(reasons), worst_mm)
-    epipolar, ratios = epipolar_px(rig, kept), length_ratios(board, rig, kept)
+    epipolar, ratios = compute_epipolar_px(rig, kept), compute_length_ratios(board, rig, kept)
     on_progress(1.0)
     return Calibration(
         replace(rig, quality=quality), board, kept, dropped, solved, held_out, judged, bounds,
@@ -140,7 +150,7 @@ class _Work:
         dropped: list[DroppedPair] = []
         solved = self._first(pairs)
         for _ in range(_MOST_CLEANINGS):
-            more = misfits(self._board, pairs, solved)
+            more = find_misfits(self._board, pairs, solved)
             if not more:
                 break
             dropped += more
@@ -218,8 +228,8 @@ def _bounds(solved: Bundle, held_out: HeldOut, points_mm: FloatArray) -> FloatAr
         return np.empty(0)
     model = solved.model
     covariance = solved.rig_covariance
-    formal = bounds_mm(model, solved.shared, covariance, points_mm)
-    slopes = triangulation_slopes(model, solved.shared, points_mm)
+    formal = compute_bounds_mm(model, solved.shared, covariance, points_mm)
+    slopes = compute_triangulation_slopes(model, solved.shared, points_mm)
     off = held_out.rigs[:, : model.n_rig] - held_out.rigs[:, : model.n_rig].mean(axis=0)
     moved = np.einsum("nij,kj->kni", slopes, off)
     n = len(moved)

@@ -16,7 +16,7 @@ _N_DRAWN, _SEED = 1024, 20
 _FRACTION = 0.95
 
 
-def working_points_mm(
+def make_working_points_mm(
     model: RigModel, shared: FloatArray, depth_mm: tuple[float, float], fineness: int = 1
 ) -> FloatArray:
     """(n, 3) points of a working volume in the left camera's frame.
@@ -40,7 +40,9 @@ def working_points_mm(
     return seen
 
 
-def triangulation_slopes(model: RigModel, shared: FloatArray, points_mm: FloatArray) -> FloatArray:
+def compute_triangulation_slopes(
+    model: RigModel, shared: FloatArray, points_mm: FloatArray
+) -> FloatArray:
     """(n, 3, n_rig) how triangulated points move with the rig's numbers, their pixels held.
 
     The triangulated point minimises the distances in both pictures; at the solution its change is
@@ -56,7 +58,7 @@ def triangulation_slopes(model: RigModel, shared: FloatArray, points_mm: FloatAr
     return slopes
 
 
-def bounds_mm(
+def compute_bounds_mm(
     model: RigModel, shared: FloatArray, covariance: FloatArray, points_mm: FloatArray
 ) -> FloatArray:
     """(n,) distance that 95 % of the errors of triangulated points stay below.
@@ -67,7 +69,7 @@ def bounds_mm(
         covariance: (n_rig, n_rig) of them.
         points_mm: (n, 3) in the left camera's frame.
     """
-    slopes = triangulation_slopes(model, shared, points_mm)
+    slopes = compute_triangulation_slopes(model, shared, points_mm)
     spread = slopes @ covariance @ slopes.transpose(0, 2, 1)
     values, axes = np.linalg.eigh(spread)
     roots = axes * np.sqrt(np.maximum(values, 0.0))[:, None, :]

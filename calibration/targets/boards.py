@@ -122,12 +122,12 @@ def read_board(path: str | Path) -> Board:
     if not isinstance(content, dict):
         raise _refusal(path, "is not one JSON object")
     try:
-        return board_from(content)
+        return parse_board(content)
     except ValueError as error:
         raise _refusal(path, f"describes no possible board: {error}") from error
 
 
-def board_from(content: dict[str, Any]) -> Board:
+def parse_board(content: dict[str, Any]) -> Board:
     """A target from the keys of its file.
 
     Raises:
@@ -153,7 +153,7 @@ def board_from(content: dict[str, Any]) -> Board:
 
 
 def keys_of(board: Board) -> dict[str, Any]:
-    """The keys of a target's file, so that `board_from` gives the target again."""
+    """The keys of a target's file, so that `parse_board` gives the target again."""
     if not board.has_squares:
         return {
             "type": board.kind,

@@ -6,7 +6,7 @@ DepthAI answers without booting a camera. One that runs for somebody else is lis
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.depthai_package import depthai
+from drivers.depthai_package import import_depthai
 from drivers.discovery.listing import Listing, Unseen
 from drivers.discovery.permissions import may_use
 from navapp.errors import DeviceNotFound
@@ -42,10 +42,10 @@ def list_oak_cameras(
     usb_devices: Path = _USB_DEVICES, usb_nodes: Path = _USB_NODES
 ) -> Listing[OakCamera]:
     """Every camera that DepthAI finds, and what keeps it from finding others."""
-    on_bus = oak_nodes(usb_devices, usb_nodes)
+    on_bus = list_oak_nodes(usb_devices, usb_nodes)
     forbidden = tuple(_forbidden(node) for node in on_bus if not may_use(node))
     try:
-        dai = depthai()
+        dai = import_depthai()
     except DeviceNotFound as error:
         return Listing((), (*forbidden, Unseen.because(error)))
     try:
@@ -58,7 +58,9 @@ def list_oak_cameras(
     return Listing(tuple(camera for camera in cameras if camera.device_id), forbidden)
 
 
-def oak_nodes(usb_devices: Path = _USB_DEVICES, usb_nodes: Path = _USB_NODES) -> tuple[Path, ...]:
+def list_oak_nodes(
+    usb_devices: Path = _USB_DEVICES, usb_nodes: Path = _USB_NODES
+) -> tuple[Path, ...]:
     """Device files of the OAK cameras on the bus; whether they may be used is another question."""
     nodes = []
     for vendor in sorted(usb_devices.glob("*/idVendor")):

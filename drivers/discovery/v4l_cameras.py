@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.discovery.listing import Listing, Unseen
-from drivers.discovery.permissions import allowing
+from drivers.discovery.permissions import make_permission_remedy
 from drivers.discovery.v4l_formats import PixelFormat, VideoDevice, ask
 from drivers.v4l_names import FoundCamera, V4lNames
 
@@ -75,7 +75,7 @@ def _number(node: Path) -> tuple[int, str]:
 
 def _make_unasked(node: Path, error: OSError) -> Unseen:
     remedies = {
-        errno.EACCES: allowing(node, "video"),
+        errno.EACCES: make_permission_remedy(node, "video"),
         errno.EPERM: f"give this container or sandbox access to {node}",
         errno.ENOENT: f"give this container or sandbox the device {node}",
         errno.EBUSY: "end the other program that uses it to see its formats",

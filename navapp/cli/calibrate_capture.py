@@ -203,7 +203,7 @@ def _finish(
     diagnostics: Diagnostics,
 ) -> int:
     """Tell and write the result; the exit code."""
-    from navapp.cli.calibrate_stereo import content, tell
+    from navapp.cli.calibrate_stereo import make_content, tell
 
     figures = {
         "pairs_kept": last.n_kept,
@@ -211,7 +211,7 @@ def _finish(
         "predicted_mm": {"median": last.bound_mm, "p95": last.worst_mm},
     }
     if solver.found is not None:
-        figures |= content(*solver.found)
+        figures |= make_content(*solver.found)
     write_json(options.json, "calibrate capture", figures)
     if solver.found is not None and options.json != "-":
         tell(*solver.found, diagnostics)

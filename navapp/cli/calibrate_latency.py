@@ -69,12 +69,12 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 def _watch(
     opened: "OpenedLatency", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> "Recording":
-    from calibration.latency.light_code import pauses_ms
+    from calibration.latency.light_code import draw_pauses_ms
     from navapp.control.latency.player import CodePlayer
     from navapp.control.latency.watching import watch
 
     # Any seed will do; always the same one makes a simulated measurement repeatable.
-    pauses = pauses_ms(options.seconds, seed=0)
+    pauses = draw_pauses_ms(options.seconds, seed=0)
     player = CodePlayer(opened.display, opened.clock, pauses)
     return watch(
         opened.camera, player, opened.clock, lambda share: diagnostics.progress("flashing", share)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.cli.surface_cleaning import estimate_normals, evenly_in_space, mend, thin
+from navapp.cli.surface_cleaning import estimate_normals, mend, thin, thin_evenly
 from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.surface_files import SurfaceFile, merged_rows, read_surface_file
@@ -136,7 +136,7 @@ def _cloud(file: SurfaceFile, notes: list[str]) -> TriangleMesh:
     first, _ = merged_rows(file.mesh.vertices_mm)
     points, normals = file.mesh.vertices_mm[first], file.mesh.normals[first]
     if len(points) > MOST_MODEL_POINTS:
-        kept = evenly_in_space(points, _THINNED_MODEL_POINTS)
+        kept = thin_evenly(points, _THINNED_MODEL_POINTS)
         notes.append(f"its {len(points)} points were thinned to {len(kept)}")
         points, normals = points[kept], normals[kept]
     if not file.has_normals and len(points) >= _LEAST_MODEL_POINTS:

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     found = list_all_devices()
     write_json(options.json, "devices", to_json(found))
     if options.json != "-":
-        diagnostics.say(text(found))
+        diagnostics.say(format_text(found))
     return 0
 
 
@@ -59,7 +59,7 @@ def to_json(found: "Inventory") -> dict[str, Any]:
     return content
 
 
-def text(found: "Inventory") -> str:
+def format_text(found: "Inventory") -> str:
     """The same for people: what chooses a device stands below it, to be copied."""
     paragraphs = []
     for kind, title in _TITLES.items():

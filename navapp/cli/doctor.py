@@ -35,11 +35,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     content = {"well": is_well, "findings": [_to_json(finding) for finding in findings]}
     write_json(options.json, "doctor", content)
     if options.json != "-":
-        diagnostics.say(text(findings))
+        diagnostics.say(format_text(findings))
     return 0 if is_well else 4
 
 
-def text(findings: Sequence["Finding"]) -> str:
+def format_text(findings: Sequence["Finding"]) -> str:
     """For people: a line each, the remedy below what is not as it should be."""
     from navapp.inventory.finding import Health
 
@@ -53,14 +53,14 @@ def text(findings: Sequence["Finding"]) -> str:
 
 
 def _findings(config: str | None) -> "list[Finding]":
-    from navapp.cli.software_checks import software_findings
+    from navapp.cli.software_checks import check_software
 
     try:
         configuration, told = _configuration(config)
     except ImportError:
         # The package that is missing is named among the software.
-        return software_findings(None)
-    return [*software_findings(configuration), told, *_device_findings(configuration)]
+        return check_software(None)
+    return [*check_software(configuration), told, *_device_findings(configuration)]
 
 
 def _device_findings(configuration: "Configuration") -> "list[Finding]":

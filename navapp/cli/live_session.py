@@ -51,7 +51,7 @@ def prepared(
     """
     from navapp.cli.headless import check_accepted, check_not_expired, check_start
     from navapp.cli.prior_files import read_prior
-    from navapp.cli.simulated_patient import make_built_in_plan, nominal_prior
+    from navapp.cli.simulated_patient import make_built_in_plan, make_nominal_prior
     from navapp.control.stages import stage_by_name
     from navapp.devices import open_live
     from navapp.preop import read_plan
@@ -69,7 +69,7 @@ def prepared(
         check_accepted(opened.rig, options.allow_unaccepted, diagnostics)
         if opened.simulation is not None:
             plan = plan or make_built_in_plan(opened.simulation)
-            prior = prior or nominal_prior(opened.simulation)
+            prior = prior or make_nominal_prior(opened.simulation)
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
         prior = prior or Prior()

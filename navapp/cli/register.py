@@ -10,8 +10,8 @@ import numpy as np
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.register_inputs import (
     RegisterInputs,
+    compute_since_ms,
     read_inputs,
-    since_ms,
 )
 from navapp.errors import ResultError, UsageError
 from navapp.geometry.transform import FloatArray, skew
@@ -118,7 +118,7 @@ def _register(
         is_global=options.is_global,
         on_progress=lambda share: diagnostics.progress("starts", share),
     )
-    return answer, since_ms(started)
+    return answer, compute_since_ms(started)
 
 
 def _content(

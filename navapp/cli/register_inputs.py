@@ -63,25 +63,27 @@ def read_inputs(options: argparse.Namespace) -> RegisterInputs:
     """
     from navapp.cli.cloud_files import read_model, read_scene
     from navapp.cli.pose_files import read_pose
-    from navapp.cli.surface_cleaning import spacing
+    from navapp.cli.surface_cleaning import measure_spacing
     from navapp.geometry.mesh import TriangleMesh
     from navapp.registration import RegistrationModel, Scene
     from navapp.values import BoneModel
 
     started = time.perf_counter()
     scene, model = read_scene(options.scene), read_model(options.model)
-    factor = _MM_PER_UNIT.get(options.units) or _SPACING_MM / spacing(model.mesh.vertices_mm)
+    factor = _MM_PER_UNIT.get(options.units) or _SPACING_MM / measure_spacing(
+        model.mesh.vertices_mm
+    )
     start = RigidTransform.identity("scene", "model")
     if options.initial:
         start = read_pose(options.initial, "scene", "model", factor)
-    read_ms = since_ms(started)
+    read_ms = compute_since_ms(started)
     started = time.perf_counter()
     mesh = TriangleMesh(factor * model.mesh.vertices_mm, model.mesh.faces, model.mesh.normals)
     ready = RegistrationModel(BoneModel("model", mesh, is_removed=model.is_removed))
     _ = ready.arrays  # made at first use
     camera_mm = None if options.camera is None else factor * np.array(options.camera)
     seen = Scene(factor * scene.points, camera_mm=camera_mm)
-    prepare_ms = since_ms(started)
+    prepare_ms = compute_since_ms(started)
     warnings = tuple(_warnings(scene, model, options))
     return RegisterInputs(seen, ready, model, start, factor, warnings, read_ms, prepare_ms)
 
@@ -115,6 +117,6 @@ def _warnings(scene: "SceneFile", model: "ModelFile", options: argparse.Namespac
     return warnings
 
 
-def since_ms(started: float) -> float:
+def compute_since_ms(started: float) -> float:
     """Since a reading of `time.perf_counter`."""
     return (time.perf_counter() - started) * 1e3

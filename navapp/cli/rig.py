@@ -60,9 +60,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.part == "convert":
         return _convert(options, diagnostics)
     rig, form = read_any(options.rig)
-    write_json(options.json, "rig show", {"format": form, **content(rig, date.today())})
+    write_json(options.json, "rig show", {"format": form, **make_content(rig, date.today())})
     if options.json != "-":
-        diagnostics.say(text(rig, date.today()))
+        diagnostics.say(format_text(rig, date.today()))
     return 0
 
 
@@ -92,7 +92,7 @@ def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def content(rig: "StereoRig", today: date) -> dict[str, Any]:
+def make_content(rig: "StereoRig", today: date) -> dict[str, Any]:
     """A rig for programs."""
     return {
         "rig_id": rig.rig_id,
@@ -100,7 +100,7 @@ def content(rig: "StereoRig", today: date) -> dict[str, Any]:
         "serials": list(rig.serials),
         "image_size": [rig.width, rig.height],
         "baseline_mm": rig.baseline_mm,
-        "toe_in_deg": toe_in_deg(rig),
+        "toe_in_deg": compute_toe_in_deg(rig),
         "right_from_left": rig.right_from_left.to_list(),
         "left": _lens(rig.left),
         "right": _lens(rig.right),
@@ -108,15 +108,15 @@ def content(rig: "StereoRig", today: date) -> dict[str, Any]:
     }
 
 
-def toe_in_deg(rig: "StereoRig") -> float:
+def compute_toe_in_deg(rig: "StereoRig") -> float:
     """How far the optical axes turn towards each other, seen from above; negative: apart."""
     axis = rig.right_from_left.rotation.T @ np.array([0.0, 0.0, 1.0])
     return float(np.degrees(np.arctan2(-axis[0], axis[2])))
 
 
-def text(rig: "StereoRig", today: date) -> str:
+def format_text(rig: "StereoRig", today: date) -> str:
     """A rig for people."""
-    told = content(rig, today)
+    told = make_content(rig, today)
     left, right = told["left"], told["right"]
     serials = " and ".join(serial or "unknown" for serial in rig.serials)
     lines = [

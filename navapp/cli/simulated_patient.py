@@ -22,7 +22,7 @@ def make_built_in_plan(simulation: Simulation) -> Plan:
     )
 
 
-def nominal_prior(simulation: Simulation) -> Prior:
+def make_nominal_prior(simulation: Simulation) -> Prior:
     """How the simulated knee was meant to lie on the table."""
     return Prior(
         simulation.nominal_left_from_bone,

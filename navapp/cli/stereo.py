@@ -151,7 +151,7 @@ def _write(pair: StereoPair, answer: "StereoAnswer", options: argparse.Namespace
 
     import cv2
 
-    from navapp.cli.stereo_files import cloud_ply, draw_disparity
+    from navapp.cli.stereo_files import draw_disparity, make_cloud_ply
     from navapp.geometry.whole_files import write_whole
 
     found = answer.disparity
@@ -165,7 +165,7 @@ def _write(pair: StereoPair, answer: "StereoAnswer", options: argparse.Namespace
             shown = draw_disparity(found) if image is None else image
             write_whole(path, cv2.imencode(".png", shown)[1].tobytes())
     if options.cloud:
-        write_whole(options.cloud, cloud_ply(found, pair.rectified.geometry))
+        write_whole(options.cloud, make_cloud_ply(found, pair.rectified.geometry))
 
 
 def _content(pair: StereoPair, answer: "StereoAnswer") -> dict[str, Any]:

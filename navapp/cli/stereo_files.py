@@ -34,7 +34,7 @@ def draw_disparity(disparity_map: DisparityMap) -> NDArray[np.uint8]:
     return picture
 
 
-def cloud_ply(disparity_map: DisparityMap, geometry: RectifiedGeometry) -> bytes:
+def make_cloud_ply(disparity_map: DisparityMap, geometry: RectifiedGeometry) -> bytes:
     """Binary PLY: points in the unrectified left camera, mm, with sigma on the ray and origin."""
     cloud = reproject(disparity_map, geometry, origins=_ALL)
     points = geometry.rectified_from_left.inverse().apply(cloud.points_mm)

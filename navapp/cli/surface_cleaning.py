@@ -102,13 +102,13 @@ def estimate_normals(points: FloatArray) -> FloatArray:
     return normals
 
 
-def evenly_in_space(points: FloatArray, n_wanted: int) -> NDArray[np.int64]:
+def thin_evenly(points: FloatArray, n_wanted: int) -> NDArray[np.int64]:
     """(M,) ascending rows of at most about so many points, one in each cell of a grid."""
     _, first = np.unique(_cells(points, n_wanted), return_index=True)
     return np.sort(first)
 
 
-def spacing(points: FloatArray) -> float:
+def measure_spacing(points: FloatArray) -> float:
     """Median distance of (N, 3) points, at least 2, from their nearest neighbour."""
     from scipy.spatial import cKDTree
 

@@ -5,7 +5,7 @@ from collections import Counter
 from dataclasses import dataclass
 from importlib import metadata
 
-from drivers.child_python import last_words, run_python
+from drivers.child_python import find_last_words, run_python
 from drivers.discovery import Listing, Unseen
 
 GROUP, KIND = "navapp.devices", "camera."
@@ -69,4 +69,4 @@ def _why_not_loading(factory: str) -> str:
         done = run_python("-c", _LOAD, factory, timeout_s=_LOADING_S)
     except subprocess.TimeoutExpired:
         return f"it takes longer than {_LOADING_S:.0f} s"
-    return "" if done.returncode == 0 else last_words(done)
+    return "" if done.returncode == 0 else find_last_words(done)

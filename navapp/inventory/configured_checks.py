@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from drivers.discovery.permissions import allowing, may_use
+from drivers.discovery.permissions import make_permission_remedy, may_use
 from drivers.v4l_names import V4lNames
 from drivers.window_outputs import choose_output
 from navapp.config import Configuration
 from navapp.errors import NavappError
 from navapp.inventory.connected_devices import Inventory
-from navapp.inventory.finding import Finding, Health, unless
+from navapp.inventory.finding import Finding, Health, judge_health
 
 _LOOK = "connect it, or choose another one: navapp devices lists what there is"
 
@@ -48,7 +48,7 @@ def _usb_camera(name: str, wanted: str, names: V4lNames) -> Finding:
         return Finding(name, Health.FAILED, error.problem, error.remedy)
     if not may_use(camera.node):
         detail = f"{wanted} is {camera.node}, but this user may not open it"
-        return Finding(name, Health.FAILED, detail, allowing(camera.node, "video"))
+        return Finding(name, Health.FAILED, detail, make_permission_remedy(camera.node, "video"))
     return Finding(name, Health.OK, f"{wanted} is {camera.node}")
 
 
@@ -118,8 +118,8 @@ def _on_port(name: str, port: str) -> Finding:
         return Finding(name, Health.FAILED, f"there is no port {port}", _LOOK)
     is_fine = may_use(path)
     detail = f"the port {port} is there" + ("" if is_fine else ", but this user may not open it")
-    remedy = "" if is_fine else allowing(path, "dialout")
-    return Finding(name, unless(is_fine, True), detail, remedy)
+    remedy = "" if is_fine else make_permission_remedy(path, "dialout")
+    return Finding(name, judge_health(is_fine, True), detail, remedy)
 
 
 def _on_network(name: str, address: str) -> Finding:

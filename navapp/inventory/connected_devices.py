@@ -16,7 +16,7 @@ from drivers.discovery import (
 )
 from drivers.v4l_names import V4lNames
 from drivers.window_outputs import Output
-from navapp.config import one_table
+from navapp.config import format_table
 from navapp.inventory.camera_packages import InstalledCamera, list_installed
 
 Device = UsbCamera | OakCamera | InstalledCamera | FoundPort | Output
@@ -54,20 +54,20 @@ def make_choice_toml(device: Device) -> str:
         case UsbCamera(chosen_by=""):
             return ""
         case UsbCamera(chosen_by=name):
-            eye = one_table("camera.opencv", {"left": name})
-            other = one_table("camera.opencv", {"right": name}).splitlines()[1]
+            eye = format_table("camera.opencv", {"left": name})
+            other = format_table("camera.opencv", {"right": name}).splitlines()[1]
             return f"{_camera('opencv')}\n{eye}\n# {other}"
         case OakCamera(device_id=name):
-            return f"{_camera('depthai')}\n{one_table('camera.depthai', {'device': name})}"
+            return f"{_camera('depthai')}\n{format_table('camera.depthai', {'device': name})}"
         case InstalledCamera(backend=name):
             return _camera(name)
         case FoundPort(path=path):
             keys: Mapping[str, Any] = {"backend": "escvp21", "port": path}
-            return f'{one_table("projector", keys)}\n# or [mirror] with backend = "zaber"'
+            return f'{format_table("projector", keys)}\n# or [mirror] with backend = "zaber"'
         case Output(name=name, width=width, height=height):
             keys = {"backend": "window", "output": name, "size_px": (width, height)}
-            return one_table("display", keys)
+            return format_table("display", keys)
 
 
 def _camera(backend: str) -> str:
-    return one_table("camera", {"backend": backend})
+    return format_table("camera", {"backend": backend})

@@ -29,7 +29,7 @@ class Finding:
     remedy: str = ""
 
 
-def unless(is_fine: bool, is_needed: bool) -> Health:
+def judge_health(is_fine: bool, is_needed: bool) -> Health:
     """OK, or how bad it is that it is not."""
     if is_fine:
         return Health.OK

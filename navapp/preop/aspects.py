@@ -15,8 +15,8 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.directions import ViewCone, seen_from
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render
-from navapp.preop.aspects_kernels import contour_segments, spread_out
-from navapp.preop.bone_edges import Crease, creases, near_ends
+from navapp.preop.aspects_kernels import find_contour_segments, select_spread
+from navapp.preop.bone_edges import Crease, find_creases, find_near_ends
 from navapp.values import AspectGraph, BoneModel
 
 # Two views of which so much agrees are one: pairs of edges as near and as parallel as this.
@@ -103,11 +103,11 @@ class _AspectView:
         surface_mm = self._mesh.vertices_mm
         self._settings = settings
         self._middle_mm = 0.5 * (surface_mm.min(axis=0) + surface_mm.max(axis=0))
-        is_anatomy = ~near_ends(self._mesh)
+        is_anatomy = ~find_near_ends(self._mesh)
         self._faces = np.ascontiguousarray(
             self._mesh.faces[is_anatomy[self._mesh.faces].all(axis=1)]
         )
-        self._creases: Crease = creases(self._mesh, is_anatomy)
+        self._creases: Crease = find_creases(self._mesh, is_anatomy)
         radius_mm = float(np.linalg.norm(surface_mm - self._middle_mm, axis=1).max())
         near_mm = max(settings.distance_mm - radius_mm, 0.3 * settings.distance_mm)
         focal_px = settings.distance_mm / settings.pixel_mm
@@ -126,7 +126,7 @@ class _AspectView:
         depth = render(self._mesh, pose, self._camera).depth_mm
         middles, tangents = np.empty((2, len(self._faces), 3))
         vertices = np.array(self._mesh.vertices_mm)
-        n = contour_segments(vertices, self._faces, facing, middles, tangents)
+        n = find_contour_segments(vertices, self._faces, facing, middles, tangents)
         outline = self._find_visible(middles[:n], pose, depth)
         crease = self._creases
         towards = camera_mm - crease.points_mm
@@ -164,7 +164,7 @@ def _spread(points_mm: FloatArray, n: int) -> NDArray[np.int64]:
     if len(points_mm) == 0 or n == 0:
         return np.empty(0, dtype=np.int64)
     order = np.empty(min(n, len(points_mm)), dtype=np.int64)
-    return order[: spread_out(np.ascontiguousarray(points_mm), order)]
+    return order[: select_spread(np.ascontiguousarray(points_mm), order)]
 
 
 def _select_distinct(

@@ -27,7 +27,7 @@ class Crease:
     normals: FloatArray
 
 
-def near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
+def find_near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
     """(V,) vertices at open borders and on flat caps, with what lies close to them."""
     from scipy.spatial import cKDTree
 
@@ -38,7 +38,7 @@ def near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return np.asarray(distance < _AROUND_MM)
 
 
-def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
+def find_creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
     """Wanted vertices where the surface bends sharply, more than beside them.
 
     Args:

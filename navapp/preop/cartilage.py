@@ -14,7 +14,7 @@ from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import ends_of
-from navapp.preop.surface_import import MIN_FACES, ImportedSurface, in_lps
+from navapp.preop.surface_import import MIN_FACES, ImportedSurface, convert_to_lps
 from navapp.values import BoneModel
 
 # Thicker is none, and no even thickness may be larger.
@@ -61,7 +61,7 @@ def figures_of(bone: BoneModel) -> CartilageFigures | None:
     )
 
 
-def even_cartilage(bone: BoneModel, mean_mm: float, sd_mm: float) -> BoneModel:
+def make_even_cartilage(bone: BoneModel, mean_mm: float, sd_mm: float) -> BoneModel:
     """The bone with one thickness everywhere but where its surface ends.
 
     Raises:
@@ -97,12 +97,12 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
             subject=str(path),
             remedy="export the cartilage's outer surface, not its points",
         )
-    mesh = in_lps(mesh, header, path, warnings)
+    mesh = convert_to_lps(mesh, header, path, warnings)
     if not open_border(len(mesh.vertices_mm), mesh.faces).any() and mesh.volume_mm3() < 0.0:
         mesh = mesh.flipped()
         warnings.append(f"{bone.name}: normals of the cartilage pointed inwards and were turned")
     _check_place(bone, mesh, path)
-    distance = distance_above(bone.mesh, mesh, _REACH_MM)
+    distance = measure_distance_above(bone.mesh, mesh, _REACH_MM)
     _check_outside(bone, distance, path)
     thickness = np.where(distance > _COINCIDES_MM, distance, 0.0)
     covered = replace(
@@ -113,7 +113,9 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
     return ImportedSurface(covered, tuple(warnings))
 
 
-def distance_above(bone: TriangleMesh, surface: TriangleMesh, reach_mm: float) -> FloatArray:
+def measure_distance_above(
+    bone: TriangleMesh, surface: TriangleMesh, reach_mm: float
+) -> FloatArray:
     """(V,) distance from each vertex along its normal to the nearest triangle that looks outward.
 
     Negative beneath the bone; NaN where there is none within reach either way.

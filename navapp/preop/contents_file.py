@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from navapp.config import toml_content, validate
+from navapp.config import read_toml, validate
 from navapp.errors import ConfigurationError, PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
@@ -20,7 +20,7 @@ from navapp.preop.contents_file_tables import (
 )
 from navapp.preop.defects import paint_near, paint_within
 from navapp.preop.planned_content import PlannedContent
-from navapp.preop.surface_import import in_lps
+from navapp.preop.surface_import import convert_to_lps
 from navapp.values import (
     ANKLE_CENTRE,
     HIP_CENTRE,
@@ -78,7 +78,7 @@ def read_contents(path: str | Path, bones: Mapping[str, BoneModel]) -> PlannedCo
 
 def _tables(path: Path) -> ContentsTables:
     try:
-        return validate(ContentsTables, toml_content(path, "contents file"), str(path))
+        return validate(ContentsTables, read_toml(path, "contents file"), str(path))
     except ConfigurationError as error:
         # It is an input like a surface is, and no configuration.
         raise PlanError(error.problem, subject=error.subject, remedy=error.remedy) from error
@@ -144,7 +144,7 @@ def _surface(path: Path, warnings: list[str], *, is_own_frame: bool = False) -> 
     mesh, header = read_ply(path)
     if not len(mesh.faces):
         raise PlanError(f"{path} holds no triangles", subject=str(path), remedy="export a surface")
-    return mesh if is_own_frame else in_lps(mesh, header, path, warnings)
+    return mesh if is_own_frame else convert_to_lps(mesh, header, path, warnings)
 
 
 def _defect(table: DefectTable, bone: BoneModel, path: Path) -> Defect:

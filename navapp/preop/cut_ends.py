@@ -86,7 +86,9 @@ def on_cut_borders(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return is_cut
 
 
-def whole_until_mm(along_mm: FloatArray, is_border: NDArray[np.bool_], from_mm: float) -> float:
+def find_whole_until_mm(
+    along_mm: FloatArray, is_border: NDArray[np.bool_], from_mm: float
+) -> float:
     """How far along a bone the slices across it are whole: to the cut, which may be oblique.
 
     Args:

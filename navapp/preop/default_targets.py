@@ -10,7 +10,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import anatomy_of
 from navapp.preop.femur_landmarks import condyles_of
-from navapp.preop.tibia_landmarks import EMINENCE_HALF_MM, tibial_end
+from navapp.preop.tibia_landmarks import EMINENCE_HALF_MM, find_tibial_end
 from navapp.values import BoneModel, StageContent
 
 # Points a region: 12 on 20 x 30 mm stand 7 mm apart.
@@ -32,7 +32,7 @@ _BONE_OF_STAGE = {
 }
 
 
-def default_targets(bones: Mapping[str, BoneModel]) -> dict[str, FloatArray]:
+def make_default_targets(bones: Mapping[str, BoneModel]) -> dict[str, FloatArray]:
     """Points keyed `bone/name`, of the regions that the surfaces show; the same every time."""
     found: dict[str, FloatArray] = {}
     if "femur" in bones:
@@ -56,7 +56,7 @@ def with_defaults(
     are given, it stays as it is.
     """
     given = {name.partition("/")[0] for name in targets}
-    spread = default_targets({name: bone for name, bone in bones.items() if name not in given})
+    spread = make_default_targets({name: bone for name, bone in bones.items() if name not in given})
     filled = dict(stages)
     for stage, usual in _BONE_OF_STAGE.items():
         planned = stages.get(stage, StageContent(usual))
@@ -92,7 +92,7 @@ def _of_femur(mesh: TriangleMesh) -> dict[str, FloatArray]:
 
 
 def _of_tibia(mesh: TriangleMesh) -> dict[str, FloatArray]:
-    end = tibial_end(mesh)
+    end = find_tibial_end(mesh)
     if end is None:
         return {}
     across = end.vertices_mm[:, 0] - end.middle_mm[0]

@@ -13,7 +13,7 @@ SURFACE_NOISE_MM = 0.3
 WORST_SD_MM = 8.0
 
 
-def extreme(
+def find_extreme(
     vertices_mm: FloatArray,
     is_border: NDArray[np.bool_],
     among: NDArray[np.bool_],

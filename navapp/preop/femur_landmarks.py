@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
-from navapp.preop.extreme_points import SURFACE_NOISE_MM, WORST_SD_MM, extreme
+from navapp.preop.cut_ends import find_whole_until_mm, on_cut_borders
+from navapp.preop.extreme_points import SURFACE_NOISE_MM, WORST_SD_MM, find_extreme
 from navapp.values import Landmark, Side
 
 # Levels above the lowest point of a femur, whose condyles are 75 to 95 mm wide.
@@ -76,13 +76,13 @@ def condyles_of(femur: TriangleMesh) -> Condyles | None:
     return Condyles(vertices, on_cut_borders(femur), low, float(edges[notch]) + 0.5 * _STRIP_MM)
 
 
-def shaft_top_mm(femur: TriangleMesh) -> float:
+def find_shaft_top_mm(femur: TriangleMesh) -> float:
     """The height of the shaft's end, or of the lowest point of its cut."""
     height = femur.vertices_mm[:, 2]
-    return whole_until_mm(height, on_cut_borders(femur), height.min() + _CONDYLES_MM)
+    return find_whole_until_mm(height, on_cut_borders(femur), height.min() + _CONDYLES_MM)
 
 
-def femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
+def estimate_femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
     """What its surface allows: keyed `femur/name`; medial and lateral need the side.
 
     Args:
@@ -94,7 +94,7 @@ def femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmar
     if condyles is not None:
         vertices = condyles.vertices_mm
         middle = np.abs(vertices[:, 0] - condyles.notch_x_mm) < 2.0 * _STRIP_MM
-        centre = extreme(vertices, condyles.is_border, middle & condyles.is_condyle, DOWN)
+        centre = find_extreme(vertices, condyles.is_border, middle & condyles.is_condyle, DOWN)
         if centre is not None and centre.sd_mm is not None:
             # The plane that parts the condyles is known to a strip.
             centre = replace(centre, sd_mm=float(np.hypot(centre.sd_mm, _STRIP_MM)))
@@ -109,7 +109,7 @@ def _of_both_sides(condyles: Condyles, medial: float) -> dict[str, Landmark | No
     vertices = condyles.vertices_mm
     above = vertices[:, 2] - vertices[:, 2].min()
     is_broad = (above > _EPICONDYLES_MM[0]) & (above < _EPICONDYLES_MM[1])
-    outermost = partial(extreme, vertices, condyles.is_border)
+    outermost = partial(find_extreme, vertices, condyles.is_border)
     found = {}
     for name, sign in (("medial", medial), ("lateral", -medial)):
         condyle = condyles.of_side(sign)
@@ -124,7 +124,7 @@ def _shaft_axis(femur: TriangleMesh) -> Iterator[tuple[str, Landmark]]:
     vertices = femur.vertices_mm
     if len(vertices) == 0:
         return
-    lowest, highest = vertices[:, 2].min(), shaft_top_mm(femur)
+    lowest, highest = vertices[:, 2].min(), find_shaft_top_mm(femur)
     widest = np.ptp(vertices[vertices[:, 2] < lowest + _CONDYLES_MM, 0])
     middles = []
     for level in np.arange(highest - _SLICE_MM, lowest + _CONDYLES_MM, -_SLICE_MM):

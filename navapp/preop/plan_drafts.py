@@ -8,7 +8,7 @@ import numpy as np
 from navapp.errors import PlanError, UsageError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.ct_surface import BoneSurface, surface_of_labels, surfaces_of
+from navapp.preop.ct_surface import BoneSurface, make_label_surface, make_surfaces
 from navapp.preop.plan_origin import PlanOrigin
 from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU, NO_SEEDS, segment
 from navapp.preop.slices import Picture, draw_slices
@@ -54,7 +54,7 @@ class Draft:
     slices: Mapping[str, Picture] = field(default_factory=dict)
 
 
-def draft_from_ct(
+def make_draft_from_ct(
     read: ReadCt, settings: CtSettings | None = None, tell: Callable[[str], None] = lambda _: None
 ) -> Draft:
     """Bones of a CT of one knee, no seeds needed.
@@ -65,7 +65,7 @@ def draft_from_ct(
     settings = settings or CtSettings()
     ct = read.volume if settings.region_mm is None else _within(read.volume, settings.region_mm)
     found = segment(ct, settings.threshold_hu, settings.seeds, tell)
-    surfaces = surfaces_of(found, tell)
+    surfaces = make_surfaces(found, tell)
     tell("drawing")
     scan = surfaces.scan
     origin = PlanOrigin(
@@ -84,7 +84,7 @@ def draft_from_ct(
     return _draft(surfaces.bones, side, origin, slices, surfaces.pose_sd_mm)
 
 
-def draft_from_labels(
+def make_draft_from_labels(
     volume: LabelVolume, values: Mapping[str, int], side: Side | None = None
 ) -> Draft:
     """Bones of a ready segmentation, taken as it is.
@@ -110,7 +110,7 @@ def draft_from_labels(
                 f"label {value} for the {name} fills less than a cubic centimetre",
                 remedy="give the value of the whole bone",
             )
-        surfaces[name] = surface_of_labels(mask, volume)
+        surfaces[name] = make_label_surface(mask, volume)
         if surfaces[name].left_out > 0.0:
             warnings.append(
                 f"{name}: its label is in separate pieces; the largest is taken, without "

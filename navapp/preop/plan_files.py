@@ -21,7 +21,7 @@ from navapp.preop.bone_preview import draw_preview
 from navapp.preop.plan_content_json import content_from_json, content_to_json
 from navapp.preop.plan_integrity import make_damage_error, sha256_of
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
-from navapp.preop.plan_summary import summary_page
+from navapp.preop.plan_summary import make_summary_page
 from navapp.preop.slices import Picture
 from navapp.values import AspectGraph, BoneModel, Plan, SurgicalContent
 
@@ -206,7 +206,7 @@ def _write_content(
     }
     content["file_hash"] = _hash_of(content)
     (folder / _FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
-    page = summary_page(plan, origin, folder)
+    page = make_summary_page(plan, origin, folder)
     (folder / "summary.html").write_text(page, encoding="utf-8")
 
 

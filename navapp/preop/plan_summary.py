@@ -25,7 +25,7 @@ _LOOK = (
 )
 
 
-def summary_page(plan: Plan, origin: PlanOrigin, folder: Path) -> str:
+def make_summary_page(plan: Plan, origin: PlanOrigin, folder: Path) -> str:
     """The page; pictures are those that lie in the folder already."""
     warnings = "".join(f'<p class="warning">{escape(text)}</p>' for text in origin.warnings)
     parts = [

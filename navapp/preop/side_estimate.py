@@ -8,8 +8,8 @@ import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.preop.cut_ends import anatomy_of
-from navapp.preop.femur_landmarks import BACK, DOWN, condyles_of, shaft_top_mm
-from navapp.preop.tibia_landmarks import RIM_MM, tibial_end, tubercle_of
+from navapp.preop.femur_landmarks import BACK, DOWN, condyles_of, find_shaft_top_mm
+from navapp.preop.tibia_landmarks import RIM_MM, find_tibial_end, tubercle_of
 from navapp.values import BoneModel, Side
 
 Certainty = Literal["certain", "likely", "unknown"]
@@ -91,7 +91,7 @@ def _femur_lean_deg(femur: TriangleMesh) -> float:
         vertices[condyles.of_side(sign)][np.argmax(vertices[condyles.of_side(sign)] @ DOWN)]
         for sign in (1.0, -1.0)
     )
-    top = shaft_top_mm(femur)
+    top = find_shaft_top_mm(femur)
     if top - vertices[:, 2].min() < _SHAFT_FROM_MM + 2.0 * _SLICE_MM:
         return 0.0
     slice_x = vertices[np.abs(vertices[:, 2] - top + _SLICE_MM) < _SLICE_MM, 0]
@@ -108,7 +108,7 @@ def _tubercle_mm(tibia: TriangleMesh) -> float:
 
     Across the line behind both plateaus, so that it does not matter how the leg was turned.
     """
-    end = tibial_end(tibia)
+    end = find_tibial_end(tibia)
     tubercle = None if end is None else tubercle_of(end)
     if end is None or tubercle is None:
         return 0.0

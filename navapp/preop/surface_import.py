@@ -41,7 +41,7 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
             subject=str(path),
             remedy="export the bone's surface, not its points",
         )
-    mesh = in_lps(mesh, header, path, warnings)
+    mesh = convert_to_lps(mesh, header, path, warnings)
     whole = mesh.largest_component()
     if len(whole.faces) < MIN_FACES:
         raise PlanError(
@@ -64,7 +64,9 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
     return ImportedSurface(BoneModel(name, whole, side), tuple(warnings))
 
 
-def in_lps(mesh: TriangleMesh, header: PlyHeader, path: Path, warnings: list[str]) -> TriangleMesh:
+def convert_to_lps(
+    mesh: TriangleMesh, header: PlyHeader, path: Path, warnings: list[str]
+) -> TriangleMesh:
     """The surface as LPS in mm, by what the file says of its space and unit.
 
     Raises:

@@ -31,7 +31,7 @@ def _mean_over_parts(picture: FloatArray, n_parts: int) -> FloatArray:
     return means
 
 
-def area_resized(picture: NDArray[np.uint8], height: int, width: int) -> FloatArray:
+def resize_by_area(picture: NDArray[np.uint8], height: int, width: int) -> FloatArray:
     """(height, width, 3): every output pixel is the mean over its area of (h, w, 3) input."""
     rows = _mean_over_parts(picture.astype(np.float64), height)
     return _mean_over_parts(rows.swapaxes(0, 1), width).swapaxes(0, 1)
@@ -46,7 +46,7 @@ def fit_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[int, 
     return width, height
 
 
-def cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.int32]:
+def compute_cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.int32]:
     """Colours of (rows, columns) cells: upper half in bits 12 to 23, lower in bits 0 to 11.
 
     Args:
@@ -55,7 +55,7 @@ def cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[n
         rows: of cells, at least 1.
     """
     width, height = fit_size(picture, columns, rows)
-    levels = np.rint(area_resized(picture, height, width) * (_LEVELS / 255.0)).astype(np.int32)
+    levels = np.rint(resize_by_area(picture, height, width) * (_LEVELS / 255.0)).astype(np.int32)
     colours = (levels[:, :, 2] << 8) | (levels[:, :, 1] << 4) | levels[:, :, 0]
     canvas = np.zeros((2 * rows, columns), dtype=np.int32)
     top, left = 2 * ((2 * rows - height) // 4), (columns - width) // 2
@@ -85,7 +85,7 @@ def _ramp_cell(code: int, ramp: str) -> tuple[str, Style]:
     return ramp[round(brightness * (len(ramp) - 1))], Style(color=colour, bgcolor=_colour(0))
 
 
-def row_strip(codes: NDArray[np.int32], ramp: str = "") -> Strip:
+def make_row_strip(codes: NDArray[np.int32], ramp: str = "") -> Strip:
     """One row of cells: a segment per run of equal cells."""
     starts = np.flatnonzero(np.diff(codes, prepend=codes[0] - 1))
     lengths = np.diff(starts, append=len(codes))

@@ -7,7 +7,7 @@ from textual.content import Content
 from navapp.control.interlocks import is_current
 from navapp.control.states import OtherBone, Snapshot
 from navapp.ui.actions import is_acceptable
-from navapp.ui.gauges import Number, bar
+from navapp.ui.gauges import Number, draw_bar
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 from navapp.values import Status
@@ -52,11 +52,11 @@ class PosePanel(TextView):
         others = others[: room - len(needed)]
         more = more[: room - len(needed) - len(others)]
         free = [Content("")] * (room - len(needed) - len(more) - len(others))
-        above = [navigable_line(view, width), *needed, *more, *free]
+        above = [format_navigable_line(view, width), *needed, *more, *free]
         return [*above, *others, *_error(view, width)]
 
 
-def navigable_line(view: View, width: int) -> Content:
+def format_navigable_line(view: View, width: int) -> Content:
     """The filled line that says yes or no."""
     word = "yes" if view.is_navigable else "NO"
     more = len(view.snapshot.reasons) - 1
@@ -69,7 +69,7 @@ def navigable_line(view: View, width: int) -> Content:
     return Content.styled(f"{text}{hint.rjust(width - len(text) - 1)} "[:width], view.level.band)
 
 
-def reason_lines(view: View, width: int) -> list[Content]:
+def format_reason_lines(view: View, width: int) -> list[Content]:
     """The first reason and its remedy, wrapped, with a free column at the right."""
     problem, remedy = view.reason
     room = max(width - 1, 1)
@@ -89,7 +89,7 @@ def _other_reasons(view: View, width: int) -> list[Content]:
 def _middle(view: View, width: int) -> tuple[list[Content], list[Content]]:
     """What must be read, and what may be left out."""
     if not view.is_navigable:
-        return reason_lines(view, width), _other_reasons(view, width)
+        return format_reason_lines(view, width), _other_reasons(view, width)
     snapshot = view.snapshot
     needed = [
         Content(""),
@@ -181,7 +181,7 @@ def _error(view: View, width: int) -> list[Content]:
             ("  over" if is_over else "", style),
         ),
         Content.assemble(
-            (bar(error, tolerance, max(width - 5, 4), view.symbols), bar_style),
+            (draw_bar(error, tolerance, max(width - 5, 4), view.symbols), bar_style),
             (f"{tolerance:5.2f}", "$text-muted"),
         ),
     ]

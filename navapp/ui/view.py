@@ -166,11 +166,11 @@ class View:
         return f"{seconds // 60:02d}:{seconds % 60:02d}"
 
 
-def health_level(health: DeviceHealth) -> Level:
+def choose_health_level(health: DeviceHealth) -> Level:
     """Of a device."""
     return _HEALTH_LEVELS[health]
 
 
-def event_level(level: EventLevel) -> Level:
+def choose_event_level(level: EventLevel) -> Level:
     """Of an event."""
     return _EVENT_LEVELS[level]

@@ -3,7 +3,7 @@
 from textual.content import Content
 
 from navapp.control.states import SessionState
-from navapp.ui.gauges import Number, cut, share_bar
+from navapp.ui.gauges import Number, cut, draw_fraction_bar
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 
@@ -32,7 +32,7 @@ class WorkLine(TextView):
         return [
             Content.assemble(
                 f" {cut(progress.what, room, view.symbols):<{room}} ",
-                (share_bar(progress.share, _BAR_WIDTH, view.symbols), "$primary"),
+                (draw_fraction_bar(progress.share, _BAR_WIDTH, view.symbols), "$primary"),
                 f" {Number.PERCENT.text(100.0 * progress.share)} %",
                 (hint, "bold $foreground"),
             )

@@ -25,7 +25,7 @@ import numpy as np
 from calibration.rig.held_out_views import look_at_rig
 from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import Calibration, solve_rig
-from calibration.targets.boards import Board, board_from, read_board
+from calibration.targets.boards import Board, parse_board, read_board
 from calibration.targets.detection import SeenBoard, find_board
 from calibration.targets.seen_pairs import SeenPair
 from drivers.recorded_sources import PictureFiles, open_folder
@@ -76,8 +76,8 @@ def main() -> int:
         phantom(place.parent)
     board = folder / "calib" / "opencv_chessboard"
     if board.is_dir():
-        pictures = looked_at(open_folder(board), board_from(_CHESSBOARD))
-        compare("opencv_chessboard", board_from(_CHESSBOARD), pictures, None, None)
+        pictures = looked_at(open_folder(board), parse_board(_CHESSBOARD))
+        compare("opencv_chessboard", parse_board(_CHESSBOARD), pictures, None, None)
     drawn(options.rigs)
     return 0
 

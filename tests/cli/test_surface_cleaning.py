@@ -3,10 +3,10 @@ import pytest
 
 from navapp.cli.surface_cleaning import (
     estimate_normals,
-    evenly_in_space,
+    measure_spacing,
     mend,
-    spacing,
     thin,
+    thin_evenly,
 )
 from navapp.geometry.mesh import TriangleMesh
 from tests.geometry.shapes import sphere
@@ -140,7 +140,7 @@ def test_points_are_thinned_evenly(scale):
     points = 30.0 * scattered(40_000)
     dense = points[:, 0] > 0.0
     points = scale * points[dense | (np.arange(len(points)) % 10 == 0)]
-    kept = evenly_in_space(points, 2000)
+    kept = thin_evenly(points, 2000)
     assert 1600 <= len(kept) <= 2000
     assert (np.diff(kept) > 0).all()
     share = (points[kept, 0] > 0.0).mean()
@@ -149,4 +149,4 @@ def test_points_are_thinned_evenly(scale):
 
 def test_spacing_is_that_of_the_nearest_neighbours():
     grid = np.stack(np.meshgrid(*[np.arange(5) * 0.25] * 3), axis=-1).reshape(-1, 3)
-    assert spacing(grid) == pytest.approx(0.25)
+    assert measure_spacing(grid) == pytest.approx(0.25)

@@ -14,7 +14,7 @@ from drivers.depthai_stereo import DepthaiStereo
 from drivers.interfaces import PowerState
 from drivers.opencv_stereo import OpencvStereo
 from drivers.replay_camera import ReplaySettings
-from navapp.config import Configuration, as_toml, parse
+from navapp.config import Configuration, format_toml, parse
 from navapp.devices import open_live, open_recording
 from navapp.errors import (
     ConfigurationError,
@@ -225,7 +225,7 @@ def test_a_pjlink_projector_is_opened_with_the_password_of_a_file(tmp_path) -> N
         assert devices.projector.name == "sim:projector"
         assert devices.projector.status().power is PowerState.STANDBY
         devices.close()
-        assert "sesame" not in as_toml(configuration, True) + repr(configuration)
+        assert "sesame" not in format_toml(configuration, True) + repr(configuration)
         (tmp_path / "password").unlink()
         with pytest.raises(ConfigurationError, match=r"password file .* cannot be read"):
             open_live(configuration, is_headless=True)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from calibration.latency.acceptance import measure_accepted_latency
-from calibration.latency.light_code import pauses_ms
+from calibration.latency.light_code import draw_pauses_ms
 from drivers.clock import SystemClock
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo
@@ -55,7 +55,7 @@ def test_a_window_is_seen_some_milliseconds_after_the_call(monkeypatch) -> None:
         display.open()
         try:
             with mss.MSS(display=server) as eye:
-                player = CodePlayer(display, clock, pauses_ms(7.0, 0))
+                player = CodePlayer(display, clock, draw_pauses_ms(7.0, 0))
                 recording = watch(ScreenCamera(clock, eye), player, clock, lambda _: None)
             clock.wait_until_ns(clock.now_ns() + 200_000_000)
             assert not seen(server, 0, 0, WIDTH, HEIGHT).any()

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
-from navapp.preop.default_targets import default_targets, with_defaults
+from navapp.preop.default_targets import make_default_targets, with_defaults
 from navapp.values import BoneModel, StageContent
 from tests.geometry.shapes import sphere
 from tests.preop.knees import bones_of, knees
@@ -12,7 +12,7 @@ from tests.preop.knees import bones_of, knees
 
 def test_targets_are_spread_over_the_surfaces_that_meet_in_the_joint() -> None:
     for knee in knees()[:6]:
-        targets = default_targets(bones_of(knee))
+        targets = make_default_targets(bones_of(knee))
         assert set(targets) == {
             "femur/weight_bearing", "femur/trochlea", "tibia/plateau", "patella/back"
         }  # fmt: skip
@@ -29,18 +29,20 @@ def test_targets_are_spread_over_the_surfaces_that_meet_in_the_joint() -> None:
         assert np.median(femur.query(targets["tibia/plateau"])[0]) < 12.0
         assert np.median(femur.query(targets["patella/back"])[0]) < 12.0
         assert np.ptp(targets["femur/weight_bearing"][:, 0]) > 30.0
-        again = default_targets(bones_of(knee))
+        again = make_default_targets(bones_of(knee))
         assert all(again[name].tobytes() == points.tobytes() for name, points in targets.items())
 
 
 def test_both_condyles_have_as_many() -> None:
     knee = knees()[0]
-    points = default_targets(bones_of(knee))["femur/weight_bearing"]
+    points = make_default_targets(bones_of(knee))["femur/weight_bearing"]
     assert (points[:, 0] > 0.0).sum() == (points[:, 0] < 0.0).sum() == 12
 
 
 def test_what_is_no_knee_has_no_targets() -> None:
-    assert "femur/weight_bearing" not in default_targets({"femur": BoneModel("femur", sphere(9.0))})
+    assert "femur/weight_bearing" not in make_default_targets(
+        {"femur": BoneModel("femur", sphere(9.0))}
+    )
 
 
 def test_stages_are_judged_by_the_targets_of_their_bone() -> None:

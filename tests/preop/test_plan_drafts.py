@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.preop.plan_drafts import draft_from_labels
+from navapp.preop.plan_drafts import make_draft_from_labels
 from navapp.preop.volume import LabelVolume
 
 
@@ -17,11 +17,11 @@ def labels_of(*balls) -> LabelVolume:
 
 
 def test_a_label_in_one_piece_says_nothing() -> None:
-    assert draft_from_labels(labels_of((25.0, 15.0)), {"femur": 3}).origin.warnings == ()
+    assert make_draft_from_labels(labels_of((25.0, 15.0)), {"femur": 3}).origin.warnings == ()
 
 
 def test_pieces_that_are_left_out_are_told() -> None:
-    draft = draft_from_labels(labels_of((25.0, 15.0), (60.0, 5.0)), {"femur": 3})
+    draft = make_draft_from_labels(labels_of((25.0, 15.0), (60.0, 5.0)), {"femur": 3})
     assert told_share(draft) == pytest.approx(5.0**3 / (5.0**3 + 15.0**3), rel=0.2)
     assert draft.bones["femur"].mesh.vertices_mm[:, 0].max() < 45.0
 
@@ -36,7 +36,7 @@ def test_pieces_that_hardly_hang_together_are_told_as_well(joint) -> None:
     else:
         labels[10:25, 10:25, 45:60] = 3
         labels[17, 17, 30:45] = 3
-    draft = draft_from_labels(LabelVolume(labels, np.eye(4), np.ones(3)), {"femur": 3})
+    draft = make_draft_from_labels(LabelVolume(labels, np.eye(4), np.ones(3)), {"femur": 3})
     n = (labels > 0).sum()
     assert told_share(draft) == pytest.approx(1.0 - 25.0**3 / n, rel=0.15)
 

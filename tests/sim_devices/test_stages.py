@@ -7,10 +7,10 @@ from sim_devices.stages import (
     HOLE_DEPTH_MM,
     HOLE_RADIUS_MM,
     drill_hole,
-    entry_point,
+    find_entry_point,
     make_worn_patch,
 )
-from sim_devices.tools import across, chuck_mesh, drill_mesh, hand_meshes
+from sim_devices.tools import across, hand_meshes, make_chuck_mesh, make_drill_mesh
 
 AXIS = np.array([0.0, np.sin(0.1), np.cos(0.1)])
 
@@ -23,7 +23,9 @@ def femur():
 @pytest.fixture(scope="module")
 def entry():
     knee = make_knee(KneeSpec(1))
-    return entry_point(knee.bones["femur"], knee.landmarks["femur/notch"] + (0, -10.0, 0), AXIS)
+    return find_entry_point(
+        knee.bones["femur"], knee.landmarks["femur/notch"] + (0, -10.0, 0), AXIS
+    )
 
 
 def open_edges(*meshes):
@@ -78,7 +80,7 @@ def test_the_wall_faces_the_axis(femur, entry):
 
 def test_a_line_beside_the_bone_has_no_entry_point(femur):
     with pytest.raises(ValueError, match="misses"):
-        entry_point(femur, np.array([500.0, 0.0, 0.0]), AXIS)
+        find_entry_point(femur, np.array([500.0, 0.0, 0.0]), AXIS)
 
 
 def test_the_worn_patch_is_round_its_centre_and_nowhere_else(femur):
@@ -89,7 +91,7 @@ def test_the_worn_patch_is_round_its_centre_and_nowhere_else(femur):
     assert worn[distance > 30.0].max() == 0.0
 
 
-@pytest.mark.parametrize("mesh", [drill_mesh(), chuck_mesh(), *hand_meshes()])
+@pytest.mark.parametrize("mesh", [make_drill_mesh(), make_chuck_mesh(), *hand_meshes()])
 def test_instruments_are_closed_and_their_triangles_are_small(mesh):
     assert mesh.volume_mm3() > 100.0
     corners = mesh.vertices_mm[mesh.faces]

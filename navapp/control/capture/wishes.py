@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.rig.bundle_adjustment import Bundle, solve_bundle
-from calibration.rig.dropped_pairs import DroppedPair, misfits
+from calibration.rig.dropped_pairs import DroppedPair, find_misfits
 from calibration.rig.initial_rig import matrix_of, pose_of, start_poses, start_rig
 from calibration.rig.next_view import find_next_view
 from calibration.rig.parameters import RigModel, pack, unpack
-from calibration.rig.uncertainty import bounds_mm, working_points_mm
+from calibration.rig.uncertainty import compute_bounds_mm, make_working_points_mm
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
 from calibration.targets.seen_pairs import SeenPair
@@ -122,7 +122,7 @@ def _solved(
     else:
         shared, poses = last.solved.shared, _poses(board, used, last)
     solved = solve_bundle(board, used, model, shared, poses)
-    more = misfits(board, used, solved)
+    more = find_misfits(board, used, solved)
     if not more or len(used) - len(more) < N_STARTING:
         return solved, used, out
     bad = {one.index for one in more}
@@ -146,10 +146,10 @@ def _poses(board: Board, pairs: Sequence[SeenPair], last: Wish) -> FloatArray:
 def volume_bounds_mm(solved: Bundle, depth_mm: tuple[float, float]) -> FloatArray:
     """(n,) predicted 95 % errors of points of the working volume, from the covariance."""
     model = solved.model
-    points_mm = working_points_mm(model, solved.shared, depth_mm)
+    points_mm = make_working_points_mm(model, solved.shared, depth_mm)
     if len(points_mm) == 0:
         return np.empty(0)
-    return bounds_mm(model, solved.shared, solved.rig_covariance, points_mm)
+    return compute_bounds_mm(model, solved.shared, solved.rig_covariance, points_mm)
 
 
 def noise_px(solved: Bundle) -> float:

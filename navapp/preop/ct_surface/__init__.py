@@ -3,8 +3,8 @@
 from navapp.preop.ct_surface.bone_surfaces import (
     BoneSurface,
     CtSurfaces,
-    surface_of_labels,
-    surfaces_of,
+    make_label_surface,
+    make_surfaces,
 )
 
-__all__ = ["BoneSurface", "CtSurfaces", "surface_of_labels", "surfaces_of"]
+__all__ = ["BoneSurface", "CtSurfaces", "make_label_surface", "make_surfaces"]

@@ -21,7 +21,7 @@ def compute_axial_fractions(ct: CtVolume, normals: FloatArray) -> FloatArray:
     return share
 
 
-def blur_shift_mm(
+def compute_blur_shift_mm(
     mesh: TriangleMesh, neighbours: csr_array, ct: CtVolume, scan: Scan
 ) -> FloatArray:
     """(V,) how much further out a curved edge lies than its blurred profile says.

@@ -11,8 +11,8 @@ from navapp.geometry.simplify import simplified
 from navapp.geometry.transform import FloatArray
 from navapp.preop.ct_surface.blur import compute_axial_fractions
 from navapp.preop.ct_surface.cortex_model import Scan, sample_positions_mm
-from navapp.preop.ct_surface.isosurface import surface_around
-from navapp.preop.ct_surface.profiles import along, cubic
+from navapp.preop.ct_surface.isosurface import make_isosurface
+from navapp.preop.ct_surface.profiles import make_cubic_interpolation, sample_along
 from navapp.preop.ct_surface.refinement import refine_surface
 from navapp.preop.ct_surface.scan_estimate import UNKNOWN_SCAN, estimate_scan
 from navapp.preop.segmentation import Segmentation
@@ -66,14 +66,16 @@ class CtSurfaces:
     pose_sd_mm: float
 
 
-def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: None) -> CtSurfaces:
+def make_surfaces(
+    found: Segmentation, tell: Callable[[str], None] = lambda step: None
+) -> CtSurfaces:
     """The surface of each named bone.
 
     In each round the scanner is estimated on the surfaces so far, and they are moved with it:
     normals that lean make its blur look wider than it is.
     """
     tell("laying first surfaces")
-    density = cubic(found.ct)
+    density = make_cubic_interpolation(found.ct)
     bones = {name: _first_surface(found, number) for name, number in found.names.items()}
     scan = UNKNOWN_SCAN
     for reach_mm in _REACHES_MM:
@@ -90,9 +92,9 @@ def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: 
     return CtSurfaces(working, scan, _POSE_SD_VOXELS * float(found.ct.spacing_mm.max()))
 
 
-def surface_of_labels(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
+def make_label_surface(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
     """The surface of a ready segmentation: voxels are all that is known of it."""
-    mesh, left_out = surface_around(mask, volume)
+    mesh, left_out = make_isosurface(mask, volume)
     surface = BoneSurface(mesh, _is_cut(mesh, volume), np.zeros(len(mesh.vertices_mm), dtype=bool))
     return replace(_working(surface, volume), left_out=left_out)
 
@@ -107,7 +109,7 @@ def _working(surface: BoneSurface, volume: CtVolume | LabelVolume) -> BoneSurfac
 
 
 def _first_surface(found: Segmentation, number: int) -> BoneSurface:
-    mesh, _ = surface_around(found.bones == number, found.ct)
+    mesh, _ = make_isosurface(found.bones == number, found.ct)
     return BoneSurface(mesh, _is_cut(mesh, found.ct), np.zeros(len(mesh.vertices_mm), dtype=bool))
 
 
@@ -121,7 +123,7 @@ def _scan(
     points = np.concatenate([bone.mesh.vertices_mm[~bone.is_cut] for bone in bones.values()])
     normals = np.concatenate([bone.mesh.normals[~bone.is_cut] for bone in bones.values()])
     every = np.linspace(0, len(points) - 1, min(_N_PROFILES, len(points))).astype(np.intp)
-    profiles = along(points[every], normals[every], sample_positions_mm(), density)
+    profiles = sample_along(points[every], normals[every], sample_positions_mm(), density)
     return estimate_scan(profiles, compute_axial_fractions(ct, normals[every]), reach_mm, start)
 
 

@@ -9,9 +9,13 @@ from scipy.sparse import csr_array
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.ct_surface.blur import blur_shift_mm, compute_axial_fractions, neighbours_of
+from navapp.preop.ct_surface.blur import (
+    compute_axial_fractions,
+    compute_blur_shift_mm,
+    neighbours_of,
+)
 from navapp.preop.ct_surface.cortex_model import Scan, fit_edges, sample_positions_mm
-from navapp.preop.ct_surface.profiles import along
+from navapp.preop.ct_surface.profiles import sample_along
 from navapp.preop.volume import CtVolume
 
 # Samples are used up to half way to another bone, in these classes.
@@ -53,7 +57,7 @@ def refine_surface(
         is_cut: (V,) where the volume ends, so that there is no edge.
         ct: the volume.
         is_other: (D, H, W) voxels of other bones.
-        density: of LPS points (`profiles.cubic`).
+        density: of LPS points (`profiles.make_cubic_interpolation`).
         scan: of this CT.
         reach_mm: how far off the mesh may be.
     """
@@ -62,7 +66,7 @@ def refine_surface(
     weight[is_cut] = 0.0
     is_measured = weight > 0.0
     even = _smooth_offsets(offset, weight, neighbours)
-    even += np.where(is_measured, blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
+    even += np.where(is_measured, compute_blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
     even[is_cut] = 0.0
     mesh = TriangleMesh(mesh.vertices_mm + even[:, None] * mesh.normals, mesh.faces)
     return RefinedSurface(mesh, is_measured)
@@ -78,7 +82,7 @@ def _measure_offsets(
 ) -> tuple[FloatArray, FloatArray]:
     """Offset and weight of each vertex."""
     positions = sample_positions_mm()
-    profiles = along(mesh.vertices_mm, mesh.normals, positions, density)
+    profiles = sample_along(mesh.vertices_mm, mesh.normals, positions, density)
     blur = scan.blur_mm(compute_axial_fractions(ct, mesh.normals))
     blur_class = np.digitize(blur, np.linspace(blur.min(), blur.max(), _BLUR_CLASSES + 1)[1:-1])
     until_class = _until_class(mesh, ct, is_other)

@@ -12,7 +12,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.segmentation.bone_naming import BONES, NamedParts, parts_of
 from navapp.preop.segmentation.cores import find_cores
 from navapp.preop.segmentation.growth import grow
-from navapp.preop.segmentation.masks import LabelArray, bounds, depth_mm
+from navapp.preop.segmentation.masks import LabelArray, compute_depth_mm, find_bounds
 from navapp.preop.segmentation.plates import Plates, find_plates
 from navapp.preop.segmentation.seeds import with_seeds
 from navapp.preop.segmentation.solids import find_solids
@@ -96,11 +96,13 @@ def _is_cut_at_side(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
 
 def _is_cut_by_padding(bone: NDArray[np.bool_], ct: CtVolume) -> bool:
     """Whether the picture ends beside a bone: skin and flesh lie between any bone and air."""
-    box = bounds(bone, np.full(3, 2, dtype=np.intp))
+    box = find_bounds(bone, np.full(3, 2, dtype=np.intp))
     is_padding = ct.hu[box] <= PADDING_HU
     if not is_padding.any():
         return False
-    beside = depth_mm(bone[box], ct.spacing_mm) > -_BESIDE_VOXELS * float(ct.spacing_mm.max())
+    beside = compute_depth_mm(bone[box], ct.spacing_mm) > -_BESIDE_VOXELS * float(
+        ct.spacing_mm.max()
+    )
     return int((beside & is_padding).sum()) > _LEAST_PADDING
 
 
@@ -114,7 +116,7 @@ def _around_solids(
             f"there is no bone in the CT: nothing in flesh is denser than {threshold_hu:g} HU",
             remedy="lower --threshold, or give another series",
         )
-    box = bounds(solid, np.ceil(_MARGIN_MM / ct.spacing_mm[::-1]).astype(np.intp))
+    box = find_bounds(solid, np.ceil(_MARGIN_MM / ct.spacing_mm[::-1]).astype(np.intp))
     cut = ct.crop([edge.start for edge in box[::-1]], [edge.stop for edge in box[::-1]])
     return cut, np.ascontiguousarray(hu[box]), np.ascontiguousarray(solid[box])
 

@@ -43,7 +43,7 @@ class _Placed:
             raise ValueError("lps_from_index must be a finite affine 4x4 matrix")
         if self._voxels.ndim != 3 or self._voxels.size == 0:
             raise ValueError("a volume has three axes and at least one voxel")
-        if spacing.shape != (3,) or not np.allclose(spacing, steps_mm(matrix), rtol=1e-6):
+        if spacing.shape != (3,) or not np.allclose(spacing, compute_steps_mm(matrix), rtol=1e-6):
             raise ValueError("spacing_mm must be the lengths of the matrix's columns")
         if not is_invertible(matrix):
             raise ValueError("the axes of lps_from_index lie in one plane")
@@ -145,7 +145,7 @@ class LabelVolume(_Placed):
         return replace(self, labels=voxels, lps_from_index=lps_from_index)
 
 
-def steps_mm(lps_from_index: FloatArray) -> FloatArray:
+def compute_steps_mm(lps_from_index: FloatArray) -> FloatArray:
     """(3,) lengths of one step along i, j, k."""
     lengths: FloatArray = np.sqrt((lps_from_index[:3, :3] ** 2).sum(axis=0))
     return lengths
@@ -159,7 +159,7 @@ def is_invertible(lps_from_index: FloatArray) -> bool:
     if not np.isfinite(lps_from_index).all():
         return False
     volume_mm3 = abs(float(np.linalg.det(lps_from_index[:3, :3])))
-    return bool(volume_mm3 > 1e-3 * float(steps_mm(lps_from_index).prod()) > 0.0)
+    return bool(volume_mm3 > 1e-3 * float(compute_steps_mm(lps_from_index).prod()) > 0.0)
 
 
 def _map_points(matrix: FloatArray, points: ArrayLike) -> FloatArray:

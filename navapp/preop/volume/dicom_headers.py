@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
-from navapp.preop.volume.dicom_identity import NAMING_TAGS, naming_values
+from navapp.preop.volume.dicom_identity import NAMING_TAGS, find_naming_values
 from navapp.values import Side
 
 _SLICE_TAGS = (
@@ -110,7 +110,7 @@ def read_header(file: Path) -> tuple[SliceHeader | OtherFile, set[str]]:
                 force=True,
                 specific_tags=[*_SLICE_TAGS, *NAMING_TAGS],
             )
-            names = naming_values(header)
+            names = find_naming_values(header)
         except OSError as error:
             return OtherFile(file, NO_UID, f"it cannot be opened ({error.strerror})"), set()
         except Exception:  # noqa: BLE001 (as in _understood)

@@ -32,7 +32,7 @@ class Identity:
         return self._any_word.sub(_HIDDEN, str(text)) if self._any_word else str(text)
 
 
-def naming_values(header: Any) -> set[str]:
+def find_naming_values(header: Any) -> set[str]:
     """Values of a header's naming tags; `header` is pydicom's."""
     return {str(header.get(tag) or "") for tag in NAMING_TAGS} - {""}
 

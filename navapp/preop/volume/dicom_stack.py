@@ -27,7 +27,7 @@ _SAME_TILT_DEG = 1.0
 _AGAIN = "export the whole series again, or get the CT from its archive"
 
 
-def in_order(folder: Folder, slices: Sequence[SliceHeader]) -> list[SliceHeader]:
+def sort_slices(folder: Folder, slices: Sequence[SliceHeader]) -> list[SliceHeader]:
     """The slices sorted along their common normal, lowest first.
 
     Raises:
@@ -56,7 +56,7 @@ def is_same_place(a: SliceHeader, b: SliceHeader) -> bool:
     return abs(float((b.position_mm - a.position_mm) @ a.normal)) < _STEP_MM
 
 
-def stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
+def compute_stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
     """(4, 4) `lps_from_index` of slices at different places, a lean of the stack kept in it.
 
     Raises:
@@ -94,7 +94,7 @@ def stack_matrix(folder: Folder, ordered: Sequence[SliceHeader]) -> FloatArray:
     return matrix
 
 
-def thickness_warnings(ordered: Sequence[SliceHeader], matrix: FloatArray) -> list[str]:
+def make_thickness_warnings(ordered: Sequence[SliceHeader], matrix: FloatArray) -> list[str]:
     """What the thickness tag says otherwise than the positions, which are taken."""
     height = float(matrix[:3, 2] @ ordered[0].normal)
     tag = ordered[0].thickness_mm
@@ -107,7 +107,9 @@ def thickness_warnings(ordered: Sequence[SliceHeader], matrix: FloatArray) -> li
     ]
 
 
-def tilt_warnings(folder: Folder, ordered: Sequence[SliceHeader], matrix: FloatArray) -> list[str]:
+def make_tilt_warnings(
+    folder: Folder, ordered: Sequence[SliceHeader], matrix: FloatArray
+) -> list[str]:
     """What positions and the tag say of a tilted gantry.
 
     The positions' lean is in the matrix, exactly. A tag without a lean is right for pictures that

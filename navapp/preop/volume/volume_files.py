@@ -12,7 +12,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.volume.ct_volume import is_invertible
 from navapp.preop.volume.dicom_headers import is_dicom
 from navapp.preop.volume.itk_package import (
-    codecs_heard,
+    listen_to_codecs,
     lps_from_index_of,
     read_image,
     voxels_of,
@@ -53,7 +53,7 @@ def read_file(path: Path) -> FileVolume:
     if suffix in _NIFTI and (header is None or not header.is_whole):
         # SimpleITK fills what is missing with zeros, without a word.
         raise _make_damage_error(path)
-    with codecs_heard() as has_complained:
+    with listen_to_codecs() as has_complained:
         try:
             image = read_image(path)
             values = voxels_of(image)
@@ -146,7 +146,7 @@ def _make_damage_error(path: Path) -> InputError:
     )
 
 
-def whole_numbers(values: NDArray[Any]) -> NDArray[np.integer[Any]] | None:
+def convert_to_whole(values: NDArray[Any]) -> NDArray[np.integer[Any]] | None:
     """The values as an integer type; None when they are no whole numbers."""
     if np.issubdtype(values.dtype, np.integer):
         return values

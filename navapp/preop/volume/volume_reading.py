@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from navapp.errors import InputError, UsageError
-from navapp.preop.volume.ct_volume import CtVolume, LabelVolume, steps_mm
+from navapp.preop.volume.ct_volume import CtVolume, LabelVolume, compute_steps_mm
 from navapp.preop.volume.dicom_series import read_series
-from navapp.preop.volume.hounsfield import compact, without_padding
-from navapp.preop.volume.volume_checks import content_warnings, refusal_of
-from navapp.preop.volume.volume_files import read_file, whole_numbers
+from navapp.preop.volume.hounsfield import convert_compactly, replace_padding
+from navapp.preop.volume.volume_checks import make_content_warnings, refusal_of
+from navapp.preop.volume.volume_files import convert_to_whole, read_file
 from navapp.values import Side
 
 
@@ -66,9 +66,9 @@ def read_ct(path: str | Path, series_uid: str | None = None) -> ReadCt:
         raise UsageError("--series is for a DICOM folder", remedy="leave it out, or name a folder")
     found = read_file(path)
     volume = CtVolume(
-        compact(without_padding(found.values)),
+        convert_compactly(replace_padding(found.values)),
         found.lps_from_index,
-        steps_mm(found.lps_from_index),
+        compute_steps_mm(found.lps_from_index),
     )
     source = CtSource(found.suffix, "", volume.size[2])
     return _check_volume(str(path), volume, found.warnings, source)
@@ -81,7 +81,7 @@ def read_labels(path: str | Path) -> LabelVolume:
         InputError: missing, damaged, or something else than labels.
     """
     found = read_file(Path(path))
-    labels = whole_numbers(found.values)
+    labels = convert_to_whole(found.values)
     if labels is None or not labels.any():
         what = "its values are not whole" if labels is None else "every voxel is 0"
         raise InputError(
@@ -89,7 +89,7 @@ def read_labels(path: str | Path) -> LabelVolume:
             subject=str(path),
             remedy="export the segmentation as one label map",
         )
-    return LabelVolume(labels, found.lps_from_index, steps_mm(found.lps_from_index))
+    return LabelVolume(labels, found.lps_from_index, compute_steps_mm(found.lps_from_index))
 
 
 def _check_volume(
@@ -101,4 +101,4 @@ def _check_volume(
         problem, remedy = refusal
         also = f" ({'; '.join(warnings)})" if warnings else ""
         raise InputError(f"{shown} {problem}{also}", subject=shown, remedy=remedy)
-    return ReadCt(volume, (*warnings, *content_warnings(volume)), source)
+    return ReadCt(volume, (*warnings, *make_content_warnings(volume)), source)

@@ -6,7 +6,7 @@ from textual.content import Content
 
 from navapp.control.capture.states import CapturePhase, CaptureSnapshot
 from navapp.ui.capture.keys import HAND_HINT, KEYS, is_possible
-from navapp.ui.gauges import Number, bar, cut, share_bar
+from navapp.ui.gauges import Number, cut, draw_bar, draw_fraction_bar
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines
 from navapp.ui.view import Level
@@ -122,7 +122,7 @@ class GaugeLine(Lines[CaptureView]):
             return [
                 Content.assemble(
                     (" solving ", "$text-muted"),
-                    (share_bar(snapshot.progress.share, _WORK_WIDTH, symbols), "$primary"),
+                    (draw_fraction_bar(snapshot.progress.share, _WORK_WIDTH, symbols), "$primary"),
                     f" {Number.PERCENT.text(100.0 * snapshot.progress.share)} %",
                 )
             ]
@@ -130,7 +130,7 @@ class GaugeLine(Lines[CaptureView]):
         return [
             Content.assemble(
                 (" error   ", "$text-muted"),
-                (bar(snapshot.bound_mm, snapshot.stop_mm, _GAUGE_WIDTH, symbols), level.value),
+                (draw_bar(snapshot.bound_mm, snapshot.stop_mm, _GAUGE_WIDTH, symbols), level.value),
                 f" {Number.MM.text(snapshot.bound_mm)} mm, enough at {snapshot.stop_mm:.2f}",
                 (f"; everywhere {Number.MM.text(snapshot.worst_mm).strip()}", "$text-muted"),
             ).truncate(width)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from calibration.latency.display_area import WatchedCells
-from calibration.latency.light_code import Switches, pauses_ms
+from calibration.latency.light_code import Switches, draw_pauses_ms
 
 N_CELLS = 48
 # Cells that see the display.
@@ -59,7 +59,7 @@ class Bench:
 
     def record(self, seed: int) -> tuple[Switches, WatchedCells, WatchedCells]:
         rng = np.random.default_rng((seed, 77))
-        told = np.concatenate([[0.0], np.cumsum(pauses_ms(self.seconds, seed))])
+        told = np.concatenate([[0.0], np.cumsum(draw_pauses_ms(self.seconds, seed))])
         share = told / told[-1]
         lit = told + self.delay_ms + self.drift_ms * share + self.jump_ms * (share > 0.5)
         lit = lit + self.late_ms * (rng.random(len(told)) < self.late_share)

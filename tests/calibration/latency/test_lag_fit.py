@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from calibration.latency.lag_fit import block_sums, draws, fine_lags_ms
-from calibration.latency.light_code import Switches, pauses_ms
+from calibration.latency.lag_fit import compute_block_sums, draw_counts, list_fine_lags_ms
+from calibration.latency.light_code import Switches, draw_pauses_ms
 
-TOLD = Switches(np.concatenate([[0.0], np.cumsum(pauses_ms(10.0, 4))]))
+TOLD = Switches(np.concatenate([[0.0], np.cumsum(draw_pauses_ms(10.0, 4))]))
 TIMES = np.linspace(0.0, 10_000.0, 240)
 BLOCKS = [slice(n, n + 24) for n in range(0, 240, 24)]
-LAGS = fine_lags_ms(50.0)
+LAGS = list_fine_lags_ms(50.0)
 ONCE = np.ones((1, len(BLOCKS)))
 
 
@@ -18,7 +18,7 @@ def seen(lag_ms: float) -> np.ndarray:
 
 
 def sums_of(grey: np.ndarray):
-    return block_sums(TOLD.compute_lit_fractions(TIMES, LAGS, 16.0), grey, BLOCKS, LAGS)
+    return compute_block_sums(TOLD.compute_lit_fractions(TIMES, LAGS, 16.0), grey, BLOCKS, LAGS)
 
 
 @pytest.mark.parametrize("lag_ms", [12.0, 47.75, 101.5])
@@ -46,10 +46,10 @@ def test_lags_that_explain_as_much_are_answered_by_their_middle() -> None:
 
 
 def test_draws_count_every_block_as_often_on_average() -> None:
-    counts = draws(12)
+    counts = draw_counts(12)
     assert (counts.sum(axis=1) == 12).all()
     np.testing.assert_allclose(counts.mean(axis=0), 1.0, atol=0.25)
     assert counts.std() > 0.8
-    half = draws(12, np.arange(12) < 6)
+    half = draw_counts(12, np.arange(12) < 6)
     assert (half.sum(axis=1) == 6).all()
     assert not half[:, 6:].any()

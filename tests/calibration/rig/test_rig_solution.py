@@ -9,8 +9,8 @@ from calibration.rig.acceptance import find_occupied_cells
 from calibration.rig.dropped_pairs import Fault
 from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import solve_rig
-from calibration.rig.uncertainty import working_points_mm
-from calibration.targets.boards import board_from
+from calibration.rig.uncertainty import make_working_points_mm
+from calibration.targets.boards import parse_board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.errors import ResultError
 from tests.calibration.marks import (
@@ -119,7 +119,7 @@ def test_frontal_views_are_refused(world):
 
 def test_a_board_that_stays_in_the_middle_is_refused(world):
     rng = np.random.default_rng(3)
-    small = board_from(
+    small = parse_board(
         {
             "type": "charuco", "squares_x": 6, "squares_y": 5, "square_mm": 10.0,
             "marker_mm": 7.0, "dictionary": "DICT_4X4_100",
@@ -200,7 +200,7 @@ def test_views_set_aside_judge(world):
 
 
 def test_the_working_volume_is_what_both_cameras_see(world, solved):
-    points_mm = working_points_mm(solved.solved.model, solved.solved.shared, (350.0, 550.0))
+    points_mm = make_working_points_mm(solved.solved.model, solved.solved.shared, (350.0, 550.0))
     rig = solved.rig
     for camera, seen in ((rig.left, points_mm), (rig.right, rig.right_from_left.apply(points_mm))):
         pixels = camera.project(seen)

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.targets.boards import board_from, keys_of
+from calibration.targets.boards import keys_of, parse_board
 from calibration.targets.detection import find_board
 from calibration.targets.drawing import make_drawing
 from calibration.targets.printing import Sheet, render_page
@@ -119,7 +119,7 @@ def test_the_caption_is_the_boards_file(name: str) -> None:
     comments = re.findall(r"<!-- (.*?) -->", render_page(sheet, "svg").decode(), flags=re.DOTALL)
     text = " ".join(comments)
     keys = json.loads(text[text.index("{") : text.index("}") + 1])
-    assert board_from(keys) == sheet.board == board_from(keys_of(sheet.board))
+    assert parse_board(keys) == sheet.board == parse_board(keys_of(sheet.board))
 
 
 def test_the_pdf_holds_the_same_squares() -> None:
@@ -152,7 +152,7 @@ def inflated(stream: bytes) -> bytes:
 )
 def test_the_paper_that_is_needed(columns, rows, square_mm, paper) -> None:
     keys = {"type": "chessboard", "squares_x": columns, "squares_y": rows, "square_mm": square_mm}
-    assert Sheet(board_from(keys)).paper == paper
+    assert Sheet(parse_board(keys)).paper == paper
 
 
 def test_the_same_board_gives_the_same_file() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.latency.acceptance import WORST_MS, measure_accepted_latency
-from calibration.latency.light_code import pauses_ms
+from calibration.latency.light_code import draw_pauses_ms
 from calibration.latency.measurement import Latency
 from navapp.control.latency.player import CodePlayer
 from navapp.control.latency.watching import Recording, watch
@@ -22,7 +22,7 @@ def nothing(_: float) -> None:
 
 
 def player_of(room: Room, seconds: float) -> CodePlayer:
-    return CodePlayer(room.display, room.clock, pauses_ms(seconds, 0))
+    return CodePlayer(room.display, room.clock, draw_pauses_ms(seconds, 0))
 
 
 def players() -> list[threading.Thread]:
@@ -101,7 +101,9 @@ def test_progress_rises_to_one_and_the_display_is_dark_at_the_end() -> None:
 def test_switches_are_the_pauses_of_the_code_and_stand_in_no_step_with_the_frames() -> None:
     room = Room()
     recording = watch(room.camera, player_of(room, 10.0), room.clock, nothing)
-    np.testing.assert_allclose(np.diff(recording.switches.times_ms), pauses_ms(10.0, 0), atol=0.01)
+    np.testing.assert_allclose(
+        np.diff(recording.switches.times_ms), draw_pauses_ms(10.0, 0), atol=0.01
+    )
     phases = np.exp(2j * np.pi * recording.switches.times_ms / 40.0)
     assert abs(phases.mean()) < 0.3
 

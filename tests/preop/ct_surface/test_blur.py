@@ -3,7 +3,11 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.preop.ct_surface.blur import blur_shift_mm, compute_axial_fractions, neighbours_of
+from navapp.preop.ct_surface.blur import (
+    compute_axial_fractions,
+    compute_blur_shift_mm,
+    neighbours_of,
+)
 from navapp.preop.ct_surface.cortex_model import Scan
 from tests.geometry.shapes import cube
 from tests.preop.ct_phantoms import ball, ct_of, cylinder, lattice, leaning_axes
@@ -45,7 +49,7 @@ def cylinder_mesh(radius_mm, n_rings=25):
 
 
 def shifts_mm(mesh, scan=EVEN, ct=STRAIGHT):
-    return blur_shift_mm(mesh, neighbours_of(mesh.faces, len(mesh.vertices_mm)), ct, scan)
+    return compute_blur_shift_mm(mesh, neighbours_of(mesh.faces, len(mesh.vertices_mm)), ct, scan)
 
 
 @pytest.mark.parametrize("radius_mm", [6.0, 12.0, 25.0])

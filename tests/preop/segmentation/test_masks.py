@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from navapp.preop.segmentation.masks import bounds, close_gaps, components, depth_mm, largest
+from navapp.preop.segmentation.masks import (
+    close_gaps,
+    compute_depth_mm,
+    find_bounds,
+    label_components,
+    select_largest,
+)
 
 SPACING_MM = np.array([0.5, 0.7, 1.2])
 HALF_MM = np.full(3, 0.5)
@@ -18,7 +24,7 @@ def test_depth_is_the_distance_to_the_rim_in_mm():
     rim = mask & ndimage.binary_dilation(~mask, np.ones((3, 3, 3)))
     inner = ndimage.distance_transform_edt(~rim, sampling=SPACING_MM[::-1])
     outer = ndimage.distance_transform_edt(~mask, sampling=SPACING_MM[::-1])
-    depth = depth_mm(mask, SPACING_MM)
+    depth = compute_depth_mm(mask, SPACING_MM)
     np.testing.assert_allclose(depth, np.where(mask, inner, -outer), atol=1e-4)
     assert depth.dtype == np.float32
 
@@ -26,7 +32,7 @@ def test_depth_is_the_distance_to_the_rim_in_mm():
 def test_the_volumes_end_is_no_rim():
     mask = np.ones((5, 9, 9), dtype=bool)
     mask[:, :2] = False
-    np.testing.assert_allclose(depth_mm(mask, HALF_MM)[0, 2:, 0], 0.5 * np.arange(7))
+    np.testing.assert_allclose(compute_depth_mm(mask, HALF_MM)[0, 2:, 0], 0.5 * np.arange(7))
 
 
 def test_components_are_ordered_by_size_and_the_small_left_out():
@@ -35,17 +41,17 @@ def test_components_are_ordered_by_size_and_the_small_left_out():
     mask[1:5, 10:14, 1:5] = True
     mask[1:4, 1:4, 10:13] = True
     voxel_mm3 = float(SPACING_MM.prod())
-    parts = components(mask, SPACING_MM, 0.0)
+    parts = label_components(mask, SPACING_MM, 0.0)
     assert [int((parts == n).sum()) for n in range(4)] == [2400 - 64 - 27 - 8, 64, 27, 8]
     for least, n_left in ((8.0, 3), (8.1, 2), (27.1, 1), (64.1, 0)):
-        assert components(mask, SPACING_MM, least * voxel_mm3).max() == n_left
-    assert (largest(mask, SPACING_MM) == (parts == 1)).all()
+        assert label_components(mask, SPACING_MM, least * voxel_mm3).max() == n_left
+    assert (select_largest(mask, SPACING_MM) == (parts == 1)).all()
 
 
 def test_components_hang_together_by_faces_alone():
     mask = np.zeros((4, 4, 4), dtype=bool)
     mask[:2, :2, :2] = mask[2:, 2:, 2:] = True
-    assert components(mask, HALF_MM, 0.0).max() == 2
+    assert label_components(mask, HALF_MM, 0.0).max() == 2
 
 
 @pytest.mark.parametrize(("gap", "is_shut"), [(3, True), (5, True), (7, False), (10, False)])
@@ -95,5 +101,5 @@ def test_a_groove_that_the_volume_cuts_stays_open():
 def test_bounds_hold_what_is_set_and_stop_at_the_volume():
     mask = np.zeros((10, 12, 14), dtype=bool)
     mask[2, 5, 7] = mask[4, 6, 11] = True
-    assert bounds(mask, np.zeros(3, dtype=np.intp)) == (slice(2, 5), slice(5, 7), slice(7, 12))
-    assert bounds(mask, np.array([3, 1, 5])) == (slice(0, 8), slice(4, 8), slice(2, 14))
+    assert find_bounds(mask, np.zeros(3, dtype=np.intp)) == (slice(2, 5), slice(5, 7), slice(7, 12))
+    assert find_bounds(mask, np.array([3, 1, 5])) == (slice(0, 8), slice(4, 8), slice(2, 14))
