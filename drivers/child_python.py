@@ -1,4 +1,4 @@
-"""Python in a child process: what is loaded there may print, hang or crash without harm."""
+"""Runs Python in a child process, so that output, hangs and crashes there do no harm."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""The calibration that an OAK camera carries -> a rig."""
+"""Converts the calibration stored in an OAK camera to a rig."""
 
 from typing import Any
 

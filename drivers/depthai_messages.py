@@ -1,4 +1,4 @@
-"""A group of DepthAI's messages -> two pictures with their times."""
+"""Converts a group of DepthAI's messages to two pictures with their times."""
 
 from dataclasses import dataclass
 from datetime import timedelta
@@ -14,7 +14,7 @@ from navapp.errors import DeviceProtocolError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthaiPair:
-    """What one group tells.
+    """Two pictures of one message group, with their times, exposure and sensitivity.
 
     Attributes:
         left, right: (H, W) uint8, arrays of their own.

@@ -39,7 +39,7 @@ _BACK_BY_NS: dict[str, int] = {}
 
 
 class DepthaiStereo:
-    """Free-running; opened again, it is the same camera with the same settings, or refused."""
+    """Free-running OAK stereo camera; opening it again refuses another camera in its place."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""ESC/VP21's numbers: what the lamp does, and what is broken.
+"""Meaning of ESC/VP21's codes for power states and faults.
 
 Source: ESC/VP21 Command User's Guide for Business Projectors. Models differ in what they call
 standby; only `01` can show a picture.

@@ -1,4 +1,4 @@
-"""Stereo from USB cameras through OpenCV: two of them, or one that sends both eyes side by side."""
+"""Stereo camera of USB cameras through OpenCV: two, or one that sends both eyes side by side."""
 
 import threading
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from navapp.errors import DeviceError, DeviceLost, UnsupportedControl, UsageErro
 
 @dataclass(frozen=True, slots=True)
 class OpencvStereoSettings:
-    """Which cameras, and how they work.
+    """Which USB cameras, and their settings.
 
     Attributes:
         left: serial number, or path below `/dev/v4l/by-id` or `/dev/v4l/by-path`.

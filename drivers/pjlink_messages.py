@@ -1,4 +1,4 @@
-"""PJLink class 1: what goes over the wire, as values.
+"""PJLink class 1: formats requests and parses replies.
 
 Source: the protocol's tables as the manufacturers print them. Class 2 and its SHA-256 greeting are
 not spoken.
@@ -36,7 +36,7 @@ _SEVERITY = ("", "warning", "error")
 
 
 class PasswordRefused(DeviceError):  # noqa: N818 (named as its siblings)
-    """Final: trying again changes nothing."""
+    """The projector refuses the password; trying again does not help."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Recorded stereo pairs by their place in line: folders of pictures and session folders."""
+"""Recorded stereo pairs in folders of pictures and session folders, by index."""
 
 import re
 from collections.abc import Iterable

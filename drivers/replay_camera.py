@@ -25,7 +25,7 @@ Order = Literal["forward", "pingpong"]
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """How a recording is walked through.
+    """Order, range and rate of a replay.
 
     Attributes:
         order: `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.

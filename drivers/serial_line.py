@@ -1,4 +1,4 @@
-"""Packets on a line: what has come is kept and split at its terminator, however it was cut."""
+"""Requests and answers on a serial line; received bytes are split at the terminator."""
 
 import threading
 

@@ -44,7 +44,7 @@ class Port(Protocol):
 
 
 class Address(Protocol):
-    """Where a port is found."""
+    """Where a port is, and how it is opened."""
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""The thread that owns an opened USB camera."""
+"""A thread that reads an opened USB camera without pause."""
 
 import threading
 from collections.abc import Callable

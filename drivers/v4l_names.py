@@ -1,4 +1,4 @@
-"""Which video device is which camera: by serial number or port, never by a number that changes."""
+"""Finds video devices by serial number or USB port; device numbers change and are not used."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

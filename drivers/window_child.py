@@ -1,4 +1,4 @@
-"""The process that owns the window: black unless a living application vouches for a picture.
+"""The process that owns the window; shows black unless the application confirms the picture.
 
 Started by `drivers.window_display` as `python -m drivers.window_child MEMORY WAKE OUTPUT WIDTH
 HEIGHT`: the descriptor of the shared memory, that of a pipe of which every byte means "look again"
@@ -101,7 +101,7 @@ class Window:
 
 
 class Keeper:
-    """Decides what is to be seen, and waits for reasons to decide again."""
+    """Decides which picture the window shows, and waits for changes."""
 
     def __init__(self, window: Window, memory: WindowMemory, wake: int) -> None:
         self._window = window

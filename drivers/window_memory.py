@@ -1,4 +1,4 @@
-"""What a window's two processes share: two pictures, and which of them may be seen until when.
+"""Shared memory of the window's two processes: two pictures, and until when each may be shown.
 
 The application writes one picture while the window's process may still copy the other. Every field
 is one aligned 64-bit word that only one side writes; a woken reader looks at all of them again.

@@ -1,4 +1,4 @@
-"""The application's end of the window's process: starting it, vouching for it, ending it."""
+"""Starts, watches and ends the window's process, from the application's side."""
 
 import contextlib
 import json
@@ -22,7 +22,7 @@ _ERRORS = {kind.__name__: kind for kind in (DeviceError, DeviceNotFound, WrongDe
 
 @dataclass(frozen=True, slots=True)
 class WindowSettings:
-    """Which window.
+    """Output, size and flips of a window.
 
     Attributes:
         output: name of the monitor or projector as SDL tells it; empty: the only one.

@@ -1,4 +1,4 @@
-"""One axis of a Zaber device: flags that speak against its place, motions followed to their end.
+"""One axis of a Zaber device: motions followed to their end, and flags that mark one as failed.
 
 A reply says OK when a command was accepted, not when the axis has arrived.
 """
@@ -24,7 +24,7 @@ _LATER = ("AGAIN", "STATUSBUSY", "FULL")
 
 
 class ZaberAxis:
-    """What an axis says of itself.
+    """One axis: its place, its motions, and the flags that mark a motion as failed.
 
     Attributes:
         talk: the line of its device.

@@ -1,4 +1,4 @@
-"""How the knee lies on the table in front of the cameras."""
+"""Placement of the simulated knee on the table in front of the cameras."""
 
 import numpy as np
 

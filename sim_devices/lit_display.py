@@ -1,4 +1,4 @@
-"""A simulated display whose light is late, and the view of the cameras that look at it."""
+"""A simulated display with a delay, and the view of cameras that look at it."""
 
 import math
 import threading

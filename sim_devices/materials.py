@@ -1,4 +1,4 @@
-"""How the surfaces of the operating site look."""
+"""Table of materials: reflectance and gloss of the simulated surfaces."""
 
 from dataclasses import dataclass, replace
 from enum import IntEnum, unique

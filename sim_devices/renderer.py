@@ -1,4 +1,4 @@
-"""Renders posed bodies into one picture: z-buffer, then shading; what never moves is kept."""
+"""Renders posed bodies into a picture: z-buffer, then shading; static parts are cached."""
 
 import threading
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """What a rendering is made of besides shapes.
+    """Materials, texture and lamps of a rendering.
 
     Attributes:
         materials: table of `materials.make_material_table`.

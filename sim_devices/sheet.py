@@ -24,7 +24,7 @@ _EDGE_PX = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrintedSheet:
-    """What is printed.
+    """A printed sheet: its picture, resolution and place.
 
     Attributes:
         white: (h, w) uint8, 255 where the paper is white, 0 where it is black.

@@ -1,4 +1,4 @@
-"""What the surgical stages look like: the bodies of each and how they are made.
+"""Bodies of the simulated surgical stages, and how they are made.
 
 Everything is built as for a right knee; a left one is the mirror image of the whole site.
 """

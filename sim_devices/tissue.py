@@ -30,7 +30,7 @@ WALL_MM = 24.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """A surface of the site and what the renderer wants to know of its vertices.
+    """A surface with values per vertex for the renderer.
 
     Attributes:
         mesh: in the table's frame.

@@ -1,4 +1,4 @@
-"""Which format a rig's file has, and reading and writing whichever it is."""
+"""Recognises the format of a rig's file, and reads and writes rigs in every known format."""
 
 from pathlib import Path
 from typing import Literal, get_args

@@ -1,4 +1,4 @@
-"""Distortion as other programs know it: the first coefficients of OpenCV's polynomial."""
+"""Distortion coefficients in OpenCV's order, as other programs store them."""
 
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera

@@ -1,4 +1,4 @@
-"""YAML of other programs, and what is asked of its entries."""
+"""Reads YAML of other programs and checks its entries; each error names file and key."""
 
 from collections.abc import Mapping
 from pathlib import Path

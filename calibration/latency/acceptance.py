@@ -1,4 +1,4 @@
-"""Whether a measured latency may be believed; what it refuses it names in one sentence."""
+"""Measures a latency and raises `ResultError`, in one sentence, where it cannot be trusted."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where a camera sees the display: the cells of its pictures that follow the code."""
+"""Finds the cells of a camera's pictures whose brightness follows the display's code."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _TURN_MS = 1000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WatchedCells:
-    """What one eye saw.
+    """Grey values of one eye's pictures, frame by frame.
 
     Attributes:
         times_ms: (n,) stamps of its exposures, rising.
@@ -33,7 +33,7 @@ class WatchedCells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Area:
-    """The cells that follow the code.
+    """The cells of a camera's pictures that follow the code.
 
     Attributes:
         is_in: (c,) these cells.

@@ -1,4 +1,4 @@
-"""The lag at which a code explains most of what was seen, and how that scatters."""
+"""Fits the lag at which a code explains a grey value best, and resamples it for its scatter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

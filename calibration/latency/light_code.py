@@ -1,4 +1,4 @@
-"""The code that a display shows: light and darkness in turn, for times that nobody can foresee."""
+"""The code that a display shows: alternately light and dark, for random times."""
 
 from dataclasses import dataclass
 
@@ -30,7 +30,7 @@ def draw_pauses_ms(duration_s: float, seed: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Switches:
-    """When the display was told to change.
+    """Times at which the display was told to switch between dark and light.
 
     Attributes:
         times_ms: (m,) rising, m even; dark before the first, lit after it, dark after the next.

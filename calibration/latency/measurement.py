@@ -1,4 +1,4 @@
-"""From what two eyes saw of a code to the lag of either, and to what may be said of both."""
+"""Measures the lag of each eye behind a code, and from both the display's delay and the skew."""
 
 import math
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ _T95 = 2.05
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A time and how well it is known.
+    """A time and its standard error.
 
     Attributes:
         value_ms, sigma_ms: and its standard error.
@@ -49,7 +49,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class EyeLag:
-    """How one eye saw the code.
+    """Lag of one eye behind the code, and how well the code explains its pictures.
 
     Attributes:
         lag: from the call that changed the display to the change in the pictures, on their stamps.
@@ -74,7 +74,7 @@ class EyeLag:
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """What was found.
+    """Result of a latency measurement.
 
     Attributes:
         left, right: the eyes.

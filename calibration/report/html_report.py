@@ -1,4 +1,4 @@
-"""The report of a calibration: one HTML file without anything from elsewhere."""
+"""Writes the report of a calibration as one HTML file without external resources."""
 
 from html import escape
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The pictures of a report, as SVG text.
+"""Plots of a calibration's report, each as SVG text.
 
 Matplotlib is slow to import, so each function takes it at first use.
 """

@@ -1,4 +1,4 @@
-"""What a calibration has to show before it is accepted."""
+"""Limits that a calibration has to meet, and the sentences that say which it does not."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _FINENESS = 3
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What is asked of a calibration.
+    """Limits that a calibration has to meet.
 
     Attributes:
         fewest_pairs: that must be used.
@@ -48,7 +48,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Where and how the board was shown.
+    """How well the views cover the pictures, depths and tilts.
 
     Attributes:
         left, right: shares of the cells that the working volume needs, with marks in them.

@@ -1,4 +1,4 @@
-"""Both cameras, their places and all poses of the board in one robust least squares.
+"""Robust least squares for both cameras, their placement and all poses of the board at once.
 
 Gauss-Newton with Levenberg's damping.
 """
@@ -21,7 +21,7 @@ _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
-    """A solved rig.
+    """Result of a bundle adjustment: rig, poses of the board, information and residuals.
 
     Attributes:
         model: which numbers were solved for.

@@ -1,4 +1,4 @@
-"""Pairs that do not belong: found by what they leave, and named by why."""
+"""Finds pairs of pictures that do not fit the rig, and says why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

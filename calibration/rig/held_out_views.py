@@ -1,4 +1,4 @@
-"""Held-out views: what a model is worth on pictures that it was not solved with."""
+"""Cross-validation: solves without some of the views and measures the residuals of those."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ N_FOLDS = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOut:
-    """What views say of rigs that were solved without them.
+    """Residuals of views under rigs that were solved without them.
 
     Attributes:
         squares_px2: (V,) mean squared distance between marks seen and predicted, per view.

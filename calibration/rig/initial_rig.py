@@ -1,4 +1,4 @@
-"""Where a calibration begins: OpenCV's usual chain, view by view and camera by camera."""
+"""First estimate of a rig by OpenCV's functions: each camera alone, then their placement."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""How long a rig measures a board that is seen once, and how sure that is."""
+"""Measures the length of a board that is seen once with a rig, and its standard error."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ _N_UNKNOWN = 7
 
 @dataclass(frozen=True, slots=True)
 class MeasuredLength:
-    """Of a board in one pair.
+    """A board's measured size relative to its true one, from one pair.
 
     Attributes:
         ratio: measured over true.

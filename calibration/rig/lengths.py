@@ -1,4 +1,4 @@
-"""What a rig measures: distances across the epipolar lines, and lengths on the board."""
+"""Triangulation with a rig: points, epipolar distances and ratios of lengths on the board."""
 
 from collections.abc import Sequence
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Residuals of a rig at one place, how they change, and the normal equations of a step from there.
+"""Residuals and Jacobian of a rig at one estimate, and the normal equations of its next step.
 
 The poses are eliminated view by view (Schur complement), so that the cost grows with the number of
 views alone. Residuals count in units of their marks' own standard errors.
@@ -29,7 +29,7 @@ _EXPECTED_FRACTION_OFF = (0.01, 0.01, 0.05)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Views:
-    """What stays the same in all steps.
+    """Observations and model of a bundle adjustment, the same in all steps.
 
     Attributes:
         board: that was seen.
@@ -56,7 +56,7 @@ class Views:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PictureLinearisation:
-    """What one picture leaves, and how it changes.
+    """Residuals of one picture and their derivatives.
 
     Attributes:
         residual_px: (n, 2) seen less predicted.
@@ -74,7 +74,7 @@ class _PictureLinearisation:
 
 
 class Linearisation:
-    """What the views leave, and how it changes, at one linear.
+    """Residuals of all views and their derivatives, at one estimate.
 
     Args:
         views: V.
@@ -150,7 +150,7 @@ class Linearisation:
 
 
 class NormalEquations:
-    """What a step at one place is solved from, weighed by what is left there."""
+    """Normal equations of a step from one linearisation, with robust weights."""
 
     def __init__(self, linear: Linearisation) -> None:
         n = linear.views.model.n_shared

@@ -1,4 +1,4 @@
-"""Which view of the board tells most about the rig: what a capture asks for next."""
+"""Chooses the view of the board that lowers a rig's predicted error most."""
 
 from collections.abc import Sequence
 from functools import cache

@@ -20,7 +20,7 @@ N_COEFFICIENTS = (4, 5, 8, 12)
 
 @dataclass(frozen=True, slots=True)
 class RigModel:
-    """Which numbers are solved for.
+    """Which parameters of a rig are solved for.
 
     Attributes:
         n_coefficients: of each lens, one of `N_COEFFICIENTS`.

@@ -1,4 +1,4 @@
-"""Where a rig sees points of the board, and how that moves with every number of the rig."""
+"""Projects points of the board into a camera of the rig, with derivatives by all parameters."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A rig as it is, on new views of the board."""
+"""Checks an existing rig on new views of the board."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _FEWEST_PAIRS, _N_SIGMAS = 3, 2.0
 
 @dataclass(frozen=True, slots=True)
 class RigCheck:
-    """What new views say of a rig.
+    """Result of checking a rig on new views.
 
     Attributes:
         n_pairs: that saw the board.

@@ -1,4 +1,4 @@
-"""From what both cameras saw of a target to a judged rig."""
+"""Solves a rig from pairs of pictures of a target: drops bad pairs, chooses a model, judges it."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ _CHANCE = 1.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """A solved rig and what it is worth.
+    """A solved rig with its residuals, coverage and predicted errors.
 
     Attributes:
         rig: with its quality record.
@@ -131,7 +131,7 @@ def solve_rig(
 
 
 class _Work:
-    """The steps, and how far they are."""
+    """The steps of a calibration, with progress."""
 
     def __init__(
         self, board: Board, size: tuple[int, int], on_progress: Callable[[float], None]

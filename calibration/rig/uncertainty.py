@@ -1,4 +1,4 @@
-"""What a rig's own uncertainty costs where it is used, in millimetres.
+"""Predicted error in mm of points that a rig triangulates, from the rig's covariance.
 
 A point of the working volume is projected by the rig as solved and triangulated by a rig that is
 off by what its covariance allows; how far the answer lies from the point is what a user has to

@@ -1,4 +1,4 @@
-"""Targets for calibration: what is printed on them, and the file that says so.
+"""Calibration targets: geometry of each kind, and the JSON file that describes a printed one.
 
 A target's frame: x along its columns, y along its rows, z away from who looks at it. Boards of
 squares begin at the outer corner of the first square, circles at the first circle's centre.
@@ -36,7 +36,7 @@ _FEWEST_SQUARES, _FEWEST_CIRCLES = 3, 2
 
 @dataclass(frozen=True)
 class Board:
-    """A flat target.
+    """A flat calibration target.
 
     Attributes:
         kind: of the target.

@@ -1,4 +1,4 @@
-"""A target found in a picture, every mark to a hundredth of a pixel where the picture allows it."""
+"""Finds a target in a picture and locates its marks with sub-pixel accuracy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenBoard:
-    """What one picture shows of a target.
+    """Marks of a target found in one picture.
 
     Attributes:
         ids: (n,) rows of `Board.points_mm`, ascending.

@@ -1,4 +1,4 @@
-"""A target as shapes in millimetres: what is printed, and what pictures of it are made of."""
+"""A target as black shapes in mm, and as a grey picture of these."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A target on paper, to scale: PDF or SVG."""
+"""Renders a target to scale as a page, PDF or SVG."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""A target seen by both cameras at once."""
+"""A target as seen by both cameras at one instant."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from navapp.geometry.transform import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenPair:
-    """What the two pictures of one instant show of a target.
+    """Marks of a target found in both pictures of one instant.
 
     Attributes:
         index: number of the pair, as its files are called.

@@ -1,4 +1,4 @@
-"""What a check raises, and what all checks need."""
+"""The exception of a failed contract check, and helpers that all checks use."""
 
 import os
 import threading

@@ -1,4 +1,4 @@
-"""Whether this user may use a device file, and how to become one who may."""
+"""Whether this user may open a device file, and the command that grants it."""
 
 import getpass
 import grp

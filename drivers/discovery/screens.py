@@ -1,4 +1,4 @@
-"""The outputs of the X server, asked for by a process of its own.
+"""Lists the outputs of the X server, in a child process.
 
 SDL takes signals, threads and a connection for good when it starts, and a broken graphics library
 may end the process: neither is for the application. `python -m drivers.discovery.screens` prints

@@ -1,4 +1,4 @@
-"""The USB cameras of this computer, each with the name by which a configuration chooses it."""
+"""Lists the USB cameras of this computer, each with the name that a configuration takes."""
 
 import errno
 from collections import Counter

@@ -1,4 +1,4 @@
-"""A folder of pairs, and the board that both pictures of each show."""
+"""Reads a folder of picture pairs and finds the board in both pictures of each."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardPairs:
-    """What the pictures of a folder show.
+    """The board in the pictures of a folder.
 
     Attributes:
         seen: pairs that show the board, by their numbers.

@@ -113,7 +113,7 @@ def _capture(opened: "OpenedCapture", solver: "_Solver", options: argparse.Names
 
 
 class _Solver:
-    """Solves, judges and writes; keeps what it found for the end."""
+    """Solves the rig of a capture, judges it and writes its files."""
 
     def __init__(
         self,

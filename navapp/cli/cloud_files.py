@@ -1,4 +1,4 @@
-"""Scene and model of a registration from users' files, and what had to be done to them."""
+"""Reads scene and model of a registration from users' files, with notes of what was changed."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the command line says on stderr, and its results as JSON."""
+"""Messages on stderr, and results as JSON."""
 
 import json
 import math
@@ -16,7 +16,7 @@ from navapp.geometry.whole_files import write_whole
 
 @dataclass(frozen=True, slots=True)
 class Diagnostics:
-    """How much is said."""
+    """Messages on stderr, as many as the options ask for."""
 
     is_verbose: bool = False
     is_quiet: bool = False

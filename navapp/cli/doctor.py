@@ -1,4 +1,4 @@
-"""`navapp doctor`: what is there, what is missing, and what to do about it."""
+"""`navapp doctor`: checks of the installation and of the configured devices, with remedies."""
 
 import argparse
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""`navapp plan --contents --markups`: the surgical content of a plan, read and told."""
+"""`navapp plan --contents --markups`: reads the surgical content of a plan and reports it."""
 
 import argparse
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""What `navapp plan` makes a plan from: a CT, a ready segmentation, or surfaces."""
+"""`navapp plan`: makes bone models from a CT, a segmentation or surface files."""
 
 import argparse
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Options of `navapp plan` that are given once a bone, and the cartilage on it."""
+"""Options of `navapp plan` of the form BONE=VALUE, and `--cartilage`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The two files of a registration, in mm and ready; what speaks against them."""
+"""Reads the inputs of `navapp register`, converts them to mm and warns of doubtful ones."""
 
 import argparse
 import time
@@ -24,7 +24,7 @@ _SMALLEST_MM, _LARGEST_MM = 5.0, 5000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegisterInputs:
-    """What is registered, and the way back to the files' unit.
+    """Scene, model and start of a registration in mm, with the conversion to the files' unit.
 
     Attributes:
         scene, model: in mm.

@@ -1,4 +1,4 @@
-"""`navapp rig`: what a rig's file says, and the same rig in another format."""
+"""`navapp rig`: prints what a rig's file holds, or converts it to another format."""
 
 import argparse
 from datetime import date

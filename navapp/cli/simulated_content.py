@@ -1,4 +1,4 @@
-"""What a surgeon would have planned for the simulated knee: by the book, from its landmarks."""
+"""Surgical content of a plan for the simulated knee, constructed from its landmarks."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""What the simulated patient brings along when nothing else is given: a plan and a prior."""
+"""Plan and prior of the simulated patient, used when none is given."""
 
 from navapp.cli.simulated_content import make_built_in_content
 from navapp.devices import Simulation

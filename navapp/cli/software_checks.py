@@ -1,4 +1,4 @@
-"""What `navapp doctor` sees of Python, the packages, the kernels' cache and the terminal."""
+"""Checks of `navapp doctor`: Python, packages, the kernels' cache and the terminal."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What `navapp stereo` writes: a picture of the disparity, and the cloud."""
+"""Output files of `navapp stereo`: a picture of the disparity, and the point cloud."""
 
 import numpy as np
 from numpy.typing import NDArray

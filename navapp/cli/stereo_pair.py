@@ -1,4 +1,4 @@
-"""The pair that `navapp stereo` matches, and where it is to be looked."""
+"""Reads and rectifies the pair of `navapp stereo` and finds its disparity range."""
 
 import argparse
 import json

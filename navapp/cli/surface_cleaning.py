@@ -1,4 +1,4 @@
-"""What users' surfaces need before they can be a model: mended, turned outward, thinned."""
+"""Cleans users' surfaces for registration: repairs, orients and thins them."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ _NORMAL_NEIGHBOURS = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MendedSurface:
-    """A surface, and what was done to it in words for people."""
+    """A repaired surface, with notes for people."""
 
     mesh: TriangleMesh
     notes: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Which configuration file is read, and reading it."""
+"""Finds and reads the configuration file."""
 
 import os
 import tomllib

@@ -113,7 +113,7 @@ class PlanSection(Section):
 
 
 class TrackingSection(Section):
-    """The line."""
+    """Tracking of the bones."""
 
     method: Literal["bimcc", "icp"] = "bimcc"
     """icp is the paper's baseline."""
@@ -163,7 +163,7 @@ class EmptySection(Section):
 
 
 class Configuration(Section):
-    """The whole file."""
+    """The whole configuration file."""
 
     camera: CameraSection = CameraSection()
     display: DisplaySection = DisplaySection()

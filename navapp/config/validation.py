@@ -1,4 +1,4 @@
-"""From a file's content to a checked model, or to one sentence that names what is wrong."""
+"""Validates a file's content; an error is one sentence with the key and the nearest known one."""
 
 import difflib
 from collections.abc import Mapping

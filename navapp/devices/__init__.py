@@ -1,4 +1,4 @@
-"""Composition root: the only place that turns a configuration into opened devices."""
+"""Opens the devices that a configuration names; the only package that does."""
 
 from navapp.devices.cameras import make_real_camera
 from navapp.devices.capture import OpenedCapture, open_capture

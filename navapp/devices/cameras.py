@@ -1,4 +1,4 @@
-"""The configured camera of this world: USB, OAK, or of an installed package."""
+"""Makes the configured real camera: USB, OAK, or one of an installed package."""
 
 from drivers.clock import Clock
 from drivers.depthai_settings import DepthaiSettings

@@ -1,4 +1,4 @@
-"""An opened camera in front of a board, for a guided capture."""
+"""Opens the camera of a guided capture; a simulated one sees a board in a simulated hand."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""An opened camera that sees an opened display, for their delays."""
+"""Opens a display and a camera that sees it, to measure their delays."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Cameras that other packages bring: entry points `camera.NAME` of the group `navapp.devices`."""
+"""Makes cameras of other packages, entry points `camera.NAME` of group `navapp.devices`."""
 
 from collections.abc import Mapping
 from importlib import metadata

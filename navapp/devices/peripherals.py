@@ -1,4 +1,4 @@
-"""What stands around the camera: display, projector and mirror."""
+"""Makes display, projector and mirror as configured."""
 
 from contextlib import ExitStack
 from functools import partial

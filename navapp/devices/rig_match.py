@@ -1,4 +1,4 @@
-"""A camera and the rig that it was calibrated as: whether they belong together."""
+"""Opens a camera and refuses it when it is not the one that the rig was calibrated with."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Opened devices, from a configuration or a recording."""
+"""Opens the devices of a session, from a configuration or a recording."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

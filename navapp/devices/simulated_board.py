@@ -1,4 +1,4 @@
-"""A printed board and the hand that holds it before simulated cameras."""
+"""A printed board and a hand that holds it, for simulated cameras."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The simulated room as it is configured, and what it tells apart from its devices."""
+"""The simulated room as configured: world, camera, and the truth kept apart from them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Judging results with the truth, after the run."""
+"""Compares results with the truth, after a run."""
 
 from navapp.evaluation.truth import compute_mean_tre_mm
 

@@ -1,4 +1,4 @@
-"""Cameras of other packages: entry points `camera.NAME` of the group `navapp.devices`."""
+"""Lists cameras of other packages: entry points `camera.NAME` of group `navapp.devices`."""
 
 import subprocess
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Whether the devices that the configuration names are there; none of them is started."""
+"""Checks that the configured devices are connected, without starting any."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""All that is connected, and how each device is chosen in the configuration."""
+"""Lists all connected devices, and makes the TOML that chooses each."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Device = UsbCamera | OakCamera | InstalledCamera | FoundPort | Output
 
 @dataclass(frozen=True, slots=True)
 class Inventory:
-    """What one look at the computer gave."""
+    """All devices that were found connected."""
 
     usb_cameras: Listing[UsbCamera]
     oak_cameras: Listing[OakCamera]

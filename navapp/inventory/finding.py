@@ -1,4 +1,4 @@
-"""One thing that `navapp doctor` looked at."""
+"""One result of `navapp doctor`."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +14,7 @@ class Health(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at.
+    """Result of one check.
 
     Attributes:
         name: of it.

@@ -1,4 +1,4 @@
-"""What the system must grant before a device can be used: groups, a udev rule, libraries, a screen.
+"""Checks what devices need of the system: groups, a udev rule, libraries, a screen.
 
 A check says nothing of a kind of device that is neither connected nor configured.
 """

@@ -1,4 +1,4 @@
-"""Compose a picture from the video, the layers of a stage and the banner that says what it is."""
+"""Composes a picture from the video, the layers of a stage and a banner."""
 
 import numpy as np
 from numpy.typing import NDArray

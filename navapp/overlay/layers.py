@@ -1,4 +1,4 @@
-"""What can be drawn over the video: one function a layer, one line in the table."""
+"""Layers that can be drawn over the video: one function each, and the table of their names."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

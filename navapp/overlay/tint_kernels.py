@@ -1,4 +1,4 @@
-"""Compiled veil over a bone."""
+"""Compiled loops that tint a bone's pixels in the video."""
 
 import numpy as np
 from numba import njit

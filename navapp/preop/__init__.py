@@ -1,4 +1,4 @@
-"""Before the operation: a CT, a segmentation or surfaces become a plan."""
+"""Planning: makes plans from a CT, a segmentation or surfaces, and reads and writes them."""
 
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.aspects import AspectSettings, build_aspects

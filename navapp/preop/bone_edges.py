@@ -1,4 +1,4 @@
-"""What of a bone's mesh is an edge to the eye, and what is only the end of the mesh."""
+"""Finds visible edges of a bone's mesh: creases, apart from borders where the mesh ends."""
 
 from dataclasses import dataclass
 

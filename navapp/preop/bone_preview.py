@@ -1,4 +1,4 @@
-"""A picture of a bone from three sides, for whoever looks into a plan folder."""
+"""Draws a bone from three sides, as a picture in the plan folder."""
 
 import numpy as np
 

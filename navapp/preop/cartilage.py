@@ -1,4 +1,4 @@
-"""Cartilage on a bone: what a camera sees above the surface that a CT shows.
+"""Cartilage on a bone: thickness and standard deviation per vertex, even or from a surface file.
 
 The plan holds a thickness and its standard deviation per vertex; the bone itself stays as it is.
 """

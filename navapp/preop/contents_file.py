@@ -1,4 +1,4 @@
-"""A contents file: what a person writes down of the operation, in plan coordinates (LPS, mm)."""
+"""Reads a contents file: the planned operation in TOML, coordinates LPS, mm."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

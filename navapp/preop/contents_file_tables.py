@@ -1,4 +1,4 @@
-"""The tables of a contents file: frozen models with units in the keys, unknown keys refused."""
+"""Pydantic models of the tables of a contents file; unknown keys are refused."""
 
 from typing import Annotated, Literal, Self
 

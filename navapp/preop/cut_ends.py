@@ -1,4 +1,4 @@
-"""Where a bone's surface ends without the bone ending: flat caps of cut bones, open borders."""
+"""Finds where a bone's surface was cut: flat caps and open borders."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Default targets: points spread over the joint's surfaces, where the registration is judged."""
+"""Default targets: points on the joint's surfaces at which the registration error is judged."""
 
 from collections.abc import Mapping
 from dataclasses import replace

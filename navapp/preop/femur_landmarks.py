@@ -28,7 +28,7 @@ ACROSS = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Condyles:
-    """The end of a femur, parted at its notch.
+    """A femur's vertices, which of them belong to a condyle, and the plane between the two.
 
     Attributes:
         vertices_mm: (V, 3) of the bone.

@@ -1,4 +1,4 @@
-"""A plan made whole: what files say, and what the surfaces say where files say nothing."""
+"""Completes a plan: side, landmarks and targets from the surfaces where files give none."""
 
 from collections.abc import Mapping
 from dataclasses import replace

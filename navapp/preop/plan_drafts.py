@@ -1,4 +1,4 @@
-"""Drafts of plans: bones out of a CT or a ready segmentation, with all there is to say of them."""
+"""Makes bone models with their origin and pictures, from a CT or a segmentation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ _LEAST_LABEL_MM3 = 1000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtSettings:
-    """What an operator may override.
+    """Settings of a plan from a CT that an operator may override.
 
     Attributes:
         threshold_hu: what is denser may be bone; the surface does not depend on it.
@@ -37,7 +37,7 @@ class CtSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """Bones before they become a plan.
+    """Bone models before they become a plan.
 
     Attributes:
         bones: name -> model, those that are followed.

@@ -1,4 +1,4 @@
-"""Plan folders: plan.json, one PLY a bone, a picture of each."""
+"""Reads and writes plan folders: plan.json, a PLY file and a picture per bone."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What tells that a plan's folder is as it was written."""
+"""Digest of a plan's file, and the error for a plan folder that was changed or is damaged."""
 
 import hashlib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A plan's summary: one HTML page for whoever has to decide whether to trust it."""
+"""The summary of a plan as one HTML page."""
 
 import base64
 from html import escape

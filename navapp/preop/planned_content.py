@@ -1,4 +1,4 @@
-"""What files say of an operation, before it becomes part of a plan."""
+"""Surgical content read from files, before it is put into a plan."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace

@@ -1,4 +1,4 @@
-"""Left or right, from the shapes of the bones; "unknown" is an answer."""
+"""Estimates left or right from the shapes of the bones, with a certainty; may be unknown."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ _LEAST_POINTS = 8
 
 @dataclass(frozen=True, slots=True)
 class SideEstimate:
-    """Which side it is, how sure that is, and what says so."""
+    """An estimated side with its certainty and reasons."""
 
     side: Side | None
     certainty: Certainty

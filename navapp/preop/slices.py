@@ -1,4 +1,4 @@
-"""Slices of a volume with the contour of a surface in them: the eye judges a segmentation."""
+"""Draws slices of a volume with a surface's contour, to check a segmentation by eye."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""A bone's surface from a file, cleaned: one piece, outward normals, LPS, mm."""
+"""Imports a bone's surface from a file: one piece, outward normals, LPS, mm."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The devices panel: each device's health, troubles first where there is little room."""
+"""The devices panel: each device's health; those in trouble come first where space is short."""
 
 from textual.content import Content
 

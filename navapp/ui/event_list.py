@@ -11,7 +11,7 @@ _WORDS = {EventLevel.INFO: "", EventLevel.WARNING: "WARNING ", EventLevel.ALARM:
 
 
 class EventList(TextView):
-    """As many as there are lines."""
+    """The newest events, as many as fit."""
 
     def __init__(self) -> None:
         super().__init__("events")

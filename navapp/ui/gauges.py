@@ -1,4 +1,4 @@
-"""Numbers of fixed width, bars with their limit drawn in, sparklines: text only."""
+"""Text gauges: numbers of fixed width, bars with a limit, sparklines."""
 
 import math
 from collections.abc import Sequence

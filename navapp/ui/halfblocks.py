@@ -1,4 +1,4 @@
-"""A picture as terminal cells: two pixels a cell, few colours, long runs."""
+"""Converts a picture to terminal cells of two pixels each."""
 
 from functools import lru_cache
 

@@ -1,4 +1,4 @@
-"""The line panel: how fast, how late, how much was dropped."""
+"""The line panel: frame rate, latency, dropped frames and skew."""
 
 from textual.content import Content
 

@@ -1,4 +1,4 @@
-"""The pages over the main screen: help, devices, events, and the question before quitting."""
+"""Pages over the main screen: help, devices, events, and the question before quitting."""
 
 import dataclasses
 import textwrap

@@ -1,4 +1,4 @@
-"""The pose panel: may guides be shown, and if not, why and what to do."""
+"""The pose panel: whether guides may be shown; if not, the reason and a remedy."""
 
 import textwrap
 
@@ -23,7 +23,7 @@ _STATUS_LEVELS = {
 
 
 class PosePanel(TextView):
-    """First line: navigable, yes or no. Last lines: the error. Between: figures, or the reason.
+    """Whether guides may be shown, figures or the reason, and the error against its limit.
 
     Above the error a line for each other bone that is followed: rms figures make room for them, a
     reason or a question to the operator does not.

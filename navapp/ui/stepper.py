@@ -1,4 +1,4 @@
-"""The five stages in a row, and what the present one asks for."""
+"""The row of the five stages, with gates and measurements of the current one."""
 
 from textual.content import Content
 

@@ -1,4 +1,4 @@
-"""The terminal belongs to the screen: what libraries print goes to a log."""
+"""Takes over the terminal for the screen; output of libraries goes to a log."""
 
 import contextlib
 import os

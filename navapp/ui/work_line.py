@@ -1,4 +1,4 @@
-"""The line for long work: what it does, how far it is, how to cancel it."""
+"""The progress line of long work: what, how far, and how to cancel."""
 
 from textual.content import Content
 
@@ -11,7 +11,7 @@ _BAR_WIDTH = 26
 
 
 class WorkLine(TextView):
-    """Always there, so that nothing jumps when work begins; empty when there is none."""
+    """Progress of long work; empty, but in place, when there is none."""
 
     def __init__(self) -> None:
         super().__init__("work")

@@ -1,4 +1,4 @@
-"""The end of a wire as a driver's port, on a clock that moves when somebody waits."""
+"""A driver's port that is connected to a simulated wire."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The end of a wire as a pseudo-terminal: any program opens it like a serial port."""
+"""Connects a simulated wire to a pseudo-terminal, which programs open like a serial port."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""A stage and how it travels: phases of constant acceleration, in microsteps and seconds."""
+"""Motion of a stage in phases of constant acceleration; microsteps and seconds."""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class StageModel:
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """A motion from a place.
+    """A motion from a place, as a function of time.
 
     Attributes:
         start_ns: when it began.

@@ -1,4 +1,4 @@
-"""The cable between a firmware and a driver: what is sent may be split, late, lost or spoilt."""
+"""A simulated cable between firmware and driver that can split, delay, lose or spoil messages."""
 
 import random
 from collections import deque
@@ -13,7 +13,7 @@ Spoiler = Callable[[bytes], Pieces]
 
 
 class Firmware(Protocol):
-    """A device's program."""
+    """Protocol of a simulated device's firmware."""
 
     def receive(self, data: bytes) -> None:
         """Take bytes in; never fails."""
@@ -29,7 +29,7 @@ class Firmware(Protocol):
 
 
 class Wire:
-    """Carries bytes both ways.
+    """Carries bytes between a firmware and a driver, both ways.
 
     Attributes:
         firmware: at its far end.

@@ -1,4 +1,4 @@
-"""From segmented bones to their surfaces, unbiased by threshold and thin cortex."""
+"""Sub-voxel surfaces of segmented bones, unbiased by threshold and thin cortex."""
 
 from navapp.preop.ct_surface.bone_surfaces import (
     BoneSurface,

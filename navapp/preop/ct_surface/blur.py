@@ -1,4 +1,4 @@
-"""What a scanner's blur does at a surface, by its direction and by its curvature."""
+"""A scanner's blur at a surface: by the normal's direction, and the shift of curved edges."""
 
 import numpy as np
 from scipy.sparse import csr_array

@@ -1,4 +1,4 @@
-"""Bone surfaces of a segmented CT, where the cortex's edge is and not where a threshold puts it."""
+"""Surfaces of segmented bones, placed at the edge of the cortex by a model of the blur."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ _PADDING_VOXELS = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoneSurface:
-    """One bone.
+    """Surface of one bone from a CT.
 
     Attributes:
         mesh: LPS mm, closed, normals outward.
@@ -53,7 +53,7 @@ class BoneSurface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtSurfaces:
-    """Surfaces by name, and what the scanner was found to do.
+    """Surfaces of all bones of a CT, with the scanner's estimated blur.
 
     Attributes:
         bones: by name.

@@ -1,4 +1,4 @@
-"""Where the surface of a bone lies in a density profile across its cortex, unbiased by thin cortex.
+"""Fits the edge of a blurred plate of cortex to density profiles across a bone's surface.
 
 A scanner blurs. The half-maximum of a blurred plate lies at its edge only when the plate is thick;
 cortex at the condyles is as thin as the blur is wide: its peak is lower, and the half-maximum lies
@@ -29,7 +29,7 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What blurs a plate of cortex in one CT.
+    """Densities and blur of one CT.
 
     Attributes:
         cortex_hu: density of the plate.
@@ -54,7 +54,7 @@ class Scan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Best explanation of N profiles.
+    """Edges fitted to N profiles.
 
     Attributes:
         offset_mm: (N,) of the edge along the outward normal.
@@ -101,7 +101,7 @@ def fit_edges(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Model:
-    """Of every tried pair of offset and thickness, offsets first.
+    """Predicted profiles for every tried pair of offset and thickness, offsets first.
 
     Attributes:
         offsets_mm: (m,).

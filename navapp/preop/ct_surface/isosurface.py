@@ -1,4 +1,4 @@
-"""The first surface of a bone: around its voxels, smooth, closed."""
+"""A smooth closed surface around a mask of voxels, the start of the refinement."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""A bone's surface moved to where its density profiles say that it is."""
+"""Moves the vertices of a bone's surface to the edges found in its density profiles."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _MOST_WEIGHT = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RefinedSurface:
-    """A surface on the edges of its cortex.
+    """A surface whose vertices lie on the edge of the cortex.
 
     Attributes:
         mesh: LPS mm.

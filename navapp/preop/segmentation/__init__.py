@@ -1,4 +1,4 @@
-"""From the density of a CT to named bones."""
+"""Segments a CT of the knee into named bones."""
 
 from navapp.preop.segmentation.bone_naming import BONES
 from navapp.preop.segmentation.knee_segmentation import (

@@ -1,4 +1,4 @@
-"""Which part is which bone: by size and place, in patient coordinates."""
+"""Names connected parts as bones by size and place, in patient coordinates."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _OTHER_LEG = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """What naming looks at: LPS mm.
+    """Size and place of one connected part, in LPS mm.
 
     Attributes:
         number: of its voxels.

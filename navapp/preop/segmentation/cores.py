@@ -1,4 +1,4 @@
-"""Cores: the inside of each bone, apart from all others however narrow the joint is."""
+"""Finds cores: the inside of each bone, separate from all others."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Growth: each core takes the cortex around it, up to the valley between two bones."""
+"""Grows each core to its bone, up to the cortex or the valley between two bones."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""Segmentation of a CT of the knee: from density to named bones."""
+"""Segments a CT of the knee: solids, plates, cores, names, growth."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Seeds: points by which an operator names bones."""
+"""Names bones by points that an operator gives."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""Solids: all that the soft tissue around does not reach, marrow included."""
+"""Finds solids: bone with its marrow, all that the soft tissue around does not reach."""
 
 import numpy as np
 from numpy.typing import NDArray

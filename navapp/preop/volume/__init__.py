@@ -1,4 +1,4 @@
-"""A CT as it was recorded: voxels in HU and where each of them lies, checked before use."""
+"""Reads a CT: voxels in HU with their places, checked before use."""
 
 from navapp.preop.volume.ct_volume import CtVolume, LabelVolume
 from navapp.preop.volume.dicom_listing import SeriesInfo, list_series

@@ -1,4 +1,4 @@
-"""Volumes: an array of voxels and the affine map that says where each of them lies."""
+"""Volumes: an array of voxels and the affine map from indices to LPS mm."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -12,7 +12,7 @@ _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
 class _Placed:
-    """What any volume knows of its place. Indices are (i, j, k): against the array's axes k, j, i.
+    """A volume's place. Indices are (i, j, k): against the array's axes k, j, i.
 
     `lps_from_index` is any invertible affine map: its axes may be oblique, left-handed (flips of a
     NIfTI file), and not at right angles (a tilted gantry: the step from slice to slice leans, and

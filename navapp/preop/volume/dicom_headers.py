@@ -1,4 +1,4 @@
-"""One DICOM file's header, as far as a volume needs it. pydicom is imported here alone."""
+"""Reads the tags of one DICOM file that a volume needs. Only this module imports pydicom."""
 
 import logging
 import warnings

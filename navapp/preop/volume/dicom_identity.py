@@ -1,4 +1,4 @@
-"""Keeping a patient's identity out of everything that is said about a DICOM series."""
+"""Removes a patient's identity from texts about a DICOM series."""
 
 import re
 from collections.abc import Iterable

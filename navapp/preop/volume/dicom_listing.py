@@ -1,4 +1,4 @@
-"""What DICOM series a folder holds."""
+"""Lists the DICOM series in a folder, and chooses one."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ class SeriesInfo:
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """Everything a folder's DICOM headers say.
+    """All DICOM headers of a folder.
 
     Attributes:
         shown: the folder's path, fit to be shown.

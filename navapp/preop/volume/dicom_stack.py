@@ -1,4 +1,4 @@
-"""Slices in order: from the headers of one series to the place of every voxel, or a refusal.
+"""Sorts the slices of a series and computes the place of every voxel, or refuses the series.
 
 Positions decide (ImagePositionPatient along the normal), never file names, numbers or the
 thickness tag: readers that go by those make a straight, evenly spaced stack of anything.

@@ -1,4 +1,4 @@
-"""Arrays of Hounsfield units: what is no measurement becomes air; the smallest type that fits."""
+"""Arrays of Hounsfield units: padding becomes air, and the smallest type that fits is used."""
 
 from typing import Any
 

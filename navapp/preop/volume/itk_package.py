@@ -1,4 +1,4 @@
-"""SimpleITK, imported at first use, and kept quiet: what its codecs say is read, not shown."""
+"""Imports SimpleITK at first use, and captures what its codecs print."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""What SimpleITK does not tell of a NIfTI file: whether it is whole, and axes that lean.
+"""Reads from a NIfTI header what SimpleITK does not tell: completeness, and leaning axes.
 
 Fields by nifti1.h and nifti2.h of the NIfTI Data Format Working Group.
 """

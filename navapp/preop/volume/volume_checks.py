@@ -1,4 +1,4 @@
-"""What a CT's voxels and size say about whether a plan can be made from it."""
+"""Checks of a CT's size and values: refusals and warnings."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Reading a CT, or a ready segmentation, from whatever holds it."""
+"""Reads a CT or a segmentation, from DICOM or from one file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +33,7 @@ class CtSource:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReadCt:
-    """A CT, where it came from, and what a person must know before trusting it."""
+    """A CT with its source and warnings."""
 
     volume: CtVolume
     warnings: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The lines of the capture's screen."""
+"""Widgets of the capture's screen."""
 
 from dataclasses import dataclass
 
