@@ -85,7 +85,7 @@ BREACHES = [
     ("navapp/tracking/line.py", "import pydicom", "only planning reads a CT"),
     ("navapp/tracking/judge.py", "import navapp.overlay", "tracking stands on"),
     ("navapp/control/trackers.py", "import sim_devices.world", "control is handed"),
-    ("navapp/control/states.py", "import navapp.inventory.looking", "control is handed"),
+    ("navapp/control/states.py", "import navapp.inventory.connected_devices", "control is handed"),
     ("navapp/control/frame_sources.py", "import drivers.replay_camera", "control knows the device"),
     ("navapp/ui/app.py", "import navapp.devices", "the screen reads snapshots"),
     ("drivers/clock.py", "import navapp.cli.main", "only the command line"),

@@ -48,7 +48,7 @@ def prepare_session(
     """
     from navapp.cli.headless import check_accepted, check_not_expired, check_start
     from navapp.cli.prior_files import read_prior
-    from navapp.cli.simulated_patient import built_in_plan, nominal_prior
+    from navapp.cli.simulated_patient import make_built_in_plan, make_nominal_prior
     from navapp.control.specification import specify_session
     from navapp.control.stages import stage_by_name
     from navapp.devices import open_live
@@ -66,8 +66,8 @@ def prepare_session(
         check_not_expired(opened.rig, date.today())
         check_accepted(opened.rig, options.allow_unaccepted, diagnostics)
         if opened.simulation is not None:
-            plan = plan or built_in_plan(opened.simulation)
-            prior = prior or nominal_prior(opened.simulation)
+            plan = plan or make_built_in_plan(opened.simulation)
+            prior = prior or make_nominal_prior(opened.simulation)
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
         prior = prior or Prior()

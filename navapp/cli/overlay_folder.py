@@ -1,4 +1,4 @@
-"""A folder of overlay pictures that is complete or not there."""
+"""Writes overlay pictures to a folder that appears only when all of them are written."""
 
 import shutil
 import tempfile

@@ -120,7 +120,7 @@ def _run_headless(
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:
     """Join a frame with the truth, after the run: by bone, of those whose pose is known."""
     from navapp.control.stages import stage_of
-    from navapp.evaluation import mean_tre_mm
+    from navapp.evaluation import compute_mean_tre_mm
 
     simulation, plan = session.opened.simulation, session.specification.plan
     if simulation is None:
@@ -133,7 +133,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
         if pose is not None and stage.bone in simulation.oracle.bodies:
             true = simulation.oracle.left_from_body(stage.bone, result.frame.captured_ns)
             targets = plan.targets_of(stage.targets)
-            errors_mm[stage.bone] = mean_tre_mm(pose, true, plan.bones[stage.bone], targets)
+            errors_mm[stage.bone] = compute_mean_tre_mm(pose, true, plan.bones[stage.bone], targets)
     return errors_mm
 
 

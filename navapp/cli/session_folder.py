@@ -9,7 +9,7 @@ from typing import get_args
 from drivers.session_files import SessionWriter
 from navapp import __version__
 from navapp.cli.prior_files import prior_to_json
-from navapp.config import Configuration, as_toml
+from navapp.config import Configuration, format_toml
 from navapp.control.operators import RecordedEvents, read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
 from navapp.control.specification import SessionSpecification
@@ -51,7 +51,7 @@ def start_recording(
     write_plan(folder / _PLAN, plan)
     prior = json.dumps(prior_to_json(specification.prior), indent=1)
     write_whole(folder / _PRIOR, prior.encode())
-    write_whole(folder / "configuration.toml", as_toml(configuration, False).encode())
+    write_whole(folder / "configuration.toml", format_toml(configuration, False).encode())
     content = {
         "navapp": __version__,
         "rig_id": rig.rig_id,

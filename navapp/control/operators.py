@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Protocol
 import numpy as np
 from pydantic import Field
 
-from navapp.config import Section, checked
+from navapp.config import Section, validate
 from navapp.control.command_files import command_from_json
 from navapp.control.stages import stage_by_name
 from navapp.control.states import (
@@ -233,7 +233,7 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
     Raises:
         ConfigurationError: an unknown key, action or stage.
     """
-    steps = checked(Script, content, name).step
+    steps = validate(Script, content, name).step
     for step in steps:
         if step.do == "stage":
             stage_by_name(step.stage)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking.correlated_residuals import (
     noise_ratio2,
@@ -84,7 +84,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             predicted_tre_mm(one, parts.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit.estimate, shown)
         )
-        error_mm = mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
+        error_mm = compute_mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
         ratio, is_misfit = (
             shown_ratio2(fit.estimate) ** 0.5,
             Reason.SURFACE_MISFIT in shown.reasons,

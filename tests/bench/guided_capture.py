@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.lengths import triangulated_mm
-from calibration.rig.solve import solve_rig
-from calibration.targets.pairs import SeenPair
+from calibration.rig.lengths import triangulate_mm
+from calibration.rig.rig_solution import solve_rig
+from calibration.targets.seen_pairs import SeenPair
 from navapp.control.capture.next_view import plan_next_view
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
@@ -52,7 +52,7 @@ def captured(seed: int, noise_px: float, stop_mm: float) -> Captured:
     points_mm = found.points_mm
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    errors = np.linalg.norm(triangulated_mm(found.rig, left, right) - points_mm, axis=1)
+    errors = np.linalg.norm(triangulate_mm(found.rig, left, right) - points_mm, axis=1)
     is_accepted = found.rig.quality is not None and found.rig.quality.is_accepted
     model = found.solved.model.name
     return Captured(

@@ -8,8 +8,8 @@ import pytest
 from navapp.control.stages import STAGES, stage_by_name, stage_by_number, stage_of
 from navapp.control.states import EnterStage
 from navapp.errors import UsageError
-from navapp.preop.contents_tables import StagesTable
-from navapp.preop.targets import with_defaults
+from navapp.preop.contents_file_tables import StagesTable
+from navapp.preop.default_targets import with_defaults
 from navapp.values import Plan, StageContent, SurgicalContent
 from tests.control.fakes import Bench, a_plan
 from tests.preop.knees import bones_of, knees

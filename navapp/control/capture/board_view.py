@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard, find_board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from drivers.frames import StereoFrame
 from navapp.geometry.bands import beside
 from navapp.geometry.rectification import luma

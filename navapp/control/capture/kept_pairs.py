@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.rig.judge import occupied
-from calibration.targets.pairs import SeenPair
+from calibration.rig.acceptance import find_occupied_cells
+from calibration.targets.seen_pairs import SeenPair
 from navapp.control.capture.board_view import BoardView
 from navapp.control.capture.interfaces import PairStore
 
@@ -61,5 +61,5 @@ class KeptPairs:
             [pair.right.pixels for pair in self._pairs],
         )
         return np.stack(
-            [occupied(np.vstack([np.empty((0, 2)), *one]), self._size) for one in sides]
+            [find_occupied_cells(np.vstack([np.empty((0, 2)), *one]), self._size) for one in sides]
         )

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.bundle import Bundle, solve_bundle
-from calibration.rig.guide import wanted_view
-from calibration.rig.parameters import RigModel, packed, unpacked
-from calibration.rig.start import matrix_of, pose_of, start_poses, start_rig
-from calibration.rig.uncertainty import bounds_mm, working_points_mm
-from calibration.rig.views import DroppedPair, misfits
+from calibration.rig.bundle_adjustment import Bundle, solve_bundle
+from calibration.rig.dropped_pairs import DroppedPair, find_misfits
+from calibration.rig.initial_rig import matrix_of, pose_of, start_poses, start_rig
+from calibration.rig.next_view import find_next_view
+from calibration.rig.parameters import RigModel, pack, unpack
+from calibration.rig.uncertainty import compute_bounds_mm, make_working_points_mm
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
@@ -98,9 +98,9 @@ def _plan_from_rig(
 ) -> NextView:
     """The next view for a rig that can be solved."""
     solved, used, out = _solve(board, pairs, size, last)
-    rig = unpacked(solved.model, solved.shared)
+    rig = unpack(solved.model, solved.shared)
     bounds = volume_bounds_mm(solved, depth_mm)
-    view = wanted_view(board, solved, noise_px(solved), depth_mm, avoid)
+    view = find_next_view(board, solved, noise_px(solved), depth_mm, avoid)
     pose = starting_view(board, 0, depth_mm) if view is None else view
     indices = tuple(pair.index for pair in used)
     if len(bounds) == 0:
@@ -117,12 +117,12 @@ def _solve(
     used = [pair for pair in pairs if pair.index not in {one.index for one in out}]
     model = RigModel(_SIMPLEST, 0, *size)
     if last is None or last.solved is None:
-        shared = packed(model, start_rig(board, used, size))
+        shared = pack(model, start_rig(board, used, size))
         poses = start_poses(board, used, model, shared)
     else:
         shared, poses = last.solved.shared, _poses(board, used, last)
     solved = solve_bundle(board, used, model, shared, poses)
-    more = misfits(board, used, solved)
+    more = find_misfits(board, used, solved)
     if not more or len(used) - len(more) < N_STARTING:
         return solved, used, out
     bad = {one.index for one in more}
@@ -146,10 +146,10 @@ def _poses(board: Board, pairs: Sequence[SeenPair], last: NextView) -> FloatArra
 def volume_bounds_mm(solved: Bundle, depth_mm: tuple[float, float]) -> FloatArray:
     """(n,) predicted 95 % errors of points of the working volume, from the covariance."""
     model = solved.model
-    points_mm = working_points_mm(model, solved.shared, depth_mm)
+    points_mm = make_working_points_mm(model, solved.shared, depth_mm)
     if len(points_mm) == 0:
         return np.empty(0)
-    return bounds_mm(model, solved.shared, solved.rig_covariance, points_mm)
+    return compute_bounds_mm(model, solved.shared, solved.rig_covariance, points_mm)
 
 
 def noise_px(solved: Bundle) -> float:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibration.targets.detection import SeenBoard
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.control.capture.board_view import BoardView
 from navapp.control.capture.states import Check
 

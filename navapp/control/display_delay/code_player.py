@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 
-from calibration.latency.code import Switches
+from calibration.latency.light_code import Switches
 from drivers.clock import Clock
 from drivers.interfaces import Display
 from navapp.geometry.transform import FloatArray

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.latency.area import Watched
-from calibration.latency.code import Switches
+from calibration.latency.display_area import WatchedCells
+from calibration.latency.light_code import Switches
 from drivers.clock import Clock
 from drivers.frames import Image, StereoFrame
 from drivers.interfaces import StereoCamera
@@ -37,8 +37,8 @@ class CodeRecording:
     """
 
     switches: Switches
-    left: Watched
-    right: Watched
+    left: WatchedCells
+    right: WatchedCells
     age_ms: float | None
 
 
@@ -74,12 +74,12 @@ class _Frames:
         for cells, picture in zip(self._cells, (frame.left, frame.right), strict=True):
             cells.append(_means(picture))
 
-    def as_watched(self, since_ns: int) -> tuple[Watched, Watched]:
+    def as_watched(self, since_ns: int) -> tuple[WatchedCells, WatchedCells]:
         """Both eyes, in time since then."""
         left_ms = 1e-6 * np.array([time_ns - since_ns for time_ns in self._captured_ns])
         right_ms = left_ms + 1e-6 * np.array(self._skew_ns)
         left, right = (np.array(cells) for cells in self._cells)
-        return Watched(np.asarray(left_ms), left), Watched(np.asarray(right_ms), right)
+        return WatchedCells(np.asarray(left_ms), left), WatchedCells(np.asarray(right_ms), right)
 
     @property
     def age_ms(self) -> float | None:

@@ -5,9 +5,9 @@ import threading
 import numpy as np
 import pytest
 
-from calibration.latency.code import pauses_ms
-from calibration.latency.judge import WORST_MS, judged_latency
-from calibration.latency.measure import Latency
+from calibration.latency.acceptance import WORST_MS, measure_accepted_latency
+from calibration.latency.light_code import draw_pauses_ms
+from calibration.latency.measurement import Latency
 from navapp.control.display_delay.code_player import CodePlayer
 from navapp.control.display_delay.code_recording import CodeRecording, record_code
 from navapp.errors import DeviceLost, DeviceTimeout, ResultError
@@ -22,7 +22,7 @@ def nothing(_: float) -> None:
 
 
 def player_of(room: Room, seconds: float) -> CodePlayer:
-    return CodePlayer(room.display, room.clock, pauses_ms(seconds, 0))
+    return CodePlayer(room.display, room.clock, draw_pauses_ms(seconds, 0))
 
 
 def players() -> list[threading.Thread]:
@@ -40,7 +40,7 @@ def players() -> list[threading.Thread]:
 def test_the_truth_of_the_room_is_recovered(truth: dict[str, float]) -> None:
     room = Room(**truth)
     recording = record_code(room.camera, player_of(room, 20.0), room.clock, nothing)
-    found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+    found = measure_accepted_latency(recording.switches, recording.left, recording.right, 59.94)
     true_late_ms = truth.get("unstamped_skew_ms", 0.0)
     true_offset_ms = true_late_ms + truth.get("skew_ms", 0.0)
     assert found.delay.value_ms == pytest.approx(truth["delay_ms"] + HALF_REFRESH_MS, abs=WORST_MS)
@@ -55,7 +55,9 @@ def recorded_and_judged(**truth: float) -> tuple[CodeRecording, Latency]:
         room = Room(is_stepped=False, **truth)
         recording = record_code(room.camera, player_of(room, 8.0), room.clock, nothing)
         try:
-            found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+            found = measure_accepted_latency(
+                recording.switches, recording.left, recording.right, 59.94
+            )
         except ResultError:
             if is_last:
                 raise
@@ -83,7 +85,7 @@ def test_frames_that_are_dropped_or_repeated_are_borne() -> None:
     recording = record_code(room.camera, player_of(room, 20.0), room.clock, nothing)
     assert (np.diff(recording.left.times_ms) > 0.0).all()
     assert np.diff(recording.left.times_ms).max() > 1900.0
-    found = judged_latency(recording.switches, recording.left, recording.right, 59.94)
+    found = measure_accepted_latency(recording.switches, recording.left, recording.right, 59.94)
     assert found.delay.value_ms == pytest.approx(40.0 + HALF_REFRESH_MS, abs=WORST_MS)
 
 
@@ -99,7 +101,9 @@ def test_progress_rises_to_one_and_the_display_is_dark_at_the_end() -> None:
 def test_switches_are_the_pauses_of_the_code_and_stand_in_no_step_with_the_frames() -> None:
     room = Room()
     recording = record_code(room.camera, player_of(room, 10.0), room.clock, nothing)
-    np.testing.assert_allclose(np.diff(recording.switches.times_ms), pauses_ms(10.0, 0), atol=0.01)
+    np.testing.assert_allclose(
+        np.diff(recording.switches.times_ms), draw_pauses_ms(10.0, 0), atol=0.01
+    )
     phases = np.exp(2j * np.pi * recording.switches.times_ms / 40.0)
     assert abs(phases.mean()) < 0.3
 
