@@ -1,3 +1,3 @@
-"""Calibration of the rig and the display: works on pictures and points, never on devices."""
+"""Calibration of a stereo rig, of a display delay and of a tool tip, from pictures and poses."""
 
 import navapp  # noqa: F401 (sets the environment before any heavy import)

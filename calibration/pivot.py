@@ -22,7 +22,7 @@ _CHI2_3_95 = 7.815
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PivotFit:
-    """A tip and what every pose says of it.
+    """A fitted tip and the residual of every pose.
 
     Attributes:
         tip_mm: (3,) in the tool's frame.
@@ -42,7 +42,7 @@ class PivotFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pivot:
-    """The tip of a tool.
+    """The tip of a tool, in its tracked frame.
 
     Attributes:
         linear: least squares over all poses.

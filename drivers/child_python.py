@@ -1,4 +1,4 @@
-"""Python in a child process: what is loaded there may print, hang or crash without harm."""
+"""Runs Python in a child process, so that output, hangs and crashes there do no harm."""
 
 import os
 import subprocess
@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 
-def child_environment() -> dict[str, str]:
+def make_child_environment() -> dict[str, str]:
     """This process's environment, in which Python finds these packages from any folder."""
     paths = [str(Path(__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
     return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))}
@@ -25,11 +25,11 @@ def run_python(*arguments: str, timeout_s: float) -> "subprocess.CompletedProces
         text=True,
         timeout=timeout_s,
         check=False,
-        env=child_environment(),
+        env=make_child_environment(),
     )
 
 
-def last_words(done: "subprocess.CompletedProcess[str]") -> str:
+def find_last_words(done: "subprocess.CompletedProcess[str]") -> str:
     """Why it failed: the last line of its errors, else how it ended."""
     lines = done.stderr.strip().splitlines()
     return lines[-1] if lines else f"it ended with code {done.returncode}"

@@ -1,4 +1,4 @@
-"""Time, injected: monotonic nanoseconds of the host, or a clock that a test or a source turns."""
+"""Clocks: monotonic nanoseconds of the host, or of a clock that a test sets."""
 
 import threading
 import time

@@ -1,10 +1,10 @@
-"""The calibration that an OAK camera carries -> a rig."""
+"""Converts the calibration stored in an OAK camera to a rig."""
 
 from typing import Any
 
 import numpy as np
 
-from drivers.depthai_package import depthai
+from drivers.depthai_package import import_depthai
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import RigQuality, StereoRig
@@ -15,7 +15,7 @@ _QUALITY = RigQuality(
 )
 
 
-def factory_rig(handler: Any, width: int, height: int, device_id: str) -> StereoRig:
+def make_factory_rig(handler: Any, width: int, height: int, device_id: str) -> StereoRig:
     """The mono pair as calibrated by the maker, marked as not accepted.
 
     This is the one place where the maker's centimetres become mm: the handler is asked for them.
@@ -29,7 +29,7 @@ def factory_rig(handler: Any, width: int, height: int, device_id: str) -> Stereo
     Raises:
         RigError: no calibration, or one that no rig can have.
     """
-    dai = depthai()
+    dai = import_depthai()
     left, right = dai.CameraBoardSocket.CAM_B, dai.CameraBoardSocket.CAM_C
     try:
         cameras = [_camera(handler, socket, width, height) for socket in (left, right)]
@@ -54,7 +54,7 @@ def factory_rig(handler: Any, width: int, height: int, device_id: str) -> Stereo
 
 def _camera(handler: Any, socket: Any, width: int, height: int) -> Camera:
     model = handler.getDistortionModel(socket)
-    if model != depthai().CameraModel.Perspective:
+    if model != import_depthai().CameraModel.Perspective:
         raise ValueError(f"a {model.name} lens")
     matrix = np.array(handler.getCameraIntrinsics(socket, width, height), dtype=np.float64)
     distortion = np.array(handler.getDistortionCoefficients(socket), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A group of DepthAI's messages -> two pictures with their times."""
+"""Converts a group of DepthAI's messages to two pictures with their times."""
 
 from dataclasses import dataclass
 from datetime import timedelta
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.depthai_package import depthai
+from drivers.depthai_package import import_depthai
 from drivers.depthai_parts import EYES
 from drivers.frames import Image
 from navapp.errors import DeviceProtocolError
@@ -14,7 +14,7 @@ from navapp.errors import DeviceProtocolError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthaiPair:
-    """What one group tells.
+    """Two pictures of one message group, with their times, exposure and sensitivity.
 
     Attributes:
         left, right: (H, W) uint8, arrays of their own.
@@ -43,7 +43,7 @@ def pair_of(group: Any, shape: tuple[int, int], device_id: str) -> DepthaiPair:
     Raises:
         DeviceProtocolError: a picture of another size.
     """
-    middle = depthai().CameraExposureOffset.MIDDLE
+    middle = import_depthai().CameraExposureOffset.MIDDLE
     left, right = (group[eye] for eye in EYES)
     device_ns = [_ns(message.getTimestampDevice(middle)) for message in (left, right)]
     pictures = [np.asarray(message.getFrame(), dtype=np.uint8) for message in (left, right)]

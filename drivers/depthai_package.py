@@ -8,7 +8,7 @@ from typing import Any
 from navapp.errors import DeviceNotFound
 
 
-def depthai() -> Any:
+def import_depthai() -> Any:
     """The module.
 
     Raises:

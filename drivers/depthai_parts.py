@@ -8,7 +8,7 @@ from datetime import timedelta
 from functools import partial
 from typing import Any, Protocol
 
-from drivers.depthai_package import depthai
+from drivers.depthai_package import import_depthai
 from drivers.depthai_settings import DepthaiSettings
 from navapp.errors import DeviceError, DeviceNotFound
 
@@ -56,8 +56,8 @@ def open_parts(settings: DepthaiSettings) -> DepthaiParts:
         DeviceNotFound: no package, no such camera, or it does not boot.
         DeviceError: it has no mono pair, or refuses the pipeline.
     """
-    dai = depthai()
-    info = _found(settings.device)
+    dai = import_depthai()
+    info = _find_device(settings.device)
     begin_s = time.monotonic()
     with ExitStack() as undo:
         try:
@@ -93,9 +93,9 @@ def open_parts(settings: DepthaiSettings) -> DepthaiParts:
             ) from error
 
 
-def _found(device_id: str) -> Any:
+def _find_device(device_id: str) -> Any:
     """Description of the wanted camera on USB; the network is never searched."""
-    dai = depthai()
+    dai = import_depthai()
     try:
         infos = dai.Device.getAllAvailableDevices()
     except RuntimeError:
@@ -123,7 +123,7 @@ def _found(device_id: str) -> Any:
 
 def _build(pipeline: Any, settings: DepthaiSettings) -> tuple[GroupQueue, list[Any]]:
     """Nodes from both eyes to one queue of pairs, and the control queues of the eyes."""
-    dai = depthai()
+    dai = import_depthai()
     sync = pipeline.create(dai.node.Sync)
     sync.setSyncThreshold(timedelta(milliseconds=settings.max_skew_ms))
     # The left eye gives the signal on which the right one exposes.
@@ -147,7 +147,7 @@ def _lock(control: Any, exposure_ms: float, iso: float) -> None:
 
 def _send_exposure(queues: list[Any], exposure_ms: float, iso: float) -> None:
     for queue in queues:
-        message = depthai().CameraControl()
+        message = import_depthai().CameraControl()
         _lock(message, exposure_ms, iso)
         queue.send(message)
 

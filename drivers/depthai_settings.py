@@ -1,4 +1,4 @@
-"""What an OAK camera is asked for."""
+"""Settings of an OAK camera."""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ _CONTROLS = {"exposure_ms": 5.0, "iso": 200.0, "ir_dots": 0.0, "ir_flood": 0.0}
 
 @dataclass(frozen=True, slots=True)
 class DepthaiSettings:
-    """Which OAK camera, and how it works.
+    """Which OAK camera, and its settings.
 
     Attributes:
         device: its id; empty when only one is connected.

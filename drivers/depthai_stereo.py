@@ -8,7 +8,7 @@ from datetime import timedelta
 from typing import Any
 
 from drivers.clock import Clock
-from drivers.depthai_calibration import factory_rig
+from drivers.depthai_calibration import make_factory_rig
 from drivers.depthai_messages import DepthaiPair, pair_of
 from drivers.depthai_parts import DepthaiParts, open_parts
 from drivers.depthai_settings import DepthaiSettings
@@ -39,7 +39,7 @@ _BACK_BY_NS: dict[str, int] = {}
 
 
 class DepthaiStereo:
-    """Free-running; opened again, it is the same camera with the same settings, or refused."""
+    """Free-running OAK stereo camera; opening it again refuses another camera in its place."""
 
     def __init__(
         self,
@@ -101,7 +101,7 @@ class DepthaiStereo:
         """
         if self._parts is not None:
             return
-        parts = self._booted()
+        parts = self._boot()
         try:
             self._take_over(parts)
         except BaseException:
@@ -149,9 +149,9 @@ class DepthaiStereo:
         parts = self._running()
         controls = {**self._settings.controls, control: value}
         if control in ("exposure_ms", "iso"):
-            with self._lost_if_it_fails():
+            with self._report_lost_device():
                 parts.send_exposure(controls["exposure_ms"], controls["iso"])
-            has = self._settled(control, value)
+            has = self._wait_until_settled(control, value)
         else:
             has = self._light(parts, control, value)
         self._settings = replace(self._settings, controls=controls)
@@ -163,7 +163,7 @@ class DepthaiStereo:
         if parts is not None:
             self._release(parts)
 
-    def _booted(self) -> DepthaiParts:
+    def _boot(self) -> DepthaiParts:
         """Open the device; one that was closed in good health is waited for."""
         while True:
             try:
@@ -203,7 +203,7 @@ class DepthaiStereo:
         if parts.usb_speed not in _FAST:
             notes.append("the link is slow: use a USB 3 port and cable")
         try:
-            self._rig = factory_rig(
+            self._rig = make_factory_rig(
                 parts.calibration, self._settings.width, self._settings.height, self._device_id
             )
         except RigError as error:
@@ -214,7 +214,7 @@ class DepthaiStereo:
         self._meter = FrameMeter()
 
     def _light(self, parts: DepthaiParts, lamp: str, brightness: float) -> float:
-        with self._lost_if_it_fails():
+        with self._report_lost_device():
             is_taken = parts.set_infrared(lamp, brightness)
         if not is_taken:
             raise UnsupportedControl(
@@ -225,7 +225,7 @@ class DepthaiStereo:
         self._controls[lamp] = brightness
         return brightness
 
-    def _settled(self, control: str, wish: float) -> float:
+    def _wait_until_settled(self, control: str, wish: float) -> float:
         """What the pictures say, once that is near the wish or no longer expected to be."""
         for _ in range(_MOST_FRAMES_TO_SETTLE):
             self.read(1.0)
@@ -236,11 +236,11 @@ class DepthaiStereo:
     def _group(self, timeout_s: float) -> Any:
         """The next message of both eyes."""
         parts = self._running()
-        with self._lost_if_it_fails():
+        with self._report_lost_device():
             return parts.queue.get(timedelta(seconds=timeout_s))
 
     @contextmanager
-    def _lost_if_it_fails(self) -> Iterator[None]:
+    def _report_lost_device(self) -> Iterator[None]:
         """DepthAI has no one error for a link that is gone."""
         try:
             yield

@@ -1,4 +1,4 @@
-"""ESC/VP21's numbers: what the lamp does, and what is broken.
+"""Meaning of ESC/VP21's codes for power states and faults.
 
 Source: ESC/VP21 Command User's Guide for Business Projectors. Models differ in what they call
 standby; only `01` can show a picture.
@@ -42,12 +42,12 @@ _FAULTS = {
 }
 
 
-def power_state(code: str | None) -> PowerState:
+def parse_power_state(code: str | None) -> PowerState:
     """Of `PWR?`; a code that we do not know, or none at all, is a fault."""
     return _POWER.get(code or "", PowerState.FAULT)
 
 
-def faults(code: str | None) -> tuple[str, ...]:
+def parse_faults(code: str | None) -> tuple[str, ...]:
     """Of `ERR?`, two hexadecimal digits; at most one is told at a time."""
     number = int(code or "00", 16)
     return () if number == 0 else (_FAULTS.get(number, f"fault {number:02X}"),)

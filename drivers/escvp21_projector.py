@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from drivers.clock import Clock
-from drivers.escvp21_codes import faults, power_state
+from drivers.escvp21_codes import parse_faults, parse_power_state
 from drivers.escvp21_line import EscVp21Line
 from drivers.interfaces import CommandResult, PowerState, ProjectorStatus
 from drivers.serial_port import Address
@@ -75,7 +75,7 @@ class EscVp21Projector:
         """
         deadline_ns = self._deadline_ns(timeout_s)
         wanted = PowerState.ON if is_on else PowerState.STANDBY
-        power = self._settled_power(deadline_ns)
+        power = self._wait_for_power(deadline_ns)
         if power in _PASSING:
             raise DeviceTimeout(
                 f"the projector is still {power.value}", subject="projector", remedy="wait for it"
@@ -84,7 +84,7 @@ class EscVp21Projector:
         if power is not wanted:
             command = "PWR ON" if is_on else "PWR OFF"
             self._talk.tell(command, self._talk.line.remaining_s(deadline_ns))
-            power = self._settled_power(deadline_ns)
+            power = self._wait_for_power(deadline_ns)
             serial = self._read_serial() if power is PowerState.ON else serial
         if power is not wanted:
             is_out = not is_on and power is PowerState.COOLING
@@ -128,8 +128,8 @@ class EscVp21Projector:
             if not self._talk.is_silent:
                 raise
             return ProjectorStatus(PowerState.FAULT, faults=(SILENT,))
-        power = power_state(code)
-        broken = faults(self._talk.ask("ERR", _HEX))
+        power = parse_power_state(code)
+        broken = parse_faults(self._talk.ask("ERR", _HEX))
         if power is PowerState.FAULT:
             broken = (*broken, f"power state {code or 'not told'}")
         if power is not PowerState.ON:
@@ -155,9 +155,9 @@ class EscVp21Projector:
         return self._talk.line.deadline_ns(timeout_s)
 
     def _power(self) -> PowerState:
-        return power_state(self._talk.ask("PWR", _HEX))
+        return parse_power_state(self._talk.ask("PWR", _HEX))
 
-    def _settled_power(self, deadline_ns: int) -> PowerState:
+    def _wait_for_power(self, deadline_ns: int) -> PowerState:
         """The state once it is neither warming nor cooling, or at the end of the time."""
         while (power := self._power()) in _PASSING:
             now_ns = self._clock.now_ns()
@@ -199,7 +199,7 @@ class EscVp21Projector:
         Raises:
             WrongDevice: not the bound one. The line is closed: nothing may be told to a stranger.
         """
-        serial = self._told_serial()
+        serial = self._ask_serial()
         self._serial = self._serial or serial
         if serial not in ("", self._serial):
             self.close()
@@ -210,7 +210,7 @@ class EscVp21Projector:
             )
         return serial
 
-    def _told_serial(self) -> str:
+    def _ask_serial(self) -> str:
         """One that is not expected must be told twice in a row; empty when none is."""
         before = ""
         for _ in range(3):

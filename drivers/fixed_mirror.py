@@ -1,4 +1,4 @@
-"""A mirror that is screwed down."""
+"""The mirror mount of a rig whose mirror does not move."""
 
 import math
 
@@ -7,7 +7,7 @@ from navapp.errors import UnsupportedControl
 
 
 class FixedMirror:
-    """Knows its angle and never moves.
+    """A mirror mount at a known angle that never moves.
 
     Raises:
         ValueError: the angle is not a number.

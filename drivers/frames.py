@@ -1,4 +1,4 @@
-"""What a stereo camera hands out."""
+"""`StereoFrame`, what a stereo camera returns, and a meter of its rate and skew."""
 
 from collections import deque
 from dataclasses import dataclass

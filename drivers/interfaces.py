@@ -1,4 +1,4 @@
-"""The devices that navapp knows: protocols, identical for real and simulated backends.
+"""Protocols of all devices, the same for real and simulated backends.
 
 Every protocol has its contract in `drivers.contracts`. Closing always works: twice, from any state,
 and afterwards no thread, descriptor or light remains. A backend is used from one thread at a time.
@@ -17,7 +17,7 @@ from navapp.geometry.rig import StereoRig
 
 @dataclass(frozen=True, slots=True)
 class CameraInfo:
-    """What a stereo camera says of itself.
+    """Properties of a stereo camera.
 
     Attributes:
         name: for people; a simulated camera's name begins with `sim:`.
@@ -94,7 +94,7 @@ class StereoCamera(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class DisplayInfo:
-    """What a display says of itself; flips are those that the backend applies by itself."""
+    """Properties of a display; flips are those that the backend applies by itself."""
 
     name: str
     backend: str
@@ -221,7 +221,7 @@ class ProjectorControl(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MirrorInfo:
-    """What a mirror mount says of itself."""
+    """Properties of a mirror mount."""
 
     name: str
     backend: str

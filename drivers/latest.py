@@ -1,4 +1,4 @@
-"""The newest frame, never a queue."""
+"""A slot for the newest frame, and the thread that fills it."""
 
 import threading
 from typing import Generic, TypeVar
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class LatestSlot(Generic[T]):
-    """One place: a newer value replaces an unread one, and the drop is counted."""
+    """Holds one value; a newer one replaces an unread one, and the drop is counted."""
 
     def __init__(self) -> None:
         self._condition = threading.Condition()

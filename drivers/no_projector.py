@@ -5,7 +5,7 @@ from navapp.errors import UnsupportedControl
 
 
 class NoProjector:
-    """Says that it is absent and refuses every command."""
+    """Control line of an absent projector: refuses every command."""
 
     @property
     def name(self) -> str:

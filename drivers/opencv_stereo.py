@@ -1,4 +1,4 @@
-"""Stereo from USB cameras through OpenCV: two of them, or one that sends both eyes side by side."""
+"""Stereo camera of USB cameras through OpenCV: two, or one that sends both eyes side by side."""
 
 import threading
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from navapp.errors import DeviceError, DeviceLost, UnsupportedControl, UsageErro
 
 @dataclass(frozen=True, slots=True)
 class OpencvStereoSettings:
-    """Which cameras, and how they work.
+    """Which USB cameras, and their settings.
 
     Attributes:
         left: serial number, or path below `/dev/v4l/by-id` or `/dev/v4l/by-path`.
@@ -122,7 +122,9 @@ class OpencvStereo:
             with ExitStack() as undo:
                 cameras = []
                 for identity in found:
-                    camera = UvcCamera(identity, self._sent(), self._clock, self._open_capture)
+                    camera = UvcCamera(
+                        identity, self._make_sent_settings(), self._clock, self._open_capture
+                    )
                     undo.callback(camera.close)
                     cameras.append(camera)
                 undo.pop_all()
@@ -193,7 +195,7 @@ class OpencvStereo:
             )
         return pairs
 
-    def _sent(self) -> UvcSettings:
+    def _make_sent_settings(self) -> UvcSettings:
         """What each camera sends."""
         eye = self._settings.eye
         return eye if self._settings.right is not None else replace(eye, width=2 * eye.width)

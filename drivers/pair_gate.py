@@ -1,11 +1,11 @@
-"""Which pairs of a camera that pairs by itself are handed out."""
+"""Decides which pairs of a camera with its own pairing are new and recent enough to return."""
 
 from dataclasses import dataclass
 
 
 @dataclass(slots=True)
 class PairGate:
-    """Lets new, fresh pairs of one instant through, and counts the others.
+    """Accepts new and recent pairs of one instant, and counts the others.
 
     Attributes:
         max_skew_ns: greatest difference of the capture times in a pair.

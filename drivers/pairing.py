@@ -1,4 +1,4 @@
-"""Pictures of two cameras that run by themselves -> pairs of one instant."""
+"""Pairs pictures of two unsynchronised cameras by their times."""
 
 import threading
 from collections import deque

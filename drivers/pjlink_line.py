@@ -14,9 +14,9 @@ from drivers.pjlink_messages import (
     MOST_REPLY_BYTES,
     PasswordRefused,
     Reply,
-    digest,
-    parsed_reply,
-    request,
+    compute_digest,
+    make_request,
+    parse_reply,
     salt_of,
 )
 from navapp.errors import DeviceLost, DeviceNotFound, DeviceProtocolError, DeviceTimeout
@@ -100,13 +100,13 @@ class PjlinkLine:
 
     def ask(self, command: str, parameter: str = "?") -> Reply:
         """Send one request and wait for its answer."""
-        line = self._prefix + request(command, parameter)
+        line = self._prefix + make_request(command, parameter)
         self._prefix = ""
         try:
             self._connection.send(line.encode())
         except OSError as error:
-            raise _lost(_cause(error)) from error
-        return parsed_reply(self._line(), command)
+            raise _make_lost_error(_cause(error)) from error
+        return parse_reply(self._line(), command)
 
     def close(self) -> None:
         """Hang up."""
@@ -120,7 +120,7 @@ class PjlinkLine:
                 subject="projector",
                 remedy="write the one of its network menu into [projector] password_file",
             )
-        return digest(salt, password) if salt else ""
+        return compute_digest(salt, password) if salt else ""
 
     def _line(self) -> str:
         """The next line that the projector says."""
@@ -145,9 +145,9 @@ class PjlinkLine:
         except TimeoutError as error:
             raise _silent() from error
         except OSError as error:
-            raise _lost(_cause(error)) from error
+            raise _make_lost_error(_cause(error)) from error
         if not data:
-            raise _lost(_HUNG_UP)
+            raise _make_lost_error(_HUNG_UP)
         return data
 
 
@@ -164,5 +164,5 @@ def _cause(error: OSError) -> str:
     return _HUNG_UP if isinstance(error, ConnectionError) else str(error)
 
 
-def _lost(why: str) -> DeviceLost:
+def _make_lost_error(why: str) -> DeviceLost:
     return DeviceLost(f"the connection to the projector is lost ({why})", subject="projector")

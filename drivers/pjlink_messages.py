@@ -1,4 +1,4 @@
-"""PJLink class 1: what goes over the wire, as values.
+"""PJLink class 1: formats requests and parses replies.
 
 Source: the protocol's tables as the manufacturers print them. Class 2 and its SHA-256 greeting are
 not spoken.
@@ -36,7 +36,7 @@ _SEVERITY = ("", "warning", "error")
 
 
 class PasswordRefused(DeviceError):  # noqa: N818 (named as its siblings)
-    """Final: trying again changes nothing."""
+    """The projector refuses the password; trying again does not help."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,17 +64,17 @@ def salt_of(greeting: str) -> str:
     return match[1] or ""
 
 
-def digest(salt: str, password: str) -> str:
+def compute_digest(salt: str, password: str) -> str:
     """What precedes the first request of a connection: MD5, 32 lower-case hexadecimal digits."""
     return hashlib.md5((salt + password).encode(), usedforsecurity=False).hexdigest()
 
 
-def request(command: str, parameter: str) -> str:
+def make_request(command: str, parameter: str) -> str:
     """One line, its end included; the parameter `?` asks."""
     return f"%1{command} {parameter}\r"
 
 
-def parsed_reply(line: str, command: str) -> Reply:
+def parse_reply(line: str, command: str) -> Reply:
     """The answer to that command.
 
     Raises:
@@ -92,7 +92,7 @@ def parsed_reply(line: str, command: str) -> Reply:
     return Reply(value)
 
 
-def power_state(value: str) -> PowerState:
+def parse_power_state(value: str) -> PowerState:
     """Of a reply to POWR."""
     if value not in _POWER:
         raise _unreadable("power", value)
@@ -111,21 +111,21 @@ def is_source(text: str) -> bool:
     return _SOURCE.fullmatch(text) is not None
 
 
-def source(value: str) -> str:
+def parse_source(value: str) -> str:
     """Of a reply to INPT."""
     if not is_source(value):
         raise _unreadable("source", value)
     return value
 
 
-def lamp_hours(value: str) -> tuple[int, ...]:
+def parse_lamp_hours(value: str) -> tuple[int, ...]:
     """Of a reply to LAMP."""
     if _LAMPS.fullmatch(value) is None:
         raise _unreadable("lamp hours", value)
     return tuple(int(hours) for hours in value.split()[::2])
 
 
-def faults(value: str) -> tuple[str, ...]:
+def parse_faults(value: str) -> tuple[str, ...]:
     """Of a reply to ERST, such as «lamp error»."""
     if _FAULTS.fullmatch(value) is None:
         raise _unreadable("faults", value)

@@ -17,12 +17,12 @@ from drivers.pjlink_messages import (
     ON,
     STANDBY,
     Reply,
-    faults,
     is_hidden,
     is_source,
-    lamp_hours,
-    power_state,
-    source,
+    parse_faults,
+    parse_lamp_hours,
+    parse_power_state,
+    parse_source,
 )
 from navapp.errors import (
     DeviceError,
@@ -146,10 +146,10 @@ class PjlinkProjector:
             found, hours = line.ask("ERST"), line.ask("LAMP")
         return ProjectorStatus(
             power=_power(power),
-            source=source(chosen.value) if not chosen.error else None,
+            source=parse_source(chosen.value) if not chosen.error else None,
             is_muted=is_hidden(mute.value) if not mute.error else None,
-            lamp_hours=lamp_hours(hours.value) if not hours.error else (),
-            faults=faults(found.value) if not found.error else (),
+            lamp_hours=parse_lamp_hours(hours.value) if not hours.error else (),
+            faults=parse_faults(found.value) if not found.error else (),
         )
 
     def close(self) -> None:
@@ -219,15 +219,15 @@ class PjlinkProjector:
             )
         if answer.error == "ERR3":
             if wish.command != "POWR" and line.ask("POWR").value == STANDBY:
-                raise self._refused(wish, "in standby", "switch it on first")
+                raise self._make_refusal(wish, "in standby", "switch it on first")
             return False
         if answer.error:
-            raise self._refused(wish, f"({answer.error})", "see its manual for what it has")
+            raise self._make_refusal(wish, f"({answer.error})", "see its manual for what it has")
         raise DeviceProtocolError(
             f"the projector answers {answer.value[:40]!r} to {wish.command}", subject=self.name
         )
 
-    def _refused(self, wish: _Wish, how: str, remedy: str) -> UnsupportedControl:
+    def _make_refusal(self, wish: _Wish, how: str, remedy: str) -> UnsupportedControl:
         return UnsupportedControl(
             f"{self.name} does not take its {wish.name} to be set {how}",
             subject=self.name,
@@ -260,4 +260,4 @@ class PjlinkProjector:
 def _power(answer: Reply) -> PowerState:
     if answer.error:
         return PowerState.FAULT if answer.error == "ERR4" else PowerState.UNKNOWN
-    return power_state(answer.value)
+    return parse_power_state(answer.value)

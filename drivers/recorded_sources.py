@@ -1,4 +1,4 @@
-"""Recorded stereo pairs by their place in line: folders of pictures and session folders."""
+"""Recorded stereo pairs in folders of pictures and session folders, by index."""
 
 import re
 from collections.abc import Iterable
@@ -134,7 +134,7 @@ def _plain(folder: Path) -> PictureFiles:
             remedy="its pictures must be named like left_0000.png and right_0000.png",
         )
     odd = [
-        f"{side} {_listed(files[side].keys() - files[other].keys())}"
+        f"{side} {_list_text(files[side].keys() - files[other].keys())}"
         for side, other in (("left", "right"), ("right", "left"))
         if files[side].keys() - files[other].keys()
     ]
@@ -189,7 +189,7 @@ def _unusable(path: Path, problem: str) -> SequenceError:
     )
 
 
-def _listed(numbers: Iterable[int]) -> str:
+def _list_text(numbers: Iterable[int]) -> str:
     """The smallest numbers, and how many more there are."""
     ordered = sorted(numbers)
     text = ", ".join(str(number) for number in ordered[:_NAMED_AT_MOST])

@@ -25,7 +25,7 @@ Order = Literal["forward", "pingpong"]
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """How a recording is walked through.
+    """Order, range and rate of a replay.
 
     Attributes:
         order: `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.
@@ -119,7 +119,7 @@ class ReplayCamera:
         source = open_source(self._source_name, self._settings.is_side_by_side)
         try:
             places = self._places_of(source)
-            left, _ = self._loaded(source, places[0])
+            left, _ = self._load_pair(source, places[0])
         except BaseException:
             source.close()
             raise
@@ -145,7 +145,7 @@ class ReplayCamera:
         place = next(self._places, None)
         if place is None:
             raise EndOfSequence(f"{self._source_name} ended", subject=self._source_name)
-        left, right = self._loaded(self._source, place)
+        left, right = self._load_pair(self._source, place)
         if (left.shape[1], left.shape[0]) != self._size:
             raise SequenceError(
                 f"pair {self._source.numbers[place]} of {self._source_name} differs in size from "
@@ -212,7 +212,7 @@ class ReplayCamera:
             return 2 * n_places - 1 if n_frames is None else n_frames
         return n_places if n_frames is None else min(n_places, n_frames)
 
-    def _loaded(self, source: RecordedSource, place: int) -> tuple[Image, Image]:
+    def _load_pair(self, source: RecordedSource, place: int) -> tuple[Image, Image]:
         left, right = source.load(place)
         if left.shape != right.shape:
             raise SequenceError(

@@ -1,4 +1,4 @@
-"""Packets on a line: what has come is kept and split at its terminator, however it was cut."""
+"""Requests and answers on a serial line; received bytes are split at the terminator."""
 
 import threading
 
@@ -64,7 +64,7 @@ class SerialLine:
         Raises:
             DeviceLost: not open, or gone; it is closed then. DeviceTimeout: it takes nothing.
         """
-        port = self._opened()
+        port = self._require_port()
         try:
             port.write(data)
         except DeviceLost:
@@ -144,7 +144,7 @@ class SerialLine:
         )
 
     def _receive(self, timeout_s: float) -> bool:
-        port = self._opened()
+        port = self._require_port()
         try:
             data = port.read(timeout_s)
         except DeviceLost:
@@ -153,7 +153,7 @@ class SerialLine:
         self._received += data
         return bool(data)
 
-    def _opened(self) -> Port:
+    def _require_port(self) -> Port:
         if self._port is None:
             raise self.absence()
         return self._port

@@ -44,7 +44,7 @@ class Port(Protocol):
 
 
 class Address(Protocol):
-    """Where a port is found."""
+    """Where a port is, and how it is opened."""
 
     @property
     def name(self) -> str:
@@ -96,7 +96,7 @@ class SerialPort:
 
     def __init__(self, name: str, baud_rate: int) -> None:
         self._name = name
-        self._serial = _opened(name, baud_rate)
+        self._serial = _open_serial(name, baud_rate)
 
     def read(self, timeout_s: float) -> bytes:
         """What has come; waits for the first byte only, because a socket waits for all."""
@@ -107,7 +107,7 @@ class SerialPort:
             # A closed socket still says that one byte waits: the next read then tells.
             rest = port.read(port.in_waiting) if first and port.in_waiting else b""
         except _failures() as error:
-            raise self._lost(error) from error
+            raise self._make_lost_error(error) from error
         return bytes(first + rest)
 
     def write(self, data: bytes) -> None:
@@ -123,7 +123,7 @@ class SerialPort:
                 remedy="check that the device is switched on",
             ) from error
         except _failures() as error:
-            raise self._lost(error) from error
+            raise self._make_lost_error(error) from error
 
     def close(self) -> None:
         """Release; a line that is gone cannot be flushed, which does not matter any more."""
@@ -134,7 +134,7 @@ class SerialPort:
                 handle.close()
             self._serial.close()
 
-    def _lost(self, error: Exception) -> DeviceLost:
+    def _make_lost_error(self, error: Exception) -> DeviceLost:
         return DeviceLost(
             f"the line {self._name} is gone ({error})",
             subject=self._name,
@@ -151,7 +151,7 @@ def _failures() -> tuple[type[Exception], ...]:
     return (SerialException, OSError, termios.error, TypeError, ValueError)
 
 
-def _opened(name: str, baud_rate: int) -> "Serial":
+def _open_serial(name: str, baud_rate: int) -> "Serial":
     try:
         import serial
     except ImportError as error:

@@ -106,21 +106,25 @@ def read_frame_table(folder: str | Path) -> tuple[FrameRow, ...]:
     try:
         text = path.read_bytes().decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise _damaged(path, "cannot be read", "give the folder of a recorded session") from error
+        raise _make_damage_error(
+            path, "cannot be read", "give the folder of a recorded session"
+        ) from error
     lines = list(csv.reader(io.StringIO(text)))
     if not lines or tuple(lines[0]) != _COLUMNS:
-        raise _damaged(path, "has no header", f"its first line must be {','.join(_COLUMNS)}")
+        raise _make_damage_error(
+            path, "has no header", f"its first line must be {','.join(_COLUMNS)}"
+        )
     rows: list[FrameRow] = []
     for number, values in enumerate(lines[1:], 2):
         is_cut = number == len(lines) and not text.endswith("\n")
         row = None if is_cut else _row(path.parent, values)
         if row is None:
             problem = "breaks off in" if number == len(lines) else "is damaged in"
-            raise _damaged(path, f"{problem} line {number}", "delete that line")
+            raise _make_damage_error(path, f"{problem} line {number}", "delete that line")
         # A stalled camera hands out new frames with an old capture time.
         is_later = not rows or row.captured_ns >= rows[-1].captured_ns
         if not is_later or (rows and row.sequence <= rows[-1].sequence):
-            raise _damaged(path, f"goes backwards in line {number}", "delete that line")
+            raise _make_damage_error(path, f"goes backwards in line {number}", "delete that line")
         rows.append(row)
     return tuple(rows)
 
@@ -158,5 +162,5 @@ def _not_writable(folder: Path, error: OSError) -> InputError:
     )
 
 
-def _damaged(path: Path, problem: str, remedy: str) -> SequenceError:
+def _make_damage_error(path: Path, problem: str, remedy: str) -> SequenceError:
     return SequenceError(f"frame table {path} {problem}", subject=str(path), remedy=remedy)

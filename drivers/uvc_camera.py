@@ -63,7 +63,7 @@ class UvcCamera:
         self._capture = open_capture(str(identity.path))
         try:
             if not self._capture.isOpened():
-                raise _unopened(identity)
+                raise _make_unopened_error(identity)
             self.n_buffers = set_format(self._capture, settings, identity.serial)
             self.controls = lock_controls(self._capture, settings, identity.serial)
         except BaseException:
@@ -98,7 +98,7 @@ class UvcCamera:
         if after_ns - captured_ns > self._settings.max_age_ms * 1e6:
             self.n_stale += 1
             return None
-        return self._decoded(captured_ns)
+        return self._decode(captured_ns)
 
     def set(self, control_name: str, value: float) -> float:
         """Ask for a control and return what the camera has.
@@ -116,7 +116,7 @@ class UvcCamera:
         """Give the device back."""
         self._capture.release()
 
-    def _decoded(self, captured_ns: int) -> TimedPicture | None:
+    def _decode(self, captured_ns: int) -> TimedPicture | None:
         is_read, picture = self._capture.retrieve()
         if not is_read or picture is None:
             self.n_stale += 1
@@ -151,7 +151,7 @@ class UvcCamera:
         )
 
 
-def _unopened(identity: FoundCamera) -> DeviceNotFound:
+def _make_unopened_error(identity: FoundCamera) -> DeviceNotFound:
     if not identity.path.exists():
         remedy = "plug it in"
     elif not os.access(identity.path, os.R_OK | os.W_OK):

@@ -1,4 +1,4 @@
-"""Format and controls of a USB camera through OpenCV: asked for, then read back.
+"""Sets format and controls of a USB camera through OpenCV and verifies them by reading back.
 
 OpenCV's `set` returns True even when the camera takes something else: what is read back counts.
 """

@@ -1,4 +1,4 @@
-"""Opened USB cameras that run -> the newest pair."""
+"""The newest pair of pictures of one or two running USB cameras."""
 
 import time
 from dataclasses import dataclass

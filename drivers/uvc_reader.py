@@ -1,4 +1,4 @@
-"""The thread that owns an opened USB camera."""
+"""A thread that reads an opened USB camera without pause."""
 
 import threading
 from collections.abc import Callable
@@ -78,17 +78,17 @@ class UvcReader:
             self._refuse_tasks()
 
     def _do_tasks(self) -> None:
-        for action, future in self._taken():
+        for action, future in self._take_tasks():
             try:
                 future.set_result(action(self.camera))
             except Exception as error:  # noqa: BLE001 (belongs to the one who asked)
                 future.set_exception(error)
 
     def _refuse_tasks(self) -> None:
-        for _, future in self._taken():
+        for _, future in self._take_tasks():
             future.set_exception(DeviceLost(f"camera {self.camera.identity.serial} is closed"))
 
-    def _taken(self) -> list[Task]:
+    def _take_tasks(self) -> list[Task]:
         tasks: list[Task] = []
         while True:
             try:

@@ -1,4 +1,4 @@
-"""What a USB camera is asked for."""
+"""Settings of a USB camera."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Which video device is which camera: by serial number or port, never by a number that changes."""
+"""Finds video devices by serial number or USB port; device numbers change and are not used."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class V4lNames:
     sysfs: Path = Path("/sys/class/video4linux")
     devices: Path = Path("/dev")
 
-    def connected(self) -> tuple[FoundCamera, ...]:
+    def list_cameras(self) -> tuple[FoundCamera, ...]:
         """Every camera once, by its serial number where that names it alone."""
         by_node: dict[Path, FoundCamera] = {}
         for path in self._all_links():
@@ -55,7 +55,7 @@ class V4lNames:
         """
         if "/" in wanted:
             return self._at(Path(wanted))
-        cameras = self.connected()
+        cameras = self.list_cameras()
         found = [camera for camera in cameras if camera.serial == wanted]
         if not found:
             raise _absent(wanted, cameras)
@@ -71,17 +71,19 @@ class V4lNames:
         """Devices that the kernel knows, with or without a lasting name; those of pictures only."""
         entries = self.sysfs.glob("video*") if self.sysfs.is_dir() else ()
         return tuple(
-            self.devices / entry.name for entry in entries if _told(entry / "index") in ("", "0")
+            self.devices / entry.name
+            for entry in entries
+            if _read_text(entry / "index") in ("", "0")
         )
 
     def card(self, node: Path) -> str:
         """A camera's name for people, as the kernel has it; empty when it has none."""
-        return _told(self.sysfs / node.name / "name")
+        return _read_text(self.sysfs / node.name / "name")
 
     def serial(self, node: Path) -> str:
         """As the camera tells it; empty when it has none."""
         interface = (self.sysfs / node.name / "device").resolve()
-        return _told(interface.parent / "serial")
+        return _read_text(interface.parent / "serial")
 
     def port(self, node: Path) -> Path | None:
         """The path of the port that a camera is plugged into."""
@@ -98,7 +100,7 @@ class V4lNames:
                 remedy=f"use its serial number, or a path below {self.links / 'by-id'}",
             )
         if not path.exists():
-            raise _absent(str(path), self.connected())
+            raise _absent(str(path), self.list_cameras())
         return self._camera(path)
 
     def _all_links(self) -> Iterator[Path]:
@@ -111,7 +113,7 @@ class V4lNames:
         return FoundCamera(path, node, self.serial(node) or path.name.removesuffix(_PICTURES))
 
 
-def _told(file: Path) -> str:
+def _read_text(file: Path) -> str:
     """Content of a small file of the kernel's; empty when it cannot be read."""
     try:
         return file.read_text(encoding="utf-8").strip()

@@ -1,4 +1,4 @@
-"""The process that owns the window: black unless a living application vouches for a picture.
+"""The process that owns the window; shows black unless the application confirms the picture.
 
 Started by `drivers.window_display` as `python -m drivers.window_child MEMORY WAKE OUTPUT WIDTH
 HEIGHT`: the descriptor of the shared memory, that of a pipe of which every byte means "look again"
@@ -15,8 +15,8 @@ import time
 from collections.abc import Sequence
 from contextlib import closing
 
-from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, memory_bytes
-from drivers.window_outputs import Output, chosen, outputs, start_sdl
+from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory, count_memory_bytes
+from drivers.window_outputs import Output, choose_output, list_outputs, start_sdl
 from navapp.errors import DeviceError
 
 # What X11 takes for a window manager to put the window where it belongs.
@@ -35,7 +35,7 @@ class Window:
         # The operator's keys go to the terminal, not to the overlay.
         os.environ.setdefault("SDL_WINDOW_NO_ACTIVATION_WHEN_SHOWN", "1")
         self._pygame = pygame = start_sdl()
-        self.output: Output = chosen(outputs(), output_name, width, height)
+        self.output: Output = choose_output(list_outputs(), output_name, width, height)
         self._screen = pygame.display.set_mode(
             (width, height), pygame.NOFRAME, 32, display=self.output.index
         )
@@ -101,7 +101,7 @@ class Window:
 
 
 class Keeper:
-    """Decides what is to be seen, and waits for reasons to decide again."""
+    """Decides which picture the window shows, and waits for changes."""
 
     def __init__(self, window: Window, memory: WindowMemory, wake: int) -> None:
         self._window = window
@@ -119,13 +119,13 @@ class Keeper:
             is_disturbed = self._window.was_disturbed()
             if not self._window.is_in_place():
                 return
-            wanted = self._wanted()
+            wanted = self._select_picture()
             if (is_disturbed or wanted != self._seen) and not self._show(wanted):
                 continue
             if not self._wait():
                 return
 
-    def _wanted(self) -> int:
+    def _select_picture(self) -> int:
         fields, now_ns = self._memory.fields, time.monotonic_ns()
         picture = fields[Field.PUBLISHED]
         if now_ns - fields[Field.APPLICATION_BEAT_NS] > HANG_LIMIT_NS:
@@ -141,7 +141,7 @@ class Keeper:
         Its place is written again only after the picture between has been published.
         """
         self._window.draw(self._memory.pictures[picture % 2] if picture else None)
-        if picture and self._wanted() != picture:
+        if picture and self._select_picture() != picture:
             return False
         self._window.flip()
         self._seen = self._memory.fields[Field.SEEN] = picture
@@ -167,7 +167,7 @@ def main(arguments: Sequence[str]) -> None:
     except DeviceError as error:
         _tell({"error": type(error).__name__, "problem": error.problem, "remedy": error.remedy})
         return
-    os.ftruncate(memory_descriptor, memory_bytes(width, height))
+    os.ftruncate(memory_descriptor, count_memory_bytes(width, height))
     with closing(WindowMemory(memory_descriptor, width, height)) as memory:
         memory.fields[Field.WINDOW_BEAT_NS] = time.monotonic_ns()
         memory.fields[Field.APPLICATION_BEAT_NS] = time.monotonic_ns()

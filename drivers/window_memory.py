@@ -1,4 +1,4 @@
-"""What a window's two processes share: two pictures, and which of them may be seen until when.
+"""Shared memory of the window's two processes: two pictures, and until when each may be shown.
 
 The application writes one picture while the window's process may still copy the other. Every field
 is one aligned 64-bit word that only one side writes; a woken reader looks at all of them again.
@@ -44,7 +44,7 @@ class WindowMemory:
 
     def __init__(self, descriptor: int, width: int, height: int) -> None:
         n_bytes = 4 * width * height
-        self._map = mmap.mmap(descriptor, memory_bytes(width, height))
+        self._map = mmap.mmap(descriptor, count_memory_bytes(width, height))
         self._view = memoryview(self._map)
         self.fields = self._view[:_HEADER_BYTES].cast("q")
         self.pictures = tuple(
@@ -63,6 +63,6 @@ class WindowMemory:
         self._map.close()
 
 
-def memory_bytes(width: int, height: int) -> int:
+def count_memory_bytes(width: int, height: int) -> int:
     """Size of the memory for pictures of that size."""
     return _HEADER_BYTES + 2 * 4 * width * height

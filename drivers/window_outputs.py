@@ -53,7 +53,7 @@ def start_sdl() -> Any:
     return pygame
 
 
-def outputs() -> list[Output]:
+def list_outputs() -> list[Output]:
     """All outputs; `start_sdl` must have been called.
 
     pygame tells neither names nor places, the SDL inside it does.
@@ -61,7 +61,7 @@ def outputs() -> list[Output]:
     Raises:
         DeviceError: SDL cannot be asked.
     """
-    sdl = ctypes.CDLL(_loaded_sdl())
+    sdl = ctypes.CDLL(_find_loaded_sdl())
     sdl.SDL_GetDisplayName.restype = ctypes.c_char_p
     found = []
     for index in range(sdl.SDL_GetNumVideoDisplays()):
@@ -73,7 +73,7 @@ def outputs() -> list[Output]:
     return found
 
 
-def chosen(found: Sequence[Output], name: str, width: int, height: int) -> Output:
+def choose_output(found: Sequence[Output], name: str, width: int, height: int) -> Output:
     """The output of that name and size, px; without a name the only one.
 
     Raises:
@@ -104,7 +104,7 @@ def chosen(found: Sequence[Output], name: str, width: int, height: int) -> Outpu
     return output
 
 
-def _loaded_sdl() -> str:
+def _find_loaded_sdl() -> str:
     for line in Path("/proc/self/maps").read_text().splitlines():
         path = line.partition("/")[2]
         if Path(path).name.startswith("libSDL2-"):

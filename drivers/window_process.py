@@ -1,4 +1,4 @@
-"""The application's end of the window's process: starting it, vouching for it, ending it."""
+"""Starts, watches and ends the window's process, from the application's side."""
 
 import contextlib
 import json
@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from typing import IO, cast
 
-from drivers.child_python import child_environment
+from drivers.child_python import make_child_environment
 from drivers.window_memory import BEAT_S, HANG_LIMIT_NS, Field, WindowMemory
 from navapp.errors import DeviceError, DeviceLost, DeviceNotFound, DeviceTimeout, WrongDevice
 
@@ -22,7 +22,7 @@ _ERRORS = {kind.__name__: kind for kind in (DeviceError, DeviceNotFound, WrongDe
 
 @dataclass(frozen=True, slots=True)
 class WindowSettings:
-    """Which window.
+    """Output, size and flips of a window.
 
     Attributes:
         output: name of the monitor or projector as SDL tells it; empty: the only one.
@@ -59,7 +59,7 @@ class WindowProcess:
             os.set_blocking(self._wake, False)
             undo.callback(os.close, self._wake)
             try:
-                self._process = _started(settings, descriptor, woken)
+                self._process = _start(settings, descriptor, woken)
             finally:
                 os.close(woken)
             undo.callback(_end, self._process)
@@ -110,7 +110,7 @@ class WindowProcess:
                 self._process.kill()
 
 
-def _started(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess.Popen[bytes]":
+def _start(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess.Popen[bytes]":
     command = [sys.executable, "-P", "-m", "drivers.window_child"]
     numbers = (settings.width, settings.height)
     return subprocess.Popen(
@@ -119,7 +119,7 @@ def _started(settings: WindowSettings, descriptor: int, woken: int) -> "subproce
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         pass_fds=(descriptor, woken),
-        env=child_environment(),
+        env=make_child_environment(),
     )
 
 

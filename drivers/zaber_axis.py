@@ -1,4 +1,4 @@
-"""One axis of a Zaber device: flags that speak against its place, motions followed to their end.
+"""One axis of a Zaber device: motions followed to their end, and flags that mark one as failed.
 
 A reply says OK when a command was accepted, not when the axis has arrived.
 """
@@ -8,8 +8,8 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.clock import Clock
-from drivers.zaber_line import Reply, ZaberLine, rejection
-from drivers.zaber_warnings import costs_reference, is_harmless, named
+from drivers.zaber_line import Reply, ZaberLine, make_rejection
+from drivers.zaber_warnings import costs_reference, describe, is_harmless
 from navapp.errors import DeviceError, DeviceProtocolError, DeviceTimeout
 
 WHOLE = re.compile(r"-?\d{1,12}")
@@ -24,7 +24,7 @@ _LATER = ("AGAIN", "STATUSBUSY", "FULL")
 
 
 class ZaberAxis:
-    """What an axis says of itself.
+    """One axis: its place, its motions, and the flags that mark a motion as failed.
 
     Attributes:
         talk: the line of its device.
@@ -147,12 +147,12 @@ class ZaberAxis:
     def _tell(self, command: str, give: Callable[[str], Reply], what: str) -> None:
         """Give a motion command, again while it is refused for now."""
         deadline_ns = self.talk.line.deadline_ns(_RETRY_S)
-        while not (reply := self._given(command, give, what)).is_accepted:
+        while not (reply := self._give(command, give, what)).is_accepted:
             if reply.data not in _LATER or self._clock.now_ns() >= deadline_ns:
-                raise rejection(command, reply.data)
+                raise make_rejection(command, reply.data)
             self._clock.wait_until_ns(self._clock.now_ns() + _RETRY_NS)
 
-    def _given(self, command: str, give: Callable[[str], Reply], what: str) -> Reply:
+    def _give(self, command: str, give: Callable[[str], Reply], what: str) -> Reply:
         # Under the lock a stop is either seen here or reaches the device after the command.
         with self.talk.line.lock:
             self._require_unstopped(what)
@@ -179,7 +179,7 @@ class ZaberAxis:
         self.look()
         if self.against:
             raise DeviceError(
-                f"{what} the mirror failed: {named(self.against)}",
+                f"{what} the mirror failed: {describe(self.against)}",
                 subject="mirror",
                 remedy="see what is in its way, then home it",
             )

@@ -114,7 +114,7 @@ class ZaberLine:
             axis = 0 if of_device else self._axis
             key = (self._device, axis, self._number)
             words = f"/{self._device} {axis} {self._number:02d} {command}".rstrip()
-            self.line.send(f"{words}:{checksum(words[1:])}\n".encode("ascii"))
+            self.line.send(f"{words}:{compute_checksum(words[1:])}\n".encode("ascii"))
             return self._reply(key, self.line.deadline_ns(_ANSWER_S))
 
     def value(self, name: str, form: re.Pattern[str], *, of_device: bool = False) -> str:
@@ -126,7 +126,7 @@ class ZaberLine:
         """
         reply = self.ask(f"get {name}", of_device=of_device)
         if not reply.is_accepted:
-            raise rejection(f"get {name}", reply.data)
+            raise make_rejection(f"get {name}", reply.data)
         if form.fullmatch(reply.data) is None:
             raise _misunderstood(f"{name} = {reply.data}")
         return reply.data
@@ -141,7 +141,7 @@ class ZaberLine:
             packet = self.line.next(deadline_ns)
             if packet is None:
                 break
-            text = self._unwrapped(packet.decode("latin-1"))
+            text = self._unwrap(packet.decode("latin-1"))
             if text.startswith("!"):
                 self._hear(text)
             elif (match := _REPLY.fullmatch(text)) is None:
@@ -156,24 +156,24 @@ class ZaberLine:
         if match is not None and (int(match[1]), int(match[2])) == (self._device, self._axis):
             self._on_alert(match[4].replace(_NO_WARNING, ""))
 
-    def _unwrapped(self, text: str) -> str:
+    def _unwrap(self, text: str) -> str:
         """A packet from its first character on, without checksum; empty when that is wrong."""
         text = text.rstrip("\r")
         text = text[max(0, *(text.rfind(mark) for mark in "@#!")) :]
         if text[-3:-2] == ":":
-            if checksum(text[1:-3]) != text[-2:]:
+            if compute_checksum(text[1:-3]) != text[-2:]:
                 return ""
             self._needs_checksum = True
             return text[:-3]
         return "" if self._needs_checksum else text
 
 
-def checksum(text: str) -> str:
+def compute_checksum(text: str) -> str:
     """Two hexadecimal digits: with them the bytes between first character and colon sum to 0."""
     return f"{-sum(text.encode('latin-1')) & 0xFF:02X}"
 
 
-def rejection(command: str, word: str) -> UnsupportedControl:
+def make_rejection(command: str, word: str) -> UnsupportedControl:
     """The error of a rejected command."""
     why = _REJECTIONS.get(word, "for an unknown reason")
     return UnsupportedControl(f"the mirror rejects '{command}': {why} ({word})", subject="mirror")

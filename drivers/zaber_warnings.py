@@ -54,6 +54,6 @@ def is_harmless(flag: str) -> bool:
     return flag in _HARMLESS
 
 
-def named(flags: tuple[str, ...]) -> str:
+def describe(flags: tuple[str, ...]) -> str:
     """For people."""
     return ", ".join(f"{NAMES.get(flag, 'unknown warning')} ({flag})" for flag in flags)

@@ -14,15 +14,15 @@ from navapp.geometry.transform import FloatArray
 from sim_devices.bone_shapes import (
     PATELLA_Z_MM,
     ShapeDraws,
+    compute_patella_back,
+    compute_plateau_height,
     draw_shape,
-    femur_shape,
-    patella_back,
-    patella_shape,
-    plateau_height,
-    tibia_shape,
+    make_femur,
+    make_patella,
+    make_tibia,
 )
 from sim_devices.implicit import Below, Field, Rough, Scaled, project
-from sim_devices.relief import Bumps, waves
+from sim_devices.relief import Bumps, make_waves
 from sim_devices.surface_nets import mesh_solid
 
 Side = Literal["left", "right"]
@@ -84,7 +84,7 @@ class KneeAnatomy:
 def make_knee(spec: KneeSpec = KneeSpec()) -> KneeAnatomy:
     """The knee of a spec: deterministic; a left knee is the mirrored right one."""
     if spec.side == "left":
-        return _mirrored_knee(make_knee(replace(spec, side="right")))
+        return _mirror_knee(make_knee(replace(spec, side="right")))
     rng = np.random.default_rng([spec.seed, 1])
     shape = draw_shape(rng)
     scale = _draw_scale(rng, spec.sex)
@@ -100,12 +100,12 @@ def make_knee(spec: KneeSpec = KneeSpec()) -> KneeAnatomy:
     )
 
 
-def _mirrored_knee(knee: KneeAnatomy) -> KneeAnatomy:
+def _mirror_knee(knee: KneeAnatomy) -> KneeAnatomy:
     """The left knee of a right one."""
     still = np.zeros(3)
     return KneeAnatomy(
         replace(knee.spec, side="left"),
-        MappingProxyType({name: mirrored(mesh) for name, mesh in knee.bones.items()}),
+        MappingProxyType({name: mirror_mesh(mesh) for name, mesh in knee.bones.items()}),
         MappingProxyType({name: point * MIRROR for name, point in knee.landmarks.items()}),
         MappingProxyType({name: curve * MIRROR for name, curve in knee.curves.items()}),
         MappingProxyType({name: Scaled(f, MIRROR, still) for name, f in knee.solids.items()}),
@@ -114,7 +114,7 @@ def _mirrored_knee(knee: KneeAnatomy) -> KneeAnatomy:
     )
 
 
-def mirrored(mesh: TriangleMesh) -> TriangleMesh:
+def mirror_mesh(mesh: TriangleMesh) -> TriangleMesh:
     """The mesh of the other side of the body, its normals still outward."""
     return TriangleMesh(mesh.vertices_mm * MIRROR, mesh.faces[:, ::-1], mesh.normals * MIRROR)
 
@@ -138,7 +138,7 @@ def _right_bones(
     def add(name: str, proportions: Field, lower: list[float], upper: list[float]) -> None:
         rng = np.random.default_rng([spec.seed, 2, len(solids)])
         solid = Scaled(proportions, scale, np.zeros(3))
-        solids[name] = _weathered(solid, name, spec, rng, scale)
+        solids[name] = _add_relief(solid, name, spec, rng, scale)
         bones[name] = mesh_solid(
             solids[name], np.array(lower) * scale, np.array(upper) * scale, CELL_MM
         )
@@ -149,14 +149,14 @@ def _right_bones(
             bones[name] = TriangleMesh(mesh.vertices_mm + move, mesh.faces, mesh.normals)
             solids[name] = Scaled(solids[name], np.ones(3), move)
 
-    add("femur", femur_shape(shape), [-48.0, -40.0, -34.0], [48.0, 48.0, 104.0])
+    add("femur", make_femur(shape), [-48.0, -40.0, -34.0], [48.0, 48.0, 104.0])
     around = bones["femur"].vertices_mm / scale
     medial, lateral = _plateau_levels(shape, around)
     z = 0.5 * (medial + lateral)
-    proportions = tibia_shape(shape, medial, lateral)
+    proportions = make_tibia(shape, medial, lateral)
     add("tibia", proportions, [-46.0, -32.0, z - 114.0], [46.0, 42.0, z + 16.0])
     y, z = _ridge_y(shape, around), PATELLA_Z_MM
-    proportions = patella_shape(shape, y)
+    proportions = make_patella(shape, y)
     add("patella", proportions, [-34.0, y - 28.0, z - 30.0], [34.0, y + 6.0, z + 30.0])
     return solids, bones
 
@@ -174,11 +174,11 @@ def _settling_mm(femur: TriangleMesh, bone: TriangleMesh, away: FloatArray) -> f
     return move
 
 
-def _weathered(
+def _add_relief(
     solid: Field, name: str, spec: KneeSpec, rng: np.random.Generator, scale: FloatArray
 ) -> Field:
     """The solid with relief, and with osteophytes when old."""
-    relief = waves(rng, RELIEF_RMS_MM[spec.age_group], (6.0, 25.0))
+    relief = make_waves(rng, RELIEF_RMS_MM[spec.age_group], (6.0, 25.0))
     if spec.age_group != "old":
         return Rough(solid, relief)
     rims = project(solid, _rim_points(name, rng) * scale)
@@ -210,7 +210,9 @@ def _plateau_levels(shape: ShapeDraws, femur_vertices: FloatArray) -> tuple[floa
     for sign in (1.0, -1.0):
         above = femur_vertices[(sign * femur_vertices[:, 0] > 10.0) & (femur_vertices[:, 2] < 0.0)]
         levels.append(
-            _clear_level(lambda p: plateau_height(shape, 0.0, 0.0, p), above, 2, JOINT_GAP_MM)
+            _clear_level(
+                lambda p: compute_plateau_height(shape, 0.0, 0.0, p), above, 2, JOINT_GAP_MM
+            )
         )
     return levels[0], levels[1]
 
@@ -222,7 +224,7 @@ def _ridge_y(shape: ShapeDraws, femur_vertices: FloatArray) -> float:
         & (np.abs(femur_vertices[:, 2] - PATELLA_Z_MM) < 22.0)
         & (femur_vertices[:, 1] < 0.0)
     ]
-    return _clear_level(lambda p: patella_back(shape, p), near, 1, JOINT_GAP_MM)
+    return _clear_level(lambda p: compute_patella_back(shape, p), near, 1, JOINT_GAP_MM)
 
 
 def _clear_level(height_mm: Field, points: FloatArray, axis: int, gap_mm: float) -> float:

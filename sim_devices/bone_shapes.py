@@ -18,7 +18,7 @@ from sim_devices.implicit import (
     Intersection,
     Roller,
     Union,
-    loft,
+    make_loft,
 )
 
 
@@ -86,13 +86,13 @@ def draw_shape(rng: np.random.Generator) -> ShapeDraws:
     )
 
 
-def medial_roller(d: ShapeDraws) -> Roller:
+def make_medial_roller(d: ShapeDraws) -> Roller:
     """The medial condyle with its half of the trochlea."""
     discs = np.array([[20.5, -4.0, 19.5], [6.0, -2.0, 23.0], [-7.5, 3.0, 16.5], [-8.0, 10.0, 12.5]])
     return Roller(discs, 17.5, d.divergence + 0.07, 14.0, 11.0, 0.012)
 
 
-def lateral_roller(d: ShapeDraws) -> Roller:
+def make_lateral_roller(d: ShapeDraws) -> Roller:
     """The lateral condyle: flatter below, higher in front, shorter behind."""
     forward = d.lateral_forward
     discs = np.array(
@@ -106,17 +106,17 @@ def lateral_roller(d: ShapeDraws) -> Roller:
     return Roller(discs, -18.5, -d.divergence, 14.5, 10.5, 0.008)
 
 
-def trochlea_roller(d: ShapeDraws) -> Roller:
+def make_trochlea_roller(d: ShapeDraws) -> Roller:
     """The floor of the groove between the condyles' front halves."""
     front = -23.0 + d.groove_depth
     discs = np.array([[front + 13.0, 9.0, 13.0], [-2.0, 0.0, 17.0], [6.0, 2.0, 15.0]])
     return Roller(discs, d.groove_x, 0.0, 18.0, 8.0, 0.0)
 
 
-def femur_shape(d: ShapeDraws) -> Field:
-    """Distal femur with about 100 mm of shaft above the epicondyles."""
+def _femur_column(d: ShapeDraws) -> Field:
+    """Shaft and metaphysis of the femur, without the condyles."""
     # z, centre x, centre y, radius lateral, medial, anterior, posterior
-    shaft = loft(
+    shaft = make_loft(
         [
             [112.0, 1.0, -7.0 - d.bow, 13.5, 13.5, 13.5, 14.5],
             [90.0, 1.0, -7.5 - d.bow, 13.5, 13.5, 13.5, 14.5],
@@ -134,13 +134,29 @@ def femur_shape(d: ShapeDraws) -> Field:
     )
     bottom = Below(lambda p: np.full(len(p), -10.0), axis=2, upwards=False)
     top = Below(lambda p: np.full(len(p), 100.0), axis=2)
-    column = Intersection(Intersection(shaft, bottom, 12.0), top, 2.0)
-    solid = Union(
-        column,
+    return Intersection(Intersection(shaft, bottom, 12.0), top, 2.0)
+
+
+def _trochlea_groove(d: ShapeDraws) -> Field:
+    """What is missing in front: from the front of the shaft down into the notch."""
+    x, y = d.groove_x, -25.0 + d.groove_depth - 12.0
+    return Union(
+        Cone((x, y - 4.0, 26.0, 11.0), (x, y, 6.0, 12.0)),
         (
-            (medial_roller(d), 10.0),
-            (lateral_roller(d), 10.0),
-            (trochlea_roller(d), 9.0),
+            (Cone((x, y, 6.0, 12.0), (x, y + 6.0, -13.0, 12.0)), 3.0),
+            (Cone((x, y + 6.0, -13.0, 12.0), (x + 1.0, y + 24.0, -32.0, 11.0)), 3.0),
+        ),
+    )
+
+
+def make_femur(d: ShapeDraws) -> Field:
+    """Distal femur with about 100 mm of shaft above the epicondyles."""
+    solid = Union(
+        _femur_column(d),
+        (
+            (make_medial_roller(d), 10.0),
+            (make_lateral_roller(d), 10.0),
+            (make_trochlea_roller(d), 9.0),
             (Ellipsoid((28.5, 5.0, 2.0), (9.5, 14.0, 15.0)), 8.0),
             (Ellipsoid((31.0, 9.0, 13.0), (4.5, 6.0, 8.0)), 6.0),
             (Ellipsoid((-28.5, 4.0, 1.0), (9.0, 13.0, 14.0)), 8.0),
@@ -151,22 +167,13 @@ def femur_shape(d: ShapeDraws) -> Field:
         Cone((-1.0, 12.0, -26.0, r), (-1.0, 37.0, 12.0, r)),
         ((Cone((-1.0, 23.0, -34.0, r), (-1.0, 52.0, 6.0, r)), 4.0),),
     )
-    # The trochlear groove: from the front of the shaft down into the notch.
-    x, y = d.groove_x, -25.0 + d.groove_depth - 12.0
-    trochlea = Union(
-        Cone((x, y - 4.0, 26.0, 11.0), (x, y, 6.0, 12.0)),
-        (
-            (Cone((x, y, 6.0, 12.0), (x, y + 6.0, -13.0, 12.0)), 3.0),
-            (Cone((x, y + 6.0, -13.0, 12.0), (x + 1.0, y + 24.0, -32.0, 11.0)), 3.0),
-        ),
-    )
     # The popliteus groove below the lateral epicondyle.
     groove = Cone((-40.0, 9.0, -10.0, 4.5), (-38.5, 22.0, 0.0, 4.5))
-    carved = Difference(Difference(solid, trochlea, 9.0), notch, 5.0)
+    carved = Difference(Difference(solid, _trochlea_groove(d), 9.0), notch, 5.0)
     return Difference(carved, groove, 5.0)
 
 
-def plateau_height(
+def compute_plateau_height(
     d: ShapeDraws, medial_mm: float, lateral_mm: float, points: FloatArray
 ) -> FloatArray:
     """Height of the tibia's upper surface over x and y; the two compartments' levels are given."""
@@ -183,10 +190,10 @@ def plateau_height(
     return result
 
 
-def tibia_shape(d: ShapeDraws, medial_mm: float, lateral_mm: float) -> Field:
-    """Proximal tibia, some 110 mm of it; the levels are those of `plateau_height`."""
+def make_tibia(d: ShapeDraws, medial_mm: float, lateral_mm: float) -> Field:
+    """Proximal tibia, some 110 mm of it; the levels are those of `compute_plateau_height`."""
     z = 0.5 * (medial_mm + lateral_mm)
-    column = loft(
+    column = make_loft(
         [
             [z + 25.0, 0.0, 6.0, 34.0, 35.5, 23.5, 24.5],
             [z, 0.0, 6.0, 34.0, 35.5, 23.5, 24.5],
@@ -215,14 +222,14 @@ def tibia_shape(d: ShapeDraws, medial_mm: float, lateral_mm: float) -> Field:
         ),
     )
     valley = Cone((-1.0, 36.5, z + 20.0, 10.0), (0.0, 42.0, z - 25.0, 9.0))
-    plateau = Below(lambda p: plateau_height(d, medial_mm, lateral_mm, p), axis=2)
+    plateau = Below(lambda p: compute_plateau_height(d, medial_mm, lateral_mm, p), axis=2)
     return Intersection(Difference(solid, valley, 6.0), plateau, 3.0)
 
 
 PATELLA_Z_MM = 10.0
 
 
-def patella_back(d: ShapeDraws, points: FloatArray) -> FloatArray:
+def compute_patella_back(d: ShapeDraws, points: FloatArray) -> FloatArray:
     """How far the patella's back stands behind its ridge's top (negative: in front of it)."""
     x, z = points[:, 0] - d.ridge_x - d.groove_x, points[:, 2] - PATELLA_Z_MM
     slope = np.where(x < 0.0, 0.30, 0.34)
@@ -233,7 +240,7 @@ def patella_back(d: ShapeDraws, points: FloatArray) -> FloatArray:
     return result
 
 
-def patella_shape(d: ShapeDraws, ridge_y_mm: float) -> Field:
+def make_patella(d: ShapeDraws, ridge_y_mm: float) -> Field:
     """Patella whose median ridge reaches back to y = ridge_y_mm."""
     z, x = PATELLA_Z_MM, d.groove_x
 
@@ -248,9 +255,9 @@ def patella_shape(d: ShapeDraws, ridge_y_mm: float) -> Field:
         across = (p[:, 0] - x) / (1.0 + 0.012 * np.clip(up, -26.0, 26.0))
         return seen_from_front(np.stack([across, up, 0.0 * up], axis=1))
 
-    seen_from_front = loft(
+    seen_from_front = make_loft(
         [[-1.0, 0.0, 0.0, 22.0, 21.5, 24.5, 19.5], [1.0, 0.0, 0.0, 22.0, 21.5, 24.5, 19.5]],
         exponent=2.0,
     )
-    back = Below(lambda p: ridge_y_mm + patella_back(d, p), axis=1)
+    back = Below(lambda p: ridge_y_mm + compute_patella_back(d, p), axis=1)
     return Intersection(Intersection(outline, back, 4.0), Below(front, axis=1, upwards=False), 8.0)

@@ -232,13 +232,13 @@ class SimulatedCamera:
             DeviceLost: it was never opened.
         """
         if self._origin_ns is None:
-            raise _closed()
+            raise _make_closed_error()
         return captured_ns - self._origin_ns
 
     def _current_opening(self) -> tuple[int, int]:
         with self._lock:
             if self._opening % 2 == 0 or self._origin_ns is None:
-                raise _closed()
+                raise _make_closed_error()
             return self._opening, self._origin_ns
 
     def _next_exposure(self, now_ns: int, limit_ns: int) -> tuple[int, int]:
@@ -270,10 +270,10 @@ class SimulatedCamera:
             DeviceLost: closed meanwhile, or unplugged at any moment since it was opened.
         """
         unplugged_ns = self._faults.first_moment_ns(
-            FaultKind.UNPLUG, self._opened_ns, max(elapsed_ns, self._elapsed_ns(opening))
+            FaultKind.UNPLUG, self._opened_ns, max(elapsed_ns, self._compute_elapsed_ns(opening))
         )
         while True:
-            now_ns = self._elapsed_ns(opening)
+            now_ns = self._compute_elapsed_ns(opening)
             if unplugged_ns is not None and now_ns >= unplugged_ns:
                 raise DeviceLost(
                     "the simulated camera was unplugged",
@@ -287,10 +287,10 @@ class SimulatedCamera:
                 next_ns = min(next_ns, unplugged_ns)
             self._clock.wait_until_ns(self._clock.now_ns() - now_ns + next_ns)
 
-    def _elapsed_ns(self, opening: int) -> int:
+    def _compute_elapsed_ns(self, opening: int) -> int:
         current, origin_ns = self._current_opening()
         if current != opening:
-            raise _closed()
+            raise _make_closed_error()
         return self._clock.now_ns() - origin_ns
 
     def _frame(self, exposed_ns: int) -> StereoFrame:
@@ -316,13 +316,13 @@ class SimulatedCamera:
             turn_rad = self._faults.turn_rad(world_time_ns)
             radiance = self._world.render(eye, world_time_ns, self._scale, turn_rad)
         controls = self._controls
-        sensor = self._nominal_sensor.adjusted(
+        sensor = self._nominal_sensor.with_exposure(
             controls["exposure_ms"] / NOMINAL_EXPOSURE_MS, controls["gain_db"]
         )
         return sensor.picture(radiance, eye, self._sequence)
 
 
-def _closed() -> DeviceLost:
+def _make_closed_error() -> DeviceLost:
     return DeviceLost(
         "the simulated camera is not open",
         subject="sim:stereo camera",

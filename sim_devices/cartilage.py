@@ -7,7 +7,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.anatomy import KneeAnatomy
 from sim_devices.bone_shapes import PATELLA_Z_MM
-from sim_devices.relief import waves
+from sim_devices.relief import make_waves
 
 MAXIMUM_MM = 3.2
 MAXIMUM_MEAN_MM = 2.6
@@ -20,7 +20,7 @@ def smoothstep(low: float, high: float, value: FloatArray) -> FloatArray:
     return result
 
 
-def articular_weight(anatomy: KneeAnatomy, bone: str) -> FloatArray:
+def compute_articular_weight(anatomy: KneeAnatomy, bone: str) -> FloatArray:
     """(V,) 1 on the bone's joint surface, 0 elsewhere, smooth at its border.
 
     Raises:
@@ -58,7 +58,7 @@ def _femur_weight(place: FloatArray, normals: FloatArray) -> FloatArray:
     return result
 
 
-def cartilage_thickness_mm(
+def make_cartilage_thickness_mm(
     anatomy: KneeAnatomy, bone: str, mean_mm: float, seed: int
 ) -> FloatArray:
     """(V,) thickness per vertex: `mean_mm` over the joint surface, varying by some 30 % there.
@@ -71,9 +71,9 @@ def cartilage_thickness_mm(
             f"a mean cartilage thickness of {mean_mm} mm is not possible",
             remedy=f"give 0 to {MAXIMUM_MEAN_MM} mm",
         )
-    weight = articular_weight(anatomy, bone)
+    weight = compute_articular_weight(anatomy, bone)
     vertices = anatomy.bones[bone].vertices_mm
-    variation = waves(np.random.default_rng([seed, 3]), 0.3, (30.0, 80.0))
+    variation = make_waves(np.random.default_rng([seed, 3]), 0.3, (30.0, 80.0))
     thickness = weight * np.clip(1.0 + variation(vertices), 0.3, 1.7) * mean_mm
     articular = weight > 0.5
     for _ in range(8 if mean_mm > 0.0 else 0):
@@ -82,7 +82,7 @@ def cartilage_thickness_mm(
     return thickness
 
 
-def worn(
+def wear_patch(
     mesh: TriangleMesh, thickness_mm: FloatArray, centre_mm: FloatArray, radius_mm: float
 ) -> FloatArray:
     """(V,) thickness with a bare patch of the given radius, sloping at its border."""
@@ -102,4 +102,4 @@ def with_defect(
     mesh: TriangleMesh, thickness_mm: FloatArray, centre_mm: FloatArray, radius_mm: float
 ) -> TriangleMesh:
     """The surface of cartilage that is worn off around a point of the bone."""
-    return with_cartilage(mesh, worn(mesh, thickness_mm, centre_mm, radius_mm))
+    return with_cartilage(mesh, wear_patch(mesh, thickness_mm, centre_mm, radius_mm))

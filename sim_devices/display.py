@@ -1,4 +1,4 @@
-"""A display that keeps its picture to itself."""
+"""A simulated display that stores its picture."""
 
 import threading
 
@@ -11,7 +11,7 @@ from navapp.errors import DeviceLost
 
 
 class SimulatedDisplay:
-    """Shows pictures to whoever asks for `visible_image`, under the rules of every display."""
+    """A display whose picture `visible_image` returns, under the rules of every display."""
 
     def __init__(
         self,

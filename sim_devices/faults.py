@@ -1,4 +1,4 @@
-"""Faults of a simulated camera, written down as data."""
+"""Scripted faults of a simulated camera."""
 
 import math
 from dataclasses import dataclass
@@ -72,7 +72,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class FaultScript:
-    """What happens when; empty means that all goes well."""
+    """Faults by time; without any, all goes well."""
 
     faults: tuple[Fault, ...] = ()
 

@@ -1,4 +1,4 @@
-"""A hand that holds something in front of the cameras: it moves where it is told, never exactly."""
+"""A simulated hand that moves a body to a wanted pose, not exactly."""
 
 import threading
 
@@ -24,7 +24,7 @@ _NEAREST_MM, _FARTHEST_MM = 150.0, 1500.0
 
 
 class Hand:
-    """Holds a body; all methods may be called from any thread.
+    """Moves a body to wanted poses; all methods may be called from any thread.
 
     Args:
         left_from_body: where it is held first.

@@ -111,7 +111,7 @@ class Ellipsoid:
         return np.where(slope < 1e-6, -min(self.radii_mm), value)
 
 
-def cone_distance(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+def compute_cone_distance(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
     """Exact distance to the hull of two balls (or discs), given as centre and radius.
 
     The nearest ball of the family between the two is where the derivative of
@@ -143,7 +143,7 @@ class Cone:
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Values (N,) at points (N, 3)."""
-        return cone_distance(points, np.asarray(self.start), np.asarray(self.end))
+        return compute_cone_distance(points, np.asarray(self.start), np.asarray(self.end))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,9 +169,9 @@ class Roller:
     def outline(self, points: FloatArray) -> FloatArray:
         """Distance to the outline in the y-z plane."""
         flat = points[:, 1:]
-        value = cone_distance(flat, self.discs[0], self.discs[1])
+        value = compute_cone_distance(flat, self.discs[0], self.discs[1])
         for start, end in zip(self.discs[1:-1], self.discs[2:], strict=True):
-            value = smooth_min(value, cone_distance(flat, start, end), 4.0)
+            value = smooth_min(value, compute_cone_distance(flat, start, end), 4.0)
         return value
 
     def across(self, points: FloatArray) -> FloatArray:
@@ -223,7 +223,7 @@ class Loft:
         return value
 
 
-def loft(rows: list[list[float]], exponent: float, twist_rad_per_mm: float = 0.0) -> Loft:
+def make_loft(rows: list[list[float]], exponent: float, twist_rad_per_mm: float = 0.0) -> Loft:
     """A loft through rows of z and the six values of `Loft.table`, monotone cubic between them."""
     from scipy.interpolate import PchipInterpolator
 
@@ -260,7 +260,7 @@ class Below:
         return value if self.upwards else -value
 
 
-def gradient(field: Field, points: FloatArray, step_mm: float = 0.01) -> FloatArray:
+def compute_gradient(field: Field, points: FloatArray, step_mm: float = 0.01) -> FloatArray:
     """(N, 3) gradient by central differences; pointing outwards near the surface."""
     n = len(points)
     offsets = np.concatenate([np.eye(3), -np.eye(3)]) * step_mm
@@ -273,7 +273,7 @@ def project(field: Field, points: FloatArray, iterations: int = 6) -> FloatArray
     """(N, 3) points moved onto the surface by damped Newton steps of at most 2 mm."""
     moved = np.array(points, dtype=np.float64)
     for _ in range(iterations):
-        slope = gradient(field, moved)
+        slope = compute_gradient(field, moved)
         squared = np.maximum(np.einsum("ij,ij->i", slope, slope), 0.05)
         step = field(moved) / squared
         moved -= np.clip(step, -2.0, 2.0)[:, None] * slope

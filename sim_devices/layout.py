@@ -1,4 +1,4 @@
-"""How the knee lies on the table in front of the cameras."""
+"""Placement of the simulated knee on the table in front of the cameras."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ _PLACEMENT_DEG = (6.0, 9.0)
 _PLACEMENT_MM = (6.0, 10.0)
 
 
-def nearer(bone: TriangleMesh, level_mm: float, sign: float) -> TriangleMesh:
+def select_side(bone: TriangleMesh, level_mm: float, sign: float) -> TriangleMesh:
     """The faces of a bone on one side of a level of its z."""
     beyond = sign * (bone.vertices_mm[:, 2] - level_mm) > 0.0
     return TriangleMesh(bone.vertices_mm, bone.faces[beyond[bone.faces].all(axis=1)], bone.normals)
@@ -40,7 +40,7 @@ def nominal_table_from_femur() -> RigidTransform:
     return RigidTransform.from_parts("table", "femur", rotation, _FEMUR_ON_TABLE_MM)
 
 
-def misplaced(nominal: RigidTransform, seed: int) -> RigidTransform:
+def misplace(nominal: RigidTransform, seed: int) -> RigidTransform:
     """The femur as it really lies: 6 to 9 deg and 6 to 10 mm off."""
     rng = np.random.default_rng([seed, 41])
     turn, shift = rng.standard_normal((2, 3))
@@ -49,7 +49,7 @@ def misplaced(nominal: RigidTransform, seed: int) -> RigidTransform:
     return nominal.moved(np.concatenate([shift, turn]), nominal.translation_mm)
 
 
-def flexed(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
+def flex_knee(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
     """femur_from_tibia of the bent knee: turned about the condyles, then set at the joint gap."""
     bottom = femur.vertices_mm[:, 2].min()
     condyles = femur.vertices_mm[femur.vertices_mm[:, 2] < bottom + 40.0]

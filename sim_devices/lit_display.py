@@ -1,4 +1,4 @@
-"""A simulated display whose light is late, and the view of the cameras that look at it."""
+"""A simulated display with a delay, and the view of cameras that look at it."""
 
 import math
 import threading
@@ -11,7 +11,7 @@ from drivers.frames import Image
 from drivers.interfaces import DisplayInfo
 from navapp.geometry.rig import StereoRig
 from sim_devices.display import SimulatedDisplay
-from sim_devices.rigs import NO_TURN, Turn, default_rig
+from sim_devices.rigs import NO_TURN, Turn, make_default_rig
 from sim_devices.sensor import Eye
 
 # Radiance of the wall behind, and of a white display.
@@ -108,7 +108,7 @@ class DisplayInView:
             exposure_ns: during which light is gathered, around the time of a picture.
             rig: of the two cameras; the simulated room's when absent.
         """
-        self.rig = rig or default_rig()
+        self.rig = rig or make_default_rig()
         self._display = display
         self._clock = clock
         self._exposure_ns = exposure_ns

@@ -1,4 +1,4 @@
-"""How the surfaces of the operating site look."""
+"""Table of materials: reflectance and gloss of the simulated surfaces."""
 
 from dataclasses import dataclass, replace
 from enum import IntEnum, unique
@@ -189,7 +189,7 @@ _BLOODY = {
 }
 
 
-def material_table(contrast: float, blood: float) -> NDArray[np.float32]:
+def make_material_table(contrast: float, blood: float) -> NDArray[np.float32]:
     """(materials, columns) float32 for the shading kernel.
 
     Args:

@@ -83,7 +83,7 @@ class LegMotion:
         )
 
 
-def sweep_offset_mm(kind: InstrumentKind, time_s: float) -> FloatArray:
+def compute_sweep_offset_mm(kind: InstrumentKind, time_s: float) -> FloatArray:
     """(3,) place of the hand relative to the middle of the bone, in the table's frame (mm).
 
     It comes in from the lower right, passes over the bone and leaves again, every six seconds.
@@ -104,7 +104,7 @@ def sweep_offset_mm(kind: InstrumentKind, time_s: float) -> FloatArray:
     return offset
 
 
-def drill_motion(
+def compute_drill_motion(
     entry_mm: FloatArray, axis: FloatArray, time_s: float, *, turns: bool
 ) -> FloatArray:
     """(4, 4) pose of the drill in the bone: it pecks, draws back and turns.

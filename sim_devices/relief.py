@@ -31,7 +31,7 @@ class Waves:
         return value
 
 
-def waves(
+def make_waves(
     rng: np.random.Generator, rms_mm: float, wavelengths_mm: tuple[float, float], count: int = 32
 ) -> Waves:
     """Waves with log-uniform wavelengths and an RMS value; equally steep."""

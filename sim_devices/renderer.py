@@ -1,4 +1,4 @@
-"""Renders posed bodies into one picture: z-buffer, then shading; what never moves is kept."""
+"""Renders posed bodies into a picture: z-buffer, then shading; static parts are cached."""
 
 import threading
 from collections.abc import Mapping, Sequence
@@ -48,10 +48,10 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """What a rendering is made of besides shapes.
+    """Materials, texture and lamps of a rendering.
 
     Attributes:
-        materials: table of `materials.material_table`.
+        materials: table of `materials.make_material_table`.
         tile: the solid noise.
         lamps: (L, 4) direction towards the lamp in the lamps' frame, strength. Operating lamps
             hang a metre away and are broad: over the site their direction is constant.
@@ -157,7 +157,7 @@ class Renderer:
     ) -> FloatImage:
         """(H, W, 3) float32 BGR radiance; `poses` are camera_from_body of every body."""
         with self._lock:
-            image_kept, inverse_depth_kept, _ = self._kept(poses, camera_from_lamps)
+            image_kept, inverse_depth_kept, _ = self._render_background(poses, camera_from_lamps)
             image = image_kept.copy()
             box = self._project(poses, static=False)
             if box is not None:
@@ -175,7 +175,7 @@ class Renderer:
     ) -> DepthPicture:
         """What each pixel shows, from the same z-buffer as `render`."""
         with self._lock:
-            _, inverse_depth_kept, triangle_kept = self._kept(poses, camera_from_lamps)
+            _, inverse_depth_kept, triangle_kept = self._render_background(poses, camera_from_lamps)
             self._inverse_depth[:] = inverse_depth_kept
             self._triangle[:] = triangle_kept
             box = self._project(poses, static=False)
@@ -191,7 +191,7 @@ class Renderer:
             depth_mm[seen] = 1.0 / self._inverse_depth[seen]
             return DepthPicture(depth_mm, body, geometry.bodies)
 
-    def _kept(
+    def _render_background(
         self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
     ) -> tuple[FloatImage, FloatImage, NDArray[np.int32]]:
         """Picture, z-buffer and triangles of what never moves, drawn at the first call."""

@@ -20,7 +20,7 @@ WORKING_DISTANCE_MM = 450.0
 TOE_IN_DEG = 2.5
 
 
-def default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> StereoRig:
+def make_default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> StereoRig:
     """Two slightly unequal cameras, 80 mm apart, each turned inwards by 2.5 deg.
 
     Another picture size is the same rig with its pictures resized.

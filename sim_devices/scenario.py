@@ -1,4 +1,4 @@
-"""What a simulated operation looks like."""
+"""Parameters of a simulated operation."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args

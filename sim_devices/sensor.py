@@ -53,7 +53,7 @@ class SensorModel:
         if not (self.read_noise_e >= 0.0 and self.psf_sigma_px >= 0.0 and self.seed >= 0):
             raise ValueError("read noise, blur and seed of a sensor cannot be negative")
 
-    def adjusted(self, exposure_factor: float, gain_db: float) -> "SensorModel":
+    def with_exposure(self, exposure_factor: float, gain_db: float) -> "SensorModel":
         """The same sensor exposed longer or shorter, its amplifiers turned up."""
         gain = 10.0 ** (gain_db / 20.0)
         return replace(
@@ -92,7 +92,7 @@ class SensorModel:
             noise,
             row_starts,
             self.kernel_parameters(),
-            tone_table(self.gain_left if eye == "left" else self.gain_right),
+            make_tone_table(self.gain_left if eye == "left" else self.gain_right),
             np.empty(rows.shape[1], np.int32),
             picture,
         )
@@ -106,15 +106,15 @@ class SensorModel:
 
 
 @lru_cache(maxsize=16)
-def tone_table(gain: float) -> NDArray[np.uint8]:
+def make_tone_table(gain: float) -> NDArray[np.uint8]:
     """(4096,) grey value of a signal between nothing and full well, after amplification."""
     signal = np.minimum(gain * np.linspace(0.0, 1.0, _TABLE_SIZE), 1.0)
-    table = np.rint(255.0 * tone_curve(signal)).astype(np.uint8)
+    table = np.rint(255.0 * compute_tone_curve(signal)).astype(np.uint8)
     table.setflags(write=False)
     return table
 
 
-def tone_curve(signal: NDArray[np.float64]) -> NDArray[np.float64]:
+def compute_tone_curve(signal: NDArray[np.float64]) -> NDArray[np.float64]:
     """Transfer curve of video cameras over 0..1 (Recommendation ITU-R BT.709, item 1.2)."""
     bright = 1.099 * np.power(np.maximum(signal, 0.018), 0.45) - 0.099
     return np.asarray(np.where(signal < 0.018, 4.5 * signal, bright), dtype=np.float64)

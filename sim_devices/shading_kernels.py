@@ -87,7 +87,7 @@ def _step(value: float) -> Any:
 
 
 @njit(cache=True, nogil=True)
-def albedo_at(
+def compute_albedo(
     materials: Floats, row: int, fine: Floats, coarse: Floats, mark: float, out: Floats
 ) -> None:
     """Reflectance of a point from its noise, and how wet it is.
@@ -176,7 +176,7 @@ def _blend(attributes: Floats, a: int, b: int, c: int, column: int, weights: Flo
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _bumped_normal(
+def _bump_normal(
     attributes: Floats,
     a: int,
     b: int,
@@ -215,7 +215,7 @@ def _place(
 
 
 @njit(cache=True, nogil=True)
-def light_at(
+def compute_light(
     lamps: Floats,
     part: int,
     normal: Floats,
@@ -322,11 +322,11 @@ def shade(
                 coarse,
             )
             mark = _blend(attributes, a, b, c, 3, weights)
-            albedo_at(materials, row, fine, coarse, mark, colour)
+            compute_albedo(materials, row, fine, coarse, mark, colour)
             bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])
-            _bumped_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
+            _bump_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
             wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
-            light_at(lamps, part, normal, point, eye, wrap, shininess, sums)
+            compute_light(lamps, part, normal, point, eye, wrap, shininess, sums)
             exposure = _blend(attributes, a, b, c, 4, weights)
             exposure *= _bilinear(occlusion, float32(x) / stride, float32(y) / stride)
             dx, dy = float32(x) - middle_x, float32(y) - middle_y

@@ -10,7 +10,7 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from sim_devices.camera import Scene
-from sim_devices.rigs import NO_TURN, Turn, camera_from_left, default_rig
+from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
 from sim_devices.sensor import Eye
 from sim_devices.sheet_kernels import draw_sheet
 
@@ -24,7 +24,7 @@ _EDGE_PX = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrintedSheet:
-    """What is printed.
+    """A printed sheet: its picture, resolution and place.
 
     Attributes:
         white: (h, w) uint8, 255 where the paper is white, 0 where it is black.
@@ -87,7 +87,7 @@ class SheetScene:
         rig: StereoRig | None = None,
         ground: float = _GROUND,
     ) -> None:
-        self.rig = rig or default_rig()
+        self.rig = rig or make_default_rig()
         self._ground = ground
         self._sheet = sheet
         self._left_from_sheet = left_from_sheet

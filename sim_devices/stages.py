@@ -1,4 +1,4 @@
-"""What the surgical stages look like: the bodies of each and how they are made.
+"""Bodies of the simulated surgical stages, and how they are made.
 
 Everything is built as for a right knee; a left one is the mirror image of the whole site.
 """
@@ -13,9 +13,15 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.materials import MaterialId
 from sim_devices.renderer import Part
-from sim_devices.textures import smooth_noise
+from sim_devices.textures import make_smooth_noise
 from sim_devices.tissue import Sheet
-from sim_devices.tools import across, bloody_fingers, chuck_mesh, drill_mesh, hand_meshes
+from sim_devices.tools import (
+    across,
+    hand_meshes,
+    make_bloody_fingers,
+    make_chuck_mesh,
+    make_drill_mesh,
+)
 
 HOLE_RADIUS_MM = 4.5
 HOLE_DEPTH_MM = 25.0
@@ -60,8 +66,8 @@ def _drilling(site: Site) -> tuple[Part, ...]:
         mark=np.clip(depth / HOLE_DEPTH_MM, 0.0, 1.0),
         exposure=1.0 / (1.0 + (depth / 7.0) ** 2),
     )
-    drill = Part("drill", drill_mesh(), MaterialId.STEEL)
-    chuck = Part("chuck", chuck_mesh(), MaterialId.HANDLE)
+    drill = Part("drill", make_drill_mesh(), MaterialId.STEEL)
+    chuck = Part("chuck", make_chuck_mesh(), MaterialId.HANDLE)
     return (_femur(site, femur, worn), hole, drill, chuck, *_surroundings(site))
 
 
@@ -83,21 +89,21 @@ def _surroundings(site: Site) -> tuple[Part, ...]:
         Part("tibia", site.bones["tibia"], material),
         Part("tissue", site.tissue.mesh, MaterialId.TISSUE, site.tissue.mark, site.tissue.exposure),
         Part("drape", site.drape.mesh, MaterialId.DRAPE, site.drape.mark, site.drape.exposure),
-        Part("hand", glove, MaterialId.GLOVE, mark=bloody_fingers(glove)),
+        Part("hand", glove, MaterialId.GLOVE, mark=make_bloody_fingers(glove)),
         Part("hand", tool, MaterialId.STEEL),
     )
 
 
-def worn_patch(femur: TriangleMesh, centre_mm: FloatArray, radius_mm: float) -> FloatArray:
+def make_worn_patch(femur: TriangleMesh, centre_mm: FloatArray, radius_mm: float) -> FloatArray:
     """(V,) 0 to 1: an irregular worn patch round a point of the surface."""
     offset = femur.vertices_mm - centre_mm
-    ragged = 1.0 + 0.25 * smooth_noise(femur.vertices_mm, 13.0, 5)
+    ragged = 1.0 + 0.25 * make_smooth_noise(femur.vertices_mm, 13.0, 5)
     distance = np.linalg.norm(offset * (1.0, 0.7, 0.7), axis=1) / (radius_mm * ragged)
     worn: FloatArray = np.clip((1.25 - distance) / 0.5, 0.0, 1.0)
     return worn
 
 
-def entry_point(femur: TriangleMesh, beside_mm: FloatArray, axis: FloatArray) -> FloatArray:
+def find_entry_point(femur: TriangleMesh, beside_mm: FloatArray, axis: FloatArray) -> FloatArray:
     """(3,) where a line along `axis` that passes beside a point first meets the bone."""
     u, v = across(axis)
     offset = femur.vertices_mm - beside_mm

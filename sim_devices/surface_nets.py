@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import IntArray, TriangleMesh
 from navapp.geometry.transform import FloatArray
-from sim_devices.implicit import Field, gradient
+from sim_devices.implicit import Field, compute_gradient
 
 BoolArray = NDArray[np.bool_]
 
@@ -49,7 +49,7 @@ class Grid:
         return result
 
 
-def grid_around(lower_mm: FloatArray, upper_mm: FloatArray, spacing_mm: float) -> Grid:
+def make_grid(lower_mm: FloatArray, upper_mm: FloatArray, spacing_mm: float) -> Grid:
     """A cubic lattice that covers the box."""
     counts = np.ceil((upper_mm - lower_mm) / spacing_mm).astype(int) + 1
     return Grid(lower_mm, np.full(3, spacing_mm), (int(counts[0]), int(counts[1]), int(counts[2])))
@@ -68,7 +68,7 @@ def sample(field: Field, grid: Grid, stride: int = 4, chunk: int = 1 << 16) -> F
     near_node = np.abs(coarse) < limit
     near_block = np.zeros([n - 1 for n in counts], dtype=bool)
     for corner in CORNERS:
-        near_block |= near_node[_shifted(corner, near_block.shape)]
+        near_block |= near_node[_shift_slices(corner, near_block.shape)]
     values = coarse
     block_of = []
     for axis, n in enumerate(grid.shape):
@@ -87,7 +87,7 @@ def sample(field: Field, grid: Grid, stride: int = 4, chunk: int = 1 << 16) -> F
     return flat.reshape(grid.shape)
 
 
-def _shifted(corner: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[slice, ...]:
+def _shift_slices(corner: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[slice, ...]:
     return tuple(slice(int(c), int(c) + n) for c, n in zip(corner, shape, strict=True))
 
 
@@ -111,12 +111,12 @@ def _single_sheet() -> BoolArray:
     return result
 
 
-def cell_codes(inside: BoolArray) -> NDArray[np.uint8]:
+def compute_cell_codes(inside: BoolArray) -> NDArray[np.uint8]:
     """(nx-1, ny-1, nz-1) bit c set when corner c of the cell is inside."""
     cells = tuple(n - 1 for n in inside.shape)
     codes = np.zeros(cells, dtype=np.uint8)
     for bit, corner in enumerate(CORNERS):
-        codes |= inside[_shifted(corner, cells)].astype(np.uint8) << np.uint8(bit)
+        codes |= inside[_shift_slices(corner, cells)].astype(np.uint8) << np.uint8(bit)
     return codes
 
 
@@ -129,7 +129,7 @@ def repair_ambiguous(values: FloatArray) -> FloatArray:
     flat = values.reshape(-1)
     rounds = 0
     while True:
-        bad = np.argwhere(~_single_sheet()[cell_codes(values < 0.0)])
+        bad = np.argwhere(~_single_sheet()[compute_cell_codes(values < 0.0)])
         if len(bad) == 0:
             return values
         corners = np.ravel_multi_index(
@@ -143,7 +143,7 @@ def repair_ambiguous(values: FloatArray) -> FloatArray:
         rounds += 1
 
 
-def surface_net(values: FloatArray, grid: Grid) -> TriangleMesh:
+def make_surface_net(values: FloatArray, grid: Grid) -> TriangleMesh:
     """The closed zero level of sampled values, negative inside; coordinates in mm.
 
     Raises:
@@ -154,7 +154,7 @@ def surface_net(values: FloatArray, grid: Grid) -> TriangleMesh:
     border = [inside.take(side, axis).any() for axis in range(3) for side in (0, -1)]
     if any(border) or not inside.any():
         raise ValueError("the solid must lie inside the grid and not be empty")
-    codes = cell_codes(inside)
+    codes = compute_cell_codes(inside)
     cells = np.argwhere((codes != 0) & (codes != 255))
     number = np.full(codes.shape, -1, dtype=np.int32)
     number[tuple(cells.T)] = np.arange(len(cells), dtype=np.int32)
@@ -191,13 +191,13 @@ def mesh_solid(
     field: Field, lower_mm: FloatArray, upper_mm: FloatArray, cell_mm: float
 ) -> TriangleMesh:
     """Closed manifold mesh of the largest piece of a solid, its vertices on the surface."""
-    grid = grid_around(lower_mm, upper_mm, cell_mm)
-    mesh = surface_net(sample(field, grid), grid).largest_component()
-    vertices = relaxed(mesh.vertices_mm, mesh.faces)
-    return TriangleMesh(onto_surface(field, vertices, cell_mm), mesh.faces)
+    grid = make_grid(lower_mm, upper_mm, cell_mm)
+    mesh = make_surface_net(sample(field, grid), grid).largest_component()
+    vertices = relax(mesh.vertices_mm, mesh.faces)
+    return TriangleMesh(move_onto_surface(field, vertices, cell_mm), mesh.faces)
 
 
-def relaxed(vertices: FloatArray, faces: IntArray) -> FloatArray:
+def relax(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Vertices moved to the middle between themselves and the mean of their neighbours, twice."""
     starts, ends = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     count = np.bincount(starts, minlength=len(vertices))[:, None]
@@ -209,12 +209,12 @@ def relaxed(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return vertices
 
 
-def onto_surface(field: Field, vertices: FloatArray, cell_mm: float) -> FloatArray:
+def move_onto_surface(field: Field, vertices: FloatArray, cell_mm: float) -> FloatArray:
     """Vertices moved onto the surface: three Newton steps of at most half a cell.
 
     The slope is taken once: the way is so short that the first direction does.
     """
-    slope = gradient(field, vertices)
+    slope = compute_gradient(field, vertices)
     squared = np.maximum(np.einsum("ij,ij->i", slope, slope), 0.05)
     limit = 0.5 * cell_mm / np.sqrt(squared)
     for _ in range(3):

@@ -38,7 +38,7 @@ class NoiseTile:
 
 
 @lru_cache(maxsize=4)
-def noise_tile(seed: int, blur_voxels: float = 0.0, size: int = TILE_SIZE) -> NoiseTile:
+def make_noise_tile(seed: int, blur_voxels: float = 0.0, size: int = TILE_SIZE) -> NoiseTile:
     """The tile of a seed; `blur_voxels` (Gaussian sigma) is for pictures of few pixels."""
     from scipy import fft
 
@@ -67,7 +67,7 @@ def noise_tile(seed: int, blur_voxels: float = 0.0, size: int = TILE_SIZE) -> No
     return NoiseTile(values)
 
 
-def smooth_noise(
+def make_smooth_noise(
     points: NDArray[np.float64], wavelength_mm: float, seed: int
 ) -> NDArray[np.float64]:
     """(N,) values of zero mean and about unit deviation at points (N, d) mm: a sum of waves.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.raster_kernels import raster_triangles
-from sim_devices.textures import smooth_noise
+from sim_devices.textures import make_smooth_noise
 
 CELL_MM = 1.25
 # How far the ground is known on which the drape lies, and where the visible sheet ends under it.
@@ -30,7 +30,7 @@ WALL_MM = 24.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """A surface of the site and what the renderer wants to know of its vertices.
+    """A surface with values per vertex for the renderer.
 
     Attributes:
         mesh: in the table's frame.
@@ -77,7 +77,7 @@ def make_tissue(
     return Sheet(grid.mesh(height), skin.ravel(), exposure.ravel())
 
 
-def trimmed(sheet: Sheet) -> Sheet:
+def trim(sheet: Sheet) -> Sheet:
     """What of the tissue can ever show from under the drape."""
     mesh = sheet.mesh
     near = np.hypot(mesh.vertices_mm[:, 0], mesh.vertices_mm[:, 1]) < SHEET_RADIUS_MM
@@ -98,26 +98,26 @@ def make_drape(tissue: Sheet, skin_height_mm: float, seed: int) -> Sheet:
     columns, rows = 240, 78
     angle = np.linspace(0.0, 2.0 * np.pi, columns, endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    hem = DRAPE_HOLE_MM + 4.0 * smooth_noise(circle * 60.0, 70.0, seed)
+    hem = DRAPE_HOLE_MM + 4.0 * make_smooth_noise(circle * 60.0, 70.0, seed)
     # Narrow rings at the hem, wide ones outside; none wider than 9 mm.
     step = np.minimum(0.8 * 1.09 ** np.arange(rows), 9.0)
     outwards = np.concatenate([[0.0], np.cumsum(step)])[:rows]
     radius = hem[None, :] + outwards[:, None]
     x, y = radius * np.cos(angle), radius * np.sin(angle)
     flat = np.column_stack([x.ravel(), y.ravel()])
-    folds = smooth_noise(flat, 95.0, seed + 1) * 6.0
+    folds = make_smooth_noise(flat, 95.0, seed + 1) * 6.0
     # Creases: the absolute value of a smooth field has sharp valleys.
-    creases = np.abs(smooth_noise(flat, 70.0, seed + 2)) * 7.0
-    small = smooth_noise(flat, 22.0, seed + 3) * 0.7
+    creases = np.abs(make_smooth_noise(flat, 70.0, seed + 2)) * 7.0
+    small = make_smooth_noise(flat, 22.0, seed + 3) * 0.7
     distance = np.repeat(outwards, columns)
     calm = np.clip(distance / 45.0, 0.0, 1.0)
     roll = 4.5 * np.exp(-(((distance - 4.0) / 4.0) ** 2)) - 4.0 * np.exp(-distance / 1.5)
     slope = -0.22 * distance - 0.0004 * distance**2
     height = skin_height_mm + 7.0 + roll + calm * (folds + creases) + small * calm + slope
-    lifted = np.maximum(height, _raised(tissue, flat) + roll)
+    lifted = np.maximum(height, _raise_height(tissue, flat) + roll)
     vertices = np.column_stack([flat, -lifted])
     mesh = TriangleMesh(vertices, _ring_faces(rows, columns))
-    stain = smooth_noise(flat, 50.0, seed + 5) - 1.9 + 0.7 * np.exp(-distance / 40.0)
+    stain = make_smooth_noise(flat, 50.0, seed + 5) - 1.9 + 0.7 * np.exp(-distance / 40.0)
     valley = np.clip(1.0 - creases / 5.0, 0.0, 1.0) * calm
     return Sheet(mesh, np.clip(0.5 + 2.0 * stain, 0.0, 1.0), 1.0 - 0.35 * valley)
 
@@ -143,7 +143,7 @@ class _Grid:
         return TriangleMesh(vertices, faces)
 
 
-def _raised(tissue: Sheet, places: FloatArray) -> FloatArray:
+def _raise_height(tissue: Sheet, places: FloatArray) -> FloatArray:
     """(N,) the tissue's greatest height near places (x, y), some millimetres up; -inf beyond it."""
     import cv2
     from scipy.ndimage import map_coordinates
@@ -183,7 +183,7 @@ def _heights(bones: Sequence[TriangleMesh], grid: _Grid) -> FloatArray:
 
 
 def _field(points: FloatArray, wavelength_mm: float, seed: int, grid: _Grid) -> FloatArray:
-    return smooth_noise(points, wavelength_mm, seed).reshape(grid.size, grid.size)
+    return make_smooth_noise(points, wavelength_mm, seed).reshape(grid.size, grid.size)
 
 
 def _border_distance(exposed: NDArray[np.bool_], grid: _Grid, seed: int) -> FloatArray:

@@ -4,7 +4,7 @@ import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from sim_devices.textures import smooth_noise
+from sim_devices.textures import make_smooth_noise
 
 DRILL_RADIUS_MM = 4.2
 _DRILL_LENGTH_MM = 125.0
@@ -12,7 +12,7 @@ _DRILL_LENGTH_MM = 125.0
 _ODD = np.array([1.0, 1.6180339887, 2.6180339887])
 
 
-def tube(centres: FloatArray, radii: FloatArray, columns: int = 24) -> TriangleMesh:
+def make_tube(centres: FloatArray, radii: FloatArray, columns: int = 24) -> TriangleMesh:
     """A closed tube along a path of centres (N, 3) with radii (N,) or (N, columns)."""
     along = np.gradient(centres, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -37,7 +37,7 @@ def tube(centres: FloatArray, radii: FloatArray, columns: int = 24) -> TriangleM
     return TriangleMesh(vertices, np.concatenate([*sides, *caps]).astype(np.int32))
 
 
-def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
+def merge_meshes(meshes: list[TriangleMesh]) -> TriangleMesh:
     """Several meshes as one."""
     starts = np.cumsum([0, *(len(mesh.vertices_mm) for mesh in meshes)])
     return TriangleMesh(
@@ -47,7 +47,7 @@ def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
     )
 
 
-def drill_mesh() -> TriangleMesh:
+def make_drill_mesh() -> TriangleMesh:
     """A twist drill with its tip at the origin and its shaft along -z."""
     z = np.linspace(0.0, _DRILL_LENGTH_MM, 160)
     radius = np.minimum(DRILL_RADIUS_MM, 0.05 + 1.1 * z)
@@ -55,16 +55,16 @@ def drill_mesh() -> TriangleMesh:
     flute = np.cos(2.0 * (angle[None, :] - 2.0 * np.pi * z[:, None] / 26.0))
     groove = np.where(z[:, None] < 65.0, 0.34 * np.clip(flute - 0.1, 0.0, 1.0), 0.0)
     centres = np.column_stack([np.zeros_like(z), np.zeros_like(z), -z])
-    return tube(centres, radius[:, None] * (1.0 - groove), 28)
+    return make_tube(centres, radius[:, None] * (1.0 - groove), 28)
 
 
-def chuck_mesh() -> TriangleMesh:
+def make_chuck_mesh() -> TriangleMesh:
     """The chuck and nose of the drilling machine, in the drill's frame but not turning."""
     z = np.linspace(95.0, 190.0, 40)
     radius = np.interp(
         z, [95.0, 97.0, 112.0, 114.0, 150.0, 190.0], [6.0, 9.0, 11.0, 15.0, 17.0, 20.0]
     )
-    return tube(np.column_stack([np.zeros_like(z), np.zeros_like(z), -z]), radius, 36)
+    return make_tube(np.column_stack([np.zeros_like(z), np.zeros_like(z), -z]), radius, 36)
 
 
 def hand_meshes() -> tuple[TriangleMesh, TriangleMesh]:
@@ -77,7 +77,7 @@ def hand_meshes() -> tuple[TriangleMesh, TriangleMesh]:
     s = np.linspace(0.0, 165.0, 60)
     tip = np.array([-22.0, -16.0, 0.0])
     rod = np.interp(s, [0.0, 4.0, 12.0, 60.0, 66.0, 165.0], [0.4, 1.8, 2.6, 3.0, 6.5, 7.5])
-    tool = tube(tip + s[:, None] * axis, rod, 28)
+    tool = make_tube(tip + s[:, None] * axis, rod, 28)
     u, v = across(axis)
     grip = tip + 62.0 * axis
     pieces = []
@@ -91,7 +91,7 @@ def hand_meshes() -> tuple[TriangleMesh, TriangleMesh]:
     pieces.append(_limb([wrist - 20.0 * axis, wrist, wrist + np.array([60.0, 60.0, -4.0])], 23.0))
     sleeve = [wrist + np.array([40.0, 42.0, -4.0]), wrist + np.array([330.0, 260.0, 20.0])]
     pieces.append(_limb(sleeve, 27.0))
-    return joined(pieces), tool
+    return merge_meshes(pieces), tool
 
 
 def _limb(knots: list[FloatArray], radius: float) -> TriangleMesh:
@@ -104,13 +104,13 @@ def _limb(knots: list[FloatArray], radius: float) -> TriangleMesh:
     path = PchipInterpolator(length, points)(s)
     ends = np.minimum(s, length[-1] - s)
     taper = np.sqrt(np.clip(1.0 - (1.0 - np.minimum(ends / radius, 1.0)) ** 2, 0.01, 1.0))
-    wrinkle = 1.0 + 0.03 * smooth_noise(path, 14.0, 3)
-    return tube(path, radius * taper * wrinkle, 24)
+    wrinkle = 1.0 + 0.03 * make_smooth_noise(path, 14.0, 3)
+    return make_tube(path, radius * taper * wrinkle, 24)
 
 
-def bloody_fingers(glove: TriangleMesh) -> FloatArray:
+def make_bloody_fingers(glove: TriangleMesh) -> FloatArray:
     """(V,) blood on the gloves, more towards the fingers."""
-    noise = smooth_noise(glove.vertices_mm, 24.0, 8)
+    noise = make_smooth_noise(glove.vertices_mm, 24.0, 8)
     reach = np.exp(-np.linalg.norm(glove.vertices_mm, axis=1) / 70.0)
     stains: FloatArray = np.clip(0.25 * noise + 1.1 * reach - 0.25, 0.0, 1.0)
     return stains

@@ -1,4 +1,4 @@
-"""What is really so in the simulated world; for judging results, never for making them."""
+"""True poses of the simulated world, for judging results only."""
 
 from collections.abc import Callable
 from typing import Protocol

@@ -10,24 +10,24 @@ from navapp.errors import UsageError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
-from sim_devices.anatomy import KneeAnatomy, make_knee, mirrored
-from sim_devices.cartilage import cartilage_thickness_mm, with_cartilage, worn
+from sim_devices.anatomy import KneeAnatomy, make_knee, mirror_mesh
+from sim_devices.cartilage import make_cartilage_thickness_mm, wear_patch, with_cartilage
 from sim_devices.layout import (
-    flexed,
+    flex_knee,
     left_from_table,
-    misplaced,
-    nearer,
+    misplace,
     nominal_table_from_femur,
+    select_side,
 )
-from sim_devices.materials import material_table
-from sim_devices.motion import LegMotion, drill_motion, sweep_offset_mm
+from sim_devices.materials import make_material_table
+from sim_devices.motion import LegMotion, compute_drill_motion, compute_sweep_offset_mm
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
-from sim_devices.rigs import NO_TURN, Turn, camera_from_left, default_rig
+from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import Eye
-from sim_devices.stages import STAGES, Site, entry_point, worn_patch
-from sim_devices.textures import noise_tile
-from sim_devices.tissue import SKIN_BELOW_TOP_MM, make_drape, make_tissue, trimmed
+from sim_devices.stages import STAGES, Site, find_entry_point, make_worn_patch
+from sim_devices.textures import make_noise_tile
+from sim_devices.tissue import SKIN_BELOW_TOP_MM, make_drape, make_tissue, trim
 
 _TISSUE_FOLLOWS = 0.9
 # How far from the joint line the surgeon laid the bones bare.
@@ -63,21 +63,21 @@ class World:
 
     def __init__(self, scenario: Scenario, rig: StereoRig | None = None) -> None:
         self.scenario = scenario
-        self.rig: StereoRig = rig or default_rig()
+        self.rig: StereoRig = rig or make_default_rig()
         self.anatomy: KneeAnatomy = make_knee(scenario.knee)
         self._is_left = scenario.side == "left"
         right = {
-            name: mirrored(mesh) if self._is_left else mesh for name, mesh in self._surfaces_mm()
+            name: mirror_mesh(mesh) if self._is_left else mesh for name, mesh in self._surfaces_mm()
         }
         self._left_from_table = left_from_table(self.rig)
         self._nominal = nominal_table_from_femur()
-        self._start = misplaced(self._nominal, scenario.seed)
-        self._femur_from_tibia = flexed(right["femur"], right["tibia"])
+        self._start = misplace(self._nominal, scenario.seed)
+        self._femur_from_tibia = flex_knee(right["femur"], right["tibia"])
         self._motion = LegMotion(scenario.motion, scenario.seed)
         self._site = self._make_site(right)
         self._surfaces = Surfaces(
-            material_table(scenario.contrast, scenario.blood),
-            noise_tile(scenario.seed),
+            make_material_table(scenario.contrast, scenario.blood),
+            make_noise_tile(scenario.seed),
             _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
         )
         self._lock = threading.Lock()
@@ -99,12 +99,12 @@ class World:
     @property
     def nominal_left_from_femur(self) -> RigidTransform:
         """Where the femur lies according to the book: the rough start that an operator has."""
-        return self._seen(self._nominal)
+        return self._place_in_view(self._nominal)
 
     @property
     def nominal_left_from_tibia(self) -> RigidTransform:
         """Where the tibia lies according to the book: the knee bent as it is at rest."""
-        return self._seen(self._nominal @ self._femur_from_tibia)
+        return self._place_in_view(self._nominal @ self._femur_from_tibia)
 
     @property
     def approach_axis(self) -> FloatArray:
@@ -140,7 +140,7 @@ class World:
         Raises:
             UsageError: there is no such body.
         """
-        return self._seen(self._table_from_body(body, time_ns / 1e9))
+        return self._place_in_view(self._table_from_body(body, time_ns / 1e9))
 
     def cartilage_mm(self, bone: str) -> FloatArray:
         """(V,) true thickness over the vertices of a bone of the anatomy, worn at the defect.
@@ -151,10 +151,10 @@ class World:
             UsageError: the anatomy has no such bone.
         """
         mean_mm, seed = self.scenario.cartilage_mm, self.scenario.seed
-        thickness = cartilage_thickness_mm(self.anatomy, bone, mean_mm, seed)
+        thickness = make_cartilage_thickness_mm(self.anatomy, bone, mean_mm, seed)
         if bone == "femur":
             mesh = self.anatomy.bones[bone]
-            thickness = worn(mesh, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
+            thickness = wear_patch(mesh, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
         return thickness
 
     def render(
@@ -186,7 +186,7 @@ class World:
             stage = self._stage
             parts = self._parts.get(stage)
             if parts is None:
-                parts = tuple(self._sided(part) for part in STAGES[stage](self._site))
+                parts = tuple(self._mirror_if_left(part) for part in STAGES[stage](self._site))
                 self._parts[stage] = parts
             key = (stage, eye, scale, turn_rad)
             if key not in self._renderers:
@@ -202,7 +202,7 @@ class World:
         if scale >= 0.8:
             return self._surfaces
         blur = 0.6 * (1.0 / scale - 1.0)
-        tile = noise_tile(self.scenario.seed, round(blur, 1))
+        tile = make_noise_tile(self.scenario.seed, round(blur, 1))
         return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
 
     def _poses(
@@ -233,14 +233,16 @@ class World:
         if body == "drape":
             return RigidTransform.identity("table", "drape")
         if body == "hand":
-            offset = sweep_offset_mm(self.scenario.instrument, time_s)
+            offset = compute_sweep_offset_mm(self.scenario.instrument, time_s)
             height = float(self._site.tissue.mesh.vertices_mm[:, 2].min()) - _HAND_ABOVE_MM
             return RigidTransform.from_parts(
                 "table", "hand", np.eye(3), offset + np.array([0.0, 0.0, height])
             )
         if body in ("drill", "chuck"):
             site = self._site
-            tool = drill_motion(site.entry_mm, site.entry_axis, time_s, turns=body == "drill")
+            tool = compute_drill_motion(
+                site.entry_mm, site.entry_axis, time_s, turns=body == "drill"
+            )
             return femur @ RigidTransform("femur", body, tool)
         raise UsageError(
             f"there is no body {body!r} in the simulated world",
@@ -248,7 +250,7 @@ class World:
             remedy=f"choose one of {', '.join(self.bodies)}",
         )
 
-    def _seen(self, table_from_body: RigidTransform) -> RigidTransform:
+    def _place_in_view(self, table_from_body: RigidTransform) -> RigidTransform:
         """left_from_body of a pose that was made as for a right knee."""
         if self._is_left:
             table_from_body = RigidTransform(
@@ -267,10 +269,12 @@ class World:
         """Vertices of the femur's bone where its cartilage is mostly worn away, as a CT shows."""
         return np.flatnonzero(self._site.worn > 0.5).astype(np.int64)
 
-    def _sided(self, part: Part) -> Part:
+    def _mirror_if_left(self, part: Part) -> Part:
         if not self._is_left:
             return part
-        return Part(part.body, mirrored(part.mesh), part.material, part.mark, part.exposure, -1.0)
+        return Part(
+            part.body, mirror_mesh(part.mesh), part.material, part.mark, part.exposure, -1.0
+        )
 
     def _defect_mm(self) -> FloatArray:
         """(3,) middle of the worn patch: on the medial condyle, in front of its lowest point."""
@@ -288,10 +292,10 @@ class World:
         laid = {"femur": femur, "tibia": femur @ self._femur_from_tibia}
         on_table = [right[name].transformed(pose) for name, pose in laid.items()]
         bare = [
-            nearer(
+            select_side(
                 right["femur"], float(right["femur"].vertices_mm[:, 2].min()) + _BARE_FEMUR_MM, -1.0
             ),
-            nearer(
+            select_side(
                 right["tibia"], float(right["tibia"].vertices_mm[:, 2].max()) - _BARE_TIBIA_MM, 1.0
             ),
         ]
@@ -303,10 +307,10 @@ class World:
         axis = rotation_from_vector((np.radians(-6.0), 0.0, 0.0)) @ (0.0, 0.0, 1.0)
         return Site(
             bones=right,
-            worn=worn_patch(right["femur"], self._defect_mm() * mirror, _DEFECT_RADIUS_MM),
+            worn=make_worn_patch(right["femur"], self._defect_mm() * mirror, _DEFECT_RADIUS_MM),
             is_covered=self.scenario.cartilage_mm > 0.0,
-            tissue=trimmed(tissue),
+            tissue=trim(tissue),
             drape=make_drape(tissue, top - SKIN_BELOW_TOP_MM - 11.0, self.scenario.seed),
-            entry_mm=entry_point(right["femur"], notch + np.array([0.0, -10.0, 0.0]), axis),
+            entry_mm=find_entry_point(right["femur"], notch + np.array([0.0, -10.0, 0.0]), axis),
             entry_axis=axis,
         )

@@ -9,7 +9,7 @@ from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import (
     BoneModel,
     DisparityMap,
-    LineTimings,
+    FrameTimings,
     Origin,
     Plan,
     PoseEstimate,
@@ -293,13 +293,13 @@ def test_a_part_of_a_cloud_keeps_its_columns_together():
 
 
 def test_the_total_is_the_sum_of_all_timings():
-    fields = dataclasses.fields(LineTimings)
-    timings = LineTimings(*(2.0**i for i in range(len(fields))))
+    fields = dataclasses.fields(FrameTimings)
+    timings = FrameTimings(*(2.0**i for i in range(len(fields))))
     assert timings.total_ms == 2.0 ** len(fields) - 1.0
 
 
 def test_a_frame_without_an_estimate_has_no_pose():
-    lost = TrackedFrame("femur", None, Verdict(PoseStatus.LOST), LineTimings())
+    lost = TrackedFrame("femur", None, Verdict(PoseStatus.LOST), FrameTimings())
     assert lost.left_from_bone is None
     found = dataclasses.replace(lost, estimate=estimate(np.eye(6)))
     assert found.left_from_bone is POSE

@@ -1,1 +1,1 @@
-"""Rigs in the files of other programs."""
+"""Reading and writing stereo rigs in the file formats of OpenCV, Kalibr and ROS."""

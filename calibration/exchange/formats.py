@@ -1,4 +1,4 @@
-"""Which format a rig's file has, and reading and writing whichever it is."""
+"""Recognises the format of a rig's file, and reads and writes rigs in every known format."""
 
 from pathlib import Path
 from typing import Literal, get_args
@@ -83,7 +83,7 @@ def write_as(form: Format, path: str | Path, rig: StereoRig) -> None:
         write_rig(path, rig)
 
 
-def lost(rig: StereoRig, form: Format) -> list[str]:
+def list_losses(rig: StereoRig, form: Format) -> list[str]:
     """What a format cannot say of a rig, one sentence each."""
     if form in ("opencv-yaml", "opencv-xml"):
         return []

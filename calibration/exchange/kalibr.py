@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.exchange.lens_models import coefficients
-from calibration.exchange.yaml_files import entry, numbers, read_mapping, unusable
+from calibration.exchange.lens_models import pad_coefficients
+from calibration.exchange.yaml_files import find_entry, make_error, parse_numbers, read_mapping
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
@@ -28,15 +28,15 @@ def read_kalibr(path: Path) -> StereoRig:
     content = read_mapping(path, FORM)
     names = sorted(key for key in content if str(key).startswith("cam"))
     if names != ["cam0", "cam1"]:
-        raise unusable(path, FORM, f"has {', '.join(names) or 'no camera'}, not cam0 and cam1")
+        raise make_error(path, FORM, f"has {', '.join(names) or 'no camera'}, not cam0 and cam1")
     try:
         left, right = _camera(content, "cam0"), _camera(content, "cam1")
-        matrix = numbers(entry(content["cam1"], "T_cn_cnm1"), "T_cn_cnm1", 4, 4)
+        matrix = parse_numbers(find_entry(content["cam1"], "T_cn_cnm1"), "T_cn_cnm1", 4, 4)
         matrix[:3, 3] *= _MM_PER_M
         pose = RigidTransform("right", "left", matrix)
         rig = StereoRig(left, right, pose, name=path.stem)
     except (ValueError, TypeError) as error:
-        raise unusable(path, FORM, f"describes no possible rig ({error})") from error
+        raise make_error(path, FORM, f"describes no possible rig ({error})") from error
     if pose.inverse().translation_mm[0] <= 0.0:
         raise RigError(
             f"Kalibr file {path} has cam1 at the left of cam0",
@@ -68,19 +68,19 @@ def _camera(content: dict[str, Any], name: str) -> Camera:
     given = content[name]
     if not isinstance(given, dict):
         raise ValueError(f"{name} holds no keys")
-    if (camera_model := entry(given, "camera_model")) != "pinhole":
+    if (camera_model := find_entry(given, "camera_model")) != "pinhole":
         raise ValueError(f"{name}: camera_model {camera_model!r} is not supported, only pinhole")
-    model = entry(given, "distortion_model")
+    model = find_entry(given, "distortion_model")
     if model not in _COEFFICIENTS:
         raise ValueError(
             f"{name}: distortion_model {model!r} is not supported, only "
             f"{' and '.join(_COEFFICIENTS)}"
         )
-    found = numbers(
+    found = parse_numbers(
         given.get("distortion_coeffs", []), f"{name}: distortion_coeffs", _COEFFICIENTS[model]
     )
-    fx, fy, cx, cy = numbers(entry(given, "intrinsics"), f"{name}: intrinsics", 4)
-    width, height = numbers(entry(given, "resolution"), f"{name}: resolution", 2)
+    fx, fy, cx, cy = parse_numbers(find_entry(given, "intrinsics"), f"{name}: intrinsics", 4)
+    width, height = parse_numbers(find_entry(given, "resolution"), f"{name}: resolution", 2)
     matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     return Camera(matrix, found, int(width), int(height))
 
@@ -90,7 +90,7 @@ def _content(number: int, camera: Camera, from_left: FloatArray | None) -> dict[
     content: dict[str, Any] = {
         "cam_overlaps": [1 - number],
         "camera_model": "pinhole",
-        "distortion_coeffs": coefficients(camera, _COEFFICIENTS["radtan"], FORM).tolist(),
+        "distortion_coeffs": pad_coefficients(camera, _COEFFICIENTS["radtan"], FORM).tolist(),
         "distortion_model": "radtan",
         "intrinsics": [float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2))],
         "resolution": [camera.width, camera.height],

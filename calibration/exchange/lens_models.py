@@ -1,11 +1,11 @@
-"""Distortion as other programs know it: the first coefficients of OpenCV's polynomial."""
+"""Distortion coefficients in OpenCV's order, as other programs store them."""
 
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.transform import FloatArray
 
 
-def coefficients(camera: Camera, n_known: int, form: str) -> FloatArray:
+def pad_coefficients(camera: Camera, n_known: int, form: str) -> FloatArray:
     """The first coefficients of a lens, zeros included.
 
     Args:
@@ -20,7 +20,7 @@ def coefficients(camera: Camera, n_known: int, form: str) -> FloatArray:
     if found[n_known:].any():
         raise RigError(
             f"{form} knows {n_known} coefficients of distortion, the rig's lenses have "
-            f"{n_used(camera)}",
+            f"{count_used(camera)}",
             subject=form,
             remedy="choose a format that can say it; OpenCV's can",
         )
@@ -29,7 +29,7 @@ def coefficients(camera: Camera, n_known: int, form: str) -> FloatArray:
     return padded
 
 
-def n_used(camera: Camera) -> int:
+def count_used(camera: Camera) -> int:
     """Coefficients of a lens up to the last that is not 0."""
     used = camera.distortion.nonzero()[0]
     return int(used[-1]) + 1 if len(used) else 0

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.exchange.lens_models import coefficients, n_used
-from calibration.exchange.yaml_files import entry, numbers, read_mapping, unusable
+from calibration.exchange.lens_models import count_used, pad_coefficients
+from calibration.exchange.yaml_files import find_entry, make_error, parse_numbers, read_mapping
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.rectification import Rectifier
@@ -44,7 +44,7 @@ def read_ros(folder: Path) -> StereoRig:
             projection = _numbers(content, "projection_matrix", 3, 4)
             shifts.append(np.linalg.solve(projection[:, :3], projection[:, 3]) * _MM_PER_M)
         except (ValueError, TypeError, np.linalg.LinAlgError) as error:
-            raise unusable(path, FORM, f"describes no camera ({error})") from error
+            raise make_error(path, FORM, f"describes no camera ({error})") from error
     shift_mm = shifts[1] - shifts[0]
     if shift_mm[0] >= 0.0:
         what = "holds no baseline" if shift_mm[0] == 0.0 else "has the right camera at the left"
@@ -59,7 +59,7 @@ def read_ros(folder: Path) -> StereoRig:
         )
         return StereoRig(cameras[0], cameras[1], pose, name=folder.resolve().name)
     except ValueError as error:
-        raise unusable(folder, FORM, f"describes no possible rig ({error})") from error
+        raise make_error(folder, FORM, f"describes no possible rig ({error})") from error
 
 
 def write_ros(folder: Path, rig: StereoRig) -> None:
@@ -125,31 +125,35 @@ def _camera(content: dict[str, Any]) -> Camera:
     found = _numbers(content, "distortion_coefficients")
     if found.size > _COEFFICIENTS[model]:
         raise ValueError(f"{model} has {_COEFFICIENTS[model]} coefficients, not {found.size}")
-    size = [int(entry(content, key)) for key in ("image_width", "image_height")]
+    size = [int(find_entry(content, key)) for key in ("image_width", "image_height")]
     return Camera(_numbers(content, "camera_matrix", 3, 3), found, size[0], size[1])
 
 
 def _numbers(content: dict[str, Any], key: str, *shape: int) -> FloatArray:
     """Of a table of rows, cols and data, or of a plain list, which some drivers write."""
-    given = entry(content, key)
-    return numbers(entry(given, "data") if isinstance(given, dict) else given, key, *shape)
+    given = find_entry(content, key)
+    return parse_numbers(
+        find_entry(given, "data") if isinstance(given, dict) else given, key, *shape
+    )
 
 
 def _content(side: str, camera: Camera, turn: Any, projection: Any) -> dict[str, Any]:
-    model = "plumb_bob" if n_used(camera) <= _COEFFICIENTS["plumb_bob"] else "rational_polynomial"
-    found = coefficients(camera, _COEFFICIENTS[model], FORM)
+    model = (
+        "plumb_bob" if count_used(camera) <= _COEFFICIENTS["plumb_bob"] else "rational_polynomial"
+    )
+    found = pad_coefficients(camera, _COEFFICIENTS[model], FORM)
     return {
         "image_width": camera.width,
         "image_height": camera.height,
         "camera_name": side,
-        "camera_matrix": _written(camera.matrix),
+        "camera_matrix": _matrix_to_yaml(camera.matrix),
         "distortion_model": model,
-        "distortion_coefficients": _written(found.reshape(1, -1)),
-        "rectification_matrix": _written(turn),
-        "projection_matrix": _written(projection),
+        "distortion_coefficients": _matrix_to_yaml(found.reshape(1, -1)),
+        "rectification_matrix": _matrix_to_yaml(turn),
+        "projection_matrix": _matrix_to_yaml(projection),
     }
 
 
-def _written(matrix: Any) -> dict[str, Any]:
+def _matrix_to_yaml(matrix: Any) -> dict[str, Any]:
     rows, columns = np.shape(matrix)
     return {"rows": rows, "cols": columns, "data": np.ravel(matrix).astype(float).tolist()}

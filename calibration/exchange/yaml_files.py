@@ -1,4 +1,4 @@
-"""YAML of other programs, and what is asked of its entries."""
+"""Reads YAML of other programs and checks its entries; each error names file and key."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,15 +21,15 @@ def read_mapping(path: Path, form: str) -> dict[str, Any]:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise unusable(path, form, f"cannot be read ({error.strerror})") from error
+        raise make_error(path, form, f"cannot be read ({error.strerror})") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise unusable(path, form, "is no YAML") from error
+        raise make_error(path, form, "is no YAML") from error
     if not isinstance(content, dict):
-        raise unusable(path, form, "holds no keys")
+        raise make_error(path, form, "holds no keys")
     return content
 
 
-def entry(content: Mapping[str, Any], key: str) -> Any:
+def find_entry(content: Mapping[str, Any], key: str) -> Any:
     """The entry of a key.
 
     Raises:
@@ -40,7 +40,7 @@ def entry(content: Mapping[str, Any], key: str) -> Any:
     return content[key]
 
 
-def numbers(value: Any, key: str, *shape: int) -> FloatArray:
+def parse_numbers(value: Any, key: str, *shape: int) -> FloatArray:
     """Numbers in a shape; without one a row of any length.
 
     Raises:
@@ -58,7 +58,7 @@ def numbers(value: Any, key: str, *shape: int) -> FloatArray:
     return found.reshape(shape)
 
 
-def unusable(path: Path, form: str, problem: str) -> RigError:
+def make_error(path: Path, form: str, problem: str) -> RigError:
     """The error for a foreign file that makes no rig."""
     return RigError(
         f"{form} file {path} {problem}", subject=str(path), remedy="export it again, or calibrate"

@@ -1,1 +1,1 @@
-"""How late a display is seen, and which eye sees it later, from a code of light and darkness."""
+"""Delay of a display, per eye, from pictures of a display that flashes a known random code."""

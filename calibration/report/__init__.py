@@ -1,1 +1,1 @@
-"""A calibration for the eyes of a person who has to decide whether to trust it."""
+"""HTML report of a calibration: verdict, figures and plots for the person who accepts it."""

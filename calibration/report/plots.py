@@ -1,4 +1,4 @@
-"""The pictures of a report, as SVG text.
+"""Plots of a calibration's report, each as SVG text.
 
 Matplotlib is slow to import, so each function takes it at first use.
 """
@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from calibration.rig.lengths import epipolar_px
-from calibration.rig.solve import Calibration
-from calibration.rig.uncertainty import bounds_mm
+from calibration.rig.lengths import compute_epipolar_px
+from calibration.rig.rig_solution import Calibration
+from calibration.rig.uncertainty import compute_bounds_mm
 from navapp.geometry.transform import FloatArray
 
 _BLUE, _ORANGE, _PALE, _GREY = "#2b6cb0", "#c05621", "#fbd38d", "#718096"
 _MAP_COLUMNS, _MAP_ROWS = 48, 27
 
 
-def residuals(found: Calibration) -> str:
+def draw_residuals(found: Calibration) -> str:
     """Seen less predicted of every mark, enlarged, over both pictures."""
     largest = max(float(np.abs(part).max()) for pair in found.solved.residuals_px for part in pair)
     factor = 0.04 * found.solved.model.width / max(largest, 1e-9)
@@ -42,7 +42,7 @@ def residuals(found: Calibration) -> str:
     return _svg(draw, (9.6, 3.1))
 
 
-def coverage(found: Calibration) -> str:
+def draw_coverage(found: Calibration) -> str:
     """Where marks were seen in both pictures, and where none were though the rig is used there."""
     from matplotlib.colors import ListedColormap
 
@@ -65,7 +65,7 @@ def coverage(found: Calibration) -> str:
     return _svg(draw, (9.6, 3.1))
 
 
-def views(found: Calibration) -> str:
+def draw_views(found: Calibration) -> str:
     """Residuals of every view, solved with and held out."""
     solved = [_rms(np.vstack(left)) for left in found.solved.residuals_px]
     held = np.sqrt(found.held_out.squares_px2)
@@ -83,9 +83,9 @@ def views(found: Calibration) -> str:
     return _svg(draw, (9.6, 2.4))
 
 
-def epipolar(found: Calibration) -> str:
+def draw_epipolar(found: Calibration) -> str:
     """Distances of the right marks from the left ones' lines."""
-    across = epipolar_px(found.rig, found.pairs)
+    across = compute_epipolar_px(found.rig, found.pairs)
 
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()
@@ -96,7 +96,7 @@ def epipolar(found: Calibration) -> str:
     return _svg(draw, (4.7, 2.4))
 
 
-def uncertainty(found: Calibration, depth_mm: float) -> str:
+def draw_uncertainty(found: Calibration, depth_mm: float) -> str:
     """Predicted 95 % error of a point at one distance, over the left picture; mm."""
     model, shared = found.solved.model, found.solved.shared
     x = (np.arange(_MAP_COLUMNS) + 0.5) / _MAP_COLUMNS * model.width
@@ -105,8 +105,10 @@ def uncertainty(found: Calibration, depth_mm: float) -> str:
     points_mm = found.rig.left.rays(np.column_stack([u.ravel(), v.ravel()])) * depth_mm
     covariance = found.solved.rig_covariance
     # In the working volume the solve may know of more than its covariance does.
-    formal = bounds_mm(model, shared, covariance, found.points_mm)
-    told = bounds_mm(model, shared, covariance, points_mm) * np.median(found.bounds_mm / formal)
+    formal = compute_bounds_mm(model, shared, covariance, found.points_mm)
+    told = compute_bounds_mm(model, shared, covariance, points_mm) * np.median(
+        found.bounds_mm / formal
+    )
     pixels = found.rig.right.project(found.rig.right_from_left.apply(points_mm))
     is_seen = ((pixels >= 0.0) & (pixels < (model.width, model.height))).all(axis=1)
     told = np.where(is_seen, told, np.nan).reshape(u.shape)

@@ -1,1 +1,1 @@
-"""From pictures of a target to a judged stereo rig."""
+"""Calibration of a stereo rig from pictures of a target, with acceptance limits."""

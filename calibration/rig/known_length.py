@@ -1,4 +1,4 @@
-"""How long a rig measures a board that is seen once, and how sure that is."""
+"""Measures the length of a board that is seen once with a rig, and its standard error."""
 
 from dataclasses import dataclass
 
@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.rig.start import matrix_of, pose_of
+from calibration.rig.initial_rig import matrix_of, pose_of
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard, find_board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rectification import Image, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
@@ -20,7 +20,7 @@ _N_UNKNOWN = 7
 
 @dataclass(frozen=True, slots=True)
 class MeasuredLength:
-    """Of a board in one pair.
+    """A board's measured size relative to its true one, from one pair.
 
     Attributes:
         ratio: measured over true.
@@ -53,10 +53,10 @@ class LengthMeter:
             return None
         if in_left is None or in_right is None:
             return None
-        return measured_length(self.board, self.rig, SeenPair(0, in_left, in_right))
+        return measure_length(self.board, self.rig, SeenPair(0, in_left, in_right))
 
 
-def measured_length(board: Board, rig: StereoRig, pair: SeenPair) -> MeasuredLength | None:
+def measure_length(board: Board, rig: StereoRig, pair: SeenPair) -> MeasuredLength | None:
     """The size at which a board fits a pair best, its pose and its size solved for.
 
     One camera cannot tell a large board from a near one; two can, as far as their places are known.

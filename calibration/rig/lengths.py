@@ -1,4 +1,4 @@
-"""What a rig measures: distances across the epipolar lines, and lengths on the board."""
+"""Triangulation with a rig: points, epipolar distances and ratios of lengths on the board."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -6,12 +6,12 @@ from itertools import combinations
 import numpy as np
 
 from calibration.targets.boards import Board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 
 
-def epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
+def compute_epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
     """(N,) signed distances of the right marks from the lines of the left ones, px."""
     rotation, t = rig.right_from_left.rotation, rig.right_from_left.translation_mm
     cross = np.array([[0.0, -t[2], t[1]], [t[2], 0.0, -t[0]], [-t[1], t[0], 0.0]])
@@ -26,7 +26,7 @@ def epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
     return np.concatenate(distances)
 
 
-def triangulated_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
+def triangulate_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
     """(n, 3) points in the left camera's frame, half-way between both rays."""
     a = rig.left.rays(left_px)
     b = rig.right_from_left.inverse().rotate(rig.right.rays(right_px))
@@ -39,14 +39,14 @@ def triangulated_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -
     return middle
 
 
-def length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
+def compute_length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
     """Triangulated over true distance, for the far corners of what is seen of the board."""
     ratios = []
     for pair in pairs:
         ids, left, right = pair.common()
         if len(ids) < 4:
             continue
-        true_mm, found_mm = board.points_mm[ids], triangulated_mm(rig, left, right)
+        true_mm, found_mm = board.points_mm[ids], triangulate_mm(rig, left, right)
         x, y = true_mm[:, 0], true_mm[:, 1]
         far = {
             int(np.argmin(x + y)),

@@ -1,4 +1,4 @@
-"""Residuals of a rig at one place, how they change, and the normal equations of a step from there.
+"""Residuals and Jacobian of a rig at one estimate, and the normal equations of its next step.
 
 The poses are eliminated view by view (Schur complement), so that the cost grows with the number of
 views alone. Residuals count in units of their marks' own standard errors.
@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.equilibration import equilibrated, unit_sizes
-from calibration.rig.parameters import RigModel, shape_mm
-from calibration.rig.projection import projected
+from calibration.rig.equilibration import compute_unit_sizes, equilibrate
+from calibration.rig.parameters import RigModel, unpack_shape_mm
+from calibration.rig.projection import project
 from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.transform import FloatArray
 
 # Huber's limit, in robust standard deviations of what is left.
@@ -24,12 +24,12 @@ _MAD_TO_SIGMA = 1.4826
 _RIDGE = 1e-12
 # A printed mark lies where it should to so much of the distance to the next one, along x, y and z
 # (one standard deviation): paper shrinks, and a plate bends more than a print is off.
-_EXPECTED_SHARE_OFF = (0.01, 0.01, 0.05)
+_EXPECTED_FRACTION_OFF = (0.01, 0.01, 0.05)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Views:
-    """What stays the same in all steps.
+    """Observations and model of a bundle adjustment, the same in all steps.
 
     Attributes:
         board: that was seen.
@@ -56,7 +56,7 @@ class Views:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PictureLinearisation:
-    """What one picture leaves, and how it changes.
+    """Residuals of one picture and their derivatives.
 
     Attributes:
         residual_px: (n, 2) seen less predicted.
@@ -74,7 +74,7 @@ class _PictureLinearisation:
 
 
 class Linearisation:
-    """What the views leave, and how it changes, at one linear.
+    """Residuals of all views and their derivatives, at one estimate.
 
     Args:
         views: V.
@@ -86,7 +86,7 @@ class Linearisation:
         self.views, self.shared, self.left_from_board = views, shared, left_from_board
         self.pictures = [
             [
-                self._linearised(seen, sigma_px, pose, number)
+                self._linearise_picture(seen, sigma_px, pose, number)
                 for number, (seen, sigma_px) in enumerate(view)
             ]
             for view, pose in zip(views.pictures, left_from_board, strict=True)
@@ -123,19 +123,19 @@ class Linearisation:
     def marks_off(self) -> tuple[FloatArray, FloatArray]:
         """Of 3 `n_marks` coordinates: standard deviation mm, and how many of them each is off."""
         model = self.views.model
-        expected_mm = np.array(_EXPECTED_SHARE_OFF) * self.views.board.spacing_mm
+        expected_mm = np.array(_EXPECTED_FRACTION_OFF) * self.views.board.spacing_mm
         sigma_mm = np.tile(expected_mm, model.n_marks)
         return sigma_mm, self.shared[model.n_rig :] / sigma_mm
 
-    def _linearised(
+    def _linearise_picture(
         self, seen: SeenBoard, sigma_px: FloatArray, left_from_board: FloatArray, number: int
     ) -> _PictureLinearisation:
         """One picture: of the left camera (0) or the right one (1)."""
         model = self.views.model
         points_mm = self.views.board.points_mm[seen.ids]
         if model.n_marks:
-            points_mm = points_mm + shape_mm(model, self.shared)[seen.ids]
-        pixels, by_rig, by_pose, by_point = projected(
+            points_mm = points_mm + unpack_shape_mm(model, self.shared)[seen.ids]
+        pixels, by_rig, by_pose, by_point = project(
             points_mm, left_from_board, model, self.shared, number
         )
         by_shared = np.zeros((len(by_rig), model.n_shared))
@@ -150,7 +150,7 @@ class Linearisation:
 
 
 class NormalEquations:
-    """What a step at one place is solved from, weighed by what is left there."""
+    """Normal equations of a step from one linearisation, with robust weights."""
 
     def __init__(self, linear: Linearisation) -> None:
         n = linear.views.model.n_shared
@@ -196,14 +196,14 @@ class NormalEquations:
             inverses.append(inverse)
             reduced -= mixed @ inverse @ mixed.T
             right -= mixed @ inverse @ own_right
-        step = np.zeros(n) if is_fixed else _solved(reduced, right)
+        step = np.zeros(n) if is_fixed else _solve_symmetric(reduced, right)
         poses = [
             inverse @ (own_right - mixed.T @ step)
             for inverse, (mixed, _, own_right) in zip(inverses, self._view_normals, strict=True)
         ]
         return step, np.array(poses)
 
-    def reduced(self) -> FloatArray:
+    def compute_reduced_normal(self) -> FloatArray:
         """(n_shared, n_shared) information about the shared numbers alone."""
         reduced = self._shared_normal.copy()
         for mixed, own, _ in self._view_normals:
@@ -211,10 +211,10 @@ class NormalEquations:
         return 0.5 * (reduced + reduced.T)
 
 
-def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
+def _solve_symmetric(normal: FloatArray, right: FloatArray) -> FloatArray:
     """Solution of a symmetric system whose numbers have very different units."""
-    sizes = unit_sizes(normal)
-    scaled = equilibrated(normal, sizes)
+    sizes = compute_unit_sizes(normal)
+    scaled = equilibrate(normal, sizes)
     scaled[np.diag_indices_from(scaled)] += _RIDGE
     solution: FloatArray = sizes * np.linalg.solve(scaled, sizes * right)
     return solution

@@ -20,7 +20,7 @@ N_COEFFICIENTS = (4, 5, 8, 12)
 
 @dataclass(frozen=True, slots=True)
 class RigModel:
-    """Which numbers are solved for.
+    """Which parameters of a rig are solved for.
 
     Attributes:
         n_coefficients: of each lens, one of `N_COEFFICIENTS`.
@@ -55,7 +55,7 @@ class RigModel:
         return f"{self.n_coefficients} coefficients, {board}"
 
 
-def packed(model: RigModel, rig: StereoRig) -> FloatArray:
+def pack(model: RigModel, rig: StereoRig) -> FloatArray:
     """(n_shared,) numbers of a rig, with a board as it should be."""
     shared = np.zeros(model.n_shared)
     for number, camera in enumerate((rig.left, rig.right)):
@@ -70,7 +70,7 @@ def packed(model: RigModel, rig: StereoRig) -> FloatArray:
     return shared
 
 
-def unpacked(model: RigModel, shared: FloatArray) -> StereoRig:
+def unpack(model: RigModel, shared: FloatArray) -> StereoRig:
     """The rig of such numbers.
 
     Raises:
@@ -78,26 +78,26 @@ def unpacked(model: RigModel, shared: FloatArray) -> StereoRig:
     """
     cameras = []
     for number in range(2):
-        matrix, distortion = lens(model, shared, number)
+        matrix, distortion = unpack_lens(model, shared, number)
         cameras.append(Camera(matrix, distortion, model.width, model.height))
-    rotation, translation_mm = placement(model, shared)
+    rotation, translation_mm = unpack_placement(model, shared)
     pose = RigidTransform.from_parts("right", "left", cv2.Rodrigues(rotation)[0], translation_mm)
     return StereoRig(cameras[0], cameras[1], pose)
 
 
-def lens(model: RigModel, shared: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
+def unpack_lens(model: RigModel, shared: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
     """(3, 3) matrix and (n,) distortion of the left (0) or right (1) camera."""
     part = shared[number * model.n_camera : (number + 1) * model.n_camera]
     matrix = np.array([[part[0], 0.0, part[2]], [0.0, part[1], part[3]], [0.0, 0.0, 1.0]])
     return matrix, part[4:].copy()
 
 
-def placement(model: RigModel, shared: FloatArray) -> tuple[FloatArray, FloatArray]:
+def unpack_placement(model: RigModel, shared: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rotation vector (3,) and translation (3,) mm of right_from_left."""
     place = 2 * model.n_camera
     return shared[place : place + 3].copy(), shared[place + 3 : place + 6].copy()
 
 
-def shape_mm(model: RigModel, shared: FloatArray) -> FloatArray:
+def unpack_shape_mm(model: RigModel, shared: FloatArray) -> FloatArray:
     """(n_marks, 3) how far the marks are from where they should have been printed."""
     return shared[model.n_rig :].reshape(-1, 3)

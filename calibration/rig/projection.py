@@ -1,15 +1,15 @@
-"""Where a rig sees points of the board, and how that moves with every number of the rig."""
+"""Projects points of the board into a camera of the rig, with derivatives by all parameters."""
 
 from typing import Any
 
 import cv2
 import numpy as np
 
-from calibration.rig.parameters import RigModel, lens, placement
+from calibration.rig.parameters import RigModel, unpack_lens, unpack_placement
 from navapp.geometry.transform import FloatArray
 
 
-def projected(
+def project(
     points_mm: FloatArray,
     left_from_board: FloatArray,
     model: RigModel,
@@ -29,13 +29,13 @@ def projected(
         (n, 2) pixels; (2n, n_rig) slopes by the rig's numbers; (2n, 6) by the pose; (2n, 3) by the
         points' own coordinates, a translation of all along each axis of the board.
     """
-    matrix, distortion = lens(model, shared, number)
+    matrix, distortion = unpack_lens(model, shared, number)
     rotation: Any = left_from_board[:3]
     translation: Any = left_from_board[3:]
     by_rig = np.zeros((2 * len(points_mm), model.n_rig))
     chain: Any = None
     if number == 1:
-        between = placement(model, shared)
+        between = unpack_placement(model, shared)
         chain = cv2.composeRT(rotation, translation, *between)
         rotation, translation = chain[0].ravel(), chain[1].ravel()
     pixels, slopes = cv2.projectPoints(points_mm, rotation, translation, matrix, distortion)

@@ -1,4 +1,4 @@
-"""What a rig's own uncertainty costs where it is used, in millimetres.
+"""Predicted error in mm of points that a rig triangulates, from the rig's covariance.
 
 A point of the working volume is projected by the rig as solved and triangulated by a rig that is
 off by what its covariance allows; how far the answer lies from the point is what a user has to
@@ -7,16 +7,16 @@ expect.
 
 import numpy as np
 
-from calibration.rig.parameters import RigModel, unpacked
-from calibration.rig.projection import projected
+from calibration.rig.parameters import RigModel, unpack
+from calibration.rig.projection import project
 from navapp.geometry.transform import FloatArray
 
 _COLUMNS, _ROWS, _DEPTHS = 7, 5, 3
 _N_DRAWN, _SEED = 1024, 20
-_SHARE = 0.95
+_FRACTION = 0.95
 
 
-def working_points_mm(
+def make_working_points_mm(
     model: RigModel, shared: FloatArray, depth_mm: tuple[float, float], fineness: int = 1
 ) -> FloatArray:
     """(n, 3) points of a working volume in the left camera's frame.
@@ -27,7 +27,7 @@ def working_points_mm(
         depth_mm: nearest and farthest surface; the volume is what both cameras see between them.
         fineness: so many times as many points along x and y.
     """
-    rig = unpacked(model, shared)
+    rig = unpack(model, shared)
     n_x, n_y = fineness * _COLUMNS, fineness * _ROWS
     x, y = np.meshgrid(
         (np.arange(n_x) + 0.5) / n_x * model.width, (np.arange(n_y) + 0.5) / n_y * model.height
@@ -40,7 +40,9 @@ def working_points_mm(
     return seen
 
 
-def triangulation_slopes(model: RigModel, shared: FloatArray, points_mm: FloatArray) -> FloatArray:
+def compute_triangulation_slopes(
+    model: RigModel, shared: FloatArray, points_mm: FloatArray
+) -> FloatArray:
     """(n, 3, n_rig) how triangulated points move with the rig's numbers, their pixels held.
 
     The triangulated point minimises the distances in both pictures; at the solution its change is
@@ -48,7 +50,7 @@ def triangulation_slopes(model: RigModel, shared: FloatArray, points_mm: FloatAr
     """
     by_rig, by_point = [], []
     for number in range(2):
-        _, a, _, b = projected(points_mm, np.zeros(6), model, shared, number)
+        _, a, _, b = project(points_mm, np.zeros(6), model, shared, number)
         by_rig.append(a.reshape(-1, 2, model.n_rig))
         by_point.append(b.reshape(-1, 2, 3))
     rig, point = np.concatenate(by_rig, axis=1), np.concatenate(by_point, axis=1)
@@ -56,7 +58,7 @@ def triangulation_slopes(model: RigModel, shared: FloatArray, points_mm: FloatAr
     return slopes
 
 
-def bounds_mm(
+def compute_bounds_mm(
     model: RigModel, shared: FloatArray, covariance: FloatArray, points_mm: FloatArray
 ) -> FloatArray:
     """(n,) distance that 95 % of the errors of triangulated points stay below.
@@ -67,10 +69,10 @@ def bounds_mm(
         covariance: (n_rig, n_rig) of them.
         points_mm: (n, 3) in the left camera's frame.
     """
-    slopes = triangulation_slopes(model, shared, points_mm)
+    slopes = compute_triangulation_slopes(model, shared, points_mm)
     spread = slopes @ covariance @ slopes.transpose(0, 2, 1)
     values, axes = np.linalg.eigh(spread)
     roots = axes * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     drawn = np.random.default_rng(_SEED).standard_normal((3, _N_DRAWN))
-    bounds: FloatArray = np.quantile(np.linalg.norm(roots @ drawn, axis=1), _SHARE, axis=1)
+    bounds: FloatArray = np.quantile(np.linalg.norm(roots @ drawn, axis=1), _FRACTION, axis=1)
     return bounds

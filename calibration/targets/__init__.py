@@ -1,1 +1,1 @@
-"""Targets: what is printed on them, and where pictures show it."""
+"""Calibration targets: their geometry, printing them, and finding them in pictures."""

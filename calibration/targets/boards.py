@@ -1,4 +1,4 @@
-"""Targets for calibration: what is printed on them, and the file that says so.
+"""Calibration targets: geometry of each kind, and the JSON file that describes a printed one.
 
 A target's frame: x along its columns, y along its rows, z away from who looks at it. Boards of
 squares begin at the outer corner of the first square, circles at the first circle's centre.
@@ -36,7 +36,7 @@ _FEWEST_SQUARES, _FEWEST_CIRCLES = 3, 2
 
 @dataclass(frozen=True)
 class Board:
-    """A flat target.
+    """A flat calibration target.
 
     Attributes:
         kind: of the target.
@@ -122,12 +122,12 @@ def read_board(path: str | Path) -> Board:
     if not isinstance(content, dict):
         raise _refusal(path, "is not one JSON object")
     try:
-        return board_from(content)
+        return parse_board(content)
     except ValueError as error:
         raise _refusal(path, f"describes no possible board: {error}") from error
 
 
-def board_from(content: dict[str, Any]) -> Board:
+def parse_board(content: dict[str, Any]) -> Board:
     """A target from the keys of its file.
 
     Raises:
@@ -153,7 +153,7 @@ def board_from(content: dict[str, Any]) -> Board:
 
 
 def keys_of(board: Board) -> dict[str, Any]:
-    """The keys of a target's file, so that `board_from` gives the target again."""
+    """The keys of a target's file, so that `parse_board` gives the target again."""
     if not board.has_squares:
         return {
             "type": board.kind,

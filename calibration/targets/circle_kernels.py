@@ -17,7 +17,7 @@ from calibration.targets.mark_kernels import (
     FIRST_BLUR_PX,
     MOST_STEPS,
     add_pixel,
-    edge,
+    compute_edge,
     has_settled,
     tell,
 )
@@ -44,7 +44,7 @@ def predict(x: float, y: float, p: NDArray[np.float64], slopes: NDArray[np.float
     gx, gy = (p[2] * u + p[3] * v) / rho, (p[3] * u + p[4] * v) / rho
     steepness = max(math.sqrt(gx * gx + gy * gy), 1e-9)
     distance_px = (rho - 1.0) / steepness
-    step, slope = edge(distance_px, p[5])
+    step, slope = compute_edge(distance_px, p[5])
     by_rho = p[6] * slope / steepness
     slopes[0], slopes[1] = -by_rho * gx - p[8], -by_rho * gy - p[9]
     slopes[2] = by_rho * u * dx / rho
@@ -58,7 +58,7 @@ def predict(x: float, y: float, p: NDArray[np.float64], slopes: NDArray[np.float
 
 
 @njit(cache=True, nogil=True)
-def pole_of_horizon(p: NDArray[np.float64], horizon: NDArray[np.float64]) -> tuple[float, float]:
+def find_pole(p: NDArray[np.float64], horizon: NDArray[np.float64]) -> tuple[float, float]:
     """Where the disc's centre is seen.
 
     Args:
@@ -91,7 +91,7 @@ def start_shape(px_from_disc: NDArray[np.float64], p: NDArray[np.float64]) -> fl
 
 
 @njit(cache=True, nogil=True)
-def near_pixels(
+def find_near_pixels(
     centre_px: NDArray[np.float64], p: NDArray[np.float64], reach: float, radius_px: float
 ) -> NDArray[np.int64]:
     """(n, 2) columns and rows of the pixels around a disc.
@@ -144,7 +144,7 @@ def fit_circle(
     is_inside = min(x0, y0) >= window and x0 + window < width and y0 + window < height
     if radius_px > _LARGEST_RADIUS_PX or not is_inside:
         return
-    pixels = near_pixels(centre_px, p, reach, radius_px)
+    pixels = find_near_pixels(centre_px, p, reach, radius_px)
     n = len(pixels)
     if n <= 2 * N_PARAMETERS:
         return
@@ -165,7 +165,7 @@ def fit_circle(
             return
         if rests:
             shift = horizon[0] * x0 + horizon[1] * y0 + horizon[2]
-            u, v = pole_of_horizon(p, np.array([horizon[0], horizon[1], shift]))
+            u, v = find_pole(p, np.array([horizon[0], horizon[1], shift]))
             tell(x0 + u, y0 + v, p, _N_SHAPE, squares / (n - N_PARAMETERS), normal, told)
             return
 

@@ -17,7 +17,7 @@ from calibration.targets.mark_kernels import (
     FIRST_BLUR_PX,
     MOST_STEPS,
     add_pixel,
-    edge,
+    compute_edge,
     has_settled,
     tell,
 )
@@ -39,8 +39,8 @@ def predict(x: float, y: float, p: NDArray[np.float64], slopes: NDArray[np.float
     sine_1, cosine_1 = math.sin(p[2]), math.cos(p[2])
     sine_2, cosine_2 = math.sin(p[3]), math.cos(p[3])
     d1, d2 = -sine_1 * dx + cosine_1 * dy, -sine_2 * dx + cosine_2 * dy
-    step_1, slope_1 = edge(d1, p[4])
-    step_2, slope_2 = edge(d2, p[4])
+    step_1, slope_1 = compute_edge(d1, p[4])
+    step_2, slope_2 = compute_edge(d2, p[4])
     by_1, by_2 = p[5] * slope_1 * step_2, p[5] * step_1 * slope_2
     slopes[0] = by_1 * sine_1 + by_2 * sine_2
     slopes[1] = -by_1 * cosine_1 - by_2 * cosine_2
@@ -74,7 +74,7 @@ def is_clear(
 
 
 @njit(cache=True, nogil=True)
-def clear_pixels(
+def find_clear_pixels(
     corner_px: NDArray[np.float64],
     board_from_px: NDArray[np.float64],
     limits: tuple[float, float, float],
@@ -121,7 +121,7 @@ def fit_corner(
     height, width = picture.shape
     if x0 < radius or y0 < radius or x0 + radius >= width or y0 + radius >= height:
         return
-    pixels = clear_pixels(corner_px, np.linalg.inv(px_from_board), limits)
+    pixels = find_clear_pixels(corner_px, np.linalg.inv(px_from_board), limits)
     n = len(pixels)
     if n <= 2 * N_PARAMETERS:
         return

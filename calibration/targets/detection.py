@@ -1,4 +1,4 @@
-"""A target found in a picture, every mark to a hundredth of a pixel where the picture allows it."""
+"""Finds a target in a picture and locates its marks with sub-pixel accuracy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +14,7 @@ from calibration.targets.mark_kernels import N_TOLD
 from navapp.geometry.transform import FloatArray
 
 # Edges are straight over so much of a square, and lenses bend no line within so many pixels.
-_SHARE_OF_SQUARE, _MOST_RADIUS_PX, _LEAST_RADIUS_PX = 0.45, 16.0, 3.0
+_RADIUS_PER_SQUARE, _MOST_RADIUS_PX, _LEAST_RADIUS_PX = 0.45, 16.0, 3.0
 # A mark farther from where the detector put it is another one.
 _MOST_SHIFT_PX = 3.0
 _ROUGH_WINDOW_PX = 4
@@ -28,7 +28,7 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenBoard:
-    """What one picture shows of a target.
+    """Marks of a target found in one picture.
 
     Attributes:
         ids: (n,) rows of `Board.points_mm`, ascending.
@@ -59,7 +59,7 @@ def find_board(picture: Image, board: Board) -> SeenBoard | None:
     ids, rough = found
     order = np.argsort(ids)
     ids, rough = ids[order], rough[order]
-    told = (_fitted_corners if board.has_squares else _fitted_circles)(picture, board, ids, rough)
+    told = (_locate_corners if board.has_squares else _locate_circles)(picture, board, ids, rough)
     shift_px = np.linalg.norm(told[:, :2] - rough, axis=1)
     good = (shift_px < _MOST_SHIFT_PX) & (told[:, 4] > _LEAST_CONTRAST)
     if np.count_nonzero(good) < _FEWEST_MARKS:
@@ -71,7 +71,7 @@ def find_board(picture: Image, board: Board) -> SeenBoard | None:
 def _find_charuco(picture: Image, board: Board) -> tuple[NDArray[np.intp], FloatArray] | None:
     detector = cv2.aruco.CharucoDetector(board.charuco)
     corners, ids, _, _ = detector.detectBoard(picture)
-    return None if corners is None else (_flat_ids(ids), _refined(picture, corners))
+    return None if corners is None else (_flat_ids(ids), _refine_corners(picture, corners))
 
 
 def _find_chessboard(picture: Image, board: Board) -> tuple[NDArray[np.intp], FloatArray] | None:
@@ -85,7 +85,7 @@ def _find_chessboard(picture: Image, board: Board) -> tuple[NDArray[np.intp], Fl
         )
     if not is_found or not _are_inside(picture, corners):
         return None
-    corners = _refined(picture, corners)
+    corners = _refine_corners(picture, corners)
     if _is_turned(picture, board, corners):
         corners = corners[::-1]
     return np.arange(len(corners)), corners
@@ -119,7 +119,7 @@ def _flat_ids(ids: Any) -> NDArray[np.intp]:
     return np.asarray(ids, dtype=np.intp).reshape(-1)
 
 
-def _refined(picture: Image, corners: Any) -> FloatArray:
+def _refine_corners(picture: Image, corners: Any) -> FloatArray:
     """OpenCV's refinement: near enough for ours."""
     criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 1e-3)
     corners = np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2).copy()
@@ -146,14 +146,14 @@ def _is_turned(picture: Image, board: Board, corners: FloatArray) -> bool:
     return bool(grey[is_even].mean() > grey[~is_even].mean())
 
 
-def _fitted_corners(
+def _locate_corners(
     picture: Image, board: Board, ids: NDArray[np.intp], rough: FloatArray
 ) -> FloatArray:
     """(n, 5) as `fit_corner` tells."""
     maps = _local_maps(board.points_mm[ids, :2], rough)
     scale = np.sqrt(np.abs(np.linalg.det(maps)))
     square_px = scale * board.spacing_mm
-    radius = np.clip(_SHARE_OF_SQUARE * square_px, _LEAST_RADIUS_PX, _MOST_RADIUS_PX)
+    radius = np.clip(_RADIUS_PER_SQUARE * square_px, _LEAST_RADIUS_PX, _MOST_RADIUS_PX)
     along = np.full(len(ids), board.spacing_mm)
     # Blurred marks shine into the clear strip.
     aside = np.full(len(ids), board.clear_mm)
@@ -168,7 +168,7 @@ def _fitted_corners(
     return told
 
 
-def _fitted_circles(
+def _locate_circles(
     picture: Image, board: Board, ids: NDArray[np.intp], rough: FloatArray
 ) -> FloatArray:
     """(n, 5) as `fit_circle` tells, with the centres where perspective has them."""

@@ -1,4 +1,4 @@
-"""A target as shapes in millimetres: what is printed, and what pictures of it are made of."""
+"""A target as black shapes in mm, and as a grey picture of these."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class Drawing:
     high_mm: FloatArray
 
 
-def drawn(board: Board) -> Drawing:
+def make_drawing(board: Board) -> Drawing:
     """The shapes of a target."""
     if board.has_squares:
         rectangles = _black_squares(board)
@@ -38,7 +38,7 @@ def drawn(board: Board) -> Drawing:
     return Drawing(np.empty((0, 4)), discs, low, high)
 
 
-def rastered(drawing: Drawing, px_per_mm: float, margin_mm: float) -> NDArray[np.uint8]:
+def rasterise(drawing: Drawing, px_per_mm: float, margin_mm: float) -> NDArray[np.uint8]:
     """(H, W) grey picture of the paper with a white margin; pixels tell how white they are.
 
     The paper's left edge is that of the first pixel, whose centre lies half a pixel inside.
@@ -47,8 +47,8 @@ def rastered(drawing: Drawing, px_per_mm: float, margin_mm: float) -> NDArray[np
     width, height = np.ceil((drawing.high_mm + margin_mm - low) * px_per_mm).astype(int)
     black = np.zeros((height, width))
     for left, top, right, bottom in (drawing.rectangles_mm - np.tile(low, 2)) * px_per_mm:
-        rows, down = _covered(top, bottom)
-        columns, across = _covered(left, right)
+        rows, down = _cover_pixels(top, bottom)
+        columns, across = _cover_pixels(left, right)
         black[rows, columns] += down[:, None] * across
     for x, y, radius in drawing.discs_mm * px_per_mm - (*(low * px_per_mm), 0.0):
         rows, columns = _around(y, radius), _around(x, radius)
@@ -58,7 +58,7 @@ def rastered(drawing: Drawing, px_per_mm: float, margin_mm: float) -> NDArray[np
     return np.rint(255.0 * (1.0 - np.minimum(black, 1.0))).astype(np.uint8)
 
 
-def _covered(first: float, last: float) -> tuple[slice, FloatArray]:
+def _cover_pixels(first: float, last: float) -> tuple[slice, FloatArray]:
     """Pixels that an interval touches, and how much of each it covers."""
     pixels = np.arange(int(np.floor(first)), int(np.ceil(last)))
     share: FloatArray = np.minimum(last, pixels + 1.0) - np.maximum(first, pixels)

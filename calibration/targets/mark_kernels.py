@@ -21,7 +21,7 @@ _ROOT_2_OVER_PI = math.sqrt(2.0 / math.pi)
 
 
 @njit(cache=True, nogil=True)
-def edge(distance_px: float, blur_px: float) -> tuple[float, float]:
+def compute_edge(distance_px: float, blur_px: float) -> tuple[float, float]:
     """A blurred step from -1 to 1, and its slope per px."""
     z = distance_px / blur_px
     return math.erf(z / _ROOT_2), math.exp(-0.5 * z * z) * _ROOT_2_OVER_PI / blur_px

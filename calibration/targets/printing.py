@@ -1,4 +1,4 @@
-"""A target on paper, to scale: PDF or SVG."""
+"""Renders a target to scale as a page, PDF or SVG."""
 
 import io
 import json
@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from calibration.targets.boards import Board, keys_of
-from calibration.targets.drawing import Drawing, drawn
+from calibration.targets.drawing import Drawing, make_drawing
 from navapp.geometry.transform import FloatArray
 
 _MM_PER_INCH, _POINTS_PER_INCH = 25.4, 72.0
@@ -36,7 +36,7 @@ class Sheet:
     @cached_property
     def drawing(self) -> Drawing:
         """The board's shapes, in its own frame."""
-        return drawn(self.board)
+        return make_drawing(self.board)
 
     @property
     def margin_mm(self) -> float:
@@ -88,7 +88,7 @@ class Sheet:
         return None
 
 
-def printed(sheet: Sheet, form: Literal["pdf", "svg"]) -> bytes:
+def render_page(sheet: Sheet, form: Literal["pdf", "svg"]) -> bytes:
     """The page as a file, to scale."""
     # Slow to import, and of no use to any other command.
     from matplotlib import rc_context

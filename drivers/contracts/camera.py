@@ -14,7 +14,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
-    opened,
+    open_subject,
     require,
     require_raises,
 )
@@ -48,7 +48,7 @@ MakeCamera = Callable[[], CameraUnderTest]
 
 def check_opening_twice(make: MakeCamera) -> None:
     """Opening an open camera changes nothing."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         first = _read(subject)
         with must_work("opening an open camera"):
             subject.camera.open()
@@ -83,7 +83,7 @@ def check_reading_when_not_open(make: MakeCamera) -> None:
 
 def check_order_of_frames(make: MakeCamera) -> None:
     """Sequence and capture time increase strictly; nothing is received before its capture."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         frames = [_read(subject) for _ in range(subject.n_frames)]
         now_ns = subject.clock.now_ns()
     for earlier, later in pairwise(frames):
@@ -96,7 +96,7 @@ def check_order_of_frames(make: MakeCamera) -> None:
 
 def check_pictures(make: MakeCamera) -> None:
     """Pictures are uint8, of the size that `info` tells, and all of one shape."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         info = subject.camera.info
         frames = [_read(subject) for _ in range(3)]
     for frame in frames:
@@ -112,7 +112,7 @@ def check_pictures(make: MakeCamera) -> None:
 
 def check_pictures_are_kept(make: MakeCamera) -> None:
     """A picture that was handed out is not written again by later frames, nor by closing."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         frame = _read(subject)
         left, right = frame.left.copy(), frame.right.copy()
         for _ in range(2):
@@ -123,7 +123,7 @@ def check_pictures_are_kept(make: MakeCamera) -> None:
 
 def check_short_timeouts(make: MakeCamera) -> None:
     """With a short timeout `read` returns a frame or `DeviceTimeout`, soon, and goes on to work."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         for timeout_s in (0.0, 0.001):
             with must_return_soon(f"reading with a timeout of {timeout_s} s", timeout_s):
                 try:
@@ -139,7 +139,7 @@ def check_short_timeouts(make: MakeCamera) -> None:
 
 def check_reopening(make: MakeCamera) -> None:
     """A closed camera can be opened again and gives frames."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _read(subject)
         subject.camera.close()
         with must_work("opening a closed camera again"):
@@ -170,7 +170,7 @@ def check_info(make: MakeCamera) -> None:
 
 def check_unknown_control(make: MakeCamera) -> None:
     """An unknown control is refused, and so is a value that cannot be meant."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         camera = subject.camera
         require_raises(UnsupportedControl, lambda: camera.set("no such control", 1.0), "that name")
         if subject.control is not None:
@@ -185,7 +185,7 @@ def check_unknown_control(make: MakeCamera) -> None:
 
 def check_control_is_read_back(make: MakeCamera) -> None:
     """`set` returns what the camera has, and setting just that changes nothing more."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         if subject.control is None:
             return
         name, value = subject.control
@@ -246,8 +246,8 @@ CAMERA_CHECKS: tuple[Callable[[MakeCamera], None], ...] = (
 )
 
 
-def _opened(make: MakeCamera) -> AbstractContextManager[CameraUnderTest]:
-    return opened(make, lambda subject: subject.camera, "a camera")
+def _open_subject(make: MakeCamera) -> AbstractContextManager[CameraUnderTest]:
+    return open_subject(make, lambda subject: subject.camera, "a camera")
 
 
 def _read(subject: CameraUnderTest) -> StereoFrame:

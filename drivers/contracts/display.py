@@ -14,7 +14,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
-    opened,
+    open_subject,
     require,
     require_raises,
 )
@@ -48,7 +48,7 @@ _LONG_NS = 60_000_000_000
 
 def check_black_before_showing(make: MakeDisplay) -> None:
     """Black after opening; opening again changes nothing."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _require_black(subject, "a display that has shown nothing")
         _show(subject, _LONG_NS)
         with must_work("opening an open display"):
@@ -58,14 +58,14 @@ def check_black_before_showing(make: MakeDisplay) -> None:
 
 def check_picture_is_shown(make: MakeDisplay) -> None:
     """What is shown is seen, pixel for pixel, with just the flips that `info` tells."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _show(subject, _LONG_NS)
         _require_picture(subject)
 
 
 def check_picture_is_its_own(make: MakeDisplay) -> None:
     """Writing into the array after `show` changes nothing on the display."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         image = _test_image(subject)
         subject.display.show(image, subject.clock.now_ns() + _LONG_NS)
         image[:] = 0
@@ -74,7 +74,7 @@ def check_picture_is_its_own(make: MakeDisplay) -> None:
 
 def check_black_after_expiry(make: MakeDisplay) -> None:
     """Black by itself when the picture expires."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         duration_ns = 50_000_000
         _show(subject, duration_ns)
         subject.clock.wait_until_ns(subject.clock.now_ns() + duration_ns + subject.latency_ns)
@@ -83,7 +83,7 @@ def check_black_after_expiry(make: MakeDisplay) -> None:
 
 def check_newer_picture_replaces(make: MakeDisplay) -> None:
     """The newest picture counts, and its own expiry."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         dark = np.zeros_like(_test_image(subject))
         subject.display.show(dark, subject.clock.now_ns() + 1_000_000)
         _show(subject, _LONG_NS)
@@ -93,7 +93,7 @@ def check_newer_picture_replaces(make: MakeDisplay) -> None:
 
 def check_expired_picture_is_not_shown(make: MakeDisplay) -> None:
     """A picture that comes too late is never seen."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         for age_ns in (0, 1, 1_000_000_000):
             with must_work("showing an expired picture"):
                 subject.display.show(_test_image(subject), subject.clock.now_ns() - age_ns)
@@ -103,7 +103,7 @@ def check_expired_picture_is_not_shown(make: MakeDisplay) -> None:
 
 def check_black_after_blank(make: MakeDisplay) -> None:
     """`blank` makes it black at once, and it can show again."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _show(subject, _LONG_NS)
         with must_return_soon("blanking", 0.0):
             subject.display.blank()
@@ -115,7 +115,7 @@ def check_black_after_blank(make: MakeDisplay) -> None:
 
 def check_black_after_close(make: MakeDisplay) -> None:
     """Closing makes it black, also when it is opened again."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _show(subject, _LONG_NS)
         subject.display.close()
         _require_black(subject, "a closed display")
@@ -128,7 +128,7 @@ def check_black_after_close(make: MakeDisplay) -> None:
 
 def check_wrong_pictures_are_refused(make: MakeDisplay) -> None:
     """Another size, type or number of channels is refused, and the display goes on to work."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         right = _test_image(subject)
         wrong: tuple[NDArray[Any], ...] = (
             right[1:],
@@ -177,7 +177,7 @@ def check_blank_and_close_in_any_state(make: MakeDisplay) -> None:
 
 def check_nothing_is_left(make: MakeDisplay) -> None:
     """After closing no thread and no file descriptor remains."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _show(subject, _LONG_NS)
     subject = make()
     with must_leave_nothing("the display"):
@@ -204,8 +204,8 @@ DISPLAY_CHECKS: tuple[Callable[[MakeDisplay], None], ...] = (
 )
 
 
-def _opened(make: MakeDisplay) -> AbstractContextManager[DisplayUnderTest]:
-    return opened(make, lambda subject: subject.display, "a display")
+def _open_subject(make: MakeDisplay) -> AbstractContextManager[DisplayUnderTest]:
+    return open_subject(make, lambda subject: subject.display, "a display")
 
 
 def _test_image(subject: DisplayUnderTest) -> Image:

@@ -9,7 +9,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
-    opened,
+    open_subject,
     require,
     require_raises,
 )
@@ -71,7 +71,7 @@ def check_not_open(make: MakeMirror) -> None:
 
 def check_moving_needs_homing(make: MakeMirror) -> None:
     """Before homing, a movable mount refuses to move and does not know where it stands."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         mirror = subject.mirror
         if not mirror.info.is_movable:
             return
@@ -85,7 +85,7 @@ def check_moving_needs_homing(make: MakeMirror) -> None:
 
 def check_position_after_homing(make: MakeMirror) -> None:
     """After homing the position is known; a fixed mount knows it always."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         mirror = subject.mirror
         if not mirror.info.is_movable:
             _require_at(subject, "a fixed mirror")
@@ -95,7 +95,7 @@ def check_position_after_homing(make: MakeMirror) -> None:
 
 def check_moving(make: MakeMirror) -> None:
     """A movable mount arrives where it is sent; a fixed one refuses and stays."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         mirror = subject.mirror
         _home(subject)
         if mirror.info.is_movable:
@@ -114,7 +114,7 @@ def check_moving(make: MakeMirror) -> None:
 
 def check_impossible_angles(make: MakeMirror) -> None:
     """An angle out of range, or none at all, is refused before anything moves."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         mirror = subject.mirror
         _home(subject)
         before_deg = mirror.position_deg()
@@ -129,7 +129,7 @@ def check_impossible_angles(make: MakeMirror) -> None:
 
 def check_stop(make: MakeMirror) -> None:
     """`stop` works when nothing moves, twice, also before homing."""
-    with _opened(make) as subject, must_work("stopping"), must_return_soon("stopping", 1.0):
+    with _open_subject(make) as subject, must_work("stopping"), must_return_soon("stopping", 1.0):
         subject.mirror.stop()
         subject.mirror.stop()
 
@@ -142,13 +142,13 @@ def check_info(make: MakeMirror) -> None:
     require(bool(before.name) and bool(before.backend), "name and backend must not be empty")
     is_marked = before.name.startswith("sim:")
     require(is_marked == before.is_simulated, "a simulated mount's name begins with sim:")
-    with _opened(lambda: subject):
+    with _open_subject(lambda: subject):
         require(subject.mirror.info.is_movable == before.is_movable, "a mount changed its kind")
 
 
 def check_nothing_is_left(make: MakeMirror) -> None:
     """After closing no thread and no file descriptor remains."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         subject.mirror.position_deg()
     subject = make()
     with must_leave_nothing("the mirror mount"):
@@ -172,8 +172,8 @@ MIRROR_CHECKS: tuple[Callable[[MakeMirror], None], ...] = (
 )
 
 
-def _opened(make: MakeMirror) -> AbstractContextManager[MirrorUnderTest]:
-    return opened(make, lambda subject: subject.mirror, "a mirror mount")
+def _open_subject(make: MakeMirror) -> AbstractContextManager[MirrorUnderTest]:
+    return open_subject(make, lambda subject: subject.mirror, "a mirror mount")
 
 
 def _home(subject: MirrorUnderTest) -> None:

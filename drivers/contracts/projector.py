@@ -10,7 +10,7 @@ from drivers.contracts.violation import (
     must_leave_nothing,
     must_return_soon,
     must_work,
-    opened,
+    open_subject,
     require,
     require_raises,
 )
@@ -74,7 +74,7 @@ def check_not_open(make: MakeProjector) -> None:
 
 def check_absence(make: MakeProjector) -> None:
     """An absent projector refuses every command; a present one never says that it is absent."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         if _status(subject).power is PowerState.ABSENT:
             for name, command in _commands(subject):
                 require_raises(UnsupportedControl, command, f"{name} of an absent projector")
@@ -86,7 +86,7 @@ def check_absence(make: MakeProjector) -> None:
 
 def check_power(make: MakeProjector) -> None:
     """The lamp goes on and off; what is called verified is what is read back."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         for is_on, states in ((True, _LIT), (False, _UNLIT)):
             result = _ask(subject, "power", partial(_power, subject, is_on))
             if result is None:
@@ -98,7 +98,7 @@ def check_power(make: MakeProjector) -> None:
 
 def check_mute_and_flips(make: MakeProjector) -> None:
     """Mute and flips: what is called verified is what is read back."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         projector, timeout_s = subject.projector, subject.timeout_s
         if _ask(subject, "power", lambda: _power(subject, True)) is None:
             return
@@ -120,7 +120,7 @@ def check_mute_and_flips(make: MakeProjector) -> None:
 
 def check_source(make: MakeProjector) -> None:
     """A source that it has is chosen; one that cannot exist is never called verified."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         projector, timeout_s, source = subject.projector, subject.timeout_s, subject.source
         if source is None or _ask(subject, "power", lambda: _power(subject, True)) is None:
             return
@@ -137,7 +137,7 @@ def check_source(make: MakeProjector) -> None:
 
 def check_nothing_is_left(make: MakeProjector) -> None:
     """After closing no thread and no file descriptor remains."""
-    with _opened(make) as subject:
+    with _open_subject(make) as subject:
         _status(subject)
     subject = make()
     with must_leave_nothing("the projector"):
@@ -160,8 +160,8 @@ PROJECTOR_CHECKS: tuple[Callable[[MakeProjector], None], ...] = (
 
 
 @contextmanager
-def _opened(make: MakeProjector) -> Iterator[ProjectorUnderTest]:
-    with opened(make, lambda subject: subject.projector, "a projector") as subject:
+def _open_subject(make: MakeProjector) -> Iterator[ProjectorUnderTest]:
+    with open_subject(make, lambda subject: subject.projector, "a projector") as subject:
         require(bool(subject.projector.name), "a projector needs a name")
         yield subject
 

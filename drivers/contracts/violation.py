@@ -1,4 +1,4 @@
-"""What a check raises, and what all checks need."""
+"""The exception of a failed contract check, and helpers that all checks use."""
 
 import os
 import threading
@@ -62,7 +62,9 @@ class Openable(Protocol):
 
 
 @contextmanager
-def opened(make: Callable[[], S], device_of: Callable[[S], Openable], what: str) -> Iterator[S]:
+def open_subject(
+    make: Callable[[], S], device_of: Callable[[S], Openable], what: str
+) -> Iterator[S]:
     """A fresh subject whose device is open inside, and closed afterwards whatever happens."""
     subject = make()
     try:

@@ -1,4 +1,4 @@
-"""What is connected to this computer, seen without disturbing who uses it.
+"""Lists connected devices without disturbing programs that use them.
 
 Nothing is started, streamed, booted or sent: devices are asked for their names and abilities only.
 """

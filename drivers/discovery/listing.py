@@ -1,4 +1,4 @@
-"""What a look at one kind of device gives: devices, and what could not be looked at."""
+"""Result of listing one kind of device: what was found, and what could not be examined."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """Something that could not be looked at.
+    """Something that could not be examined, and why.
 
     Attributes:
         subject: what it is about, for programs.
@@ -30,7 +30,7 @@ class Unseen:
 
 @dataclass(frozen=True, slots=True)
 class Listing(Generic[T]):
-    """The devices of a kind, and what is not known of them."""
+    """Devices of one kind that were found, and what could not be examined."""
 
     found: tuple[T, ...] = ()
     unseen: tuple[Unseen, ...] = ()

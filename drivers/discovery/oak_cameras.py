@@ -6,7 +6,7 @@ DepthAI answers without booting a camera. One that runs for somebody else is lis
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.depthai_package import depthai
+from drivers.depthai_package import import_depthai
 from drivers.discovery.listing import Listing, Unseen
 from drivers.discovery.permissions import may_use
 from navapp.errors import DeviceNotFound
@@ -42,23 +42,25 @@ def list_oak_cameras(
     usb_devices: Path = _USB_DEVICES, usb_nodes: Path = _USB_NODES
 ) -> Listing[OakCamera]:
     """Every camera that DepthAI finds, and what keeps it from finding others."""
-    on_bus = oak_nodes(usb_devices, usb_nodes)
+    on_bus = list_oak_nodes(usb_devices, usb_nodes)
     forbidden = tuple(_forbidden(node) for node in on_bus if not may_use(node))
     try:
-        dai = depthai()
+        dai = import_depthai()
     except DeviceNotFound as error:
         return Listing((), (*forbidden, Unseen.because(error)))
     try:
         infos = dai.Device.getAllAvailableDevices()
     except RuntimeError as error:
-        return Listing((), (*forbidden, _unsearched(error)))
+        return Listing((), (*forbidden, _make_unsearched(error)))
     booted = dai.XLinkDeviceState.X_LINK_BOOTED
     cameras = [OakCamera(i.getDeviceId(), i.name, i.state == booted) for i in infos]
     # A camera that may not be opened does not tell its id.
     return Listing(tuple(camera for camera in cameras if camera.device_id), forbidden)
 
 
-def oak_nodes(usb_devices: Path = _USB_DEVICES, usb_nodes: Path = _USB_NODES) -> tuple[Path, ...]:
+def list_oak_nodes(
+    usb_devices: Path = _USB_DEVICES, usb_nodes: Path = _USB_NODES
+) -> tuple[Path, ...]:
     """Device files of the OAK cameras on the bus; whether they may be used is another question."""
     nodes = []
     for vendor in sorted(usb_devices.glob("*/idVendor")):
@@ -83,7 +85,7 @@ def _forbidden(node: Path) -> Unseen:
     return Unseen(str(node), problem, UDEV_REMEDY)
 
 
-def _unsearched(error: RuntimeError) -> Unseen:
+def _make_unsearched(error: RuntimeError) -> Unseen:
     return Unseen(
         "usb",
         f"the USB bus cannot be searched for OAK cameras ({error})",

@@ -1,4 +1,4 @@
-"""Whether this user may use a device file, and how to become one who may."""
+"""Whether this user may open a device file, and the command that grants it."""
 
 import getpass
 import grp
@@ -24,19 +24,19 @@ def is_member(group: str) -> bool:
         return False
 
 
-def allowing(path: Path, usual: str) -> str:
+def make_permission_remedy(path: Path, usual: str) -> str:
     """What to do so that this user may use a device file, whose group is usually that."""
     try:
         status = path.stat()
         group = grp.getgrgid(status.st_gid).gr_name
     except (OSError, KeyError):
-        return joining(usual)
+        return make_group_remedy(usual)
     if group != "root" and status.st_mode & _GROUP_MAY == _GROUP_MAY:
-        return joining(group)
-    return f"let udev give {path} to the group {usual} (MODE 0660); {joining(usual)}"
+        return make_group_remedy(group)
+    return f"let udev give {path} to the group {usual} (MODE 0660); {make_group_remedy(usual)}"
 
 
-def joining(group: str) -> str:
+def make_group_remedy(group: str) -> str:
     """What to do to become a member."""
     try:
         is_listed = getpass.getuser() in grp.getgrnam(group).gr_mem

@@ -1,4 +1,4 @@
-"""The outputs of the X server, asked for by a process of its own.
+"""Lists the outputs of the X server, in a child process.
 
 SDL takes signals, threads and a connection for good when it starts, and a broken graphics library
 may end the process: neither is for the application. `python -m drivers.discovery.screens` prints
@@ -10,9 +10,9 @@ import subprocess
 import sys
 from dataclasses import asdict
 
-from drivers.child_python import last_words, run_python
+from drivers.child_python import find_last_words, run_python
 from drivers.discovery.listing import Listing, Unseen
-from drivers.window_outputs import Output, outputs, start_sdl
+from drivers.window_outputs import Output, list_outputs, start_sdl
 from navapp.errors import DeviceError
 
 _PATIENCE_S = 15.0
@@ -26,7 +26,9 @@ def list_screens() -> Listing[Output]:
     except subprocess.TimeoutExpired:
         return _blind(f"the X server does not answer within {_PATIENCE_S:.0f} s", "start it again")
     except ValueError:
-        return _blind(f"SDL ended while it was asked ({last_words(done)})", "see navapp doctor")
+        return _blind(
+            f"SDL ended while it was asked ({find_last_words(done)})", "see navapp doctor"
+        )
     if "problem" in answer:
         return _blind(answer["problem"], answer["remedy"])
     found = tuple(Output(**output) for output in answer["outputs"])
@@ -56,7 +58,7 @@ def main() -> None:
     answer: dict[str, object]
     try:
         start_sdl()
-        answer = {"outputs": [asdict(output) for output in outputs()]}
+        answer = {"outputs": [asdict(output) for output in list_outputs()]}
     except DeviceError as error:
         answer = {"problem": error.problem, "remedy": error.remedy}
     sys.stdout.write(json.dumps(answer) + "\n")

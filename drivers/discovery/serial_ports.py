@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.discovery.listing import Listing, Unseen
-from drivers.discovery.permissions import allowing, may_use
+from drivers.discovery.permissions import make_permission_remedy, may_use
 
 _LINKS = Path("/dev/serial")
 _TTYS = Path("/sys/class/tty")
@@ -77,4 +77,4 @@ def _lasting_name(device: str, links: Path) -> str:
 
 def _forbidden(device: Path) -> Unseen:
     problem = f"this user may not open the port {device}"
-    return Unseen(str(device), problem, allowing(device, "dialout"))
+    return Unseen(str(device), problem, make_permission_remedy(device, "dialout"))

@@ -1,4 +1,4 @@
-"""The USB cameras of this computer, each with the name by which a configuration chooses it."""
+"""Lists the USB cameras of this computer, each with the name that a configuration takes."""
 
 import errno
 from collections import Counter
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.discovery.listing import Listing, Unseen
-from drivers.discovery.permissions import allowing
+from drivers.discovery.permissions import make_permission_remedy
 from drivers.discovery.v4l_formats import PixelFormat, VideoDevice, ask
 from drivers.v4l_names import FoundCamera, V4lNames
 
@@ -36,7 +36,7 @@ class UsbCamera:
 def list_usb_cameras(names: V4lNames | None = None) -> Listing[UsbCamera]:
     """Every camera once; what keeps one from being asked or chosen is told beside it."""
     names = names or V4lNames()
-    named = {camera.node: camera for camera in names.connected()}
+    named = {camera.node: camera for camera in names.list_cameras()}
     counts = Counter(camera.serial for camera in named.values())
     cameras: list[UsbCamera] = []
     unseen: list[Unseen] = []
@@ -45,20 +45,20 @@ def list_usb_cameras(names: V4lNames | None = None) -> Listing[UsbCamera]:
         try:
             device = ask(node)
         except OSError as error:
-            unseen.append(_unasked(node, error))
+            unseen.append(_make_unasked(node, error))
             device = VideoDevice(names.card(node), is_camera=True, formats=())
         if not device.is_camera:
             continue
-        chosen_by = _chosen_by(camera, counts, names)
+        chosen_by = _find_choice(camera, counts, names)
         if not chosen_by:
-            unseen.append(_unnamed(node, names))
+            unseen.append(_make_unnamed(node, names))
         path = None if camera is None else camera.path
         serial = names.serial(node)
         cameras.append(UsbCamera(node, path, chosen_by, serial, device.card, device.formats))
     return Listing(tuple(cameras), tuple(unseen))
 
 
-def _chosen_by(camera: FoundCamera | None, counts: Counter[str], names: V4lNames) -> str:
+def _find_choice(camera: FoundCamera | None, counts: Counter[str], names: V4lNames) -> str:
     if camera is None:
         return ""
     if counts[camera.serial] == 1:
@@ -73,9 +73,9 @@ def _number(node: Path) -> tuple[int, str]:
     return int(digits or 0), node.name
 
 
-def _unasked(node: Path, error: OSError) -> Unseen:
+def _make_unasked(node: Path, error: OSError) -> Unseen:
     remedies = {
-        errno.EACCES: allowing(node, "video"),
+        errno.EACCES: make_permission_remedy(node, "video"),
         errno.EPERM: f"give this container or sandbox access to {node}",
         errno.ENOENT: f"give this container or sandbox the device {node}",
         errno.EBUSY: "end the other program that uses it to see its formats",
@@ -88,7 +88,7 @@ def _unasked(node: Path, error: OSError) -> Unseen:
     )
 
 
-def _unnamed(node: Path, names: V4lNames) -> Unseen:
+def _make_unnamed(node: Path, names: V4lNames) -> Unseen:
     return Unseen(
         str(node),
         f"camera {node} has no name that stays, and cannot be chosen",

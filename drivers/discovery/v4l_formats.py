@@ -1,4 +1,4 @@
-"""What a video device says of itself, by the questions of V4L2 that disturb no stream.
+"""Queries a video device for its formats by V4L2 calls that disturb no stream.
 
 Numbers and layouts are those of the kernel's `linux/videodev2.h`.
 """

@@ -1,1 +1,1 @@
-"""The command line: one module a verb; parsing and printing only."""
+"""The command line: one module per command, with parsing and printing only."""

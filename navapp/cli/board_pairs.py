@@ -1,4 +1,4 @@
-"""A folder of pairs, and the board that both pictures of each show."""
+"""Reads a folder of picture pairs and finds the board in both pictures of each."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ from navapp.cli.diagnostics import Diagnostics
 from navapp.errors import InputError, SequenceError
 
 if TYPE_CHECKING:
-    from calibration.rig.views import DroppedPair
+    from calibration.rig.dropped_pairs import DroppedPair
     from calibration.targets.boards import Board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from drivers.recorded_sources import PictureFiles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardPairs:
-    """What the pictures of a folder show.
+    """The board in the pictures of a folder.
 
     Attributes:
         seen: pairs that show the board, by their numbers.
@@ -54,7 +54,7 @@ def read_pairs(folder: str, board: "Board", diagnostics: Diagnostics) -> BoardPa
             found, size = _look(source, place, board, size, beside)
             (seen if hasattr(found, "left") else unseen).append(found)  # type: ignore[arg-type]
             diagnostics.progress("pictures", (place + 1) / len(source.numbers))
-            diagnostics.detail(f"pair {number}: {_told(found)}")
+            diagnostics.detail(f"pair {number}: {_describe(found)}")
     if size is None:
         raise SequenceError(f"folder {folder} holds no pairs", subject=folder, remedy="add some")
     return BoardPairs(seen, unseen, size)
@@ -68,9 +68,9 @@ def _look(
     beside: ThreadPoolExecutor,
 ) -> "tuple[SeenPair | DroppedPair, tuple[int, int]]":
     """One pair: both pictures at once."""
-    from calibration.rig.views import DroppedPair, Fault
+    from calibration.rig.dropped_pairs import DroppedPair, Fault
     from calibration.targets.detection import find_board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from navapp.geometry.rectification import luma
 
     number = source.numbers[place]
@@ -95,6 +95,6 @@ def _look(
     return SeenPair(number, views["left"], views["right"]), size  # type: ignore[return-value]
 
 
-def _told(found: "SeenPair | DroppedPair") -> str:
+def _describe(found: "SeenPair | DroppedPair") -> str:
     reason = getattr(found, "reason", None)
     return str(reason) if reason else f"{len(found.left.ids)} and {len(found.right.ids)} marks"  # type: ignore[union-attr]

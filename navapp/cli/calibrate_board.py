@@ -35,7 +35,7 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Draw and write."""
     from calibration.targets.boards import keys_of, read_board
-    from calibration.targets.printing import Sheet, printed
+    from calibration.targets.printing import Sheet, render_page
     from navapp.geometry.whole_files import write_whole
 
     form = Path(options.out).suffix.lower().lstrip(".")
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     for path in (options.out, options.json):
         check_writable(path)
     sheet = Sheet(read_board(options.board))
-    write_whole(options.out, printed(sheet, "pdf" if form == "pdf" else "svg"))
+    write_whole(options.out, render_page(sheet, "pdf" if form == "pdf" else "svg"))
     warnings = _warnings(sheet)
     for warning in warnings:
         diagnostics.warn(warning)

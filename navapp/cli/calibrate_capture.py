@@ -12,9 +12,9 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import DeviceError, ResultError, UsageError
 
 if TYPE_CHECKING:
-    from calibration.rig.solve import Calibration
+    from calibration.rig.rig_solution import Calibration
     from calibration.targets.boards import Board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from drivers.interfaces import CameraInfo
     from navapp.config import CalibrationSection
     from navapp.control.capture.capture import Capture
@@ -113,7 +113,7 @@ def _capture(opened: "OpenedCapture", solver: "_Solver", options: argparse.Names
 
 
 class _Solver:
-    """Solves, judges and writes; keeps what it found for the end."""
+    """Solves the rig of a capture, judges it and writes its files."""
 
     def __init__(
         self,
@@ -126,10 +126,10 @@ class _Solver:
         self.found: tuple[Calibration, StereoRig] | None = None
 
     def __call__(self, pairs: "list[SeenPair]", report: Callable[[float], None]) -> "Outcome":
-        from calibration.report.html import write_report
-        from calibration.rig.judge import Limits
-        from calibration.rig.solve import solve_rig
-        from navapp.cli.calibrate_stereo import recorded
+        from calibration.report.html_report import write_report
+        from calibration.rig.acceptance import Limits
+        from calibration.rig.rig_solution import solve_rig
+        from navapp.cli.calibrate_stereo import with_record
         from navapp.control.capture.states import Outcome
         from navapp.geometry.rig_files import write_rig
 
@@ -137,7 +137,7 @@ class _Solver:
         limits = Limits(accept_mm=section.accept_mm, depth_mm=section.working_depth_mm)
         size = (info.width, info.height)
         found = solve_rig(self.board, pairs, size, limits=limits, on_progress=report)
-        rig = replace(recorded(found, section, folder.name), serials=info.serials)
+        rig = replace(with_record(found, section, folder.name), serials=info.serials)
         write_report(folder / "report.html", replace(found, rig=rig), limits)
         is_accepted = rig.quality is not None and rig.quality.is_accepted
         path = folder / "rig.yml"
@@ -166,7 +166,7 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
             raise DeviceError(f"{snapshot.trouble}, but nothing came; {n_kept} pairs are kept")
         if n_waited > _MOST_FRAMES_A_PAIR:
             raise ResultError(
-                f"no wanted view can be taken after {n_kept} pairs ({snapshot.wish})",
+                f"no wanted view can be taken after {n_kept} pairs ({snapshot.instruction})",
                 remedy="use a larger board, or solve what is kept with `navapp calibrate stereo`",
             )
         snapshot = capture.step()
@@ -203,7 +203,7 @@ def _finish(
     diagnostics: Diagnostics,
 ) -> int:
     """Tell and write the result; the exit code."""
-    from navapp.cli.calibrate_stereo import content, tell
+    from navapp.cli.calibrate_stereo import make_content, tell
 
     figures = {
         "pairs_kept": last.n_kept,
@@ -211,7 +211,7 @@ def _finish(
         "predicted_mm": {"median": last.bound_mm, "p95": last.worst_mm},
     }
     if solver.found is not None:
-        figures |= content(*solver.found)
+        figures |= make_content(*solver.found)
     write_json(options.json, "calibrate capture", figures)
     if solver.found is not None and options.json != "-":
         tell(*solver.found, diagnostics)

@@ -12,7 +12,7 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import ResultError, RigError
 
 if TYPE_CHECKING:
-    from calibration.rig.check import RigCheck
+    from calibration.rig.rig_check import RigCheck
     from navapp.geometry.rig import StereoRig
 
 _EXAMPLE = """\
@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Judge; the exit code."""
-    from calibration.rig.check import check_rig
+    from calibration.rig.rig_check import check_rig
     from calibration.targets.boards import read_board
     from navapp.config import find_file, load
     from navapp.geometry.rig_files import read_rig

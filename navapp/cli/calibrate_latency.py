@@ -8,8 +8,8 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
-    from calibration.latency.measure import Estimate, EyeLag, Latency
-    from navapp.control.latency.watching import Recording
+    from calibration.latency.measurement import Estimate, EyeLag, Latency
+    from navapp.control.display_delay.code_recording import CodeRecording
     from navapp.devices import OpenedLatency
 
 _EXAMPLE = """\
@@ -42,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Show, watch, solve; the exit code."""
-    from calibration.latency.judge import judged_latency
+    from calibration.latency.acceptance import measure_accepted_latency
     from navapp.config import find_file, load
     from navapp.devices import open_latency
 
@@ -56,30 +56,34 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         opened = open_latency(configuration)
         undo.callback(opened.close)
         names = (opened.display.info.name, opened.camera.info.name)
-        recording = _watched(opened, options, diagnostics)
-    found = judged_latency(recording.switches, recording.left, recording.right, options.refresh_hz)
+        recording = _watch(opened, options, diagnostics)
+    found = measure_accepted_latency(
+        recording.switches, recording.left, recording.right, options.refresh_hz
+    )
     write_json(options.json, "calibrate latency", _content(found, recording, names))
     if options.json != "-":
         _tell(found, names, diagnostics)
     return 0
 
 
-def _watched(
+def _watch(
     opened: "OpenedLatency", options: argparse.Namespace, diagnostics: Diagnostics
-) -> "Recording":
-    from calibration.latency.code import pauses_ms
-    from navapp.control.latency.player import CodePlayer
-    from navapp.control.latency.watching import watch
+) -> "CodeRecording":
+    from calibration.latency.light_code import draw_pauses_ms
+    from navapp.control.display_delay.code_player import CodePlayer
+    from navapp.control.display_delay.code_recording import record_code
 
     # Any seed will do; always the same one makes a simulated measurement repeatable.
-    pauses = pauses_ms(options.seconds, seed=0)
+    pauses = draw_pauses_ms(options.seconds, seed=0)
     player = CodePlayer(opened.display, opened.clock, pauses)
-    return watch(
+    return record_code(
         opened.camera, player, opened.clock, lambda share: diagnostics.progress("flashing", share)
     )
 
 
-def _content(found: "Latency", recording: "Recording", names: tuple[str, str]) -> dict[str, Any]:
+def _content(
+    found: "Latency", recording: "CodeRecording", names: tuple[str, str]
+) -> dict[str, Any]:
     return {
         "display": names[0],
         "camera": names[1],
@@ -107,9 +111,9 @@ def _eye(eye: "EyeLag") -> dict[str, Any]:
         "drift_ms": eye.drift.value_ms,
         "width_ms": eye.width_ms,
         "swing": eye.swing,
-        "area_share": eye.area_share,
+        "area_share": eye.area_fraction,
         "explained": eye.explained,
-        "wrong_share": eye.wrong_share,
+        "wrong_share": eye.wrong_fraction,
     }
 
 
@@ -125,8 +129,8 @@ def _tell(found: "Latency", names: tuple[str, str], diagnostics: Diagnostics) ->
     )
     diagnostics.say(
         f"{found.n_switches} switches in {found.n_frames} frames; the display fills "
-        f"{100 * found.left.area_share:.0f} % of the left picture and "
-        f"{100 * found.right.area_share:.0f} % of the right one, "
+        f"{100 * found.left.area_fraction:.0f} % of the left picture and "
+        f"{100 * found.right.area_fraction:.0f} % of the right one, "
         f"{found.left.swing:.0f} and {found.right.swing:.0f} grey values from dark to light"
     )
     if abs(found.late.value_ms) > found.late.bound_ms:

@@ -14,9 +14,9 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import InputError, ResultError, UsageError
 
 if TYPE_CHECKING:
-    from calibration.rig.solve import Calibration
+    from calibration.rig.rig_solution import Calibration
     from calibration.targets.boards import Board
-    from calibration.targets.pairs import SeenPair
+    from calibration.targets.seen_pairs import SeenPair
     from navapp.config import CalibrationSection
     from navapp.geometry.rig import StereoRig
     from navapp.geometry.transform import FloatArray
@@ -62,8 +62,8 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Solve, judge, write; the exit code."""
-    from calibration.rig.judge import Limits
-    from calibration.rig.solve import solve_rig
+    from calibration.rig.acceptance import Limits
+    from calibration.rig.rig_solution import solve_rig
     from calibration.targets.boards import read_board
     from navapp.config import find_file, load
     from navapp.geometry.rig_files import write_rig
@@ -89,15 +89,15 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         on_progress=lambda share: diagnostics.progress("solving", share),
     )  # fmt: skip
     found = replace(found, dropped=sorted([*pairs.unseen, *found.dropped], key=lambda d: d.index))
-    rig = recorded(found, section, Path(options.out).stem)
+    rig = with_record(found, section, Path(options.out).stem)
     is_accepted = rig.quality is not None and rig.quality.is_accepted
     if is_accepted or options.force:
         write_rig(options.out, rig)
     if options.report:
-        from calibration.report.html import write_report
+        from calibration.report.html_report import write_report
 
         write_report(options.report, replace(found, rig=rig), limits)
-    write_json(options.json, "calibrate stereo", content(found, rig))
+    write_json(options.json, "calibrate stereo", make_content(found, rig))
     if options.json != "-":
         tell(found, rig, diagnostics)
     return _verdict(rig, options)
@@ -131,7 +131,7 @@ def _aside(
     return pairs.seen
 
 
-def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> "StereoRig":
+def with_record(found: "Calibration", section: "CalibrationSection", name: str) -> "StereoRig":
     """The rig with its name and all that its file should say of it."""
     assert found.rig.quality is not None  # noqa: S101 (for the type checker: it always has one)
     today = date.today()
@@ -143,7 +143,7 @@ def recorded(found: "Calibration", section: "CalibrationSection", name: str) -> 
             "rms_px": found.solved.rms_px,
             "holdout_rms_px": found.held_out_rms_px,
             "epipolar_rms_px": found.epipolar_rms_px,
-            "length_error_share": length_error(found),
+            "length_error_share": compute_length_error(found),
             "uncertainty_median_mm": _quantile(found.bounds_mm, 0.5),
             "views_used": len(found.pairs),
             "views_dropped": len(found.dropped),
@@ -166,7 +166,7 @@ def is_unit(board: "Board") -> bool:
     return board.spacing_mm == 1.0
 
 
-def length_error(found: "Calibration") -> float:
+def compute_length_error(found: "Calibration") -> float:
     """Root mean square of triangulated lengths over true ones less 1."""
     if len(found.length_ratios) == 0:
         return float("nan")
@@ -178,7 +178,7 @@ def _quantile(values: "FloatArray", share: float) -> float:
     return float(np.quantile(values, share)) if len(values) else math.nan
 
 
-def content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
+def make_content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
     """The result for programs."""
     quality = rig.quality
     solved = found.solved
@@ -190,7 +190,7 @@ def content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
         "rms_px": solved.rms_px,
         "holdout_rms_px": found.held_out_rms_px,
         "epipolar_rms_px": found.epipolar_rms_px,
-        "length_error_mm": 100.0 * length_error(found),
+        "length_error_mm": 100.0 * compute_length_error(found),
         "length_100_mm": {
             "mean": 100.0 * float(ratios.mean()) if len(ratios) else None,
             "sd": 100.0 * float(ratios.std()) if len(ratios) else None,
@@ -219,7 +219,7 @@ def content(found: "Calibration", rig: "StereoRig") -> dict[str, Any]:
 
 def tell(found: "Calibration", rig: "StereoRig", diagnostics: Diagnostics) -> None:
     """The result for people."""
-    told = content(found, rig)
+    told = make_content(found, rig)
     length, bound = told["length_100_mm"], told["uncertainty_mm"]
     diagnostics.say(
         f"{len(found.pairs)} pairs, {found.solved.model.name}: rms {told['rms_px']:.3f} px, "

@@ -1,4 +1,4 @@
-"""Scene and model of a registration from users' files, and what had to be done to them."""
+"""Reads scene and model of a registration from users' files, with notes of what was changed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.cli.surface_cleaning import estimated_normals, evenly_in_space, mended, thinned
+from navapp.cli.surface_cleaning import estimate_normals, mend, thin, thin_evenly
 from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.surface_files import SurfaceFile, merged_rows, read_surface_file
@@ -63,7 +63,7 @@ def read_scene(path: str | Path) -> SceneFile:
         InputError: the file is missing or damaged, or holds no usable point.
     """
     file = _read(path)
-    notes = _dropped(file)
+    notes = _make_dropped_notes(file)
     points = file.mesh.vertices_mm
     first, _ = merged_rows(points)
     if len(first) < len(points):
@@ -85,7 +85,7 @@ def read_model(path: str | Path) -> ModelFile:
         InputError: the file is missing or damaged, or holds no surface.
     """
     file = _read(path)
-    notes = _dropped(file)
+    notes = _make_dropped_notes(file)
     mesh = _mesh(file, notes) if len(file.mesh.faces) else _cloud(file, notes)
     is_removed = np.asarray(~mesh.normals.any(axis=1))
     if len(mesh.vertices_mm) < _LEAST_MODEL_POINTS or is_removed.all():
@@ -116,18 +116,18 @@ def _read(path: str | Path) -> SurfaceFile:
     return file
 
 
-def _dropped(file: SurfaceFile) -> list[str]:
+def _make_dropped_notes(file: SurfaceFile) -> list[str]:
     n = file.n_dropped
     return [f"{n} points are not finite and were left out"] if n else []
 
 
 def _mesh(file: SurfaceFile, notes: list[str]) -> TriangleMesh:
-    result = mended(file.mesh)
+    result = mend(file.mesh)
     notes += result.notes
     n = len(result.mesh.vertices_mm)
     if n <= MOST_MODEL_POINTS:
         return result.mesh
-    coarse = thinned(result.mesh, _THINNED_MODEL_POINTS)
+    coarse = thin(result.mesh, _THINNED_MODEL_POINTS)
     notes.append(f"its {n} vertices were thinned to {len(coarse.vertices_mm)}")
     return coarse
 
@@ -136,7 +136,7 @@ def _cloud(file: SurfaceFile, notes: list[str]) -> TriangleMesh:
     first, _ = merged_rows(file.mesh.vertices_mm)
     points, normals = file.mesh.vertices_mm[first], file.mesh.normals[first]
     if len(points) > MOST_MODEL_POINTS:
-        kept = evenly_in_space(points, _THINNED_MODEL_POINTS)
+        kept = thin_evenly(points, _THINNED_MODEL_POINTS)
         notes.append(f"its {len(points)} points were thinned to {len(kept)}")
         points, normals = points[kept], normals[kept]
     if not file.has_normals and len(points) >= _LEAST_MODEL_POINTS:
@@ -144,5 +144,5 @@ def _cloud(file: SurfaceFile, notes: list[str]) -> TriangleMesh:
             "it has no normals; they were estimated, and what counts as facing the camera "
             "depends on them"
         )
-        normals = estimated_normals(points)
+        normals = estimate_normals(points)
     return TriangleMesh(points, np.empty((0, 3), dtype=np.int32), normals)

@@ -23,7 +23,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
-    from navapp.config import FILE_NAME, Configuration, as_toml, find_file, load
+    from navapp.config import FILE_NAME, Configuration, find_file, format_toml, load
     from navapp.geometry.whole_files import write_whole
 
     check_writable(options.json)
@@ -33,7 +33,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         if path.exists():
             raise UsageError(f"{path} exists already", remedy="move it away, or choose --out")
         check_writable(str(path))
-        write_whole(path, as_toml(configuration, True).encode("utf-8"))
+        write_whole(path, format_toml(configuration, True).encode("utf-8"))
         if options.json != "-":
             diagnostics.say(f"wrote {path}")
     else:
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         configuration = load(path)
         if options.json != "-":
             source = "defaults (no file found)" if path is None else str(path)
-            diagnostics.say(f"# from: {source}\n{as_toml(configuration, False)}".rstrip())
+            diagnostics.say(f"# from: {source}\n{format_toml(configuration, False)}".rstrip())
     content = {
         "path": None if path is None else str(path),
         "configuration": configuration.model_dump(mode="json"),

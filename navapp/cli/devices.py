@@ -11,7 +11,7 @@ from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 
 if TYPE_CHECKING:
     from drivers.discovery import PixelFormat, Unseen
-    from navapp.inventory.looking import Device, Inventory
+    from navapp.inventory.connected_devices import Device, Inventory
 
 _TITLES = {
     "usb_cameras": "USB cameras",
@@ -38,13 +38,13 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it; that nothing is connected is an answer, too."""
-    from navapp.inventory.looking import look
+    from navapp.inventory.connected_devices import list_all_devices
 
     check_writable(options.json)
-    found = look()
+    found = list_all_devices()
     write_json(options.json, "devices", to_json(found))
     if options.json != "-":
-        diagnostics.say(text(found))
+        diagnostics.say(format_text(found))
     return 0
 
 
@@ -59,7 +59,7 @@ def to_json(found: "Inventory") -> dict[str, Any]:
     return content
 
 
-def text(found: "Inventory") -> str:
+def format_text(found: "Inventory") -> str:
     """The same for people: what chooses a device stands below it, to be copied."""
     paragraphs = []
     for kind, title in _TITLES.items():
@@ -73,29 +73,29 @@ def text(found: "Inventory") -> str:
 
 
 def _device_to_json(device: "Device") -> dict[str, Any]:
-    from navapp.inventory.looking import choosing
+    from navapp.inventory.connected_devices import make_choice_toml
 
     keys = {
         key: os.fspath(value) if isinstance(value, Path) else value
         for key, value in asdict(device).items()
     }
-    return {**keys, "configuration": choosing(device) or None}
+    return {**keys, "configuration": make_choice_toml(device) or None}
 
 
 def _device_text(device: "Device") -> Iterator[str]:
-    from navapp.inventory.looking import choosing
+    from navapp.inventory.connected_devices import make_choice_toml
 
     name, facts = _facts(device)
     yield f"  {name}"
     for label, lines in facts:
-        yield from _labelled(label, lines)
-    yield from _labelled("choose", choosing(device).splitlines())
+        yield from _label_lines(label, lines)
+    yield from _label_lines("choose", make_choice_toml(device).splitlines())
 
 
 def _facts(device: "Device") -> tuple[str, list[tuple[str, Sequence[str]]]]:
     """A device's name for people, and what else is known of it."""
     from drivers.discovery import FoundPort, OakCamera, UsbCamera
-    from navapp.inventory.installed import InstalledCamera
+    from navapp.inventory.camera_packages import InstalledCamera
 
     match device:
         case UsbCamera():
@@ -138,6 +138,6 @@ def _unseen_text(one: "Unseen") -> Iterator[str]:
     yield f"    -> {one.remedy}"
 
 
-def _labelled(label: str, lines: Sequence[str]) -> Iterator[str]:
+def _label_lines(label: str, lines: Sequence[str]) -> Iterator[str]:
     for number, line in enumerate(lines):
         yield f"    {label:<{len(_INDENT) - 4}} {line}" if number == 0 else f"{_INDENT} {line}"

@@ -1,4 +1,4 @@
-"""What the command line says on stderr, and its results as JSON."""
+"""Messages on stderr, and results as JSON."""
 
 import json
 import math
@@ -16,7 +16,7 @@ from navapp.geometry.whole_files import write_whole
 
 @dataclass(frozen=True, slots=True)
 class Diagnostics:
-    """How much is said."""
+    """Messages on stderr, as many as the options ask for."""
 
     is_verbose: bool = False
     is_quiet: bool = False
@@ -81,19 +81,19 @@ def write_json(path: str | None, command: str, content: Mapping[str, Any]) -> No
         "units": {"length": "mm", "angle": "deg"},
         **content,
     }
-    text = json.dumps(finite(whole), indent=1, allow_nan=False) + "\n"
+    text = json.dumps(replace_not_finite(whole), indent=1, allow_nan=False) + "\n"
     if path == "-":
         sys.stdout.write(text)
     else:
         write_whole(path, text.encode("utf-8"))
 
 
-def finite(value: Any) -> Any:
+def replace_not_finite(value: Any) -> Any:
     """The value with None for every number that JSON does not have."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): finite(item) for key, item in value.items()}
+        return {str(key): replace_not_finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
+        return [replace_not_finite(item) for item in value]
     return value

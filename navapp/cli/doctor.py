@@ -1,4 +1,4 @@
-"""`navapp doctor`: what is there, what is missing, and what to do about it."""
+"""`navapp doctor`: checks of the installation and of the configured devices, with remedies."""
 
 import argparse
 from collections.abc import Sequence
@@ -35,11 +35,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     content = {"well": is_well, "findings": [_to_json(finding) for finding in findings]}
     write_json(options.json, "doctor", content)
     if options.json != "-":
-        diagnostics.say(text(findings))
+        diagnostics.say(format_text(findings))
     return 0 if is_well else 4
 
 
-def text(findings: Sequence["Finding"]) -> str:
+def format_text(findings: Sequence["Finding"]) -> str:
     """For people: a line each, the remedy below what is not as it should be."""
     from navapp.inventory.finding import Health
 
@@ -53,25 +53,25 @@ def text(findings: Sequence["Finding"]) -> str:
 
 
 def _findings(config: str | None) -> "list[Finding]":
-    from navapp.cli.software_checks import software_findings
+    from navapp.cli.software_checks import check_software
 
     try:
         configuration, told = _configuration(config)
     except ImportError:
         # The package that is missing is named among the software.
-        return software_findings(None)
-    return [*software_findings(configuration), told, *_device_findings(configuration)]
+        return check_software(None)
+    return [*check_software(configuration), told, *_device_findings(configuration)]
 
 
 def _device_findings(configuration: "Configuration") -> "list[Finding]":
-    from navapp.inventory.configured_checks import configured_findings
-    from navapp.inventory.looking import look
-    from navapp.inventory.system_checks import system_findings
+    from navapp.inventory.configured_checks import check_configured_devices
+    from navapp.inventory.connected_devices import list_all_devices
+    from navapp.inventory.system_checks import check_system
 
-    found = look()
+    found = list_all_devices()
     return [
-        *system_findings(configuration, found),
-        *configured_findings(configuration, found),
+        *check_system(configuration, found),
+        *check_configured_devices(configuration, found),
     ]
 
 

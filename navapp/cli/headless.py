@@ -12,12 +12,12 @@ import numpy as np
 from navapp.cli.diagnostics import Diagnostics, write_json
 from navapp.cli.results import frame_text, summarise, summary_text
 from navapp.control.controller import SessionController
+from navapp.control.frame_result import FrameResult
 from navapp.control.operators import Operator
-from navapp.control.results import FrameResult
 from navapp.control.runner import run_headless
 from navapp.errors import NavappError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
-from navapp.values import Prior, StageSpec
+from navapp.values import Prior
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -65,17 +65,17 @@ def check_not_expired(rig: StereoRig, today: date) -> None:
     )
 
 
-def check_start(prior: Prior, stage: StageSpec) -> None:
+def check_start(prior: Prior, bone: str) -> None:
     """Refuse a session in which nothing could ever be found.
 
     Raises:
-        PriorError: nothing is known of where the stage's bone is.
+        PriorError: nothing is known of where the bone is.
     """
-    if not prior.starts(stage.bone):
+    if not prior.starts(bone):
         raise PriorError(
-            f"nothing is known of where the {stage.bone} is",
+            f"nothing is known of where the {bone} is",
             remedy="give --prior FILE with camera_from_model"
-            + ("" if stage.bone == "femur" else f"_{stage.bone}"),
+            + ("" if bone == "femur" else f"_{bone}"),
         )
 
 
@@ -108,14 +108,14 @@ class FrameLog:
         return self._n_expected is not None and len(self.results) >= self._n_expected
 
 
-def follow(controller: SessionController, operator: Operator, log: FrameLog) -> float:
+def run_session(controller: SessionController, operator: Operator, log: FrameLog) -> float:
     """Run to the end of the source, or until the log is full; answers with the seconds it took."""
     started = time.perf_counter()
     run_headless(controller, operator, lambda: log.is_full)
     return time.perf_counter() - started
 
 
-def finish(
+def report_result(
     frames: Sequence[dict[str, Any]],
     seconds: float,
     failure: NavappError | None,

@@ -1,4 +1,4 @@
-"""The session of `navapp run`: what is given is read, devices are opened, listeners joined."""
+"""The session of `navapp run`: reads what is given, opens the devices, adds the listeners."""
 
 import argparse
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.board_watch import BoardWatch
     from navapp.control.controller import SessionController
-    from navapp.control.results import FrameListener
-    from navapp.control.session import SessionHooks
+    from navapp.control.event_log import SessionHooks
+    from navapp.control.frame_result import FrameListener
+    from navapp.control.specification import SessionSpecification
     from navapp.devices import OpenedDevices
-    from navapp.values import Plan, Prior, StageSpec
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,20 +28,17 @@ class LiveSession:
     Attributes:
         configuration: with the command line's words in it.
         opened: devices, and the simulation when there is one.
-        plan, prior: of the patient.
-        stage: to start in.
+        specification: of the session.
         board: whose lengths are known, None when none is configured.
     """
 
     configuration: "Configuration"
     opened: "OpenedDevices"
-    plan: "Plan"
-    prior: "Prior"
-    stage: "StageSpec"
+    specification: "SessionSpecification"
     board: "Board | None" = None
 
 
-def prepared(
+def prepare_session(
     configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
 ) -> LiveSession:
     """Read everything that is given, then open the devices; closed again when that is refused.
@@ -51,7 +48,8 @@ def prepared(
     """
     from navapp.cli.headless import check_accepted, check_not_expired, check_start
     from navapp.cli.prior_files import read_prior
-    from navapp.cli.simulated_patient import built_in_plan, nominal_prior
+    from navapp.cli.simulated_patient import make_built_in_plan, make_nominal_prior
+    from navapp.control.specification import specify_session
     from navapp.control.stages import stage_by_name
     from navapp.devices import open_live
     from navapp.preop import read_plan
@@ -61,26 +59,27 @@ def prepared(
     stage = stage_by_name(options.stage or configuration.stages.first)
     plan = None if given.path is None else read_plan(given.path)
     prior = None if given.prior is None else read_prior(given.prior)
-    board = _board(configuration)
+    board = _read_board(configuration)
     opened = open_live(configuration, is_headless=options.headless, board=board)
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         check_not_expired(opened.rig, date.today())
         check_accepted(opened.rig, options.allow_unaccepted, diagnostics)
         if opened.simulation is not None:
-            plan = plan or built_in_plan(opened.simulation)
-            prior = prior or nominal_prior(opened.simulation)
+            plan = plan or make_built_in_plan(opened.simulation)
+            prior = prior or make_nominal_prior(opened.simulation)
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
         prior = prior or Prior()
         stage = plan.stage(stage)
         if options.headless:
-            check_start(prior, stage)
+            check_start(prior, stage.bone)
         undo.pop_all()
-    return LiveSession(configuration, opened, plan, prior, stage, board)
+    specification = specify_session(configuration, opened.rig, plan, prior, stage, is_live=True)
+    return LiveSession(configuration, opened, specification, board)
 
 
-def _board(configuration: "Configuration") -> "Board | None":
+def _read_board(configuration: "Configuration") -> "Board | None":
     """The board that the configuration names.
 
     Raises:
@@ -107,36 +106,23 @@ def _board(configuration: "Configuration") -> "Board | None":
     return board
 
 
-def controller_of(
+def make_controller(
     session: LiveSession, *, is_inline: bool, on_frame: "Sequence[FrameListener]", undo: ExitStack
 ) -> "SessionController":
     """The controller with its listeners and, when asked for, its recorder."""
-    from navapp.control.controller import SessionController, SessionOptions
+    from navapp.control.controller import SessionController
     from navapp.control.executors import InlineExecutor, ThreadExecutor
-    from navapp.tracking import TrackerSettings
 
-    configuration, opened = session.configuration, session.opened
     return SessionController(
-        opened.devices,
-        opened.rig,
-        session.plan,
-        session.prior,
+        session.opened.devices,
+        session.specification,
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
-        options=SessionOptions(
-            line=TrackerSettings(
-                configuration.tracking.method, depth_mm=configuration.camera.depth_mm
-            ),
-            first_stage=session.stage,
-            overlay_valid_ms=configuration.display.withdrawn_ms,
-            is_recording=configuration.recording.folder is not None,
-            mirror_deg=configuration.mirror.calibrated_deg,
-        ),
-        hooks=_listening(session, on_frame, undo),
-        board_watch=_board_watch(session, is_inline=is_inline),
+        hooks=_make_hooks(session, on_frame, undo),
+        board_watch=_make_board_watch(session, is_inline=is_inline),
     )
 
 
-def _board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None":
+def _make_board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None":
     """What measures the rig whenever the board is seen; None without a board."""
     if session.board is None:
         return None
@@ -152,12 +138,12 @@ def _board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None
     )
 
 
-def _listening(
+def _make_hooks(
     session: LiveSession, on_frame: "Sequence[FrameListener]", undo: ExitStack
 ) -> "SessionHooks":
     """Who is told: the caller, the simulated room, and the recorder when there is one."""
     from navapp.cli.session_folder import discard_if_empty, start_recording
-    from navapp.control.session import SessionHooks
+    from navapp.control.event_log import SessionHooks
 
     configuration, opened = session.configuration, session.opened
     hooks = SessionHooks(
@@ -168,14 +154,7 @@ def _listening(
     folder = configuration.recording.folder
     if folder is None:
         return hooks
-    recorder = start_recording(
-        folder,
-        configuration,
-        opened.rig,
-        session.plan,
-        session.prior,
-        first_stage=session.stage.name,
-    )
+    recorder = start_recording(folder, configuration, session.specification)
     undo.callback(discard_if_empty, folder)
     undo.callback(recorder.close)
     return replace(

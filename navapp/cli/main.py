@@ -1,4 +1,4 @@
-"""The parser, and the one place where an error becomes an exit code."""
+"""The argument parser, and the conversion of errors to exit codes."""
 
 import argparse
 import importlib

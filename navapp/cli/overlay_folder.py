@@ -1,4 +1,4 @@
-"""A folder of overlay pictures that is complete or not there."""
+"""Writes overlay pictures to a folder that appears only when all of them are written."""
 
 import shutil
 import tempfile
@@ -6,7 +6,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from navapp.control.results import FrameResult
+from navapp.control.frame_result import FrameResult
 from navapp.errors import InputError
 
 _JPEG_QUALITY = 92

@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.plan_contents import add_arguments, completed, content_of, lines_of
-from navapp.cli.plan_draft import aspects_of, drafted, with_cartilage
+from navapp.cli.plan_content_options import add_arguments, complete_plan, content_of, lines_of
+from navapp.cli.plan_draft import aspects_of, make_draft, with_cartilage
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")
         plan, origin = read_plan(options.folder), read_origin(options.folder)
     else:
-        plan, origin = _made(options, diagnostics)
+        plan, origin = _make_plan(options, diagnostics)
         for warning in origin.warnings:
             diagnostics.warn(warning)
     write_json(options.json, "plan", _content(plan, origin))
@@ -115,7 +115,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def _made(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[Plan, PlanOrigin]":
+def _make_plan(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[Plan, PlanOrigin]":
     """The plan, written."""
     from navapp.preop import check_place, with_side, write_plan
     from navapp.values import Plan
@@ -129,10 +129,10 @@ def _made(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[Plan,
     if options.out is None:
         raise UsageError("--out is missing", remedy="name the plan folder to write")
     check_place(options.out)
-    draft = with_cartilage(drafted(options, diagnostics), options.cartilage)
+    draft = with_cartilage(make_draft(options, diagnostics), options.cartilage)
     bones, about_side = with_side(draft.bones, draft.side, draft.fibula)
     name = str(options.out).rstrip("/").rsplit("/", 1)[-1]
-    plan, about_content = completed(Plan(bones, name=name), options)
+    plan, about_content = complete_plan(Plan(bones, name=name), options)
     plan = replace(plan, aspects=aspects_of(bones, diagnostics))
     warnings = (*draft.origin.warnings, *about_side, *about_content)
     origin = replace(draft.origin, warnings=warnings)

@@ -1,4 +1,4 @@
-"""What `navapp plan` makes a plan from: a CT, a ready segmentation, or surfaces."""
+"""`navapp plan`: makes bone models from a CT, a segmentation or surface files."""
 
 import argparse
 from collections.abc import Mapping
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics
-from navapp.cli.plan_options import by_bone, covered
+from navapp.cli.plan_options import add_cartilage, parse_by_bone
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.geometry.transform import FloatArray
-    from navapp.preop.drafts import CtSettings, Draft
+    from navapp.preop.plan_drafts import CtSettings, Draft
     from navapp.values import AspectGraph, BoneModel
 
 _CT_ONLY = ("series", "threshold", "seed", "region")
@@ -25,7 +25,7 @@ _NO_CARTILAGE = (
 _N_STEPS = 21
 
 
-def drafted(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
+def make_draft(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
     """Bones from what the options name."""
     if options.ct is None:
         for option in _CT_ONLY:
@@ -42,7 +42,7 @@ def drafted(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
 
 def with_cartilage(draft: "Draft", entries: list[str]) -> "Draft":
     """The draft with cartilage on its bones."""
-    texts = by_bone("--cartilage", entries, "FILE.ply or NAME=MEAN_MM:SD_MM", "femur=2.0:0.6")
+    texts = parse_by_bone("--cartilage", entries, "FILE.ply or NAME=MEAN_MM:SD_MM", "femur=2.0:0.6")
     bones, warnings = dict(draft.bones), list(draft.origin.warnings)
     for name, text in texts.items():
         if name not in bones:
@@ -50,7 +50,7 @@ def with_cartilage(draft: "Draft", entries: list[str]) -> "Draft":
                 f"--cartilage names the {name}, which has no surface",
                 remedy=f"add --surface {name}=FILE",
             )
-        imported = covered(bones[name], text)
+        imported = add_cartilage(bones[name], text)
         bones[name] = imported.bone
         warnings += imported.warnings
     bare = [name for name in bones if name not in texts]
@@ -77,7 +77,7 @@ def aspects_of(
 
 
 def _from_ct(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
-    from navapp.preop.drafts import draft_from_ct
+    from navapp.preop.plan_drafts import make_draft_from_ct
     from navapp.preop.volume import read_ct
 
     settings = _settings(options)
@@ -90,13 +90,13 @@ def _from_ct(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft":
         diagnostics.detail(step)
         diagnostics.progress(f"{step:<62}", min(n_told / _N_STEPS, 0.99))
 
-    draft = draft_from_ct(read, settings, tell)
+    draft = make_draft_from_ct(read, settings, tell)
     diagnostics.progress(f"{'bones of the CT':<62}", 1.0)
     return draft
 
 
 def _settings(options: argparse.Namespace) -> "CtSettings":
-    from navapp.preop.drafts import CtSettings
+    from navapp.preop.plan_drafts import CtSettings
     from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU
 
     threshold = DEFAULT_THRESHOLD_HU if options.threshold is None else options.threshold
@@ -147,11 +147,11 @@ def _numbers(option: str, text: str, n: int, form: str) -> "FloatArray":
 
 
 def _from_labels(options: argparse.Namespace) -> "Draft":
-    from navapp.preop.drafts import draft_from_labels
+    from navapp.preop.plan_drafts import make_draft_from_labels
     from navapp.preop.volume import read_labels
 
     values = {}
-    for name, text in by_bone("--label", options.label, "VALUE", "femur=5").items():
+    for name, text in parse_by_bone("--label", options.label, "VALUE", "femur=5").items():
         if not text.isdecimal() or int(text) == 0:
             raise UsageError(
                 f"--label {name}={text} is not a value of a label", remedy="a whole number from 1"
@@ -161,16 +161,18 @@ def _from_labels(options: argparse.Namespace) -> "Draft":
         raise UsageError(
             "--labels needs to know which value is which bone", remedy="add --label femur=VALUE"
         )
-    return draft_from_labels(read_labels(options.labels), values, options.side)
+    return make_draft_from_labels(read_labels(options.labels), values, options.side)
 
 
 def _from_surfaces(options: argparse.Namespace) -> "Draft":
     from navapp.preop import PlanOrigin, import_surface
-    from navapp.preop.drafts import Draft
+    from navapp.preop.plan_drafts import Draft
 
     bones = {}
     warnings: list[str] = []
-    for name, path in by_bone("--surface", options.surface, "FILE", "femur=femur.ply").items():
+    for name, path in parse_by_bone(
+        "--surface", options.surface, "FILE", "femur=femur.ply"
+    ).items():
         imported = import_surface(name, path, options.side)
         warnings += imported.warnings
         bones[name] = imported.bone

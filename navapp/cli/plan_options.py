@@ -1,4 +1,4 @@
-"""Options of `navapp plan` that are given once a bone, and the cartilage on it."""
+"""Options of `navapp plan` of the form BONE=VALUE, and `--cartilage`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from navapp.values import BoneModel
 
 
-def by_bone(option: str, entries: list[str], value: str, example: str) -> dict[str, str]:
+def parse_by_bone(option: str, entries: list[str], value: str, example: str) -> dict[str, str]:
     """Values of an option that is given once a bone, in the order given."""
     found: dict[str, str] = {}
     for entry in entries:
@@ -31,9 +31,9 @@ def by_bone(option: str, entries: list[str], value: str, example: str) -> dict[s
     return found
 
 
-def covered(bone: "BoneModel", text: str) -> "ImportedSurface":
+def add_cartilage(bone: "BoneModel", text: str) -> "ImportedSurface":
     """The bone with the cartilage of a file, or of MEAN_MM:SD_MM."""
-    from navapp.preop import ImportedSurface, even_cartilage, import_cartilage
+    from navapp.preop import ImportedSurface, import_cartilage, make_even_cartilage
     from navapp.preop.cartilage import LARGEST_MM
 
     if text.lower().endswith(".ply") or Path(text).is_file():
@@ -51,4 +51,4 @@ def covered(bone: "BoneModel", text: str) -> "ImportedSurface":
                 f"--cartilage {bone.name}={text}: a {what} of {value_mm:g} mm is not possible",
                 remedy=f"give 0 to {LARGEST_MM:g} mm",
             )
-    return ImportedSurface(even_cartilage(bone, mean_mm, sd_mm), ())
+    return ImportedSurface(make_even_cartilage(bone, mean_mm, sd_mm), ())

@@ -1,4 +1,4 @@
-"""A pose in a file: the `matrix` of a transform, or what another command answered."""
+"""Reads a pose from a JSON file: a `matrix`, or the result of another command."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The rough start pose as a JSON file."""
+"""Reads and writes the rough start pose as JSON."""
 
 import json
 from collections.abc import Sequence

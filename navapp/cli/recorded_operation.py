@@ -4,14 +4,14 @@ import argparse
 
 from navapp.cli.session_folder import RecordedSession
 from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
-from navapp.control.operators import Operator, RecordedOperator, ReplayOperator, Together
+from navapp.control.operators import CombinedOperator, Operator, RecordedOperator, ReplayOperator
 from navapp.control.states import DistrustRig
 
 # After which frame a session found its rig moved, and how.
 MovedRig = tuple[int, DistrustRig]
 
 
-def moved_rig(session: RecordedSession | None, options: argparse.Namespace) -> MovedRig | None:
+def find_moved_rig(session: RecordedSession | None, options: argparse.Namespace) -> MovedRig | None:
     """What a replay has to know of its rig; None when nothing was found, or another one is used.
 
     What was said of the recorded rig says nothing of another one.
@@ -19,7 +19,7 @@ def moved_rig(session: RecordedSession | None, options: argparse.Namespace) -> M
     return None if session is None or options.rig else session.events.rig_moved
 
 
-def operation(
+def choose_operator(
     session: RecordedSession | None, options: argparse.Namespace
 ) -> tuple[Operator, Executor]:
     """The recorded operator, so that the same poses come out, or one that only follows.
@@ -31,13 +31,13 @@ def operation(
     )
     if session is None or is_changed or options.order != "forward":
         plain = ReplayOperator(each_frame=options.order == "each")
-        moved = moved_rig(session, options)
+        moved = find_moved_rig(session, options)
         if moved is None or options.order == "pingpong":
             return plain, InlineExecutor()
         after, command = moved
         # A replay that starts later has not a single frame before.
         recorded = RecordedOperator([(-1 if options.start > after else after, command)])
-        return Together(recorded, plain), InlineExecutor()
+        return CombinedOperator(recorded, plain), InlineExecutor()
     events = session.events
     commands = [
         (after, command)
@@ -47,12 +47,12 @@ def operation(
     return RecordedOperator(commands), RecordedExecutor(events.take_overs)
 
 
-def warnings(session: RecordedSession | None, options: argparse.Namespace) -> tuple[str, ...]:
+def list_warnings(session: RecordedSession | None, options: argparse.Namespace) -> tuple[str, ...]:
     """What a person has to know before the replay begins."""
     told = []
     if session is not None and not session.events.is_complete:
         told.append("the session was not recorded to its end; what there is will be replayed")
-    moved = moved_rig(session, options)
+    moved = find_moved_rig(session, options)
     if moved is not None and options.order == "pingpong":
         told.append(
             f"the session found its rig moved after frame {moved[0]} ({moved[1].why}); --order "

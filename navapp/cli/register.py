@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.register_work import (
-    RegisterWork,
-    prepared,
-    since_ms,
+from navapp.cli.register_inputs import (
+    RegisterInputs,
+    compute_since_ms,
+    read_inputs,
 )
 from navapp.errors import ResultError, UsageError
 from navapp.geometry.transform import FloatArray, skew
@@ -69,10 +69,10 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Register, write what was asked for; the exit code."""
     _check(options)
-    work = prepared(options)
+    work = read_inputs(options)
     for warning in work.warnings:
         diagnostics.warn(warning)
-    answer, register_ms = _registered(work, options, diagnostics)
+    answer, register_ms = _register(work, options, diagnostics)
     content = _content(work, answer, register_ms, options)
     write_json(options.json, "register", content)
     if options.json != "-":
@@ -102,8 +102,8 @@ def _check(options: argparse.Namespace) -> None:
     check_writable(options.json)
 
 
-def _registered(
-    work: RegisterWork, options: argparse.Namespace, diagnostics: Diagnostics
+def _register(
+    work: RegisterInputs, options: argparse.Namespace, diagnostics: Diagnostics
 ) -> tuple["Registration", float]:
     """The answer, and how many ms it took."""
     from navapp.registration import register
@@ -118,11 +118,11 @@ def _registered(
         is_global=options.is_global,
         on_progress=lambda share: diagnostics.progress("starts", share),
     )
-    return answer, since_ms(started)
+    return answer, compute_since_ms(started)
 
 
 def _content(
-    work: RegisterWork,
+    work: RegisterInputs,
     answer: "Registration",
     register_ms: float,
     options: argparse.Namespace,
@@ -161,7 +161,7 @@ def _content(
     }
 
 
-def _covariance(work: RegisterWork, answer: "Registration") -> FloatArray:
+def _covariance(work: RegisterInputs, answer: "Registration") -> FloatArray:
     """(6, 6) of the twist about the mean of the file's vertices, in the files' unit."""
     estimate = answer.estimate
     centre_mm = work.factor * work.file.whole.centroid_mm
@@ -194,7 +194,9 @@ def _tell(content: dict[str, Any], units: str, diagnostics: Diagnostics) -> None
             diagnostics.say(" ".join(f"{value + 0.0:14.8g}" for value in row))
 
 
-def _write_aligned(options: argparse.Namespace, work: RegisterWork, answer: "Registration") -> None:
+def _write_aligned(
+    options: argparse.Namespace, work: RegisterInputs, answer: "Registration"
+) -> None:
     """The model as its file holds it, in the scene's coordinates and unit."""
     from navapp.geometry.ply import write_ply
 

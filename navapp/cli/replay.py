@@ -1,7 +1,6 @@
-"""`navapp replay`: the same line on a recorded sequence, as fast as it goes."""
+"""`navapp replay`: tracking on a recorded sequence, as fast as it goes."""
 
 import argparse
-from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,16 +10,16 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from drivers.replay_camera import ReplaySettings
+    from navapp.cli.headless import FrameLog
     from navapp.cli.recorded_operation import MovedRig
     from navapp.config import Configuration
-    from navapp.control.controller import SessionController
     from navapp.control.executors import Executor
+    from navapp.control.frame_result import FrameListener
     from navapp.control.operators import Operator
-    from navapp.control.results import FrameListener
+    from navapp.control.specification import SessionSpecification
     from navapp.devices import OpenedDevices
-    from navapp.geometry.rig import StereoRig
-    from navapp.tracking import Method
-    from navapp.values import Plan, Prior, StageSpec
+    from navapp.errors import NavappError
+    from navapp.values import Plan, StageSpec
 
 _EXAMPLE = """\
 examples:
@@ -75,18 +74,18 @@ class _Replay:
     """What is replayed, and who operates.
 
     Attributes:
+        specification: of the session.
+        operator: gives the commands.
+        executor: runs first registrations.
+        is_as_recorded: commands and results of searches come when they came in the recording.
+        warnings: for a person, before the replay begins.
         rig_moved: after which frame the recorded session found this rig moved, and how; None when
             it did not, or another rig is used.
     """
 
-    rig: "StereoRig"
-    plan: "Plan"
-    prior: "Prior"
-    stage: "StageSpec"
-    method: "Method"
+    specification: "SessionSpecification"
     operator: "Operator"
     executor: "Executor"
-    others: "tuple[StageSpec, ...]" = ()
     is_as_recorded: bool = False
     warnings: tuple[str, ...] = ()
     rig_moved: "MovedRig | None" = None
@@ -94,9 +93,8 @@ class _Replay:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
-    from navapp.cli.headless import FrameLog, check_accepted, check_start, finish, follow
-    from navapp.cli.overlay_folder import OverlayFolder
-    from navapp.cli.results import frame_to_json, moved_rig_to_json
+    from navapp.cli.headless import FrameLog, check_accepted, check_start, report_result
+    from navapp.cli.results import frame_to_json, rig_alarm_to_json
     from navapp.config import find_file, load
     from navapp.devices import open_recording
 
@@ -106,25 +104,44 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     replay = _prepare(configuration, options)
     for warning in replay.warnings:
         diagnostics.warn(warning)
-    check_accepted(replay.rig, options.allow_unaccepted, diagnostics)
+    specification = replay.specification
+    rig = specification.rig
+    check_accepted(rig, options.allow_unaccepted, diagnostics)
     if not replay.is_as_recorded:
-        for stage in (replay.stage, *replay.others):
-            check_start(replay.prior, stage)
-    opened = open_recording(options.sequence, settings, replay.rig, configuration)
+        for bone in (specification.stage.bone, *specification.others):
+            check_start(specification.prior, bone)
+    opened = open_recording(options.sequence, settings, rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
+    seconds, failure = _run_session(replay, opened, log, options.overlay)
+    frames = [frame_to_json(result, {}) for result in log.results]
+    moved = replay.rig_moved
+    told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
+    return report_result(frames, seconds, failure, options, diagnostics, told)
+
+
+def _run_session(
+    replay: _Replay, opened: "OpenedDevices", log: "FrameLog", overlay: str | None
+) -> "tuple[float, NavappError | None]":
+    """Handle all frames; the seconds that they took, and the fault in which the session ended."""
+    from navapp.cli.headless import run_session
+    from navapp.cli.overlay_folder import OverlayFolder
+    from navapp.control.controller import SessionController
+    from navapp.control.event_log import SessionHooks
+
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         listeners: list[FrameListener] = [log]
-        if options.overlay is not None:
-            listeners.append(undo.enter_context(OverlayFolder(options.overlay)).add)
-        controller = _controller(replay, opened, configuration, listeners)
+        if overlay is not None:
+            listeners.append(undo.enter_context(OverlayFolder(overlay)).add)
+        controller = SessionController(
+            opened.devices,
+            replay.specification,
+            executor=replay.executor,
+            hooks=SessionHooks(on_frame=tuple(listeners)),
+        )
         undo.callback(controller.close)
-        seconds = follow(controller, replay.operator, log)
-    frames = [frame_to_json(result, {}) for result in log.results]
-    rig = (
-        None if replay.rig_moved is None else moved_rig_to_json(replay.rig.name, *replay.rig_moved)
-    )
-    return finish(frames, seconds, controller.failure, options, diagnostics, rig)
+        seconds = run_session(controller, replay.operator, log)
+    return seconds, controller.failure
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -155,10 +172,10 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.prior_files import read_prior
-    from navapp.cli.recorded_operation import moved_rig, operation, warnings
+    from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.operators import RecordedOperator
-    from navapp.control.stages import stage_by_name
+    from navapp.control.specification import specify_session
     from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan
     from navapp.values import Prior
@@ -167,33 +184,47 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     rig_path = options.rig or (session and session.rig_path) or configuration.camera.rig
     plan_path = options.plan or (session and session.plan_path) or configuration.plan.path
     prior_path = options.prior or (session and session.prior_path) or configuration.plan.prior
-    method = options.method or (session and session.method) or configuration.tracking.method
     stage = (session and session.first_stage) or configuration.stages.first
     if plan_path is None:
         raise UsageError("no plan is given", remedy="give --plan (make one with `navapp plan`)")
     if rig_path is None:
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
     plan = read_plan(plan_path)
-    first = (
-        plan.stage(stage_by_name(stage)) if options.bone is None else _stage_of(options.bone, plan)
-    )
-    others = tuple(_stage_of(name, plan) for name in dict.fromkeys(options.also))
-    if first.bone in {other.bone for other in others}:
-        raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
-    operator, executor = operation(session, options)
-    return _Replay(
+    first, others = _stages(options, plan, stage)
+    operator, executor = choose_operator(session, options)
+    method = options.method or (None if session is None else session.method)
+    specification = specify_session(
+        configuration,
         read_rig(rig_path),
         plan,
         Prior() if prior_path is None else read_prior(prior_path),
         first,
-        method,
+        is_live=False,
+        method=method,
+        others=others,
+    )
+    return _Replay(
+        specification,
         operator,
         executor,
-        others,
         isinstance(operator, RecordedOperator),
-        warnings(session, options),
-        moved_rig(session, options),
+        list_warnings(session, options),
+        find_moved_rig(session, options),
     )
+
+
+def _stages(
+    options: argparse.Namespace, plan: "Plan", name: str
+) -> "tuple[StageSpec, tuple[str, ...]]":
+    """The stage to start in, that of `--bone` or else the named one; and the bones of `--also`."""
+    from navapp.control.stages import stage_by_name
+
+    is_named = options.bone is None
+    first = plan.stage(stage_by_name(name)) if is_named else _stage_of(options.bone, plan)
+    others = tuple(_stage_of(bone, plan).bone for bone in dict.fromkeys(options.also))
+    if first.bone in others:
+        raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
+    return first, others
 
 
 def _stage_of(bone: str, plan: "Plan") -> "StageSpec":
@@ -203,30 +234,3 @@ def _stage_of(bone: str, plan: "Plan") -> "StageSpec":
     if bone not in plan.bones:
         raise UsageError(f"the plan has no bone '{bone}'", remedy=f"it has {', '.join(plan.bones)}")
     return stage_of(bone, plan)
-
-
-def _controller(
-    replay: _Replay,
-    opened: "OpenedDevices",
-    configuration: "Configuration",
-    listeners: "Sequence[FrameListener]",
-) -> "SessionController":
-    from navapp.control.controller import SessionController, SessionOptions
-    from navapp.control.session import SessionHooks
-    from navapp.tracking import TrackerSettings
-
-    return SessionController(
-        opened.devices,
-        replay.rig,
-        replay.plan,
-        replay.prior,
-        executor=replay.executor,
-        options=SessionOptions(
-            line=TrackerSettings(replay.method, depth_mm=configuration.camera.depth_mm),
-            first_stage=replay.stage,
-            overlay_valid_ms=configuration.display.valid_ms,
-            others=tuple(stage.bone for stage in replay.others),
-            mirror_deg=configuration.mirror.calibrated_deg,
-        ),
-        hooks=SessionHooks(on_frame=tuple(listeners)),
-    )

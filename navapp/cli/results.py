@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from navapp.control.results import FrameResult
-from navapp.control.session import rig_moved_text
+from navapp.control.frame_result import FrameResult
+from navapp.control.session import describe_moved_rig
 from navapp.control.states import DistrustRig, SessionState, Snapshot
-from navapp.values import LineTimings, Reason, Status, TrackedFrame
+from navapp.values import FrameTimings, Reason, Status, TrackedFrame
 
 
 def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
 
 def _answer_to_json(
     tracked: TrackedFrame | None,
-    timings: LineTimings,
+    timings: FrameTimings,
     tre_mm: float | None,
     silence: Reason = Reason.NOT_NAVIGATING,
 ) -> dict[str, Any]:
@@ -83,9 +83,9 @@ def rig_to_json(snapshot: Snapshot) -> dict[str, Any]:
     }
 
 
-def moved_rig_to_json(name: str, after: int, found: DistrustRig) -> dict[str, Any]:
+def rig_alarm_to_json(name: str, after: int, found: DistrustRig) -> dict[str, Any]:
     """The `rig` object of a replay: after which frame the session found the rig moved, and how."""
-    return {"name": name, "alarm": rig_moved_text(found.why), "moved_after_frame": after}
+    return {"name": name, "alarm": describe_moved_rig(found.why), "moved_after_frame": after}
 
 
 def frame_text(result: FrameResult) -> str:
@@ -105,7 +105,11 @@ def frame_text(result: FrameResult) -> str:
 
 
 def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any]:
-    """The `summary` object."""
+    """The `summary` object.
+
+    Its `latency_ms` holds percentiles of the processing time (`timing_ms.total`): the frames of
+    headless sessions and replays wait to be read and have no latency (docs/conventions.md).
+    """
     totals = [frame["timing_ms"]["total"] for frame in frames if frame["timing_ms"]["total"] > 0]
     # Every pose that was accepted and followed, OK or not: leaving out the doubtful ones would
     # flatter. What was offered for review and refused is no result of tracking.
@@ -115,7 +119,7 @@ def summarise(frames: Sequence[dict[str, Any]], seconds: float) -> dict[str, Any
         if frame["tre_mm"] is not None and frame["state"] == SessionState.NAVIGATING.value
     ]
     return {
-        **_counted(frames),
+        **_count(frames),
         "bodies": _others(frames),
         "fps": len(frames) / seconds if seconds > 0 and frames else None,
         "latency_ms": (
@@ -141,16 +145,16 @@ def _others(frames: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
     for frame in frames:
         for name, answer in frame["bodies"].items():
             turns.setdefault(name, []).append(answer)
-    return {name: _counted(answers) for name, answers in turns.items()}
+    return {name: _count(answers) for name, answers in turns.items()}
 
 
-def _counted(answers: Sequence[dict[str, Any]]) -> dict[str, int]:
+def _count(answers: Sequence[dict[str, Any]]) -> dict[str, int]:
     statuses = [answer["status"] for answer in answers]
     counts = {status.value.lower(): statuses.count(status.value) for status in Status}
     return {"frames": len(answers), **counts}
 
 
-def _counted_text(counts: dict[str, int]) -> str:
+def _count_text(counts: dict[str, int]) -> str:
     return (
         f"{counts['frames']} frames: {counts['ok']} OK, {counts['degraded']} degraded, "
         f"{counts['lost']} lost"
@@ -159,13 +163,13 @@ def _counted_text(counts: dict[str, int]) -> str:
 
 def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
-    lines = [_counted_text(summary)]
-    lines += [f"other bone, {name}: {_counted_text(n)}" for name, n in summary["bodies"].items()]
-    latency, tre = summary["latency_ms"], summary["tre_mm"]
-    if summary["fps"] is not None and latency["p50"] is not None:
+    lines = [_count_text(summary)]
+    lines += [f"other bone, {name}: {_count_text(n)}" for name, n in summary["bodies"].items()]
+    processing_ms, tre = summary["latency_ms"], summary["tre_mm"]
+    if summary["fps"] is not None and processing_ms["p50"] is not None:
         lines.append(
-            f"{summary['fps']:.1f} frames/s, line {latency['p50']:.0f} ms (median), "
-            f"{latency['p95']:.0f} ms (95 %)"
+            f"{summary['fps']:.1f} frames/s, processing {processing_ms['p50']:.0f} ms (median), "
+            f"{processing_ms['p95']:.0f} ms (95 %)"
         )
     if tre is not None:
         lines.append(

@@ -1,4 +1,4 @@
-"""`navapp rig`: what a rig's file says, and the same rig in another format."""
+"""`navapp rig`: prints what a rig's file holds, or converts it to another format."""
 
 import argparse
 from datetime import date
@@ -60,14 +60,14 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.part == "convert":
         return _convert(options, diagnostics)
     rig, form = read_any(options.rig)
-    write_json(options.json, "rig show", {"format": form, **content(rig, date.today())})
+    write_json(options.json, "rig show", {"format": form, **make_content(rig, date.today())})
     if options.json != "-":
-        diagnostics.say(text(rig, date.today()))
+        diagnostics.say(format_text(rig, date.today()))
     return 0
 
 
 def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from calibration.exchange.formats import format_of_name, lost, read_any, write_as
+    from calibration.exchange.formats import format_of_name, list_losses, read_any, write_as
 
     form = options.to or format_of_name(options.out)
     # A ROS pair is a folder, which its writer looks at.
@@ -82,7 +82,7 @@ def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             remedy="calibrate again, or add --force",
         )
     write_as(form, options.out, rig)
-    warnings = lost(rig, form)
+    warnings = list_losses(rig, form)
     for warning in warnings:
         diagnostics.warn(warning)
     result = {"from": before, "to": form, "out": options.out, "rig_id": rig.rig_id}
@@ -92,7 +92,7 @@ def _convert(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def content(rig: "StereoRig", today: date) -> dict[str, Any]:
+def make_content(rig: "StereoRig", today: date) -> dict[str, Any]:
     """A rig for programs."""
     return {
         "rig_id": rig.rig_id,
@@ -100,7 +100,7 @@ def content(rig: "StereoRig", today: date) -> dict[str, Any]:
         "serials": list(rig.serials),
         "image_size": [rig.width, rig.height],
         "baseline_mm": rig.baseline_mm,
-        "toe_in_deg": toe_in_deg(rig),
+        "toe_in_deg": compute_toe_in_deg(rig),
         "right_from_left": rig.right_from_left.to_list(),
         "left": _lens(rig.left),
         "right": _lens(rig.right),
@@ -108,15 +108,15 @@ def content(rig: "StereoRig", today: date) -> dict[str, Any]:
     }
 
 
-def toe_in_deg(rig: "StereoRig") -> float:
+def compute_toe_in_deg(rig: "StereoRig") -> float:
     """How far the optical axes turn towards each other, seen from above; negative: apart."""
     axis = rig.right_from_left.rotation.T @ np.array([0.0, 0.0, 1.0])
     return float(np.degrees(np.arctan2(-axis[0], axis[2])))
 
 
-def text(rig: "StereoRig", today: date) -> str:
+def format_text(rig: "StereoRig", today: date) -> str:
     """A rig for people."""
-    told = content(rig, today)
+    told = make_content(rig, today)
     left, right = told["left"], told["right"]
     serials = " and ".join(serial or "unknown" for serial in rig.serials)
     lines = [
@@ -132,10 +132,10 @@ def text(rig: "StereoRig", today: date) -> str:
     ]
     if rig.quality is None:
         return "\n".join([*lines, "  no quality record: nobody says how good it is"])
-    return "\n".join(lines + _told(rig.quality, today))
+    return "\n".join(lines + _describe_quality(rig.quality, today))
 
 
-def _told(quality: "RigQuality", today: date) -> list[str]:
+def _describe_quality(quality: "RigQuality", today: date) -> list[str]:
     if quality.is_accepted:
         lines = ["  accepted by its calibration"]
     else:

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
-from navapp.cli.live_session import LiveSession, controller_of, prepared
+from navapp.cli.live_session import LiveSession, make_controller, prepare_session
 from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
+    from navapp.control.frame_result import FrameResult
     from navapp.control.operators import ScriptStep
-    from navapp.control.results import FrameResult
 
 _EXAMPLE = """\
 examples:
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     check_writable(options.json)
     configuration = _with_options(load(find_file(options.config)), options)
     script = _script(options.operator)
-    session = prepared(configuration, options, diagnostics)
+    session = prepare_session(configuration, options, diagnostics)
     if options.headless:
         return _run_headless(session, script, options, diagnostics)
     return _run_screen(session, options, diagnostics)
@@ -102,27 +102,27 @@ def _run_headless(
     options: argparse.Namespace,
     diagnostics: Diagnostics,
 ) -> int:
-    from navapp.cli.headless import FrameLog, finish, follow
+    from navapp.cli.headless import FrameLog, report_result, run_session
     from navapp.cli.results import frame_to_json, rig_to_json
     from navapp.control.operators import ScriptedOperator
 
     log = FrameLog(options.frames, diagnostics)
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = controller_of(session, is_inline=True, on_frame=[log], undo=undo)
+        controller = make_controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
-        seconds = follow(controller, ScriptedOperator(script), log)
+        seconds = run_session(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
-    return finish(frames, seconds, controller.failure, options, diagnostics, rig)
+    return report_result(frames, seconds, controller.failure, options, diagnostics, rig)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:
     """Join a frame with the truth, after the run: by bone, of those whose pose is known."""
     from navapp.control.stages import stage_of
-    from navapp.evaluation import mean_tre_mm
+    from navapp.evaluation import compute_mean_tre_mm
 
-    simulation, plan = session.opened.simulation, session.plan
+    simulation, plan = session.opened.simulation, session.specification.plan
     if simulation is None:
         return {}
     answers = [(result.stage, result.tracked)]
@@ -133,7 +133,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
         if pose is not None and stage.bone in simulation.oracle.bodies:
             true = simulation.oracle.left_from_body(stage.bone, result.frame.captured_ns)
             targets = plan.targets_of(stage.targets)
-            errors_mm[stage.bone] = mean_tre_mm(pose, true, plan.bones[stage.bone], targets)
+            errors_mm[stage.bone] = compute_mean_tre_mm(pose, true, plan.bones[stage.bone], targets)
     return errors_mm
 
 
@@ -152,7 +152,7 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
 
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
-        controller = controller_of(session, is_inline=False, on_frame=[count], undo=undo)
+        controller = make_controller(session, is_inline=False, on_frame=[count], undo=undo)
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()

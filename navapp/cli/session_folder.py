@@ -9,16 +9,15 @@ from typing import get_args
 from drivers.session_files import SessionWriter
 from navapp import __version__
 from navapp.cli.prior_files import prior_to_json
-from navapp.config import Configuration, as_toml
+from navapp.config import Configuration, format_toml
 from navapp.control.operators import RecordedEvents, read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
+from navapp.control.specification import SessionSpecification
 from navapp.errors import SequenceError
-from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import write_rig
 from navapp.geometry.whole_files import write_whole
 from navapp.preop import write_plan
 from navapp.tracking import Method
-from navapp.values import Plan, Prior
 
 _FILE = "session.json"
 _RIG, _PLAN, _PRIOR = "rig.yml", "plan", "prior.json"
@@ -38,13 +37,7 @@ class RecordedSession:
 
 
 def start_recording(
-    folder: str | Path,
-    configuration: Configuration,
-    rig: StereoRig,
-    plan: Plan,
-    prior: Prior,
-    *,
-    first_stage: str,
+    folder: str | Path, configuration: Configuration, specification: SessionSpecification
 ) -> SessionRecorder:
     """Make a session folder and a recorder into it.
 
@@ -53,16 +46,18 @@ def start_recording(
     """
     folder = Path(folder)
     frames = SessionWriter(folder)
+    rig, plan = specification.rig, specification.plan
     write_rig(folder / _RIG, rig)
     write_plan(folder / _PLAN, plan)
-    write_whole(folder / _PRIOR, json.dumps(prior_to_json(prior), indent=1).encode())
-    write_whole(folder / "configuration.toml", as_toml(configuration, False).encode())
+    prior = json.dumps(prior_to_json(specification.prior), indent=1)
+    write_whole(folder / _PRIOR, prior.encode())
+    write_whole(folder / "configuration.toml", format_toml(configuration, False).encode())
     content = {
         "navapp": __version__,
         "rig_id": rig.rig_id,
         "plan_hash": plan.digest,
-        "method": configuration.tracking.method,
-        "first_stage": first_stage,
+        "method": specification.method,
+        "first_stage": specification.stage.name,
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
     return SessionRecorder(
@@ -115,13 +110,13 @@ def read_session(folder: str | Path) -> RecordedSession:
         folder / _RIG,
         folder / _PLAN,
         folder / _PRIOR,
-        _known_method(method, folder),
+        _parse_method(method, folder),
         first_stage,
         read_events(events_path),
     )
 
 
-def _known_method(name: str, folder: Path) -> Method:
+def _parse_method(name: str, folder: Path) -> Method:
     for method in _METHODS:
         if method == name:
             return method

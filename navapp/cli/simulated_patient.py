@@ -1,12 +1,12 @@
-"""What the simulated patient brings along when nothing else is given: a plan and a prior."""
+"""Plan and prior of the simulated patient, used when none is given."""
 
-from navapp.cli.simulated_contents import built_in_content
+from navapp.cli.simulated_content import make_built_in_content
 from navapp.devices import Simulation
 from navapp.geometry.mesh import TriangleMesh
 from navapp.values import BoneModel, Plan, Prior
 
 
-def built_in_plan(simulation: Simulation) -> Plan:
+def make_built_in_plan(simulation: Simulation) -> Plan:
     """The plan of the simulated patient: the surfaces that a perfect CT would have given."""
     # Normals as any reader of the plan's files computes them, so that a replay finds the same.
     bones = {
@@ -18,11 +18,11 @@ def built_in_plan(simulation: Simulation) -> Plan:
         simulation.targets,
         simulation.curves,
         name="sim:plan",
-        content=built_in_content(simulation),
+        content=make_built_in_content(simulation),
     )
 
 
-def nominal_prior(simulation: Simulation) -> Prior:
+def make_nominal_prior(simulation: Simulation) -> Prior:
     """How the simulated knee was meant to lie on the table."""
     return Prior(
         simulation.nominal_left_from_bone,

@@ -1,4 +1,4 @@
-"""What `navapp doctor` sees of Python, the packages, the kernels' cache and the terminal."""
+"""Checks of `navapp doctor`: Python, packages, the kernels' cache and the terminal."""
 
 import os
 import subprocess
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from drivers.child_python import last_words, run_python
-from navapp.inventory.finding import Finding, Health, unless
+from drivers.child_python import find_last_words, run_python
+from navapp.inventory.finding import Finding, Health, judge_health
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
@@ -47,7 +47,7 @@ _PACKAGES = (
 )
 
 
-def software_findings(configuration: "Configuration | None") -> list[Finding]:
+def check_software(configuration: "Configuration | None") -> list[Finding]:
     """All of it; packages that only other configurations need give warnings."""
     packages = [_package(one, _is_needed(one, configuration)) for one in _PACKAGES]
     return [_python(), *packages, _kernel_cache(), _terminal()]
@@ -62,14 +62,14 @@ def _is_needed(package: _Package, configuration: "Configuration | None") -> bool
 def _python() -> Finding:
     version = ".".join(str(part) for part in sys.version_info[:3])
     is_new = sys.version_info >= (3, 11)
-    return Finding("python", unless(is_new, True), version, "install Python 3.11 or newer")
+    return Finding("python", judge_health(is_new, True), version, "install Python 3.11 or newer")
 
 
 def _package(package: _Package, is_needed: bool) -> Finding:
     """Whether a package imports, tried in a process of its own: a broken one may crash."""
     from importlib.metadata import PackageNotFoundError, version
 
-    health = unless(False, is_needed)
+    health = judge_health(False, is_needed)
     try:
         installed = version(package.name)
     except PackageNotFoundError:
@@ -82,7 +82,7 @@ def _package(package: _Package, is_needed: bool) -> Finding:
         return Finding(package.name, health, detail, "run `make setup`")
     if done.returncode == 0:
         return Finding(package.name, Health.OK, f"{installed} ({package.use})")
-    detail = f"{installed} {last_words(done)}"
+    detail = f"{installed} {find_last_words(done)}"
     return Finding(package.name, health, detail, "run `make system-deps`")
 
 
@@ -95,11 +95,11 @@ def _kernel_cache() -> Finding:
         is_writable = False
     n_files = len(list(folder.rglob("*.nbc"))) if is_writable else 0
     detail = f"{folder}, {n_files} compiled kernels" if is_writable else f"{folder} not writable"
-    return Finding("kernel cache", unless(is_writable, True), detail, "set NUMBA_CACHE_DIR")
+    return Finding("kernel cache", judge_health(is_writable, True), detail, "set NUMBA_CACHE_DIR")
 
 
 def _terminal() -> Finding:
     encoding = (sys.stdout.encoding or "").lower()
     detail = f"{os.environ.get('TERM', 'none')}, {encoding or 'no encoding'}"
     remedy = "set a UTF-8 locale (LANG=C.UTF-8) for the full picture"
-    return Finding("terminal", unless("utf" in encoding, False), detail, remedy)
+    return Finding("terminal", judge_health("utf" in encoding, False), detail, remedy)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.cli.stereo_pair import Pair, expected_px, read_pair, searched_band
+from navapp.cli.stereo_pair import StereoPair, find_band, read_pair, render_expected_px
 from navapp.errors import ResultError, UsageError
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _check(options: argparse.Namespace) -> None:
     check_writable(options.json)
 
 
-def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
+def _match(pair: StereoPair, options: argparse.Namespace) -> "StereoAnswer":
     from navapp.stereo import (
         match_baseline,
         match_on_support,
@@ -127,9 +127,12 @@ def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
     fills = options.fill == "wls"
     if options.model:
         return match_on_support(
-            pair.rectified, expected_px(pair, options), fills=fills, max_gap_px=_METRIC_GAP_PX
+            pair.rectified,
+            render_expected_px(pair, options),
+            fills=fills,
+            max_gap_px=_METRIC_GAP_PX,
         )
-    band = searched_band(pair, options)
+    band = find_band(pair, options)
     try:
         if options.matcher == "gradient":
             return match_baseline(pair.rectified, band)
@@ -142,13 +145,13 @@ def _match(pair: Pair, options: argparse.Namespace) -> "StereoAnswer":
         raise UsageError(str(error), remedy="ask for fewer --disparities") from error
 
 
-def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
+def _write(pair: StereoPair, answer: "StereoAnswer", options: argparse.Namespace) -> None:
     """Every file that was asked for."""
     import io
 
     import cv2
 
-    from navapp.cli.stereo_files import cloud_ply, coloured
+    from navapp.cli.stereo_files import draw_disparity, make_cloud_ply
     from navapp.geometry.whole_files import write_whole
 
     found = answer.disparity
@@ -159,13 +162,13 @@ def _write(pair: Pair, answer: "StereoAnswer", options: argparse.Namespace) -> N
             write_whole(path, buffer.getvalue())
     for path, image in ((options.origin, found.origin), (options.picture, None)):
         if path:
-            shown = coloured(found) if image is None else image
+            shown = draw_disparity(found) if image is None else image
             write_whole(path, cv2.imencode(".png", shown)[1].tobytes())
     if options.cloud:
-        write_whole(options.cloud, cloud_ply(found, pair.rectified.geometry))
+        write_whole(options.cloud, make_cloud_ply(found, pair.rectified.geometry))
 
 
-def _content(pair: Pair, answer: "StereoAnswer") -> dict[str, Any]:
+def _content(pair: StereoPair, answer: "StereoAnswer") -> dict[str, Any]:
     from navapp.values import Origin
 
     origin = answer.disparity.origin

@@ -1,4 +1,4 @@
-"""What `navapp stereo` writes: a picture of the disparity, and the cloud."""
+"""Output files of `navapp stereo`: a picture of the disparity, and the point cloud."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ _ALL = (Origin.MATCHED, Origin.FILLED_BORDER, Origin.FILLED_INTERIOR, Origin.MIS
 _HATCH_PX = 6
 
 
-def coloured(disparity_map: DisparityMap) -> NDArray[np.uint8]:
+def draw_disparity(disparity_map: DisparityMap) -> NDArray[np.uint8]:
     """(h, w, 3) BGR: near is warm, far is cold, unknown black; filled pixels are hatched."""
     import cv2
 
@@ -33,7 +33,7 @@ def coloured(disparity_map: DisparityMap) -> NDArray[np.uint8]:
     return picture
 
 
-def cloud_ply(disparity_map: DisparityMap, geometry: RectifiedGeometry) -> bytes:
+def make_cloud_ply(disparity_map: DisparityMap, geometry: RectifiedGeometry) -> bytes:
     """Binary PLY: points in the unrectified left camera, mm, with sigma on the ray and origin."""
     cloud = disparity_map.reproject(geometry, origins=_ALL)
     points = geometry.rectified_from_left.inverse().apply(cloud.points_mm)

@@ -1,4 +1,4 @@
-"""The pair that `navapp stereo` matches, and where it is to be looked."""
+"""Reads and rectifies the pair of `navapp stereo` and finds its disparity range."""
 
 import argparse
 import json
@@ -18,7 +18,7 @@ Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pair:
+class StereoPair:
     """A pair ready to be matched.
 
     Attributes:
@@ -32,13 +32,13 @@ class Pair:
     rectify_ms: float
 
 
-def read_pair(options: argparse.Namespace) -> Pair:
+def read_pair(options: argparse.Namespace) -> StereoPair:
     """The two pictures that are named.
 
     Raises:
         InputError: missing, damaged, or no pair of this rig.
     """
-    return _rectified(_read(options.left), _read(options.right), options)
+    return _rectify(_read(options.left), _read(options.right), options)
 
 
 def _read(path: str) -> Image:
@@ -63,7 +63,7 @@ def _read(path: str) -> Image:
     return np.asarray(picture[..., :3] if picture.ndim == 3 else picture, dtype=np.uint8)
 
 
-def _rectified(left: Image, right: Image, options: argparse.Namespace) -> Pair:
+def _rectify(left: Image, right: Image, options: argparse.Namespace) -> StereoPair:
     """Both pictures grey and rectified; without a rig they are taken as they are."""
     import time
 
@@ -85,7 +85,7 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> Pair:
         nowhere = RigidTransform.identity("left_rect", "left")
         geometry = RectifiedGeometry(1.0, 0.0, 0.0, 1.0, width, height, nowhere)
         pair = RectifiedPair(*grey, geometry, Box(0, 0, width, height))
-        return Pair(pair, None, 0.0)
+        return StereoPair(pair, None, 0.0)
     rig = read_rig(options.rig)
     if (rig.width, rig.height) != (width, height):
         raise InputError(
@@ -96,10 +96,10 @@ def _rectified(left: Image, right: Image, options: argparse.Namespace) -> Pair:
     rectifier = Rectifier(rig)
     started = time.perf_counter()
     pair = rectifier.rectify(*grey)
-    return Pair(pair, rectifier, (time.perf_counter() - started) * 1e3)
+    return StereoPair(pair, rectifier, (time.perf_counter() - started) * 1e3)
 
 
-def searched_band(pair: Pair, options: argparse.Namespace) -> tuple[float, float]:
+def find_band(pair: StereoPair, options: argparse.Namespace) -> tuple[float, float]:
     """Smallest and largest disparity, px: as asked for, else of the configured depth range.
 
     Raises:
@@ -123,7 +123,7 @@ def searched_band(pair: Pair, options: argparse.Namespace) -> tuple[float, float
     return band
 
 
-def expected_px(pair: Pair, options: argparse.Namespace) -> NDArray[np.float32]:
+def render_expected_px(pair: StereoPair, options: argparse.Namespace) -> NDArray[np.float32]:
     """(h, w) disparity of the expected surface over the whole rectified left view.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What users' surfaces need before they can be a model: mended, turned outward, thinned."""
+"""Cleans users' surfaces for registration: repairs, orients and thins them."""
 
 from dataclasses import dataclass
 
@@ -10,21 +10,21 @@ from navapp.geometry.surface_files import merged_rows
 from navapp.geometry.transform import FloatArray
 
 # Pieces of fewer triangles than this share of the largest one's are strays.
-_TINY_SHARE = 0.01
+_TINY_FRACTION = 0.01
 # A surface whose openings are this share of it still has an inside.
-_OPEN_SHARE = 0.25
+_OPEN_FRACTION = 0.25
 _NORMAL_NEIGHBOURS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Mended:
-    """A surface, and what was done to it in words for people."""
+class MendedSurface:
+    """A repaired surface, with notes for people."""
 
     mesh: TriangleMesh
     notes: tuple[str, ...]
 
 
-def mended(mesh: TriangleMesh) -> Mended:
+def mend(mesh: TriangleMesh) -> MendedSurface:
     """A triangle mesh without repeated vertices, strays and inward normals.
 
     Vertices at exactly the same place become one; triangles without area or of the same corners as
@@ -39,22 +39,22 @@ def mended(mesh: TriangleMesh) -> Mended:
     faces = faces[double_area > 0.0]
     faces = faces[merged_rows(np.sort(faces, axis=1))[0]]
     if len(faces) == 0:
-        return Mended(TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32)), ())
+        return MendedSurface(TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32)), ())
     is_stray = _strays(len(vertices), faces)
     if is_stray.any():
         notes.append(f"{is_stray.sum()} triangles of tiny separate pieces were left out")
     whole = _of_faces(vertices, faces[~is_stray])
     if whole.volume_mm3() < 0.0:
         vectors, double_area = _areas(whole.vertices_mm, whole.faces)
-        if np.linalg.norm(vectors.sum(axis=0)) < _OPEN_SHARE * double_area.sum():
+        if np.linalg.norm(vectors.sum(axis=0)) < _OPEN_FRACTION * double_area.sum():
             whole = whole.flipped()
             notes.append("its normals pointed inwards and were turned")
         else:
             notes.append("it is open, and its normals may point inwards; they were not turned")
-    return Mended(whole, tuple(notes))
+    return MendedSurface(whole, tuple(notes))
 
 
-def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
+def thin(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     """About the same surface with at most about so many vertices, evenly spread.
 
     Even, because points pair with vertices: fewer where it is flat would leave gaps.
@@ -78,7 +78,7 @@ def thinned(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     return TriangleMesh(middles[used], kept, normals[used])
 
 
-def estimated_normals(points: FloatArray) -> FloatArray:
+def estimate_normals(points: FloatArray) -> FloatArray:
     """(N, 3) unit normals of a cloud, alike along each connected part of it, and outward.
 
     Outward means away from the cloud's mean, over a part as a whole.
@@ -95,20 +95,20 @@ def estimated_normals(points: FloatArray) -> FloatArray:
     offset = points[near] - points[near].mean(axis=1, keepdims=True)
     _, vectors = np.linalg.eigh(np.einsum("nki,nkj->nij", offset, offset))
     normals: FloatArray = vectors[:, :, 0]
-    sign, part = _turned_alike(normals, near[:, 1:])
+    sign, part = _find_agreeing_signs(normals, near[:, 1:])
     normals *= sign[:, None]
     outward = np.einsum("ij,ij->i", normals, points - points.mean(axis=0))
     normals *= np.where(np.bincount(part, outward) < 0.0, -1.0, 1.0)[part][:, None]
     return normals
 
 
-def evenly_in_space(points: FloatArray, n_wanted: int) -> NDArray[np.int64]:
+def thin_evenly(points: FloatArray, n_wanted: int) -> NDArray[np.int64]:
     """(M,) ascending rows of at most about so many points, one in each cell of a grid."""
     _, first = np.unique(_cells(points, n_wanted), return_index=True)
     return np.sort(first)
 
 
-def spacing(points: FloatArray) -> float:
+def measure_spacing(points: FloatArray) -> float:
     """Median distance of (N, 3) points, at least 2, from their nearest neighbour."""
     from scipy.spatial import cKDTree
 
@@ -148,7 +148,7 @@ def _strays(n_vertices: int, faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     _, piece_of_vertex = connected_components(graph, directed=False)
     piece = piece_of_vertex[faces[:, 0]]
     counts = np.bincount(piece)
-    is_stray: NDArray[np.bool_] = (counts < _TINY_SHARE * counts.max())[piece]
+    is_stray: NDArray[np.bool_] = (counts < _TINY_FRACTION * counts.max())[piece]
     return is_stray
 
 
@@ -158,7 +158,7 @@ def _of_faces(vertices: FloatArray, faces: NDArray[np.int64]) -> TriangleMesh:
     return TriangleMesh(vertices[used], index.reshape(-1, 3).astype(np.int32))
 
 
-def _turned_alike(
+def _find_agreeing_signs(
     normals: FloatArray, near: NDArray[np.integer]
 ) -> tuple[FloatArray, NDArray[np.int32]]:
     """(N,) signs that make neighbours' normals agree, and which connected part each point is of."""

@@ -1,4 +1,4 @@
-"""Poses of a tracked tool in a file: JSON, or CSV with a time and 16 numbers a line."""
+"""Reads poses of a tracked tool: JSON, or CSV with a time and 16 numbers per line."""
 
 import csv
 import json

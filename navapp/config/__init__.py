@@ -1,18 +1,17 @@
 """The TOML configuration; what is wrong with it is told with the nearest known key."""
 
-from navapp.config.checking import checked, parse
-from navapp.config.files import FILE_NAME, find_file, load, toml_content
+from navapp.config.camera_sections import FaultSection, SimulationSection
+from navapp.config.files import FILE_NAME, find_file, load, read_toml
+from navapp.config.section import Section
 from navapp.config.sections import (
     CalibrationSection,
     Configuration,
     DisplaySection,
-    FaultSection,
     MirrorSection,
     ProjectorSection,
-    Section,
-    SimulationSection,
 )
-from navapp.config.toml_text import as_toml, one_table
+from navapp.config.toml_text import format_table, format_toml
+from navapp.config.validation import parse, validate
 
 __all__ = [
     "FILE_NAME",
@@ -24,11 +23,11 @@ __all__ = [
     "ProjectorSection",
     "Section",
     "SimulationSection",
-    "as_toml",
-    "checked",
     "find_file",
+    "format_table",
+    "format_toml",
     "load",
-    "one_table",
     "parse",
-    "toml_content",
+    "read_toml",
+    "validate",
 ]

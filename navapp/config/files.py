@@ -1,12 +1,12 @@
-"""Which configuration file is read, and reading it."""
+"""Finds and reads the configuration file."""
 
 import os
 import tomllib
 from pathlib import Path
 from typing import Any
 
-from navapp.config.checking import parse
 from navapp.config.sections import Configuration
+from navapp.config.validation import parse
 from navapp.errors import ConfigurationError
 
 FILE_NAME = "navapp.toml"
@@ -45,10 +45,10 @@ def load(path: Path | None) -> Configuration:
     """
     if path is None:
         return Configuration()
-    return parse(toml_content(path, "configuration file"), str(path))
+    return parse(read_toml(path, "configuration file"), str(path))
 
 
-def toml_content(path: Path, what: str) -> dict[str, Any]:
+def read_toml(path: Path, what: str) -> dict[str, Any]:
     """What a TOML file holds; `what` it is, for messages.
 
     Raises:

@@ -2,30 +2,10 @@
 
 from typing import Annotated, Literal, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Pixels = Annotated[int, Field(gt=0)]
-
-
-def _rising(values: tuple[float, float]) -> tuple[float, float]:
-    if values[0] >= values[1]:
-        raise ValueError("the first must be smaller than the second")
-    return values
-
-
-class Section(BaseModel):
-    """One table of the file."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        use_attribute_docstrings=True,
-    )
-
+from navapp.config.camera_sections import CameraSection
+from navapp.config.section import NotNegative, Pixels, Positive, Section, check_rising
 
 S = TypeVar("S", bound="Section")
 
@@ -34,160 +14,6 @@ def _with_port(section: S, needs_port: bool, port: str) -> S:
     if needs_port and not port:
         raise ValueError("this backend needs a port")
     return section
-
-
-class FaultSection(Section):
-    """One scripted fault of the simulated camera; seconds since it was opened first."""
-
-    kind: Literal[
-        "unplug", "freeze", "drop", "delay", "blackout_left", "blackout_right", "wrong_serial",
-        "turn",
-    ]  # fmt: skip
-    """What goes wrong."""
-    start_s: Annotated[float, Field(ge=0.0)]
-    """When it begins."""
-    duration_s: Annotated[float, Field(gt=0.0, allow_inf_nan=True)]
-    """How long it lasts; inf: for good."""
-    delay_s: Annotated[float, Field(ge=0.0)] = 0.3
-    """Of a delay: how much later frames come."""
-    turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Of a turn of the right camera about its axes: x up and down, y sideways, z in its plane."""
-
-    @model_validator(mode="after")
-    def _has_its_own_keys(self) -> Self:
-        if "delay_s" in self.model_fields_set and self.kind != "delay":
-            raise ValueError(f"delay_s belongs to a delay, not to {self.kind}")
-        if ("turn_deg" in self.model_fields_set) is not (self.kind == "turn"):
-            raise ValueError("turn_deg belongs to a turn, and a turn needs it")
-        return self
-
-
-class SimulationSection(Section):
-    """The simulated patient and rig."""
-
-    seed: Annotated[int, Field(ge=0)] = 1
-    """Of the anatomy, the textures, the placement and the motion."""
-    side: Literal["left", "right"] = "right"
-    """Of the knee."""
-    sex: Literal["female", "male"] = "female"
-    """Of the patient."""
-    age_group: Literal["young", "middle", "old"] = "middle"
-    """Of the patient."""
-    cartilage_mm: Annotated[float, Field(ge=0.0, le=2.6)] = 0.0
-    """Mean thickness of the cartilage that the camera sees and the plan does not; 0: bare bone."""
-    motion: Literal["still", "breathing", "patient", "jump"] = "breathing"
-    """Of the leg."""
-    instrument: Literal["none", "sweep"] = "none"
-    """What passes in front of the bone."""
-    scale: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
-    """Size of the pictures: 1.0 is 1280 x 720."""
-    stepped: bool | None = None
-    """Whether frames wait to be read; by default in headless sessions only."""
-    skew_ms: float = 0.0
-    """The right camera exposes later by this."""
-    unstamped_skew_ms: float = 0.0
-    """The right camera exposes later by this as well, and its time stamps do not say so."""
-    grey: bool = False
-    """Grey pictures, like those of an OAK camera."""
-    board_s: Annotated[tuple[NotNegative, Positive], AfterValidator(_rising)] | None = None
-    """From when to when, in seconds, the board of [calibration] is held into the view."""
-    faults: tuple[FaultSection, ...] = ()
-    """Scripted faults: kind, start_s, duration_s; delay_s of a delay, turn_deg of a turn."""
-
-
-class OpencvSection(Section):
-    """USB cameras through OpenCV."""
-
-    left: str = ""
-    """Serial number, or a path below /dev/v4l/by-id or /dev/v4l/by-path."""
-    right: str | None = None
-    """The same; left out when the left camera sends both eyes side by side."""
-    fourcc: Annotated[str, Field(min_length=4, max_length=4)] = "MJPG"
-    """Pixel format: MJPG, YUYV, ..."""
-    width: Annotated[int, Field(gt=0)] = 1280
-    """Of the picture of one eye, px."""
-    height: Annotated[int, Field(gt=0)] = 720
-    """Of the picture of one eye, px."""
-    exposure_ms: Positive | None = None
-    """Left out, it stays where the camera has it, like the other controls; none is automatic."""
-    gain: NotNegative | None = None
-    """In the camera's own unit."""
-    white_balance_k: Positive | None = None
-    """Colour temperature."""
-    focus: NotNegative | None = None
-    """In the camera's own unit."""
-    max_skew_ms: NotNegative = 5.0
-    """Pictures that are farther apart in time make no pair; below half of the frame period."""
-    max_age_ms: Positive = 250.0
-    """Older pictures are dropped."""
-
-    @property
-    def controls(self) -> dict[str, float]:
-        """Those that are asked for."""
-        asked = {
-            "exposure_ms": self.exposure_ms,
-            "gain": self.gain,
-            "white_balance_k": self.white_balance_k,
-            "focus": self.focus,
-        }
-        return {name: value for name, value in asked.items() if value is not None}
-
-
-class DepthaiSection(Section):
-    """The mono pair of an OAK camera."""
-
-    device: str = ""
-    """Its id; empty when only one is connected."""
-    width: Annotated[int, Field(gt=0)] = 1280
-    """Of one picture, px."""
-    height: Annotated[int, Field(gt=0)] = 720
-    """Of one picture, px."""
-    exposure_ms: Positive = 5.0
-    """Of both eyes."""
-    iso: Annotated[float, Field(ge=100.0, le=1600.0)] = 200.0
-    """Sensitivity of both eyes."""
-    ir_dots: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """Brightness of the infrared dot projector; 0: off."""
-    ir_flood: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """Brightness of the infrared lamp; 0: off."""
-
-    @property
-    def controls(self) -> dict[str, float]:
-        """By the driver's names."""
-        return {
-            "exposure_ms": self.exposure_ms,
-            "iso": self.iso,
-            "ir_dots": self.ir_dots,
-            "ir_flood": self.ir_flood,
-        }
-
-
-class CameraSection(BaseModel):
-    """Where the pictures come from."""
-
-    # Tables of third-party devices, [camera.NAME], are passed through unchecked.
-    model_config = ConfigDict(
-        frozen=True,
-        extra="allow",
-        strict=True,
-        allow_inf_nan=False,
-        use_attribute_docstrings=True,
-    )
-
-    backend: str = "simulated"
-    """simulated, opencv, depthai, or the name of an installed device."""
-    rig: str | None = None
-    """Rig file (OpenCV YAML); simulated cameras bring their own."""
-    rate_hz: Positive = 15.0
-    """Pairs per second asked for, or assumed where a recording has no times."""
-    depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (300.0, 700.0)
-    """Nearest and farthest surface that the rig is used for."""
-    simulated: SimulationSection = SimulationSection()
-    """The simulated patient and rig."""
-    opencv: OpencvSection = OpencvSection()
-    """USB cameras through OpenCV."""
-    depthai: DepthaiSection = DepthaiSection()
-    """The mono pair of an OAK camera."""
 
 
 class DisplaySimulationSection(Section):
@@ -287,7 +113,7 @@ class PlanSection(Section):
 
 
 class TrackingSection(Section):
-    """The line."""
+    """Tracking of the bones."""
 
     method: Literal["bimcc", "icp"] = "bimcc"
     """icp is the paper's baseline."""
@@ -300,7 +126,10 @@ class CalibrationSection(Section):
     """A capture may end when half of the working volume has a predicted 95 % error below."""
     accept_mm: Positive = 0.40
     """A rig is accepted when nearly all of the working volume has a predicted 95 % error below."""
-    working_depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(_rising)] = (350.0, 550.0)
+    working_depth_mm: Annotated[tuple[Positive, Positive], AfterValidator(check_rising)] = (
+        350.0,
+        550.0,
+    )
     """Nearest and farthest surface of the working volume."""
     valid_days: Annotated[int, Field(gt=0)] = 180
     """A rig is refused when it is older."""
@@ -334,7 +163,7 @@ class EmptySection(Section):
 
 
 class Configuration(Section):
-    """The whole file."""
+    """The whole configuration file."""
 
     camera: CameraSection = CameraSection()
     display: DisplaySection = DisplaySection()

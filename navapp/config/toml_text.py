@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from navapp.config.sections import Configuration
 
 
-def as_toml(configuration: Configuration, with_comments: bool) -> str:
+def format_toml(configuration: Configuration, with_comments: bool) -> str:
     """The configuration as a TOML file; with comments it is a file to start from."""
     lines = ["# navapp configuration: research software, not for clinical use", ""]
     for name in Configuration.model_fields:
@@ -20,7 +20,7 @@ def as_toml(configuration: Configuration, with_comments: bool) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
-def one_table(name: str, values: Mapping[str, Any]) -> str:
+def format_table(name: str, values: Mapping[str, Any]) -> str:
     """A table with some keys: what a person adds to a file."""
     return "\n".join([f"[{name}]", *(f"{_key(k)} = {_literal(v)}" for k, v in values.items())])
 
@@ -39,7 +39,7 @@ def _table(name: str, model: type[BaseModel], values: BaseModel, with_comments: 
         lines.append(f"# {key} =" if value is None else f"{key} = {_literal(value)}")
     for key, value in (values.model_extra or {}).items():
         if isinstance(value, Mapping):
-            inner += [one_table(f"{name}.{_key(key)}", value), ""]
+            inner += [format_table(f"{name}.{_key(key)}", value), ""]
     return [*lines, "", *inner]
 
 

@@ -1,1 +1,1 @@
-"""Session controller, states, stages, interlocks, events and the recorder."""
+"""The session: controller, states, stages, tracks of bones, interlocks, events and recorder."""

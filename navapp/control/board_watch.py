@@ -1,4 +1,4 @@
-"""A board of known size, looked for beside the frames: what the rig makes of its lengths."""
+"""Measures a board of known size with the session's rig, while frames are handled."""
 
 from collections import deque
 from collections.abc import Callable
@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from drivers.frames import Image, StereoFrame
 from navapp.control.executors import Executor, Job
-from navapp.control.length_check import MOST_LOOKS, Finding, Length, LengthCheck, pooled
+from navapp.control.length_check import MOST_LOOKS, Finding, Length, LengthCheck, pool_lengths
 
 # Often enough for a board that is shown for some seconds; a slow look takes at most a tenth of the
-# time, so that the line keeps its cores.
+# time, so that tracking keeps its cores.
 _PERIOD_NS, _LEAST_PERIODS_OF_A_LOOK = 2_000_000_000, 10
-# Looks of one showing belong together.
-# Nothing seen for so long, or for so many looks, ends it.
+# Looks at a board that is shown belong together until it was not seen for so long, or for so many
+# periods.
 _SHOWING_NS, _SHOWING_PERIODS = 10_000_000_000, 2.5
 
 # Of the left and the right picture; None where not both of them show the board.
@@ -28,7 +28,7 @@ class _Look:
 
 
 class BoardWatch:
-    """One look at a time, in an executor of its own: no frame waits for it.
+    """Looks for the board in one frame at a time, in an executor of its own: no frame waits for it.
 
     Args:
         measure: finds the board in a pair and measures it.
@@ -62,7 +62,7 @@ class BoardWatch:
         if self._job is not None or frame.captured_ns < self._due_ns:
             return
         self._began_ns = frame.captured_ns
-        self._job = Job(lambda report: self._timed(frame))
+        self._job = Job(lambda report: self._measure_and_time(frame))
         self._executor.start(self._job)
 
     def take_over(self) -> LengthCheck | None:
@@ -80,26 +80,26 @@ class BoardWatch:
             return None
         period_ns = max(_PERIOD_NS, _LEAST_PERIODS_OF_A_LOOK * job.result.took_ns)
         self._due_ns = self._began_ns + period_ns
-        return None if job.result.length is None else self._added(job.result.length, period_ns)
+        return None if job.result.length is None else self._add(job.result.length, period_ns)
 
     def close(self) -> None:
         """Wait for a look that still runs."""
         self._executor.close()
 
-    def _timed(self, frame: StereoFrame) -> "_Look":
-        # How long its result lies there until a frame takes it over costs nobody anything.
+    def _measure_and_time(self, frame: StereoFrame) -> "_Look":
+        # The measurement alone is timed, not the wait until a frame takes its result over.
         started_ns = self._now_ns()
         length = self._measure(frame.left, frame.right)
         return _Look(length, self._now_ns() - started_ns)
 
-    def _added(self, length: Length, period_ns: int) -> LengthCheck | None:
+    def _add(self, length: Length, period_ns: int) -> LengthCheck | None:
         last = self.newest
         longest_ns = max(_SHOWING_NS, _SHOWING_PERIODS * period_ns)
         if last is not None and self._began_ns - last.captured_ns > longest_ns:
             self._lengths.clear()
             self._is_told = False
         self._lengths.append(length)
-        self.newest = pooled(tuple(self._lengths), self._began_ns, self._worst)
+        self.newest = pool_lengths(tuple(self._lengths), self._began_ns, self._worst)
         if self.newest.is_judged:
             self.judged = self.newest
         is_news = self.newest.is_judged and not self._is_told

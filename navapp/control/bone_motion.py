@@ -27,7 +27,9 @@ class BoneMotion:
 
     def __init__(self, rig: StereoRig, plan: Plan) -> None:
         self._rig = rig
-        self._points_mm = {name: _some(bone.mesh.vertices_mm) for name, bone in plan.bones.items()}
+        self._points_mm = {
+            name: _sample(bone.mesh.vertices_mm) for name, bone in plan.bones.items()
+        }
         self._last: tuple[int, RigidTransform] | None = None
 
     def row_px(self, frame: StereoFrame, tracked: TrackedFrame | None) -> float:
@@ -48,9 +50,9 @@ class BoneMotion:
         if not 0 < passed_ns <= _LONGEST_NS:
             return math.inf
         share = abs(frame.skew_ns) / passed_ns if frame.skew_ns else _UNKNOWN_SHARE
-        return share * self._moved_px(last[1], pose)
+        return share * self._motion_px(last[1], pose)
 
-    def _moved_px(self, before: RigidTransform, after: RigidTransform) -> float:
+    def _motion_px(self, before: RigidTransform, after: RigidTransform) -> float:
         camera, points_mm = self._rig.left, self._points_mm[after.source]
         old_px, new_px = (camera.project(pose.apply(points_mm)) for pose in (before, after))
         size_px = (camera.width, camera.height)
@@ -59,6 +61,6 @@ class BoneMotion:
         return float(moved_px.max()) if len(moved_px) else math.inf
 
 
-def _some(points_mm: FloatArray) -> FloatArray:
+def _sample(points_mm: FloatArray) -> FloatArray:
     """Spread over all of them."""
     return points_mm[:: max(1, len(points_mm) // _N_POINTS)]

@@ -1,12 +1,12 @@
-"""The controller's line to its camera: frames, silence, loss and return."""
+"""Takes frames from the camera, notices its silence and loss, and opens it again."""
 
 from collections.abc import Callable
 
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
-from navapp.control.pauses import Pauses
-from navapp.control.sources import FrameSource, open_source
+from navapp.control.backoff import Backoff
+from navapp.control.frame_sources import FrameSource, open_source
 from navapp.errors import DeviceError, NavappError
 
 # A camera that is plugged in again starts for some seconds, and each attempt costs the bus a reset.
@@ -33,7 +33,7 @@ class CameraLink:
         self._lost_source: FrameSource | None = None
         self._last_frame_ns = clock.now_ns()
         self._retry_at_ns = 0
-        self._pauses = Pauses(*_PAUSES_S)
+        self._backoff = Backoff(*_PAUSES_S)
 
     @property
     def is_down(self) -> bool:
@@ -78,7 +78,7 @@ class CameraLink:
             # Closing may wait for a reader that hangs: the caller makes the display dark first.
             self._lost_source, self._source = self._source, None
             self.trouble = str(error)
-            self._pauses.begin_again()
+            self._backoff.reset()
             self._pause()
             raise
         if frame is not None:
@@ -121,7 +121,7 @@ class CameraLink:
         self.camera.close()
 
     def _pause(self) -> None:
-        self._retry_at_ns = self._clock.now_ns() + round(self._pauses.take_s() * 1e9)
+        self._retry_at_ns = self._clock.now_ns() + round(self._backoff.next_pause_s() * 1e9)
 
     def _release(self) -> None:
         if self._lost_source is not None:

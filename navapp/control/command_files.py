@@ -24,15 +24,15 @@ from navapp.geometry.transform import RigidTransform
 _PLAIN: dict[str, type] = {
     "register": Register,
     "cancel": Cancel,
-    "accept": Accept,
-    "reject": Reject,
     "blank": Blank,
     "show": Show,
     "reconnect": Reconnect,
     "interrupt": Interrupt,
     "quit": Quit,
 }
-_NAMES = {kind: name for name, kind in _PLAIN.items()}
+# Older recordings do not say which candidate was meant: the one that was under review.
+_DECISIONS: dict[str, type[Accept] | type[Reject]] = {"accept": Accept, "reject": Reject}
+_NAMES = {kind: name for name, kind in (_PLAIN | _DECISIONS).items()}
 
 
 def command_to_json(command: Command) -> dict[str, Any]:
@@ -44,6 +44,8 @@ def command_to_json(command: Command) -> dict[str, Any]:
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
     if isinstance(command, DistrustRig):
         return {"command": "distrust_rig", "why": command.why}
+    if isinstance(command, Accept | Reject):
+        return {"command": _NAMES[type(command)], "candidate_id": command.candidate_id}
     return {"command": _NAMES[type(command)]}
 
 
@@ -62,6 +64,9 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return Propose(RigidTransform("left", str(value["bone"]), matrix))
         if name == "distrust_rig":
             return DistrustRig(str(value["why"]))
+        if name in _DECISIONS:
+            candidate_id = value.get("candidate_id")
+            return _DECISIONS[name](None if candidate_id is None else int(candidate_id))
         command: Command = _PLAIN[str(name)]()
         return command
     except (KeyError, ValueError, TypeError) as error:

@@ -10,61 +10,35 @@
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
+from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import DeviceSet
 from navapp.control.board_watch import BoardWatch
 from navapp.control.bone_motion import BoneMotion
+from navapp.control.bone_tracks import BoneTracks
 from navapp.control.camera_link import CameraLink
-from navapp.control.commands import Commands
-from navapp.control.device_care import MirrorCare, ProjectorCare
-from navapp.control.device_watch import SlowDevices, tell_changes
+from navapp.control.command_handler import CommandHandler
+from navapp.control.device_handlers import MirrorHandler, ProjectorHandler
+from navapp.control.device_monitor import MonitoredDevices, tell_changes
 from navapp.control.display_link import DisplayLink
+from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
+from navapp.control.frame_result import FrameResult
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import compose
-from navapp.control.pursuit import Pursuit
-from navapp.control.results import FrameResult
+from navapp.control.registration_job import RegistrationJob
 from navapp.control.rig_watch import RigWatch
-from navapp.control.session import Session, SessionHooks, with_bound
-from navapp.control.snapshots import SnapshotMaker
-from navapp.control.stages import STAGES
-from navapp.control.states import Blank, Command, EventLevel, Interrupt, SessionState, Snapshot
+from navapp.control.session import Session
+from navapp.control.snapshot_maker import SnapshotMaker
+from navapp.control.specification import SessionSpecification
+from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
+from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
-from navapp.geometry.rig import StereoRig
 from navapp.overlay import make_preview
-from navapp.tracking import TrackerSettings
-from navapp.values import (
-    LineTimings,
-    OverlayMode,
-    OverlayPicture,
-    Plan,
-    Prior,
-    StageSpec,
-    TrackedFrame,
-)
-
-
-@dataclass(frozen=True, slots=True)
-class SessionOptions:
-    """What a session is started with.
-
-    Attributes:
-        line: settings of the line.
-        first_stage: stage in force at the start.
-        overlay_valid_ms: how long a picture may stay on the display without a newer one.
-        is_recording: the session is kept in a folder.
-        others: bones that are registered from the prior and followed, too, unasked.
-        mirror_deg: where the mirror stood when the display was calibrated.
-    """
-
-    line: TrackerSettings = field(default_factory=TrackerSettings)
-    first_stage: StageSpec = STAGES[0]
-    overlay_valid_ms: float = 500.0
-    is_recording: bool = False
-    others: tuple[str, ...] = ()
-    mirror_deg: float = 45.0
+from navapp.tracking import make_tracker
+from navapp.values import FrameTimings, OverlayMode, OverlayPicture
 
 
 class SessionController:
@@ -77,39 +51,47 @@ class SessionController:
     def __init__(
         self,
         devices: DeviceSet,
-        rig: StereoRig,
-        plan: Plan,
-        prior: Prior,
+        specification: SessionSpecification,
         *,
         executor: Executor,
-        options: SessionOptions | None = None,
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
+        make_tracker: MakeTracker = make_tracker,
     ) -> None:
-        options, hooks = options or SessionOptions(), hooks or SessionHooks()
-        self._overlay_valid_ms = options.overlay_valid_ms
+        """Bring the devices to their places; no frame is taken yet.
+
+        Args:
+            devices: opened; closed with the controller.
+            specification: of the session.
+            executor: runs first registrations.
+            hooks: who is told what.
+            board_watch: looks for a known length; None: nobody does.
+            make_tracker: makes the tracker of a bone.
+        """
+        hooks = hooks or SessionHooks()
+        rig, plan = specification.rig, specification.plan
+        self._overlay_valid_ms = specification.overlay_valid_ms
         self._devices = devices
         self._rig = rig
         self._plan = plan
         self._executor = executor
-        self._pursuit = Pursuit(rig, plan, prior, options.line, executor)
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
         self._display = DisplayLink(devices.display)
         self.lost_device: DeviceError | None = None
         self._queue: deque[Command] = deque()
         self._lock = threading.Lock()
-        others = OtherBones(self._pursuit, options.others)
-        self._session = Session(devices.clock, hooks, self._pursuit, others, options.first_stage)
-        self._watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
-        self._slow = SlowDevices(
-            ProjectorCare(devices.projector), MirrorCare(devices.mirror, options.mirror_deg)
+        self._session = _make_session(devices.clock, specification, hooks, executor, make_tracker)
+        self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
+        self._monitored = MonitoredDevices(
+            ProjectorHandler(devices.projector),
+            MirrorHandler(devices.mirror, specification.mirror_deg),
         )
-        self._commands = Commands(
-            self._session, self._camera, self._display, self._watch, self._slow
+        self._commands = CommandHandler(
+            self._session, self._camera, self._display, self._rig_watch, self._monitored, plan
         )
         self._maker = SnapshotMaker(
-            self._session, self._camera, self._display, self._slow, rig, self._watch, plan,
-            options.is_recording,
+            self._session, self._camera, self._display, self._monitored, rig, self._rig_watch, plan,
+            specification.is_recording,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -141,11 +123,11 @@ class SessionController:
         with self._lock:
             command = self._queue.popleft() if self._queue else None
         if command is not None:
-            session.tell(session.hooks.on_command, command, session.sequence)
+            session.tell_command(command)
             self._commands.handle(command)
         else:
-            self._take_over(session.sequence + 1)
-            self._watch.take_over()
+            session.take_over(session.sequence + 1)
+            self._rig_watch.take_over()
             frame = self._next_frame(timeout_s)
             if frame is not None:
                 self._handle_frame(frame)
@@ -160,16 +142,15 @@ class SessionController:
     def close(self) -> None:
         """End everything: dark first, then what moves; safe to call twice."""
         self._display.darken()
-        self._slow.close()
+        self._monitored.close()
         # Last of the three: an attempt to open a lost display may take many seconds.
         self._display.close()
-        self._session.is_over = True
-        self._pursuit.drop()
+        self._session.close()
         self._executor.close()
-        self._watch.close()
+        self._rig_watch.close()
         self._camera.close()
         self._devices.close()
-        self._session.state = SessionState.OFFLINE
+        self._session.go_offline()
         self._snapshot = self._maker.make()
 
     def _next_frame(self, timeout_s: float) -> StereoFrame | None:
@@ -182,29 +163,23 @@ class SessionController:
         try:
             return self._camera.take(timeout_s)
         except EndOfSequence:
-            session.is_over = True
-            session.event("end", "the sequence is at its end")
+            session.end("end", "the sequence is at its end")
         except DeviceError as error:
             self._display.darken()
             self.lost_device = error
-            session.tell(session.hooks.on_command, Interrupt(), session.sequence)
-            session.lose_sight()
-            session.change(SessionState.FAULT, str(error), EventLevel.ALARM)
-            session.is_over = not self._camera.can_return
+            session.lose_camera(str(error), can_return=self._camera.can_return)
         return None
 
     def _handle_frame(self, frame: StereoFrame) -> None:
         session = self._session
-        session.sequence = frame.sequence
-        if session.state is SessionState.STARTING:
-            session.change(SessionState.READY, "pictures arrive")
-        session.take(self._look_for_bone(frame), frame.captured_ns)
-        self._watch.after(frame)
+        session.begin_frame(frame)
+        session.look_for_bone(frame)
+        self._rig_watch.check_frame(frame)
         snapshot = self._maker.make()
         picture, overlay_ms = self._show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
-        timings = LineTimings() if session.tracked is None else session.tracked.timings
+        timings = FrameTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,
             session.state,
@@ -215,25 +190,9 @@ class SessionController:
             snapshot.is_navigable,
             others,
         )
+        # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped
-        session.meter.add(
-            result.timings.total_ms if is_stepped else picture.pose_age_ns / 1e6, frame.skew_ns
-        )
-        session.tell(session.hooks.on_frame, result)
-
-    def _look_for_bone(self, frame: StereoFrame) -> TrackedFrame | None:
-        """Register, review or follow, as the state asks."""
-        state, stage = self._session.state, self._session.stage
-        if state is SessionState.REGISTERING:
-            # A search that began earlier is taken over before a frame, never within one: its
-            # answer belongs to another picture and must be followed into this one first.
-            is_of_this_frame = self._pursuit.search(stage, frame)
-            return self._take_over(frame.sequence) if is_of_this_frame else None
-        if state is SessionState.REVIEW:
-            return self._pursuit.review(stage, frame)
-        if state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
-            return self._pursuit.follow(stage, frame)
-        return None
+        session.end_frame(result, None if is_stepped else picture.pose_age_ns / 1e6)
 
     def _show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
         """Compose, show until it expires, keep a preview; also how long composing took."""
@@ -247,25 +206,33 @@ class SessionController:
         # it when what would be seen on it is not what is shown.
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
         if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
-            self._session.event("device", self._display.trouble, EventLevel.ALARM)
-        self._session.preview = make_preview(image)
-        age_ns = self._session.clock.now_ns() - frame.captured_ns
+            self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
+        self._session.keep_preview(make_preview(image))
+        age_ns = self._session.now_ns - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
 
-    def _take_over(self, next_sequence: int) -> TrackedFrame | None:
-        """Bring a finished registration under review; its best answer, when there is one."""
-        session = self._session
-        outcome = self._pursuit.take_over(next_sequence)
-        if outcome is None:
-            return None
-        session.tell(session.hooks.on_take_over, next_sequence)
-        if not outcome.candidates:
-            why = f"no start pose is known for the {session.stage.bone}"
-            if outcome.failure is not None and outcome.failure.verdict.reasons:
-                why = outcome.failure.verdict.reasons[0].value
-            session.fall_back(f"registration failed: {why}", EventLevel.WARNING)
-            return outcome.failure
-        best = outcome.candidates[0].tracked
-        text = with_bound(f"candidate 1 of {len(outcome.candidates)}", best.verdict)
-        session.change(SessionState.REVIEW, text)
-        return best
+
+def _make_session(
+    clock: Clock,
+    specification: SessionSpecification,
+    hooks: SessionHooks,
+    executor: Executor,
+    make_tracker: MakeTracker,
+) -> Session:
+    plan = specification.plan
+    trackers = Trackers(
+        specification.rig,
+        plan,
+        specification.prior,
+        specification.tracker_settings,
+        make_tracker,
+    )
+    tracks = BoneTracks(trackers)
+    return Session(
+        clock,
+        EventLog(clock, hooks),
+        tracks,
+        RegistrationJob(trackers, executor),
+        OtherBones(tracks, plan, specification.others),
+        specification.stage,
+    )

@@ -1,10 +1,10 @@
-"""The controller's line to its display: blank, withdrawn guides, trouble."""
+"""Shows pictures on the display, blanks it, and opens it again when it is lost."""
 
 import threading
 
 from drivers.interfaces import Display
-from navapp.control.pauses import Pauses
-from navapp.control.pictures import Image, fitted
+from navapp.control.backoff import Backoff
+from navapp.control.pictures import Image, fit_to_display
 from navapp.errors import DeviceError, DeviceLost
 
 _PAUSES_S = (0.5, 8.0)
@@ -21,7 +21,7 @@ class DisplayLink:
     def __init__(self, display: Display) -> None:
         self._display = display
         self._has_guides = False
-        self._reopening = _Reopening(display)
+        self._reopener = _Reopener(display)
         self.is_blanked = False
         self.trouble = ""
 
@@ -46,21 +46,21 @@ class DisplayLink:
 
     def show(self, image: Image, valid_until_ns: int, *, has_guides: bool) -> bool:
         """Show a picture, fitted to the display; whether there is a new trouble to tell."""
-        if self.is_blanked or self._reopening.is_under_way:
+        if self.is_blanked or self._reopener.is_under_way:
             return False
         is_new = False
         self._has_guides = has_guides
         try:
             info = self._display.info
-            self._display.show(fitted(image, info.width, info.height), valid_until_ns)
+            self._display.show(fit_to_display(image, info.width, info.height), valid_until_ns)
             self.trouble = ""
-            self._reopening.succeeded()
+            self._reopener.note_success()
         except DeviceError as error:
-            failure = self._reopening.failure
+            failure = self._reopener.failure
             is_new = not self.trouble or failure not in ("", self.trouble)
             self.trouble = failure or str(error)
             if isinstance(error, DeviceLost):
-                self._reopening.begin()
+                self._reopener.begin()
         self._keep_dark()
         return is_new
 
@@ -77,10 +77,10 @@ class DisplayLink:
     def close(self) -> None:
         """Dark, and not opened any more."""
         self.darken()
-        self._reopening.close()
+        self._reopener.close()
 
 
-class _Reopening:
+class _Reopener:
     """Opens a lost display in a thread, which no frame waits for, with growing pauses.
 
     Attributes:
@@ -91,7 +91,7 @@ class _Reopening:
         self._display = display
         self._thread: threading.Thread | None = None
         self.failure = ""
-        self._pauses = Pauses(*_PAUSES_S)
+        self._backoff = Backoff(*_PAUSES_S)
         self._is_over = threading.Event()
 
     @property
@@ -105,9 +105,9 @@ class _Reopening:
             self._thread = threading.Thread(target=self._run, name="display", daemon=True)
             self._thread.start()
 
-    def succeeded(self) -> None:
+    def note_success(self) -> None:
         """A picture was shown: the next loss is a new one."""
-        self._pauses.begin_again()
+        self._backoff.reset()
 
     def close(self) -> None:
         """Wait for the attempt that is under way."""
@@ -116,7 +116,7 @@ class _Reopening:
             self._thread.join()
 
     def _run(self) -> None:
-        if self._is_over.wait(self._pauses.take_s()):
+        if self._is_over.wait(self._backoff.next_pause_s()):
             return
         self.failure = ""
         try:

@@ -1,4 +1,4 @@
-"""The one answer to «may guides be shown?»: display, overlay, log and screen all use it."""
+"""Whether guides may be shown: one answer for display, overlay, log and screen."""
 
 from navapp.control.states import OtherBone, SessionState, Snapshot
 from navapp.values import Reason, Status
@@ -7,10 +7,10 @@ from navapp.values import Reason, Status
 MAX_POSE_AGE_MS = 500.0
 
 
-def navigable(snapshot: Snapshot) -> tuple[Reason, ...]:
+def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
     """Why guides must not be shown, the most urgent first; empty means they may.
 
-    A pure function of the snapshot, whose own `reasons` are not looked at.
+    A pure function of the snapshot; the snapshot's own `reasons` do not matter.
     """
     reasons: list[Reason] = []
     if snapshot.is_blanked:

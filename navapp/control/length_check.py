@@ -123,7 +123,7 @@ class _Pool:
         return self.scatter <= max(_MOST_EXCESS * self.sigma, _LITTLE * worst_share)
 
 
-def pooled(lengths: Sequence[Length], captured_ns: int, worst_share: float) -> LengthCheck:
+def pool_lengths(lengths: Sequence[Length], captured_ns: int, worst_share: float) -> LengthCheck:
     """One check of several looks: of the newest.
 
     What each look knows of its own error does not know a board that moves between the exposures,

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Protocol
 import numpy as np
 from pydantic import Field
 
-from navapp.config import Section, checked
+from navapp.config import Section, validate
 from navapp.control.command_files import command_from_json
 from navapp.control.stages import stage_by_name
 from navapp.control.states import (
@@ -36,10 +36,10 @@ _MAX_ATTEMPTS = 8
 
 
 class Operator(Protocol):
-    """Decides."""
+    """Answers snapshots with commands."""
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
-        """What to do now."""
+        """The commands to give now."""
         ...
 
 
@@ -57,18 +57,18 @@ class ReplayOperator:
             return [Register()]
         if snapshot.state is SessionState.REVIEW:
             is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
-            return [Reject() if is_lost else Accept()]
+            return [(Reject if is_lost else Accept)(snapshot.candidate_id)]
         return []
 
 
-class Together:
-    """Several operators at one session: what each of them would do, in their order."""
+class CombinedOperator:
+    """Several operators of one session: the commands of each, in their order."""
 
     def __init__(self, *operators: Operator) -> None:
         self._operators = operators
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
-        """Of all of them."""
+        """Those of all operators."""
         return [one for operator in self._operators for one in operator.commands(snapshot)]
 
 
@@ -92,7 +92,7 @@ class Script(Section):
     """[[step]] tables, in order."""
 
 
-# Offers a wrong pose first: a judge that takes it is worth nothing.
+# Offers a wrong pose first, which the judge must refuse.
 DEFAULT_SCRIPT = (ScriptStep(do="propose"), ScriptStep(do="register"))
 
 
@@ -138,13 +138,13 @@ class ScriptedOperator:
             self._phase = "proposed"
             turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
             # About a point of the bone: where the model's origin is, in the camera.
-            return [Reject(), Propose(pose.moved(turn, pose.translation_mm))]
+            return [Reject(snapshot.candidate_id), Propose(pose.moved(turn, pose.translation_mm))]
         if snapshot.verdict.status is not Status.OK:
             if self._phase == "proposed":
                 self._next_step()
-            return [Reject()]
+            return [Reject(snapshot.candidate_id)]
         self._next_step()
-        return [Accept()]
+        return [Accept(snapshot.candidate_id)]
 
     def _next_step(self) -> None:
         self._phase = "idle"
@@ -172,7 +172,7 @@ class RecordedEvents:
     """What `events.jsonl` of a session says.
 
     Attributes:
-        commands: (after which frame, command).
+        commands: (after which frame, command), without those that were refused.
         take_overs: before which frames a registration's result was used.
         is_complete: the recording ran to its end.
     """
@@ -219,6 +219,10 @@ def read_events(path: str | Path) -> RecordedEvents:
             commands.append((sequence, command_from_json(value)))
         elif value.get("type") == "take_over":
             take_overs.append(sequence)
+        elif value.get("kind") == "refused" and commands:
+            # The refusal follows its command at once. What refused it may be missing in a replay,
+            # a lost camera for example, and the command would be carried out.
+            commands.pop()
         is_complete = value.get("type") == "end"
     return RecordedEvents(commands, take_overs, is_complete)
 
@@ -229,7 +233,7 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
     Raises:
         ConfigurationError: an unknown key, action or stage.
     """
-    steps = checked(Script, content, name).step
+    steps = validate(Script, content, name).step
     for step in steps:
         if step.do == "stage":
             stage_by_name(step.stage)

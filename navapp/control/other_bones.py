@@ -1,4 +1,4 @@
-"""The other bones, which are not the stage's: followed at a lower rate, so that none is forgotten.
+"""The other bones, which are not the stage's, are followed at a lower rate.
 
 Once accepted, a bone is followed while another stage is in force, too: one such bone in every
 second frame, after the picture was shown. With three bones the two others take turns.
@@ -7,11 +7,11 @@ second frame, after the picture was shown. With three bones the two others take 
 from dataclasses import dataclass
 
 from drivers.frames import StereoFrame
-from navapp.control.pursuit import Pursuit
+from navapp.control.bone_tracks import BoneTracks
 from navapp.control.stages import stage_of
 from navapp.control.states import OtherBone
 from navapp.geometry.transform import RigidTransform
-from navapp.values import StageSpec, Status, TrackedFrame, Verdict
+from navapp.values import Plan, StageSpec, Status, TrackedFrame, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,17 +32,19 @@ class _Sight:
 
 
 class OtherBones:
-    """Whose turn it is, and what was last said of each.
+    """Follows the other bones in turns, and keeps the last verdict on each.
 
     Turns go by the count of handled frames, never by the time: a recorded session replays to them.
 
     Args:
-        pursuit: of all bones of the session.
+        tracks: of all bones of the session.
+        plan: whose stages say by what goal a bone is judged.
         unasked: bones that are registered in their turns and taken without an operator's word.
     """
 
-    def __init__(self, pursuit: Pursuit, unasked: tuple[str, ...] = ()) -> None:
-        self._pursuit = pursuit
+    def __init__(self, tracks: BoneTracks, plan: Plan, unasked: tuple[str, ...] = ()) -> None:
+        self._tracks = tracks
+        self._plan = plan
         self._unasked = unasked
         self._n_frames = 0
         self._sights: dict[str, _Sight] = {}
@@ -67,23 +69,23 @@ class OtherBones:
         if is_odd or not names:
             return {}
         name = names[turn % len(names)]
-        own, known = stage_of(name, self._pursuit.plan), _well_known(active)
-        if self._pursuit.is_accepted(own):
-            tracked = self._pursuit.glance(own, frame, self._moved(name, known))
+        own, known = stage_of(name, self._plan), _ok_pose(active)
+        if self._tracks.is_accepted(own):
+            tracked = self._tracks.glance(own, frame, self._active_motion(name, known))
         else:
-            tracked = self._pursuit.register_now(own, frame)
+            tracked = self._tracks.register_now(own, frame)
         self._remember(name, tracked.verdict, frame.captured_ns, known)
         return {name: tracked}
 
     def forget(self) -> None:
-        """What was said says nothing any more; the tracks stay."""
+        """Forget the verdicts; the tracks stay."""
         self._sights = {}
 
-    def seen(self, stage: StageSpec, now_ns: int) -> tuple[OtherBone, ...]:
+    def describe(self, stage: StageSpec, now_ns: int) -> tuple[OtherBone, ...]:
         """What is known of each, as of now."""
-        return tuple(self._seen(name, now_ns) for name in self._names(stage))
+        return tuple(self._describe(name, now_ns) for name in self._names(stage))
 
-    def _seen(self, name: str, now_ns: int) -> OtherBone:
+    def _describe(self, name: str, now_ns: int) -> OtherBone:
         sight = self._sights.get(name)
         if sight is None:
             return OtherBone(name)
@@ -91,16 +93,16 @@ class OtherBones:
         return OtherBone(name, sight.verdict, age_ms)
 
     def _names(self, stage: StageSpec) -> list[str]:
-        known = dict.fromkeys((*self._unasked, *self._pursuit.accepted))
+        known = dict.fromkeys((*self._unasked, *self._tracks.accepted))
         return [name for name in known if name != stage.bone]
 
-    def _moved(self, name: str, active: RigidTransform | None) -> RigidTransform | None:
+    def _active_motion(self, name: str, active: RigidTransform | None) -> RigidTransform | None:
         """How the stage's bone has moved since a bone's last turn, if that is known."""
         sight = self._sights.get(name)
         if sight is None or sight.active is None or active is None:
             return None
         # From one candidate to another nothing has moved.
-        now = self._pursuit.track_number, active.source
+        now = self._tracks.track_number, active.source
         is_same = (sight.track_number, sight.active.source) == now
         return active @ sight.active.inverse() if is_same else None
 
@@ -109,10 +111,10 @@ class OtherBones:
     ) -> None:
         before = self._sights.get(name, _Sight(verdict))
         ok_ns = captured_ns if verdict.status is Status.OK else before.ok_ns
-        self._sights[name] = _Sight(verdict, ok_ns, active, self._pursuit.track_number)
+        self._sights[name] = _Sight(verdict, ok_ns, active, self._tracks.track_number)
 
 
-def _well_known(active: TrackedFrame | None) -> RigidTransform | None:
+def _ok_pose(active: TrackedFrame | None) -> RigidTransform | None:
     """Where the stage's bone is, when that is OK."""
     if active is None or active.verdict.status is not Status.OK:
         return None

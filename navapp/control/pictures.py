@@ -49,7 +49,7 @@ def _scene(snapshot: Snapshot, rig: StereoRig, plan: Plan) -> Scene | None:
     return Scene(plan, snapshot.stage, bone.mesh, snapshot.left_from_bone, rig.left, is_candidate)
 
 
-def fitted(image: Image, width: int, height: int) -> Image:
+def fit_to_display(image: Image, width: int, height: int) -> Image:
     """The picture at a display's size: scaled as a whole, black at two sides when it must be."""
     import cv2
 

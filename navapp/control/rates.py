@@ -1,4 +1,4 @@
-"""How fast the line runs, for the screen and the summary."""
+"""How fast frames are handled, for the screen."""
 
 import time
 from collections import deque
@@ -18,10 +18,17 @@ class RateMeter:
         self._skew_ms: float | None = None
         self._n_frames = 0
 
-    def add(self, latency_ms: float, skew_ns: int) -> None:
-        """One more frame is done."""
+    def add(self, latency_ms: float | None, skew_ns: int) -> None:
+        """One more frame is done.
+
+        Args:
+            latency_ms: from its capture until its picture was handed to the display; None of a
+                frame that waited to be read.
+            skew_ns: between the two cameras.
+        """
         self._moments_ns.append(time.perf_counter_ns())
-        self._latency_ms.append(latency_ms)
+        if latency_ms is not None:
+            self._latency_ms.append(latency_ms)
         self._skew_ms = skew_ns / 1e6
         self._n_frames += 1
         span_ns = self._moments_ns[-1] - self._moments_ns[0]

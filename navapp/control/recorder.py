@@ -16,7 +16,7 @@ from typing import Any, Protocol, TextIO
 
 from drivers.frames import StereoFrame
 from navapp.control.command_files import command_to_json
-from navapp.control.results import FrameResult
+from navapp.control.frame_result import FrameResult
 from navapp.control.states import Command, Event
 from navapp.errors import InputError, NavappError
 from navapp.values import TrackedFrame
@@ -35,7 +35,7 @@ class FrameSink(Protocol):
 
 
 class BackgroundSink:
-    """Hands frames to a sink in a thread of its own: encoding pictures must not slow the line.
+    """Hands frames to a sink in a thread of its own: encoding pictures must not slow tracking.
 
     A full queue makes the caller wait: a recording with holes would not replay to the same poses.
 
@@ -51,7 +51,7 @@ class BackgroundSink:
         self._thread.start()
 
     def add(self, frame: StereoFrame, with_pictures: bool) -> None:
-        """Keep one, soon."""
+        """Queue one; waits while the queue is full."""
         self._raise_error()
         self._waiting.put((frame, with_pictures))
 
@@ -105,8 +105,10 @@ class SessionRecorder:
                 "sequence": result.frame.sequence,
                 "bone": result.stage.bone,
                 "state": result.state.value,
-                **_said(result.tracked),
-                "bodies": {name: _said(tracked) for name, tracked in result.others.items()},
+                **_answer_to_json(result.tracked),
+                "bodies": {
+                    name: _answer_to_json(tracked) for name, tracked in result.others.items()
+                },
             },
         )
 
@@ -157,7 +159,7 @@ class SessionRecorder:
         self._attempt(lambda: (stream.write(line), stream.flush()))
 
 
-def _said(tracked: TrackedFrame | None) -> dict[str, Any]:
+def _answer_to_json(tracked: TrackedFrame | None) -> dict[str, Any]:
     """Status and pose of one bone."""
     pose = None if tracked is None else tracked.left_from_bone
     return {

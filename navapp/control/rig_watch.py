@@ -1,6 +1,6 @@
 """Whether the rig still stands as it was calibrated: the rows of live pairs, a known length.
 
-Both only ever take trust away: what the rig has lost, no good frame gives back.
+A rig that was found moved is not believed again in the same session.
 """
 
 from collections import deque
@@ -27,7 +27,7 @@ _MOST_EXPLAINED = 0.5
 
 
 class RowWatch:
-    """Rows that disagree for longer, and more of one mind, than anything but a moved rig does."""
+    """Finds rows that disagree for so long, and so alike, that only a moved rig explains it."""
 
     def __init__(self) -> None:
         self._told: deque[tuple[int, RowCheck]] = deque()
@@ -58,7 +58,7 @@ class RowWatch:
 
 
 class RigWatch:
-    """Watches the rig of a session, and ends all trust in it.
+    """Checks the rig of a session with every frame, and ends the session's trust in it.
 
     Args:
         session: that is told.
@@ -91,20 +91,20 @@ class RigWatch:
         return None if newest is None or newest.is_judged else newest
 
     def take_over(self) -> None:
-        """Before a frame: what a look at an earlier one has found."""
+        """Before a frame: tell what was measured on an earlier one."""
         session = self._session
         found = None if self._board is None else self._board.take_over()
         if found is None or session.rig_error is not None:
             return
         if found.finding is Finding.OFF:
-            self._found(str(found))
+            self._tell_moved(str(found))
         elif found.finding is Finding.WITHIN:
-            session.event("rig", f"rig checked: {found}")
+            session.add_event("rig", f"rig checked: {found}")
         else:
-            session.event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)
+            session.add_event("rig", f"rig in doubt, check it: {found}", EventLevel.WARNING)
 
-    def after(self, frame: StereoFrame) -> None:
-        """After a frame: what its rows say; and another look for the board when it is time."""
+    def check_frame(self, frame: StereoFrame) -> None:
+        """After a frame: check its rows, and look for the board when it is time."""
         if self._session.rig_error is not None:
             return
         tracked = self._session.tracked
@@ -112,19 +112,19 @@ class RigWatch:
         rows = None if tracked is None else tracked.rows
         why = self._rows.add(rows, frame.captured_ns, motion_px)
         if why:
-            self._found(why)
+            self._tell_moved(why)
         elif self._board is not None:
             self._board.look(frame)
 
     def distrust(self, command: DistrustRig) -> None:
-        """Dark, and for good."""
+        """Darken the display and put the session into a fault that does not end."""
         self._display.darken()
         self._session.distrust_rig(command.why)
 
-    def _found(self, why: str) -> None:
+    def _tell_moved(self, why: str) -> None:
         # A replay cannot look again as fast as the session did, or follows otherwise: it is told.
         command = DistrustRig(why)
-        self._session.tell(self._session.hooks.on_command, command, self._session.sequence)
+        self._session.tell_command(command)
         self.distrust(command)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Who turns the controller's crank: a loop for headless sessions, a thread for the screen."""
+"""Steps a controller: in a loop for headless sessions, in a thread for the screen."""
 
 import threading
 from collections.abc import Callable
@@ -32,13 +32,13 @@ def run_headless(
             controller.submit(command)
         for _ in commands:
             snapshot = controller.step()
-        # A frame between two looks of the operator, as for a person.
+        # One frame between two answers of the operator, as for a person.
         snapshot = controller.step()
     return snapshot
 
 
 class SessionRunner:
-    """Steps a controller in a thread of its own; what a screen needs of it never blocks."""
+    """Steps a controller in a thread of its own; `snapshot` and `submit` never block."""
 
     def __init__(self, controller: SessionController) -> None:
         self._controller = controller

@@ -1,167 +1,328 @@
-"""What a session knows: where it stands, what it looks for, what was found, what happened."""
-
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
+"""What a session knows, and every way in which frames and commands change it."""
 
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
-from navapp.control.camera_link import Reopen
+from navapp.control.bone_tracks import BoneTracks, Candidate
+from navapp.control.event_log import EventLog
+from navapp.control.frame_result import FrameResult
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import Image
-from navapp.control.pursuit import Pursuit
 from navapp.control.rates import RateMeter
-from navapp.control.recorder import RecordingStopped
-from navapp.control.results import FrameListener
-from navapp.control.states import Command, Event, EventLevel, SessionState
-from navapp.errors import RigError, UsageError
+from navapp.control.registration_job import RegistrationJob
+from navapp.control.states import (
+    Command,
+    Event,
+    EventLevel,
+    Interrupt,
+    OtherBone,
+    Rates,
+    SessionState,
+)
+from navapp.errors import RigError
+from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, StageSpec, Status, TrackedFrame, Verdict
-
-_EVENTS_SHOWN = 60
-
-
-@dataclass(frozen=True, slots=True)
-class SessionHooks:
-    """Who is told what; all called from the thread that steps the controller."""
-
-    on_frame: tuple[FrameListener, ...] = ()
-    on_event: tuple[Callable[[Event], None], ...] = ()
-    on_command: tuple[Callable[[Command, int], None], ...] = ()
-    on_take_over: tuple[Callable[[int], None], ...] = ()
-    on_stage: tuple[Callable[[str], None], ...] = ()
-    reopen_camera: Reopen | None = None
 
 
 class Session:
-    """What frames and commands change, and snapshots are made of.
+    """State, stage, poses and events of a session; changed through its methods alone.
 
-    Attributes:
+    Args:
         clock: of the session.
-        hooks: who is told.
-        pursuit: of the stage's bone.
+        log: of its events.
+        tracks: of the session's bones.
+        registration: searches for the stage's bone.
         others: the other bones that are followed.
-        state: where the session stands.
-        stage: in force.
-        tracked: the newest answer on the stage's bone, None when there is none that counts.
-        tracked_at_ns: when its frame was captured.
-        sequence: of the newest handled frame, -1 before the first.
-        preview: of the newest picture, None before the first.
-        meter: how fast frames are handled.
-        is_over: nothing is handled any more.
-        rig_error: why the rig is not believed any more; None while it is.
+        stage: to start in.
     """
 
     def __init__(
         self,
         clock: Clock,
-        hooks: SessionHooks,
-        pursuit: Pursuit,
+        log: EventLog,
+        tracks: BoneTracks,
+        registration: RegistrationJob,
         others: OtherBones,
         stage: StageSpec,
     ) -> None:
-        self.clock = clock
-        self.hooks = hooks
-        self.pursuit = pursuit
-        self.others = others
-        self.state = SessionState.STARTING
-        self.tracked: TrackedFrame | None = None
-        self.tracked_at_ns = 0
-        self.sequence = -1
-        self.preview: Image | None = None
-        self.meter = RateMeter()
-        self.is_over = False
-        self.rig_error: RigError | None = None
-        self._events: deque[Event] = deque(maxlen=_EVENTS_SHOWN)
-        self.enter(stage)
+        self._clock = clock
+        self._log = log
+        self._tracks = tracks
+        self._registration = registration
+        self._others = others
+        self._state = SessionState.STARTING
+        self._tracked: TrackedFrame | None = None
+        self._tracked_at_ns = 0
+        self._preview: Image | None = None
+        self._meter = RateMeter()
+        self._is_over = False
+        self._rig_error: RigError | None = None
+        self._stage = stage
+        self._put_in_force(stage)
+
+    @property
+    def state(self) -> SessionState:
+        """Where the session stands."""
+        return self._state
+
+    @property
+    def stage(self) -> StageSpec:
+        """In force."""
+        return self._stage
+
+    @property
+    def tracked(self) -> TrackedFrame | None:
+        """The newest answer on the stage's bone; None when there is none that counts."""
+        return self._tracked
+
+    @property
+    def candidate(self) -> Candidate | None:
+        """The pose under review."""
+        return self._tracks.candidate
+
+    @property
+    def candidate_id(self) -> int | None:
+        """Of the pose under review; None when there is none."""
+        return self._tracks.candidate_id
+
+    @property
+    def search_progress(self) -> float | None:
+        """Share done of the registration that runs; None when none runs."""
+        return self._registration.progress
+
+    @property
+    def sequence(self) -> int:
+        """Of the newest handled frame, -1 before the first."""
+        return self._log.sequence
+
+    @property
+    def preview(self) -> Image | None:
+        """Of the newest picture, None before the first."""
+        return self._preview
+
+    @property
+    def is_over(self) -> bool:
+        """Nothing is handled any more."""
+        return self._is_over
+
+    @property
+    def rig_error(self) -> RigError | None:
+        """Why the rig is not believed any more; None while it is."""
+        return self._rig_error
 
     @property
     def events(self) -> tuple[Event, ...]:
         """The newest, oldest first."""
-        return tuple(self._events)
+        return self._log.events
 
-    def enter(self, stage: StageSpec) -> None:
-        """Put a stage in force and tell the simulated room, if any.
+    @property
+    def now_ns(self) -> int:
+        """On the session's clock."""
+        return self._clock.now_ns()
 
-        A stage that the room cannot show is said, not refused.
+    def pose_age_ms(self, now_ns: int) -> float | None:
+        """Since the capture of the frame that `tracked` belongs to; None without an answer."""
+        return None if self._tracked is None else (now_ns - self._tracked_at_ns) / 1e6
+
+    def other_bones(self, now_ns: int) -> tuple[OtherBone, ...]:
+        """The other bones that are followed, as of now."""
+        return self._others.describe(self._stage, now_ns)
+
+    def rates(self, n_dropped: int) -> Rates:
+        """How fast frames are handled."""
+        return self._meter.rates(n_dropped)
+
+    def begin_frame(self, frame: StereoFrame) -> None:
+        """A frame is about to be handled; the first one ends the start."""
+        self._log.begin_frame(frame.sequence)
+        if self._state is SessionState.STARTING:
+            self.change_state(SessionState.READY, "pictures arrive")
+
+    def look_for_bone(self, frame: StereoFrame) -> None:
+        """Register, review or follow the stage's bone in a frame, as the state asks.
+
+        A bone that is lost suspends the navigation, its return resumes it.
         """
-        self.stage = stage
-        # What was judged by the old stage's targets and tolerance says nothing in the new one.
-        self.tracked = None
-        self.pursuit.forget_verdict()
-        self.event("stage", f"stage {stage.number} {stage.name} entered")
-        for listener in self.hooks.on_stage:
-            try:
-                listener(stage.name)
-            except UsageError as error:
-                self.event("stage", str(error), EventLevel.WARNING)
-
-    def take(self, tracked: TrackedFrame | None, captured_ns: int) -> None:
-        """Take over a frame's answer: a bone that is lost suspends, its return resumes."""
-        self.tracked, self.tracked_at_ns = tracked, captured_ns
+        tracked = self._look_for_bone(frame)
+        self._tracked, self._tracked_at_ns = tracked, frame.captured_ns
         if tracked is None:
             return
         verdict = tracked.verdict
         is_lost = verdict.status is Status.LOST
-        if self.state is SessionState.NAVIGATING and is_lost:
+        if self._state is SessionState.NAVIGATING and is_lost:
             why = f": {verdict.reasons[0].value}" if verdict.reasons else ""
-            self.change(SessionState.SUSPENDED, f"bone lost{why}", EventLevel.ALARM)
-        elif self.state is SessionState.SUSPENDED and not is_lost:
-            self.change(SessionState.NAVIGATING, "bone found again")
+            self.change_state(SessionState.SUSPENDED, f"bone lost{why}", EventLevel.ALARM)
+        elif self._state is SessionState.SUSPENDED and not is_lost:
+            self.change_state(SessionState.NAVIGATING, "bone found again")
 
     def follow_others(self, frame: StereoFrame) -> dict[str, TrackedFrame]:
         """Follow another bone into a frame; in a fault none: nothing that is measured counts."""
-        if self.state is SessionState.FAULT:
+        if self._state is SessionState.FAULT:
             return {}
-        return self.others.follow(self.stage, frame, self.tracked)
+        return self._others.follow(self._stage, frame, self._tracked)
 
-    def lose_sight(self) -> None:
-        """What the loss of the camera or of the rig does to what is known of the bones."""
-        self.pursuit.drop()
-        self.others.forget()
-        self.tracked = None
+    def keep_preview(self, preview: Image) -> None:
+        """The newest picture, made small."""
+        self._preview = preview
+
+    def end_frame(self, result: FrameResult, latency_ms: float | None) -> None:
+        """Count a frame that was handled, and tell its result; latency as of `RateMeter`."""
+        self._meter.add(latency_ms, result.frame.skew_ns)
+        self._log.tell_frame(result)
+
+    def take_over(self, next_sequence: int) -> TrackedFrame | None:
+        """Bring a finished registration under review; its best answer, when there is one.
+
+        Raises:
+            Exception: what the search has raised.
+        """
+        registration = self._registration.take_due(next_sequence)
+        if registration is None:
+            return None
+        self._tracks.offer(registration)
+        self._log.tell_take_over(next_sequence)
+        best = self._tracks.candidate
+        if best is None:
+            failure = registration.answers[0] if registration.answers else None
+            why = f"no start pose is known for the {self._stage.bone}"
+            if failure is not None and failure.verdict.reasons:
+                why = failure.verdict.reasons[0].value
+            self.fall_back(f"registration failed: {why}", EventLevel.WARNING)
+            return failure
+        text = add_bound(f"candidate 1 of {best.count}", best.tracked.verdict)
+        self.change_state(SessionState.REVIEW, text)
+        return best.tracked
+
+    def enter_stage(self, stage: StageSpec) -> None:
+        """Put a stage in force; one of another bone ends the search and the review."""
+        is_other_bone = stage.bone != self._stage.bone
+        self._put_in_force(stage)
+        if is_other_bone and self._state not in (SessionState.STARTING, SessionState.FAULT):
+            self._stop_search()
+            self.fall_back(f"the {stage.bone} is now the bone to follow")
+
+    def begin_registration(self) -> None:
+        """Search for the stage's bone from the next frame on; what is under review is dropped."""
+        self._stop_search()
+        self._tracked = None
+        self.change_state(SessionState.REGISTERING, f"searching for the {self._stage.bone}")
+
+    def cancel_registration(self) -> None:
+        """Stop the search."""
+        self._stop_search()
+        self.fall_back("registration cancelled")
+
+    def propose(self, pose: RigidTransform) -> None:
+        """Put a pose of the stage's bone under review that was made by hand."""
+        self._tracked = None
+        self._registration.cancel()
+        self._tracks.propose(self._stage.bone, pose, self.now_ns)
+        self.change_state(SessionState.REVIEW, "a pose was proposed by hand")
+
+    def accept(self, candidate: Candidate) -> None:
+        """Navigate by the candidate that is under review."""
+        self._tracks.accept(self._stage)
+        text = add_bound("registration accepted", candidate.tracked.verdict)
+        self.change_state(SessionState.NAVIGATING, text)
+
+    def reject(self) -> None:
+        """Drop the candidate under review; the next one, if any, takes its place."""
+        rejected = self._tracks.reject()
+        self._tracked = None
+        text = f"candidate {rejected.number} of {rejected.count} rejected by the operator"
+        if self._tracks.candidate is None:
+            self.fall_back(text)
+        else:
+            self.add_event("reject", text)
+
+    def lose_camera(self, why: str, *, can_return: bool) -> None:
+        """The camera is gone: a fault, and the end of the session unless it can return."""
+        self.tell_command(Interrupt())
+        self.forget_sight()
+        self.change_state(SessionState.FAULT, why, EventLevel.ALARM)
+        self._is_over = not can_return
+
+    def forget_sight(self) -> None:
+        """Nothing that was seen counts any more; accepted tracks stay."""
+        self._stop_search()
+        self._others.forget()
+        self._tracked = None
 
     def distrust_rig(self, why: str) -> None:
-        """What a rig that has moved does to the session: a fault that does not end."""
-        if self.rig_error is not None:
+        """The rig has moved: a fault that does not end."""
+        if self._rig_error is not None:
             return
-        self.rig_error = RigError(rig_moved_text(why), remedy=Reason.RIG_MOVED.remedy)
-        self.lose_sight()
-        self.change(SessionState.FAULT, self.rig_error.problem, EventLevel.ALARM)
+        self._rig_error = RigError(describe_moved_rig(why), remedy=Reason.RIG_MOVED.remedy)
+        self.forget_sight()
+        self.change_state(SessionState.FAULT, self._rig_error.problem, EventLevel.ALARM)
 
-    def change(self, state: SessionState, text: str, level: EventLevel = EventLevel.INFO) -> None:
+    def end(self, kind: str, text: str) -> None:
+        """Handle nothing any more, and tell why."""
+        self._is_over = True
+        self.add_event(kind, text)
+
+    def close(self) -> None:
+        """End without a word and stop the search."""
+        self._is_over = True
+        self._stop_search()
+
+    def go_offline(self) -> None:
+        """The devices are closed."""
+        self._state = SessionState.OFFLINE
+
+    def change_state(
+        self, state: SessionState, text: str, level: EventLevel = EventLevel.INFO
+    ) -> None:
         """Stand elsewhere from now on, and tell why."""
-        self.state = state
-        self.event("state", text, level)
+        self._state = state
+        self.add_event("state", text, level)
 
     def fall_back(self, text: str, level: EventLevel = EventLevel.INFO) -> None:
-        """To where the session stands without a candidate."""
-        if self.rig_error is not None:
-            self.change(SessionState.FAULT, text, level)
+        """Go to the state that the session has without a candidate."""
+        if self._rig_error is not None:
+            self.change_state(SessionState.FAULT, text, level)
             return
-        is_known = self.pursuit.is_accepted(self.stage)
-        self.change(SessionState.SUSPENDED if is_known else SessionState.READY, text, level)
+        is_known = self._tracks.is_accepted(self._stage)
+        self.change_state(SessionState.SUSPENDED if is_known else SessionState.READY, text, level)
 
-    def event(self, kind: str, text: str, level: EventLevel = EventLevel.INFO) -> None:
+    def add_event(self, kind: str, text: str, level: EventLevel = EventLevel.INFO) -> None:
         """Keep and tell what has just happened."""
-        event = Event(self.clock.now_ns(), kind, text, level, self.sequence)
-        self._events.append(event)
-        self.tell(self.hooks.on_event, event)
+        self._log.add(kind, text, level)
 
-    def tell(self, listeners: tuple[Callable[..., None], ...], *words: object) -> None:
-        """Tell all; a recording that cannot go on is an event, not the end of the session."""
-        for listener in listeners:
-            try:
-                listener(*words)
-            except RecordingStopped as error:
-                self.event("recording", str(error), EventLevel.ALARM)
+    def tell_command(self, command: Command) -> None:
+        """A command is about to be handled."""
+        self._log.tell_command(command)
+
+    def _put_in_force(self, stage: StageSpec) -> None:
+        self._stage = stage
+        # What was judged by the old stage's targets and tolerance says nothing in the new one.
+        self._tracked = None
+        self._tracks.forget_verdicts()
+        self.add_event("stage", f"stage {stage.number} {stage.name} entered")
+        self._log.tell_stage(stage.name)
+
+    def _look_for_bone(self, frame: StereoFrame) -> TrackedFrame | None:
+        if self._state is SessionState.REGISTERING:
+            # A search that began earlier is taken over before a frame, never within one: its
+            # answer belongs to another picture and must be followed into this one first.
+            is_of_this_frame = self._registration.start(self._stage, frame)
+            return self.take_over(frame.sequence) if is_of_this_frame else None
+        if self._state is SessionState.REVIEW:
+            return self._tracks.review(self._stage, frame)
+        if self._state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
+            return self._tracks.follow(self._stage, frame)
+        return None
+
+    def _stop_search(self) -> None:
+        self._registration.cancel()
+        self._tracks.drop_candidates()
 
 
-def rig_moved_text(why: str) -> str:
+def describe_moved_rig(why: str) -> str:
     """What is said of a rig that has moved, with how that was found."""
     return f"{Reason.RIG_MOVED.value} ({why})"
 
 
-def with_bound(text: str, verdict: Verdict) -> str:
+def add_bound(text: str, verdict: Verdict) -> str:
     """A text with the predicted error, when there is one."""
     bound_mm = verdict.predicted_tre_mm
     return text if bound_mm is None else f"{text}, predicted error {bound_mm:.2f} mm"

@@ -43,12 +43,25 @@ class Propose:
 
 @dataclass(frozen=True, slots=True)
 class Accept:
-    """Take the candidate under review."""
+    """Take the candidate that the operator has seen; refused when another one is under review.
+
+    Attributes:
+        candidate_id: as the snapshot tells it; None (of recordings that do not hold it) means
+            whichever is under review.
+    """
+
+    candidate_id: int | None
 
 
 @dataclass(frozen=True, slots=True)
 class Reject:
-    """Refuse the candidate under review."""
+    """Drop the candidate that the operator has seen; refused when another one is under review.
+
+    Attributes:
+        candidate_id: as of `Accept`.
+    """
+
+    candidate_id: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +71,7 @@ class Blank:
 
 @dataclass(frozen=True, slots=True)
 class Show:
-    """Leave blank."""
+    """Show pictures on the display again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +120,7 @@ Command = (
 
 
 class EventLevel(Enum):
-    """How loud an event is; ALARM rings the terminal's bell once."""
+    """How important an event is; ALARM rings the terminal's bell once."""
 
     INFO = "info"
     WARNING = "warning"
@@ -133,7 +146,7 @@ class Event:
 
 
 class DeviceHealth(Enum):
-    """As shown in the devices panel."""
+    """State of a device, as the devices panel shows it."""
 
     OK = "ok"
     ABSENT = "absent"
@@ -154,14 +167,15 @@ class DeviceLine:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """How the line runs; None before there is a figure.
+    """How fast frames are handled; None before there is a figure.
 
     Attributes:
         frames_per_s: over the last seconds.
-        latency_ms: capture to result of the newest frame.
+        latency_ms: from the capture of the newest frame until its picture was handed to the
+            display; None of frames that wait to be read (docs/conventions.md).
         fps_history, latency_history_ms: the last values, oldest first, for sparklines.
         n_frames: handled so far.
-        n_dropped: replaced by newer ones before the line took them.
+        n_dropped: replaced by newer ones before they were handled.
         skew_ms: between the two cameras, newest frame.
     """
 
@@ -199,7 +213,7 @@ class OtherBone:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """All that a client may show, immutable; the newest wins.
+    """All that a client may show; immutable.
 
     Attributes:
         state: of the session.
@@ -208,7 +222,8 @@ class Snapshot:
         reasons: why guides are not shown; empty means navigable.
         verdict: on the newest pose, None before there is one.
         left_from_bone: the newest pose, None when there is none.
-        is_candidate: a pose waits for the operator's decision.
+        candidate_id: of the pose that waits for the operator's decision: another one for every
+            candidate of a session; None when none waits.
         is_simulated: the pictures are not of this world.
         is_recording: the session is kept in a folder.
         pose_age_ms: of that pose, now.
@@ -232,7 +247,7 @@ class Snapshot:
     is_blanked: bool = False
     verdict: Verdict | None = None
     left_from_bone: RigidTransform | None = None
-    is_candidate: bool = False
+    candidate_id: int | None = None
     pose_age_ms: float | None = None
     others: tuple[OtherBone, ...] = ()
     preview: NDArray[np.uint8] | None = None
@@ -258,3 +273,8 @@ class Snapshot:
     def is_navigable(self) -> bool:
         """Guides may be shown."""
         return not self.reasons
+
+    @property
+    def is_candidate(self) -> bool:
+        """The pose waits for the operator's decision."""
+        return self.candidate_id is not None

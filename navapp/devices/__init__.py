@@ -1,9 +1,9 @@
-"""Composition root: the only place that turns a configuration into opened devices."""
+"""Opens the devices that a configuration names; the only package that does."""
 
-from navapp.devices.cameras import real_camera
+from navapp.devices.cameras import make_real_camera
 from navapp.devices.capture import OpenedCapture, open_capture
 from navapp.devices.latency import OpenedLatency, open_latency
-from navapp.devices.opening import OpenedDevices, open_live, open_recording
+from navapp.devices.session_devices import OpenedDevices, open_live, open_recording
 from navapp.devices.simulated_room import Simulation
 
 __all__ = [
@@ -11,9 +11,9 @@ __all__ = [
     "OpenedDevices",
     "OpenedLatency",
     "Simulation",
+    "make_real_camera",
     "open_capture",
     "open_latency",
     "open_live",
     "open_recording",
-    "real_camera",
 ]

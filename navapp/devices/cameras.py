@@ -1,4 +1,4 @@
-"""The configured camera of this world: USB, OAK, or of an installed package."""
+"""Makes the configured real camera: USB, OAK, or one of an installed package."""
 
 from drivers.clock import Clock
 from drivers.depthai_settings import DepthaiSettings
@@ -7,10 +7,10 @@ from drivers.interfaces import StereoCamera
 from drivers.opencv_stereo import OpencvStereo, OpencvStereoSettings
 from drivers.uvc_settings import UvcSettings
 from navapp.config import Configuration
-from navapp.devices.installed import installed_camera
+from navapp.devices.package_camera import make_package_camera
 
 
-def real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") -> StereoCamera:
+def make_real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") -> StereoCamera:
     """The configured camera, not opened yet; any but the simulated one.
 
     Raises:
@@ -23,7 +23,7 @@ def real_camera(configuration: Configuration, clock: Clock, rig_id: str = "") ->
         return _oak_camera(configuration, clock, rig_id)
     backend = configuration.camera.backend
     settings = (configuration.camera.model_extra or {}).get(backend, {})
-    return installed_camera(backend, settings, clock)
+    return make_package_camera(backend, settings, clock)
 
 
 def _usb_camera(configuration: Configuration, clock: Clock, rig_id: str) -> StereoCamera:

@@ -1,4 +1,4 @@
-"""An opened camera in front of a board, for a guided capture."""
+"""Opens the camera of a guided capture; a simulated one sees a board in a simulated hand."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ from calibration.targets.boards import Board
 from drivers.clock import Clock, SystemClock
 from drivers.interfaces import StereoCamera
 from navapp.config import Configuration
-from navapp.devices.cameras import real_camera
-from navapp.devices.fitting import reopener
-from navapp.devices.simulated_board import hand_with, printed
-from navapp.devices.simulated_room import Pace, simulated_camera
+from navapp.devices.cameras import make_real_camera
+from navapp.devices.rig_match import make_reopener
+from navapp.devices.simulated_board import make_hand, print_board
+from navapp.devices.simulated_room import Pace, make_simulated_camera
 from sim_devices.hand import Hand
 from sim_devices.sheet import SheetScene
 
@@ -50,11 +50,11 @@ def open_capture(configuration: Configuration, board: Board, *, is_headless: boo
     clock: Clock = SystemClock()
     if configuration.camera.backend == "simulated":
         settings, rate_hz = configuration.camera.simulated, configuration.camera.rate_hz
-        pace, hand = Pace.of(settings, is_headless=is_headless), hand_with(board, settings.seed)
-        scene, clock = SheetScene(printed(board), hand.left_from_body), pace.clock
+        pace, hand = Pace.of(settings, is_headless=is_headless), make_hand(board, settings.seed)
+        scene, clock = SheetScene(print_board(board), hand.left_from_body), pace.clock
         rate_hz = min(rate_hz, _STEPPED_CAPTURE_HZ) if pace.is_stepped else rate_hz
-        camera: StereoCamera = simulated_camera(scene, settings, pace, rate_hz)
+        camera: StereoCamera = make_simulated_camera(scene, settings, pace, rate_hz)
     else:
-        camera = real_camera(configuration, clock)
+        camera = make_real_camera(configuration, clock)
     camera.open()
-    return OpenedCapture(camera, clock, reopener(camera, camera.open), hand)
+    return OpenedCapture(camera, clock, make_reopener(camera, camera.open), hand)

@@ -1,4 +1,4 @@
-"""An opened camera that sees an opened display, for their delays."""
+"""Opens a display and a camera that sees it, to measure their delays."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from drivers.clock import Clock, SystemClock
 from drivers.interfaces import Display, StereoCamera
 from navapp.config import Configuration
-from navapp.devices.cameras import real_camera
-from navapp.devices.peripherals import window_display
-from navapp.devices.simulated_room import Pace, simulated_camera
+from navapp.devices.cameras import make_real_camera
+from navapp.devices.peripherals import make_window_display
+from navapp.devices.simulated_room import Pace, make_simulated_camera
 from navapp.errors import ConfigurationError
 from sim_devices.camera import NOMINAL_EXPOSURE_MS
 from sim_devices.lit_display import DisplayInView, LitDisplay
@@ -53,13 +53,13 @@ def open_latency(configuration: Configuration) -> OpenedLatency:
             remedy="configure both as real devices, or both as simulated",
         )
     clock = SystemClock()
-    window = window_display(configuration.display, clock)
+    window = make_window_display(configuration.display, clock)
     if window is None:
-        return _simulated(configuration)
-    return _opened(OpenedLatency(real_camera(configuration, clock), window, clock))
+        return _open_simulated(configuration)
+    return _open_all(OpenedLatency(make_real_camera(configuration, clock), window, clock))
 
 
-def _simulated(configuration: Configuration) -> OpenedLatency:
+def _open_simulated(configuration: Configuration) -> OpenedLatency:
     settings, shown = configuration.camera.simulated, configuration.display.simulated
     pace = Pace.of(settings, is_headless=True)
     delay_ns = round(shown.delay_ms * 1e6)
@@ -67,13 +67,13 @@ def _simulated(configuration: Configuration) -> OpenedLatency:
         pace.clock, _WIDTH, _HEIGHT, delay_ns=delay_ns, refresh_hz=shown.refresh_hz
     )
     view = DisplayInView(display, pace.clock, round(NOMINAL_EXPOSURE_MS * 1e6))
-    camera = simulated_camera(view, settings, pace, configuration.camera.rate_hz)
-    opened = _opened(OpenedLatency(camera, display, pace.clock))
+    camera = make_simulated_camera(view, settings, pace, configuration.camera.rate_hz)
+    opened = _open_all(OpenedLatency(camera, display, pace.clock))
     view.begin(-camera.world_time_ns(0))
     return opened
 
 
-def _opened(devices: OpenedLatency) -> OpenedLatency:
+def _open_all(devices: OpenedLatency) -> OpenedLatency:
     with ExitStack() as undo:
         undo.callback(devices.close)
         devices.display.open()

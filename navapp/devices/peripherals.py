@@ -1,4 +1,4 @@
-"""What stands around the camera: display, projector and mirror."""
+"""Makes display, projector and mirror as configured."""
 
 from contextlib import ExitStack
 from functools import partial
@@ -23,7 +23,7 @@ from navapp.geometry import StereoRig
 from sim_devices.display import SimulatedDisplay
 
 
-def device_set(
+def make_device_set(
     configuration: Configuration,
     camera: StereoCamera,
     clock: Clock,
@@ -51,11 +51,11 @@ def device_set(
 
 
 def _display(settings: DisplaySection, clock: Clock, rig: StereoRig) -> Display:
-    window = window_display(settings, clock)
+    window = make_window_display(settings, clock)
     return SimulatedDisplay(clock, rig.width, rig.height) if window is None else window
 
 
-def window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay | None:
+def make_window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay | None:
     """The configured window, not opened yet; None when the display is a simulated one."""
     if settings.backend != "window" or settings.size_px is None:
         return None

@@ -1,4 +1,4 @@
-"""The simulated room as it is configured, and what it tells apart from its devices."""
+"""The simulated room as configured: world, camera, and the truth kept apart from them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calibration.targets.boards import Board
 from drivers.clock import Clock, ManualClock, SystemClock
 from navapp.config import FaultSection, SimulationSection
-from navapp.devices.simulated_board import hand_with, printed
+from navapp.devices.simulated_board import make_hand, print_board
 from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import Scene, SimulatedCamera
@@ -67,7 +67,7 @@ class Pace:
         return cls(ManualClock() if is_stepped else SystemClock(), is_stepped)
 
 
-def simulated_camera(
+def make_simulated_camera(
     scene: Scene, settings: SimulationSection, pace: Pace, rate_hz: float
 ) -> SimulatedCamera:
     """A camera before a scene, with the configured noise and faults; not opened yet."""
@@ -106,10 +106,10 @@ def with_board(world: World, board: Board | None, settings: SimulationSection) -
     """The room, with a board held into the view when there is one to be shown."""
     if board is None or settings.board_s is None:
         return world
-    hand = hand_with(board, settings.seed)
+    hand = make_hand(board, settings.seed)
     from_s, to_s = settings.board_s
     shown_ns = (round(from_s * 1e9), round(to_s * 1e9))
-    return SheetInView(world, printed(board), hand.left_from_body, shown_ns)
+    return SheetInView(world, print_board(board), hand.left_from_body, shown_ns)
 
 
 def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:

@@ -1,5 +1,5 @@
-"""Judging results with the truth, after the run."""
+"""Compares results with the truth, after a run."""
 
-from navapp.evaluation.truth import mean_tre_mm
+from navapp.evaluation.truth import compute_mean_tre_mm
 
-__all__ = ["mean_tre_mm"]
+__all__ = ["compute_mean_tre_mm"]

@@ -6,7 +6,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import BoneModel, visible_vertices
 
 
-def mean_tre_mm(
+def compute_mean_tre_mm(
     estimated: RigidTransform, true: RigidTransform, bone: BoneModel, targets_mm: FloatArray
 ) -> float | None:
     """Mean distance between estimated and true positions of the targets.

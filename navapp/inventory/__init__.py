@@ -1,4 +1,4 @@
-"""What is connected, how the configuration chooses it, and what is missing. Nothing is started.
+"""Lists connected devices, how each is chosen and what is missing, without starting any.
 
 It needs neither numpy nor numba: `navapp doctor` works where they do not.
 """

@@ -1,19 +1,19 @@
-"""Whether the devices that the configuration names are there; none of them is started."""
+"""Checks that the configured devices are connected, without starting any."""
 
 from pathlib import Path
 
-from drivers.discovery.permissions import allowing, may_use
+from drivers.discovery.permissions import make_permission_remedy, may_use
 from drivers.v4l_names import V4lNames
-from drivers.window_outputs import chosen
+from drivers.window_outputs import choose_output
 from navapp.config import Configuration
 from navapp.errors import NavappError
-from navapp.inventory.finding import Finding, Health, unless
-from navapp.inventory.looking import Inventory
+from navapp.inventory.connected_devices import Inventory
+from navapp.inventory.finding import Finding, Health, judge_health
 
 _LOOK = "connect it, or choose another one: navapp devices lists what there is"
 
 
-def configured_findings(
+def check_configured_devices(
     configuration: Configuration, found: Inventory, names: V4lNames | None = None
 ) -> list[Finding]:
     """Camera, display, projector and mirror of the configuration."""
@@ -36,7 +36,7 @@ def _camera(configuration: Configuration, found: Inventory, names: V4lNames) -> 
         ]
     if section.backend == "depthai":
         return [_oak_camera(section.depthai.device, found)]
-    return [_installed_camera(section.backend, found)]
+    return [_check_package_camera(section.backend, found)]
 
 
 def _usb_camera(name: str, wanted: str, names: V4lNames) -> Finding:
@@ -48,7 +48,7 @@ def _usb_camera(name: str, wanted: str, names: V4lNames) -> Finding:
         return Finding(name, Health.FAILED, error.problem, error.remedy)
     if not may_use(camera.node):
         detail = f"{wanted} is {camera.node}, but this user may not open it"
-        return Finding(name, Health.FAILED, detail, allowing(camera.node, "video"))
+        return Finding(name, Health.FAILED, detail, make_permission_remedy(camera.node, "video"))
     return Finding(name, Health.OK, f"{wanted} is {camera.node}")
 
 
@@ -67,7 +67,7 @@ def _oak_camera(wanted: str, found: Inventory) -> Finding:
     return Finding("camera", Health.FAILED, detail, _LOOK)
 
 
-def _installed_camera(backend: str, found: Inventory) -> Finding:
+def _check_package_camera(backend: str, found: Inventory) -> Finding:
     for camera in found.installed_cameras.found:
         if camera.backend == backend:
             detail = f"'{backend}' is brought by {camera.package}, which alone knows its devices"
@@ -87,7 +87,7 @@ def _display(configuration: Configuration, found: Inventory) -> Finding:
         if not found.displays.found:
             return Finding("display", Health.FAILED, why.problem, why.remedy)
     try:
-        output = chosen(found.displays.found, section.output, *section.size_px)
+        output = choose_output(found.displays.found, section.output, *section.size_px)
     except NavappError as error:
         return Finding("display", Health.FAILED, error.problem, error.remedy)
     return Finding("display", Health.OK, f"{output} is connected")
@@ -118,8 +118,8 @@ def _on_port(name: str, port: str) -> Finding:
         return Finding(name, Health.FAILED, f"there is no port {port}", _LOOK)
     is_fine = may_use(path)
     detail = f"the port {port} is there" + ("" if is_fine else ", but this user may not open it")
-    remedy = "" if is_fine else allowing(path, "dialout")
-    return Finding(name, unless(is_fine, True), detail, remedy)
+    remedy = "" if is_fine else make_permission_remedy(path, "dialout")
+    return Finding(name, judge_health(is_fine, True), detail, remedy)
 
 
 def _on_network(name: str, address: str) -> Finding:

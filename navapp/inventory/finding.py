@@ -1,4 +1,4 @@
-"""One thing that `navapp doctor` looked at."""
+"""One result of `navapp doctor`."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -14,7 +14,7 @@ class Health(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing looked at.
+    """Result of one check.
 
     Attributes:
         name: of it.
@@ -29,7 +29,7 @@ class Finding:
     remedy: str = ""
 
 
-def unless(is_fine: bool, is_needed: bool) -> Health:
+def judge_health(is_fine: bool, is_needed: bool) -> Health:
     """OK, or how bad it is that it is not."""
     if is_fine:
         return Health.OK

@@ -1,4 +1,4 @@
-"""What the system must grant before a device can be used: groups, a udev rule, libraries, a screen.
+"""Checks what devices need of the system: groups, a udev rule, libraries, a screen.
 
 A check says nothing of a kind of device that is neither connected nor configured.
 """
@@ -8,11 +8,16 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from drivers.discovery.oak_cameras import UDEV_REMEDY, oak_nodes
-from drivers.discovery.permissions import allowing, is_member, joining, may_use
+from drivers.discovery.oak_cameras import UDEV_REMEDY, list_oak_nodes
+from drivers.discovery.permissions import (
+    is_member,
+    make_group_remedy,
+    make_permission_remedy,
+    may_use,
+)
 from navapp.config import Configuration
-from navapp.inventory.finding import Finding, Health, unless
-from navapp.inventory.looking import Inventory
+from navapp.inventory.connected_devices import Inventory
+from navapp.inventory.finding import Finding, Health, judge_health
 
 # SDL's X11 driver loads them by these names when it starts.
 _WINDOW_LIBRARIES = (
@@ -26,7 +31,7 @@ _RULE_FOLDERS = tuple(
 )
 
 
-def system_findings(configuration: Configuration, found: Inventory) -> list[Finding]:
+def check_system(configuration: Configuration, found: Inventory) -> list[Finding]:
     """Every check that applies."""
     is_usb = configuration.camera.backend == "opencv"
     cameras = [camera.node for camera in found.usb_cameras.found]
@@ -35,7 +40,7 @@ def system_findings(configuration: Configuration, found: Inventory) -> list[Find
     return [
         *_group("video", "USB cameras", cameras, is_usb),
         *_group("dialout", "serial ports", ports, _has_local_port(configuration)),
-        *_udev_rule(oak_nodes(), configuration.camera.backend == "depthai"),
+        *_udev_rule(list_oak_nodes(), configuration.camera.backend == "depthai"),
         _libraries("window libraries", _WINDOW_LIBRARIES, is_window),
         _libraries("open3d libraries", _OPEN3D_LIBRARIES, False),
         _display_server(found, is_window),
@@ -66,13 +71,13 @@ def _group(group: str, devices: str, nodes: Sequence[Path], is_configured: bool)
     if forbidden:
         listed = ", ".join(map(str, forbidden))
         detail = f"this user may not open {listed} ({devices})"
-        return [Finding(name, Health.WARNING, detail, allowing(forbidden[0], group))]
+        return [Finding(name, Health.WARNING, detail, make_permission_remedy(forbidden[0], group))]
     if nodes:
         return [Finding(name, Health.OK, f"this user may open the connected {devices}")]
     detail = f"{devices} are configured and none is connected; this user is "
     if is_member(group):
         return [Finding(name, Health.OK, f"{detail}in the group")]
-    return [Finding(name, Health.WARNING, f"{detail}not in the group", joining(group))]
+    return [Finding(name, Health.WARNING, f"{detail}not in the group", make_group_remedy(group))]
 
 
 def _udev_rule(nodes: Sequence[Path], is_configured: bool) -> list[Finding]:
@@ -107,7 +112,7 @@ def _libraries(name: str, libraries: Sequence[str], is_needed: bool) -> Finding:
     missing = [library for library in libraries if not _loads(library)]
     if missing:
         detail = f"missing: {', '.join(missing)}"
-        return Finding(name, unless(False, is_needed), detail, "run `make system-deps`")
+        return Finding(name, judge_health(False, is_needed), detail, "run `make system-deps`")
     return Finding(name, Health.OK, f"{len(libraries)} found")
 
 
@@ -124,4 +129,4 @@ def _display_server(found: Inventory, is_needed: bool) -> Finding:
         listed = ", ".join(map(str, found.displays.found))
         return Finding("display server", Health.OK, f"X11 shows {listed}")
     (why,) = found.displays.unseen
-    return Finding("display server", unless(False, is_needed), why.problem, why.remedy)
+    return Finding("display server", judge_health(False, is_needed), why.problem, why.remedy)

@@ -1,6 +1,6 @@
-"""From a pose and a plan to the picture that is shown."""
+"""Renders the overlay picture from video, poses and a plan."""
 
-from navapp.overlay.compose import compose_video, make_preview
+from navapp.overlay.composition import compose_video, make_preview
 from navapp.overlay.layers import LAYERS
 
 __all__ = ["LAYERS", "compose_video", "make_preview"]

@@ -1,4 +1,4 @@
-"""What can be drawn over the video: one function a layer, one line in the table."""
+"""Layers that can be drawn over the video: one function each, and the table of their names."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render
-from navapp.overlay.tint_kernels import shares_of_faces, tint_pixels
+from navapp.overlay.tint_kernels import compute_face_tints, tint_pixels
 from navapp.values import Plan, StageSpec
 
 Image = NDArray[np.uint8]
@@ -27,7 +27,7 @@ DEFECT_COLOUR = (60, 60, 235)
 CURVE_COLOURS = {"artery": (60, 60, 235), "vein": (220, 90, 60), "nerve": (60, 220, 250)}
 
 # Of the bone's colour over a part that faces the camera, and how much more over a steep one.
-_LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
+_LEAST_FRACTION, _STEEP_FRACTION = 0.10, 0.35
 _FARTHEST_PX = 20_000.0
 # What is drawn simplified lies this near the surface: a vertex of it is not behind itself.
 _SKIN_MM = 1.0
@@ -74,7 +74,7 @@ def draw_bone(image: Image, scene: Scene) -> None:
     part = image[box.y : box.y + box.height, box.x : box.x + box.width]
     # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
     towards = scene.left_from_bone.rotation[2]
-    share = shares_of_faces(mesh.normals, mesh.faces, towards, _LEAST_SHARE, _STEEP_SHARE)
+    share = compute_face_tints(mesh.normals, mesh.faces, towards, _LEAST_FRACTION, _STEEP_FRACTION)
     in_row_bands(
         box.height,
         lambda rows: tint_pixels(

@@ -1,4 +1,4 @@
-"""Compiled veil over a bone."""
+"""Compiled loops that tint a bone's pixels in the video."""
 
 import numpy as np
 from numba import njit
@@ -31,7 +31,7 @@ def tint_pixels(
 
 
 @njit(cache=True, nogil=True)
-def shares_of_faces(
+def compute_face_tints(
     normals: NDArray[np.float64],
     faces: NDArray[np.int32],
     towards: NDArray[np.float64],

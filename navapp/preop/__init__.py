@@ -1,12 +1,12 @@
-"""Before the operation: a CT, a segmentation or surfaces become a plan."""
+"""Planning: makes plans from a CT, a segmentation or surfaces, and reads and writes them."""
 
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.aspects import AspectSettings, build_aspects
-from navapp.preop.cartilage import even_cartilage, figures_of, import_cartilage
-from navapp.preop.completing import complete, with_side
+from navapp.preop.cartilage import figures_of, import_cartilage, make_even_cartilage
+from navapp.preop.plan_completion import complete, with_side
 from navapp.preop.plan_files import check_place, read_origin, read_plan, write_plan
 from navapp.preop.plan_origin import PlanOrigin
-from navapp.preop.surfaces import ImportedSurface, import_surface
+from navapp.preop.surface_import import ImportedSurface, import_surface
 
 __all__ = [
     "AspectSettings",
@@ -15,10 +15,10 @@ __all__ = [
     "build_aspects",
     "check_place",
     "complete",
-    "even_cartilage",
     "figures_of",
     "import_cartilage",
     "import_surface",
+    "make_even_cartilage",
     "read_aspects",
     "read_origin",
     "read_plan",

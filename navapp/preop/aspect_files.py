@@ -1,4 +1,4 @@
-"""Aspect graphs as files."""
+"""Reads and writes aspect graphs."""
 
 import zipfile
 from pathlib import Path

@@ -15,15 +15,15 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.directions import ViewCone, seen_from
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render
-from navapp.preop.aspects_kernels import contour_segments, spread_out
-from navapp.preop.bone_edges import Crease, creases, near_ends
+from navapp.preop.aspects_kernels import find_contour_segments, select_spread
+from navapp.preop.bone_edges import Crease, find_creases, find_near_ends
 from navapp.values import AspectGraph, BoneModel
 
 # Two views of which so much agrees are one: pairs of edges as near and as parallel as this.
-_SAME_SHARE, _SAME_MM, _SAME_COSINE = 0.95, 1.5, 0.966
+_SAME_FRACTION, _SAME_MM, _SAME_COSINE = 0.95, 1.5, 0.966
 # A point so far behind what is seen around it is hidden.
 _HIDDEN_MM = 1.5
-_CREASE_SHARE = 0.35
+_CREASE_FRACTION = 0.35
 _CREASE_COSINE = 0.3
 _MARGIN_MM = 6.0
 
@@ -66,7 +66,7 @@ def build_aspects(
     settings = settings or AspectSettings()
     cone = ViewCone(None if axis is None else np.asarray(axis, dtype=np.float64), half_angle_deg)
     directions = cone.directions(settings.step_deg)
-    look = _Look(bone, settings)
+    look = _AspectView(bone, settings)
     views: list[tuple[FloatArray, FloatArray] | None] = [None] * len(directions)
 
     def run(first: int) -> None:
@@ -76,7 +76,7 @@ def build_aspects(
             views[number] = look.at(directions[number])
 
     run_both(lambda: run(0), lambda: run(1))
-    kept = _merged(directions, [view for view in views if view is not None], settings)
+    kept = _select_distinct(directions, [view for view in views if view is not None], settings)
     on_progress(1.0)
     seen = [view for view in (views[k] for k in kept) if view is not None]
     if not seen:
@@ -95,7 +95,7 @@ def build_aspects(
     )
 
 
-class _Look:
+class _AspectView:
     """One bone, looked at from anywhere."""
 
     def __init__(self, bone: BoneModel, settings: AspectSettings) -> None:
@@ -103,11 +103,11 @@ class _Look:
         surface_mm = self._mesh.vertices_mm
         self._settings = settings
         self._middle_mm = 0.5 * (surface_mm.min(axis=0) + surface_mm.max(axis=0))
-        is_anatomy = ~near_ends(self._mesh)
+        is_anatomy = ~find_near_ends(self._mesh)
         self._faces = np.ascontiguousarray(
             self._mesh.faces[is_anatomy[self._mesh.faces].all(axis=1)]
         )
-        self._creases: Crease = creases(self._mesh, is_anatomy)
+        self._creases: Crease = find_creases(self._mesh, is_anatomy)
         radius_mm = float(np.linalg.norm(surface_mm - self._middle_mm, axis=1).max())
         near_mm = max(settings.distance_mm - radius_mm, 0.3 * settings.distance_mm)
         focal_px = settings.distance_mm / settings.pixel_mm
@@ -126,15 +126,15 @@ class _Look:
         depth = render(self._mesh, pose, self._camera).depth_mm
         middles, tangents = np.empty((2, len(self._faces), 3))
         vertices = np.array(self._mesh.vertices_mm)
-        n = contour_segments(vertices, self._faces, facing, middles, tangents)
-        outline = self._seen(middles[:n], pose, depth)
+        n = find_contour_segments(vertices, self._faces, facing, middles, tangents)
+        outline = self._find_visible(middles[:n], pose, depth)
         crease = self._creases
         towards = camera_mm - crease.points_mm
         cosine = np.einsum("ij,ij->i", crease.normals, towards) / np.linalg.norm(towards, axis=1)
         turned = np.flatnonzero(cosine > _CREASE_COSINE)
-        turned = turned[self._seen(crease.points_mm[turned], pose, depth)]
+        turned = turned[self._find_visible(crease.points_mm[turned], pose, depth)]
         most = self._settings.n_points
-        n_creases = min(len(turned), int(_CREASE_SHARE * most))
+        n_creases = min(len(turned), int(_CREASE_FRACTION * most))
         chosen = _spread(middles[:n][outline], most - n_creases)
         also = _spread(crease.points_mm[turned], n_creases)
         points = np.concatenate([middles[:n][outline][chosen], crease.points_mm[turned][also]])
@@ -142,7 +142,7 @@ class _Look:
         order = _spread(points, len(points))
         return points[order], along[order]
 
-    def _seen(
+    def _find_visible(
         self, points_mm: FloatArray, pose: RigidTransform, depth_mm: NDArray[np.float32]
     ) -> NDArray[np.bool_]:
         """(n,) whether something around each point is no nearer than the point itself."""
@@ -164,10 +164,10 @@ def _spread(points_mm: FloatArray, n: int) -> NDArray[np.int64]:
     if len(points_mm) == 0 or n == 0:
         return np.empty(0, dtype=np.int64)
     order = np.empty(min(n, len(points_mm)), dtype=np.int64)
-    return order[: spread_out(np.ascontiguousarray(points_mm), order)]
+    return order[: select_spread(np.ascontiguousarray(points_mm), order)]
 
 
-def _merged(
+def _select_distinct(
     directions: FloatArray, views: list[tuple[FloatArray, FloatArray]], settings: AspectSettings
 ) -> list[int]:
     """The views that are left when each repeats no neighbour that was kept before it."""
@@ -186,7 +186,7 @@ def _merged(
             distance, index = trees[other].query(points_mm)
             parallel = np.abs(np.einsum("ij,ij->i", tangents, views[other][1][index]))
             agrees = np.asarray(distance < _SAME_MM) & (parallel > _SAME_COSINE)
-            is_new &= float(agrees.mean()) < _SAME_SHARE
+            is_new &= float(agrees.mean()) < _SAME_FRACTION
         if is_new:
             kept.append(k)
             trees[k] = cKDTree(points_mm)

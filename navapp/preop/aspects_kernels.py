@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 
 @njit(cache=True, nogil=True)
-def contour_segments(
+def find_contour_segments(
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
     facing: NDArray[np.float64],
@@ -54,7 +54,7 @@ def contour_segments(
 
 
 @njit(cache=True, nogil=True)
-def spread_out(points: NDArray[np.float64], order: NDArray[np.int64]) -> int:
+def select_spread(points: NDArray[np.float64], order: NDArray[np.int64]) -> int:
     """Choose points so that each next one is the furthest from all before it.
 
     Args:

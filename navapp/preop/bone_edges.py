@@ -1,4 +1,4 @@
-"""What of a bone's mesh is an edge to the eye, and what is only the end of the mesh."""
+"""Finds visible edges of a bone's mesh: creases, apart from borders where the mesh ends."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ class Crease:
     normals: FloatArray
 
 
-def near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
+def find_near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
     """(V,) vertices at open borders and on flat caps, with what lies close to them."""
     from scipy.spatial import cKDTree
 
@@ -38,7 +38,7 @@ def near_ends(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return np.asarray(distance < _AROUND_MM)
 
 
-def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
+def find_creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
     """Wanted vertices where the surface bends sharply, more than beside them.
 
     Args:
@@ -46,7 +46,7 @@ def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
         is_wanted: (V,) where creases are looked for.
     """
     edges, _ = face_pairs(mesh.faces)
-    normals = _smoothed(mesh, edges)
+    normals = _smooth_normals(mesh, edges)
     offset = mesh.vertices_mm[edges[:, 1]] - mesh.vertices_mm[edges[:, 0]]
     length = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
     turn = (normals[edges[:, 1]] - normals[edges[:, 0]]) / length[:, None]
@@ -71,7 +71,7 @@ def creases(mesh: TriangleMesh, is_wanted: NDArray[np.bool_]) -> Crease:
     return Crease(mesh.vertices_mm[is_sharp], tangents, np.asarray(mesh.normals)[is_sharp])
 
 
-def _smoothed(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
+def _smooth_normals(mesh: TriangleMesh, edges: NDArray[np.int32]) -> FloatArray:
     """(V, 3) normals averaged over neighbours, over about the same length for every mesh."""
     from scipy.sparse import coo_matrix, identity
 

@@ -1,4 +1,4 @@
-"""A bone of a plan as one PLY file: its surface, and what the plan knows of each vertex."""
+"""Reads and writes a plan's bone as one PLY file: surface and per-vertex values."""
 
 from pathlib import Path
 

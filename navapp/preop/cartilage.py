@@ -1,4 +1,4 @@
-"""Cartilage on a bone: what a camera sees above the surface that a CT shows.
+"""Cartilage on a bone: thickness and standard deviation per vertex, even or from a surface file.
 
 The plan holds a thickness and its standard deviation per vertex; the bone itself stays as it is.
 """
@@ -14,7 +14,7 @@ from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
 from navapp.preop.cut_ends import ends_of
-from navapp.preop.surfaces import MIN_FACES, ImportedSurface, in_lps
+from navapp.preop.surface_import import MIN_FACES, ImportedSurface, convert_to_lps
 from navapp.values import BoneModel
 
 # Thicker is none, and no even thickness may be larger.
@@ -28,7 +28,7 @@ _REACH_MM = 6.0
 # Nearer than this two surfaces are the same one.
 _COINCIDES_MM = 0.05
 # Two segmentations cross where there is no cartilage; deeper, or more often, one of them is wrong.
-_DIPS_MM, _DIPS_SHARE = 0.5, 0.02
+_DIPS_MM, _DIPS_FRACTION = 0.5, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ def figures_of(bone: BoneModel) -> CartilageFigures | None:
     )
 
 
-def even_cartilage(bone: BoneModel, mean_mm: float, sd_mm: float) -> BoneModel:
+def make_even_cartilage(bone: BoneModel, mean_mm: float, sd_mm: float) -> BoneModel:
     """The bone with one thickness everywhere but where its surface ends.
 
     Raises:
@@ -97,12 +97,12 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
             subject=str(path),
             remedy="export the cartilage's outer surface, not its points",
         )
-    mesh = in_lps(mesh, header, path, warnings)
+    mesh = convert_to_lps(mesh, header, path, warnings)
     if not open_border(len(mesh.vertices_mm), mesh.faces).any() and mesh.volume_mm3() < 0.0:
         mesh = mesh.flipped()
         warnings.append(f"{bone.name}: normals of the cartilage pointed inwards and were turned")
     _check_place(bone, mesh, path)
-    distance = distance_above(bone.mesh, mesh, _REACH_MM)
+    distance = measure_distance_above(bone.mesh, mesh, _REACH_MM)
     _check_outside(bone, distance, path)
     thickness = np.where(distance > _COINCIDES_MM, distance, 0.0)
     covered = replace(
@@ -113,7 +113,9 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
     return ImportedSurface(covered, tuple(warnings))
 
 
-def distance_above(bone: TriangleMesh, surface: TriangleMesh, reach_mm: float) -> FloatArray:
+def measure_distance_above(
+    bone: TriangleMesh, surface: TriangleMesh, reach_mm: float
+) -> FloatArray:
     """(V,) distance from each vertex along its normal to the nearest triangle that looks outward.
 
     Negative beneath the bone; NaN where there is none within reach either way.
@@ -159,7 +161,7 @@ def _check_outside(bone: BoneModel, distance_mm: FloatArray, path: Path) -> None
     """Refuse a surface that is not the outer one of this bone's cartilage."""
     is_hit = np.isfinite(distance_mm)
     is_inside = is_hit & (distance_mm < -_DIPS_MM)
-    if is_inside.sum() > _DIPS_SHARE * is_hit.sum():
+    if is_inside.sum() > _DIPS_FRACTION * is_hit.sum():
         raise PlanError(
             f"cartilage {path} lies inside the {bone.name}, by up to "
             f"{-np.nanmin(distance_mm):.1f} mm",

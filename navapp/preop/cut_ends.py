@@ -1,4 +1,4 @@
-"""Where a bone's surface ends without the bone ending: flat caps of cut bones, open borders."""
+"""Finds where a bone's surface was cut: flat caps and open borders."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from navapp.values import BoneModel
 _CAP_MM2, _CAP_WIDTH_MM = 250.0, 12.0
 # From the highest to the lowest point of a cap's roughness; between a round surface (a half) and a
 # plane (all) of twice the layer.
-_LAYER_MM, _CAP_SHARE = 0.4, 0.7
+_LAYER_MM, _CAP_FRACTION = 0.4, 0.7
 # A shaft is cut across the leg's axis (the plan's z), less 45 deg: whatever is flat there is a cap.
 # Elsewhere a joint's facet may be as flat, which turns gently where a cut turns by a right angle:
 # mean cosine between the cap's normal and those within a few layers below it.
@@ -20,7 +20,7 @@ _ACROSS, _RIM_LAYERS, _RIM_COSINE = 0.7, 6.0, 0.65
 # Facets of the hull that are one: half a degree, a twentieth of a millimetre. The hull of a rough
 # cap has several.
 _SAME_FACET = np.array([0.01, 0.01, 0.01, 0.05])
-_FACET_SHARE = 0.1
+_FACET_FRACTION = 0.1
 # Open borders that are shorter are holes in a surface, not its end: 12 mm across.
 _SHORTEST_CUT_MM = 40.0
 
@@ -86,7 +86,9 @@ def on_cut_borders(mesh: TriangleMesh) -> NDArray[np.bool_]:
     return is_cut
 
 
-def whole_until_mm(along_mm: FloatArray, is_border: NDArray[np.bool_], from_mm: float) -> float:
+def find_whole_until_mm(
+    along_mm: FloatArray, is_border: NDArray[np.bool_], from_mm: float
+) -> float:
     """How far along a bone the slices across it are whole: to the cut, which may be oblique.
 
     Args:
@@ -113,7 +115,7 @@ def _hull_directions(mesh: TriangleMesh) -> FloatArray:
     _, group = np.unique(np.ravel_multi_index(steps.T, steps.max(axis=0) + 1), return_inverse=True)
     total = np.bincount(group, area)
     summed = [np.bincount(group, area * hull.equations[:, k]) for k in range(3)]
-    large = np.column_stack(summed)[total > _FACET_SHARE * _CAP_MM2]
+    large = np.column_stack(summed)[total > _FACET_FRACTION * _CAP_MM2]
     normals: FloatArray = large / np.linalg.norm(large, axis=1, keepdims=True)
     return normals
 
@@ -124,7 +126,7 @@ def _is_cap(mesh: TriangleMesh, areas: FloatArray, normal: FloatArray, depth: Fl
     of_face = depth[mesh.faces[near]].max(axis=1)
     layer, twice = near[of_face < _LAYER_MM], near[of_face < 2.0 * _LAYER_MM]
     flat_mm2 = areas[layer].sum()
-    if flat_mm2 <= max(_CAP_MM2, _CAP_SHARE * areas[twice].sum()):
+    if flat_mm2 <= max(_CAP_MM2, _CAP_FRACTION * areas[twice].sum()):
         return False
     corners = mesh.vertices_mm[mesh.faces[layer]]
     if _width_mm(corners, areas[layer]) <= _CAP_WIDTH_MM:

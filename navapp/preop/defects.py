@@ -1,4 +1,4 @@
-"""Painting damaged cartilage on a bone: which vertices lie within an outline, or near points."""
+"""Vertices of damaged cartilage: those within an outline, or near points."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
-from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
+from navapp.preop.cut_ends import find_whole_until_mm, on_cut_borders
+from navapp.preop.extreme_points import SURFACE_NOISE_MM, WORST_SD_MM, find_extreme
 from navapp.values import Landmark, Side
 
 # Levels above the lowest point of a femur, whose condyles are 75 to 95 mm wide.
@@ -19,7 +19,7 @@ _STRIP_MM = 2.0
 # The notch of a knee is 10 to 25 mm deep seen from behind and below.
 _LEAST_NOTCH_MM = 3.0
 # A shaft is less than this share of the condyles' width, for at least this length.
-_SHAFT_SHARE, _LEAST_SHAFT_MM, _SLICE_MM = 0.55, 25.0, 2.5
+_SHAFT_FRACTION, _LEAST_SHAFT_MM, _SLICE_MM = 0.55, 25.0, 2.5
 
 DOWN, BACK = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
 BEHIND_AND_BELOW = (DOWN + BACK) / np.sqrt(2.0)
@@ -28,7 +28,7 @@ ACROSS = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Condyles:
-    """The end of a femur, parted at its notch.
+    """A femur's vertices, which of them belong to a condyle, and the plane between the two.
 
     Attributes:
         vertices_mm: (V, 3) of the bone.
@@ -76,13 +76,13 @@ def condyles_of(femur: TriangleMesh) -> Condyles | None:
     return Condyles(vertices, on_cut_borders(femur), low, float(edges[notch]) + 0.5 * _STRIP_MM)
 
 
-def shaft_top_mm(femur: TriangleMesh) -> float:
+def find_shaft_top_mm(femur: TriangleMesh) -> float:
     """The height of the shaft's end, or of the lowest point of its cut."""
     height = femur.vertices_mm[:, 2]
-    return whole_until_mm(height, on_cut_borders(femur), height.min() + _CONDYLES_MM)
+    return find_whole_until_mm(height, on_cut_borders(femur), height.min() + _CONDYLES_MM)
 
 
-def femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
+def estimate_femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
     """What its surface allows: keyed `femur/name`; medial and lateral need the side.
 
     Args:
@@ -94,7 +94,7 @@ def femur_landmarks(femur: TriangleMesh, side: Side | None) -> dict[str, Landmar
     if condyles is not None:
         vertices = condyles.vertices_mm
         middle = np.abs(vertices[:, 0] - condyles.notch_x_mm) < 2.0 * _STRIP_MM
-        centre = extreme(vertices, condyles.is_border, middle & condyles.is_condyle, DOWN)
+        centre = find_extreme(vertices, condyles.is_border, middle & condyles.is_condyle, DOWN)
         if centre is not None and centre.sd_mm is not None:
             # The plane that parts the condyles is known to a strip.
             centre = replace(centre, sd_mm=float(np.hypot(centre.sd_mm, _STRIP_MM)))
@@ -109,7 +109,7 @@ def _of_both_sides(condyles: Condyles, medial: float) -> dict[str, Landmark | No
     vertices = condyles.vertices_mm
     above = vertices[:, 2] - vertices[:, 2].min()
     is_broad = (above > _EPICONDYLES_MM[0]) & (above < _EPICONDYLES_MM[1])
-    outermost = partial(extreme, vertices, condyles.is_border)
+    outermost = partial(find_extreme, vertices, condyles.is_border)
     found = {}
     for name, sign in (("medial", medial), ("lateral", -medial)):
         condyle = condyles.of_side(sign)
@@ -124,12 +124,12 @@ def _shaft_axis(femur: TriangleMesh) -> Iterator[tuple[str, Landmark]]:
     vertices = femur.vertices_mm
     if len(vertices) == 0:
         return
-    lowest, highest = vertices[:, 2].min(), shaft_top_mm(femur)
+    lowest, highest = vertices[:, 2].min(), find_shaft_top_mm(femur)
     widest = np.ptp(vertices[vertices[:, 2] < lowest + _CONDYLES_MM, 0])
     middles = []
     for level in np.arange(highest - _SLICE_MM, lowest + _CONDYLES_MM, -_SLICE_MM):
         piece = vertices[np.abs(vertices[:, 2] - level) < 0.5 * _SLICE_MM]
-        if len(piece) < 8 or np.ptp(piece[:, 0]) > _SHAFT_SHARE * widest:
+        if len(piece) < 8 or np.ptp(piece[:, 0]) > _SHAFT_FRACTION * widest:
             break
         middles.append(0.5 * (piece.min(axis=0) + piece.max(axis=0)))
     centres = np.array(middles).reshape(-1, 3)

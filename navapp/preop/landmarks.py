@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from navapp.preop.cut_ends import anatomy_of
-from navapp.preop.femur_landmarks import femur_landmarks
-from navapp.preop.tibia_landmarks import patella_landmarks, tibia_landmarks
+from navapp.preop.femur_landmarks import estimate_femur_landmarks
+from navapp.preop.tibia_landmarks import estimate_patella_landmarks, estimate_tibia_landmarks
 from navapp.values import BoneModel, Landmark
 
 
@@ -15,9 +15,9 @@ def estimate_landmarks(bones: Mapping[str, BoneModel]) -> dict[str, Landmark]:
     """
     found: dict[str, Landmark] = {}
     if "femur" in bones:
-        found |= femur_landmarks(anatomy_of(bones["femur"]), bones["femur"].side)
+        found |= estimate_femur_landmarks(anatomy_of(bones["femur"]), bones["femur"].side)
     if "tibia" in bones:
-        found |= tibia_landmarks(anatomy_of(bones["tibia"]), bones["tibia"].side)
+        found |= estimate_tibia_landmarks(anatomy_of(bones["tibia"]), bones["tibia"].side)
     if "patella" in bones:
-        found |= patella_landmarks(anatomy_of(bones["patella"]))
+        found |= estimate_patella_landmarks(anatomy_of(bones["patella"]))
     return found

@@ -52,9 +52,9 @@ def read_markup_file(path: str | Path, warnings: list[str]) -> list[Markup]:
         entries = content["markups"]
         return [_markup(entry, path, warnings) for entry in entries]
     except (OSError, UnicodeDecodeError) as error:
-        raise _refused(path, "cannot be read", str(error)) from error
+        raise _make_error(path, "cannot be read", str(error)) from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise _refused(
+        raise _make_error(
             path, f"is no markups file ({error})", "save it anew in 3D Slicer"
         ) from error
 
@@ -65,10 +65,10 @@ def _markup(entry: dict[str, Any], path: Path, warnings: list[str]) -> Markup:
     name = str(entry.get("name") or stem)
     unit = entry.get("coordinateUnits", "mm")
     if unit != "mm":
-        raise _refused(path, f"measures '{name}' in {unit}", "export it in mm")
+        raise _make_error(path, f"measures '{name}' in {unit}", "export it in mm")
     space = _SPACES.get(str(entry.get("coordinateSystem", "LPS")).upper())
     if space is None:
-        raise _refused(
+        raise _make_error(
             path,
             f"holds '{name}' in the space {entry['coordinateSystem']}",
             "export it in LPS or RAS",
@@ -102,5 +102,5 @@ def _vector(values: Any) -> FloatArray:
     return vector
 
 
-def _refused(path: Path, what: str, remedy: str) -> PlanError:
+def _make_error(path: Path, what: str, remedy: str) -> PlanError:
     return PlanError(f"markups {path} {what}", subject=str(path), remedy=remedy)

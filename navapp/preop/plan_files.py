@@ -1,4 +1,4 @@
-"""Plan folders: plan.json, one PLY a bone, a picture of each."""
+"""Reads and writes plan folders: plan.json, a PLY file and a picture per bone."""
 
 import hashlib
 import json
@@ -17,12 +17,12 @@ from navapp.errors import InputError, PlanError
 from navapp.geometry.transform import FloatArray
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.bone_files import read_bone, write_bone
-from navapp.preop.content_files import content_from_json, content_to_json
-from navapp.preop.intact import damaged, sha256_of
+from navapp.preop.bone_preview import draw_preview
+from navapp.preop.plan_content_json import content_from_json, content_to_json
+from navapp.preop.plan_integrity import make_damage_error, sha256_of
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
-from navapp.preop.preview import draw_preview
+from navapp.preop.plan_summary import make_summary_page
 from navapp.preop.slices import Picture
-from navapp.preop.summary import summary_page
 from navapp.values import AspectGraph, BoneModel, Plan, SurgicalContent
 
 _FILE = "plan.json"
@@ -123,7 +123,7 @@ def read_plan(folder: str | Path) -> Plan:
     ) as error:
         if isinstance(error, PlanError):
             raise
-        raise damaged(folder, str(error)) from error
+        raise make_damage_error(folder, str(error)) from error
     if not bones:
         raise PlanError(
             f"plan {folder} is empty: it has no bone",
@@ -131,7 +131,7 @@ def read_plan(folder: str | Path) -> Plan:
             remedy="make it again with `navapp plan`",
         )
     if plan.digest != content.get("hash"):
-        raise damaged(folder, "its content does not match its hash")
+        raise make_damage_error(folder, "its content does not match its hash")
     return plan
 
 
@@ -146,7 +146,7 @@ def read_origin(folder: str | Path) -> PlanOrigin:
         content = _read_content(folder)
         return origin_from_json(content["origin"]) if "origin" in content else PlanOrigin()
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise damaged(folder, str(error)) from error
+        raise make_damage_error(folder, str(error)) from error
 
 
 def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGraph]:
@@ -156,7 +156,7 @@ def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGra
             continue
         path = folder / f"aspects_{name}.npz"
         if not path.is_file() or sha256_of(path) != entry["aspects_sha256"]:
-            raise damaged(folder, f"{path.name} is missing or was changed")
+            raise make_damage_error(folder, f"{path.name} is missing or was changed")
         aspects[name] = read_aspects(path)
     return aspects
 
@@ -170,7 +170,7 @@ def _read_content(folder: Path) -> dict[str, Any]:
             remedy="make it again with `navapp plan`",
         )
     if "file_hash" in content and content["file_hash"] != _hash_of(content):
-        raise damaged(folder, f"{_FILE} was edited")
+        raise make_damage_error(folder, f"{_FILE} was edited")
     return content
 
 
@@ -206,7 +206,7 @@ def _write_content(
     }
     content["file_hash"] = _hash_of(content)
     (folder / _FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
-    page = summary_page(plan, origin, folder)
+    page = make_summary_page(plan, origin, folder)
     (folder / "summary.html").write_text(page, encoding="utf-8")
 
 
@@ -249,9 +249,9 @@ def _put_in_place(temporary: Path, folder: Path) -> None:
 def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
     path = folder / entry["file"]
     if not path.is_file():
-        raise damaged(folder, f"{entry['file']} is missing")
+        raise make_damage_error(folder, f"{entry['file']} is missing")
     if sha256_of(path) != entry["sha256"]:
-        raise damaged(folder, f"{entry['file']} was changed or cut short")
+        raise make_damage_error(folder, f"{entry['file']} was changed or cut short")
     mesh, cartilage_mm, cartilage_sd_mm = read_bone(path)
     is_removed = np.zeros(len(mesh.vertices_mm), dtype=bool)
     is_removed[np.array(entry["removed"], dtype=np.intp)] = True

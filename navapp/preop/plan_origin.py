@@ -1,4 +1,4 @@
-"""Where a plan's surfaces come from: what a person needs in order to trust them."""
+"""Where a plan's surfaces come from: facts for people, without the patient's identity."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field

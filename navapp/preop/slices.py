@@ -1,4 +1,4 @@
-"""Slices of a volume with the contour of a surface in them: the eye judges a segmentation."""
+"""Draws slices of a volume with a surface's contour, to check a segmentation by eye."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ def _slice(
     picture = cv2.cvtColor(
         cv2.resize(grey, (width, _HEIGHT_PX), interpolation=cv2.INTER_LINEAR), cv2.COLOR_GRAY2BGR
     )
-    ends = contour(indices, mesh.faces, axis, position)[..., [across, down]]
+    ends = cut_contour(indices, mesh.faces, axis, position)[..., [across, down]]
     # A voxel's middle lies half a voxel inside its enlarged square.
     pixels = np.rint(((ends - lower + 0.5) * steps - 0.5) * 2**_SHIFT).astype(np.int32)
     cv2.polylines(picture, list(pixels), False, _CONTOUR, 1, cv2.LINE_AA, _SHIFT)
@@ -70,7 +70,9 @@ def _grey(volume: CtVolume | LabelVolume, plane: NDArray[np.generic]) -> NDArray
     return grey
 
 
-def contour(points: FloatArray, faces: NDArray[np.int32], axis: int, position: float) -> FloatArray:
+def cut_contour(
+    points: FloatArray, faces: NDArray[np.int32], axis: int, position: float
+) -> FloatArray:
     """(S, 2, 3) segments in which triangles cross the plane `points[:, axis] == position`."""
     height = points[:, axis] - position
     # A vertex in the plane counts as above it: every triangle then crosses in two edges or none.

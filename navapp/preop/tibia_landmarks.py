@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.cut_ends import on_cut_borders, whole_until_mm
-from navapp.preop.extremes import SURFACE_NOISE_MM, WORST_SD_MM, extreme
+from navapp.preop.cut_ends import find_whole_until_mm, on_cut_borders
+from navapp.preop.extreme_points import SURFACE_NOISE_MM, WORST_SD_MM, find_extreme
 from navapp.values import Landmark, Side
 
 # Levels below the top of the eminence at which a tibia is as broad as its plateau.
@@ -52,7 +52,7 @@ class TibialEnd:
         return looks_up
 
 
-def tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
+def find_tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
     """The upper end; None when it is not there.
 
     Args:
@@ -76,9 +76,9 @@ def tibial_end(tibia: TriangleMesh) -> TibialEnd | None:
 def tubercle_of(end: TibialEnd) -> Landmark | None:
     """The foremost point below the plateau; None when it is foremost only where the search ends."""
     below = end.below_top_mm
-    whole_mm = whole_until_mm(below, end.is_border, _TUBERCLE_MM[0])
+    whole_mm = find_whole_until_mm(below, end.is_border, _TUBERCLE_MM[0])
     is_level = (below > _TUBERCLE_MM[0]) & (below < min(_TUBERCLE_MM[1], whole_mm))
-    found = extreme(end.vertices_mm, end.is_border, is_level, np.array([0.0, -1.0, 0.0]))
+    found = find_extreme(end.vertices_mm, end.is_border, is_level, np.array([0.0, -1.0, 0.0]))
     if found is None:
         return None
     depth_mm = float(end.vertices_mm[:, 2].max() - found.point_mm[2])
@@ -86,14 +86,14 @@ def tubercle_of(end: TibialEnd) -> Landmark | None:
     return None if is_at_end else found
 
 
-def tibia_landmarks(tibia: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
+def estimate_tibia_landmarks(tibia: TriangleMesh, side: Side | None) -> dict[str, Landmark]:
     """What its surface allows: keyed `tibia/name`; medial and lateral need the side.
 
     Args:
         tibia: without caps (`anatomy_of`), open where it was cut.
         side: None when it is not known.
     """
-    end = tibial_end(tibia)
+    end = find_tibial_end(tibia)
     if end is None or end.middle_sd_mm > WORST_SD_MM or not end.is_plateau.any():
         return {}
     found: dict[str, Landmark | None] = {"tubercle": tubercle_of(end)}
@@ -127,7 +127,7 @@ def _plateau(end: TibialEnd, sign: float) -> Landmark | None:
     return Landmark(point, float(np.hypot(spread, end.middle_sd_mm)), "surface")
 
 
-def patella_landmarks(patella: TriangleMesh) -> dict[str, Landmark]:
+def estimate_patella_landmarks(patella: TriangleMesh) -> dict[str, Landmark]:
     """Its centre of volume; nothing when it was cut.
 
     Args:

@@ -17,7 +17,7 @@ from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface
 from navapp.stereo.subpixel.refine import refine_on_model, without_specks
 from navapp.stereo.subpixel.refine_scene import refine_scene
-from navapp.values import DisparityMap, LineTimings
+from navapp.values import DisparityMap, FrameTimings
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
@@ -41,7 +41,7 @@ class StereoAnswer:
     disparity: DisparityMap
     matched: DisparityMap
     reasons: tuple[str, ...]
-    timings: LineTimings
+    timings: FrameTimings
 
 
 def match_scene(
@@ -114,7 +114,7 @@ def match_on_support(
     if np.isfinite(support_px).any() and not (left.origin > 0).any():
         return _nothing(pair, _NOT_CONFIRMED, started)
     if not fills:
-        return StereoAnswer(left, left, (), LineTimings(stereo_ms=_ms(started)))
+        return StereoAnswer(left, left, (), FrameTimings(stereo_ms=_ms(started)))
     # What the right camera sees of the support is all that is known of its view.
     right_px = seen_from_right(support_px, left.x, pair.geometry.width)
     evidence = Evidence(right_px, 0, _by_sigma(left))
@@ -133,7 +133,7 @@ def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoA
         return _nothing(pair, _NO_CONTRAST, started)
     if in_patches < _LEAST_IN_PATCHES * matched.matched_share:
         return _nothing(pair, _DISAGREEMENT, started)
-    return StereoAnswer(matched, matched, (), LineTimings(stereo_ms=_ms(started)))
+    return StereoAnswer(matched, matched, (), FrameTimings(stereo_ms=_ms(started)))
 
 
 def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) -> StereoAnswer:
@@ -168,7 +168,7 @@ def _answer(
     is_expected: NDArray[np.bool_] | None = None,
 ) -> StereoAnswer:
     """The answer, its occlusions filled where that is wanted and a surface is expected."""
-    timings = LineTimings(stereo_ms=_ms(started_ns))
+    timings = FrameTimings(stereo_ms=_ms(started_ns))
     if fill is None:
         return StereoAnswer(left, left, (), timings)
     started_ns = time.perf_counter_ns()
@@ -202,7 +202,7 @@ def _nothing(pair: RectifiedPair, why: str, started_ns: int) -> StereoAnswer:
     box = pair.box
     unknown = np.full((box.height, box.width), np.nan, dtype=np.float32)
     nothing = DisparityMap(unknown, unknown, np.zeros(unknown.shape, np.uint8), box.x, box.y)
-    return StereoAnswer(nothing, nothing, (why,), LineTimings(stereo_ms=_ms(started_ns)))
+    return StereoAnswer(nothing, nothing, (why,), FrameTimings(stereo_ms=_ms(started_ns)))
 
 
 def _box_of(pair: RectifiedPair) -> NDArray[np.uint8]:

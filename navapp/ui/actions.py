@@ -139,7 +139,7 @@ ACTIONS: tuple[Action, ...] = (
         "accept",
         "accept the candidate under review",
         is_acceptable,
-        lambda _: Accept(),
+        lambda snapshot: Accept(snapshot.candidate_id),
         slot="accept",
     ),
     Action(
@@ -148,7 +148,7 @@ ACTIONS: tuple[Action, ...] = (
         "reject",
         "reject the candidate under review",
         lambda snapshot: snapshot.is_candidate,
-        lambda _: Reject(),
+        lambda snapshot: Reject(snapshot.candidate_id),
         slot="reject",
     ),
     Action(

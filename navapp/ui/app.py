@@ -20,7 +20,7 @@ from navapp.ui.palette import ActionProvider
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
-from navapp.ui.symbols import UNICODE, Symbols, symbols_for
+from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
 from navapp.ui.theme import NAVAPP_THEME
 from navapp.ui.view import View
@@ -180,7 +180,7 @@ def run_app(session: Session, log_path: Path, title: str = "navapp") -> int:
     failure: Exception | None = None
     try:
         with own_terminal(log_path):
-            symbols = symbols_for(getattr(sys.__stdout__, "encoding", None), os.environ)
+            symbols = choose_symbols(getattr(sys.__stdout__, "encoding", None), os.environ)
             app = NavigationApp(session, title, symbols=symbols)
             code = asyncio.run(drive(app))
             failure = app.failure

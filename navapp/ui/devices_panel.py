@@ -1,11 +1,11 @@
-"""The devices panel: each device's health, troubles first where there is little room."""
+"""The devices panel: each device's health; those in trouble come first where space is short."""
 
 from textual.content import Content
 
 from navapp.control.states import DeviceHealth, DeviceLine
 from navapp.ui.gauges import cut
 from navapp.ui.text_view import TextView
-from navapp.ui.view import View, health_level
+from navapp.ui.view import View, choose_health_level
 
 _TROUBLES = (DeviceHealth.LOST, DeviceHealth.TROUBLE)
 
@@ -21,7 +21,7 @@ class DevicesPanel(TextView):
         """Fits any height; what does not fit is counted."""
         devices = sorted(view.snapshot.devices, key=lambda device: device.health not in _TROUBLES)
         if len(devices) <= height:
-            return [device_line(view, device, width) for device in devices]
+            return [format_device_line(view, device, width) for device in devices]
         troubles = [device for device in devices if device.health in _TROUBLES]
         if not troubles:
             if len(devices) > 2 * height:
@@ -29,16 +29,16 @@ class DevicesPanel(TextView):
                 devices.sort(key=lambda device: device.health is DeviceHealth.ABSENT)
             return _in_pairs(view, devices[: 2 * height], width)
         shown = troubles[: max(height - 1, 1)]
-        lines = [device_line(view, device, width) for device in shown]
+        lines = [format_device_line(view, device, width) for device in shown]
         rest = len(devices) - len(shown)
         left = len(troubles) - len(shown)
         note = f"and {left} more in trouble" if left else f"{rest} others without trouble"
         return [*lines, Content.styled(cut(note, width, view.symbols), "$text-muted")]
 
 
-def device_line(view: View, device: DeviceLine, width: int) -> Content:
+def format_device_line(view: View, device: DeviceLine, width: int) -> Content:
     """Symbol, kind and health; name and detail as far as they fit."""
-    level = health_level(device.health)
+    level = choose_health_level(device.health)
     word = device.health.value
     shown = word.upper() if device.health in _TROUBLES else word
     head = f"{level.mark(view.symbols)} {cut(device.kind, 10, view.symbols):<10} {shown:<8}"
@@ -50,7 +50,7 @@ def _in_pairs(view: View, devices: list[DeviceLine], width: int) -> list[Content
     half = width // 2
     cells = []
     for device in devices:
-        level = health_level(device.health)
+        level = choose_health_level(device.health)
         name = cut(device.kind, half - 3, view.symbols).ljust(half - 2)
         style = "$foreground" if device.health is DeviceHealth.OK else "$text-muted"
         cells.append(Content.assemble((f"{level.mark(view.symbols)} ", level.value), (name, style)))

@@ -5,13 +5,13 @@ from textual.content import Content
 from navapp.control.states import Event, EventLevel
 from navapp.ui.gauges import cut
 from navapp.ui.text_view import TextView
-from navapp.ui.view import Level, View, event_level
+from navapp.ui.view import Level, View, choose_event_level
 
 _WORDS = {EventLevel.INFO: "", EventLevel.WARNING: "WARNING ", EventLevel.ALARM: "ALARM "}
 
 
 class EventList(TextView):
-    """As many as there are lines."""
+    """The newest events, as many as fit."""
 
     def __init__(self) -> None:
         super().__init__("events")
@@ -19,12 +19,12 @@ class EventList(TextView):
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """One line an event."""
         newest = view.snapshot.events[::-1][:height]
-        return [event_line(view, event, width) for event in newest]
+        return [format_event_line(view, event, width) for event in newest]
 
 
-def event_line(view: View, event: Event, width: int) -> Content:
+def format_event_line(view: View, event: Event, width: int) -> Content:
     """Time since the session's start, symbol, word and text."""
-    level = event_level(event.level)
+    level = choose_event_level(event.level)
     is_quiet = level is Level.QUIET
     mark = " " if is_quiet else level.mark(view.symbols)
     style = "$foreground" if is_quiet else level.value

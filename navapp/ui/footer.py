@@ -10,7 +10,7 @@ _WIDE = 110
 
 
 class KeyFooter(TextView):
-    """Every key keeps its place."""
+    """The keys at fixed places; those that cannot be used now are dimmed."""
 
     def __init__(self) -> None:
         super().__init__("footer")

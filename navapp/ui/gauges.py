@@ -1,4 +1,4 @@
-"""Numbers of fixed width, bars with their limit drawn in, sparklines: text only."""
+"""Text gauges: numbers of fixed width, bars with a limit, sparklines."""
 
 import math
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class Number(Enum):
         return f"{min(max(value, 0.0), largest):{width}.{decimals}f}"
 
 
-def bar(value: float | None, limit: float, width: int, symbols: Symbols) -> str:
+def draw_bar(value: float | None, limit: float, width: int, symbols: Symbols) -> str:
     """A bar of `width` cells with the limit at four fifths; an arrow ends it beyond its end."""
     inner = max(width - 2, 2)
     end = limit * _BAR_END
@@ -43,7 +43,7 @@ def bar(value: float | None, limit: float, width: int, symbols: Symbols) -> str:
     return symbols.bar_left + "".join(cells) + symbols.bar_right
 
 
-def share_bar(share: float, width: int, symbols: Symbols) -> str:
+def draw_fraction_bar(share: float, width: int, symbols: Symbols) -> str:
     """A bar of `width` cells for work that is done to this share."""
     inner = max(width - 2, 1)
     filled = round(inner * min(max(share, 0.0), 1.0))
@@ -51,7 +51,7 @@ def share_bar(share: float, width: int, symbols: Symbols) -> str:
     return symbols.bar_left + cells + symbols.bar_right
 
 
-def sparkline(values: Sequence[float], width: int, symbols: Symbols) -> str:
+def draw_sparkline(values: Sequence[float], width: int, symbols: Symbols) -> str:
     """The newest values on a scale from zero, newest at the right, `width` cells."""
     newest = [value for value in values[-width:] if math.isfinite(value)] if width > 0 else []
     top = _HEADROOM * max(newest, default=0.0)

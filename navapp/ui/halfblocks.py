@@ -1,4 +1,4 @@
-"""A picture as terminal cells: two pixels a cell, few colours, long runs."""
+"""Converts a picture to terminal cells of two pixels each."""
 
 from functools import lru_cache
 
@@ -31,13 +31,13 @@ def _mean_over_parts(picture: FloatArray, n_parts: int) -> FloatArray:
     return means
 
 
-def area_resized(picture: NDArray[np.uint8], height: int, width: int) -> FloatArray:
+def resize_by_area(picture: NDArray[np.uint8], height: int, width: int) -> FloatArray:
     """(height, width, 3): every output pixel is the mean over its area of (h, w, 3) input."""
     rows = _mean_over_parts(picture.astype(np.float64), height)
     return _mean_over_parts(rows.swapaxes(0, 1), width).swapaxes(0, 1)
 
 
-def fitted_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[int, int]:
+def fit_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[int, int]:
     """Width in columns and height in half rows of the largest picture that fits, height even."""
     h, w = picture.shape[:2]
     scale = min(columns / w, 2 * rows / h)
@@ -46,7 +46,7 @@ def fitted_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[in
     return width, height
 
 
-def cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.int32]:
+def compute_cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.int32]:
     """Colours of (rows, columns) cells: upper half in bits 12 to 23, lower in bits 0 to 11.
 
     Args:
@@ -54,8 +54,8 @@ def cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[n
         columns: of cells, at least 1.
         rows: of cells, at least 1.
     """
-    width, height = fitted_size(picture, columns, rows)
-    levels = np.rint(area_resized(picture, height, width) * (_LEVELS / 255.0)).astype(np.int32)
+    width, height = fit_size(picture, columns, rows)
+    levels = np.rint(resize_by_area(picture, height, width) * (_LEVELS / 255.0)).astype(np.int32)
     colours = (levels[:, :, 2] << 8) | (levels[:, :, 1] << 4) | levels[:, :, 0]
     canvas = np.zeros((2 * rows, columns), dtype=np.int32)
     top, left = 2 * ((2 * rows - height) // 4), (columns - width) // 2
@@ -85,7 +85,7 @@ def _ramp_cell(code: int, ramp: str) -> tuple[str, Style]:
     return ramp[round(brightness * (len(ramp) - 1))], Style(color=colour, bgcolor=_colour(0))
 
 
-def row_strip(codes: NDArray[np.int32], ramp: str = "") -> Strip:
+def make_row_strip(codes: NDArray[np.int32], ramp: str = "") -> Strip:
     """One row of cells: a segment per run of equal cells."""
     starts = np.flatnonzero(np.diff(codes, prepend=codes[0] - 1))
     lengths = np.diff(starts, append=len(codes))

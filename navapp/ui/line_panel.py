@@ -1,8 +1,8 @@
-"""The line panel: how fast, how late, how much was dropped."""
+"""The line panel: frame rate, latency, dropped frames and skew."""
 
 from textual.content import Content
 
-from navapp.ui.gauges import Number, sparkline
+from navapp.ui.gauges import Number, draw_sparkline
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
 
@@ -24,12 +24,12 @@ class LinePanel(TextView):
             Content.assemble(
                 Number.RATE.text(rates.frames_per_s),
                 (" fps ", "$text-muted"),
-                (sparkline(rates.fps_history, room, symbols), "$secondary"),
+                (draw_sparkline(rates.fps_history, room, symbols), "$secondary"),
             ),
             Content.assemble(
                 Number.RATE.text(rates.latency_ms),
                 (" ms  ", "$text-muted"),
-                (sparkline(rates.latency_history_ms, room, symbols), "$secondary"),
+                (draw_sparkline(rates.latency_history_ms, room, symbols), "$secondary"),
             ),
             Content.assemble(
                 ("drops ", "$text-muted"),

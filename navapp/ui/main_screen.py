@@ -9,7 +9,7 @@ from navapp.ui.event_list import EventList
 from navapp.ui.footer import KeyFooter
 from navapp.ui.line_panel import LinePanel
 from navapp.ui.picture_view import NOTICE, PictureView
-from navapp.ui.pose_panel import PosePanel, navigable_line, reason_lines
+from navapp.ui.pose_panel import PosePanel, format_navigable_line, format_reason_lines
 from navapp.ui.screens import ViewScreen
 from navapp.ui.stepper import StageStepper
 from navapp.ui.text_view import TextView
@@ -27,8 +27,8 @@ class SmallNotice(TextView):
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """Most important line first."""
         return [
-            navigable_line(view, width),
-            *reason_lines(view, width),
+            format_navigable_line(view, width),
+            *format_reason_lines(view, width),
             Content(f"{'sim, ' if view.snapshot.is_simulated else ''}{_stage_and_state(view)}"),
             Content.assemble(("SPACE", "bold $primary"), " blank"),
             Content.styled("make the terminal 80 x 24", "$text-muted"),

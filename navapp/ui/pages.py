@@ -1,4 +1,4 @@
-"""The pages over the main screen: help, devices, events, and the question before quitting."""
+"""Pages over the main screen: help, devices, events, and the question before quitting."""
 
 import dataclasses
 import textwrap
@@ -12,8 +12,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Static
 
 from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
-from navapp.ui.devices_panel import device_line
-from navapp.ui.event_list import event_line
+from navapp.ui.devices_panel import format_device_line
+from navapp.ui.event_list import format_event_line
 from navapp.ui.picture_view import NOTICE
 from navapp.ui.screens import PageScreen, ViewScreen
 from navapp.ui.text_view import TextView
@@ -83,7 +83,7 @@ class DeviceDetails(TextView):
         """A line a device, what it says below."""
         lines = []
         for device in view.snapshot.devices:
-            lines.append(device_line(view, dataclasses.replace(device, detail=""), width))
+            lines.append(format_device_line(view, dataclasses.replace(device, detail=""), width))
             said = textwrap.wrap(device.detail, max(width - 2, 1)) or [""]
             lines += [Content(f"  {line}") for line in said]
         return lines or [Content("no devices")]
@@ -126,7 +126,7 @@ class EventsPage(PageScreen):
         events = self.query_one("#all-events", Static)
         if is_new or not events.content:
             width = max(self.size.width - 4, 20)
-            lines = [event_line(view, event, width) for event in view.snapshot.events[::-1]]
+            lines = [format_event_line(view, event, width) for event in view.snapshot.events[::-1]]
             events.update(Content("\n").join(lines or [Content(" nothing happened yet")]))
 
 

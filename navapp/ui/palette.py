@@ -9,7 +9,7 @@ from navapp.ui.screens import ViewScreen
 
 
 class ActionProvider(Provider):
-    """Offers what can be done now."""
+    """Offers the actions that are possible now."""
 
     def _possible(self) -> list[Action]:
         screen = self.screen

@@ -8,7 +8,7 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
-from navapp.ui.halfblocks import cell_codes, row_strip
+from navapp.ui.halfblocks import compute_cell_codes, make_row_strip
 from navapp.ui.view import Level, View
 
 _WAITING = "waiting for the first picture"
@@ -43,15 +43,15 @@ class HalfBlocks(Widget):
             self._strips, self._codes = [], np.empty((0, 0), dtype=np.int32)
             self.refresh()
             return
-        codes = cell_codes(preview, columns, rows)
+        codes = compute_cell_codes(preview, columns, rows)
         if codes.shape != self._codes.shape or not self._strips:
-            self._strips = [row_strip(row, self._ramp) for row in codes]
+            self._strips = [make_row_strip(row, self._ramp) for row in codes]
             self._codes = codes
             self.refresh()
             return
         changed = np.flatnonzero((codes != self._codes).any(axis=1)).tolist()
         for y in changed:
-            self._strips[y] = row_strip(codes[y], self._ramp)
+            self._strips[y] = make_row_strip(codes[y], self._ramp)
         self._codes = codes
         if changed:
             self.refresh(*(Region(0, y, columns, 1) for y in changed))

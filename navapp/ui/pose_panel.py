@@ -1,4 +1,4 @@
-"""The pose panel: may guides be shown, and if not, why and what to do."""
+"""The pose panel: whether guides may be shown; if not, the reason and a remedy."""
 
 import textwrap
 
@@ -7,7 +7,7 @@ from textual.content import Content
 from navapp.control.interlocks import is_current
 from navapp.control.states import OtherBone, Snapshot
 from navapp.ui.actions import is_acceptable
-from navapp.ui.gauges import Number, bar
+from navapp.ui.gauges import Number, draw_bar
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 from navapp.values import Status
@@ -23,7 +23,7 @@ _STATUS_LEVELS = {
 
 
 class PosePanel(TextView):
-    """First line: navigable, yes or no. Last lines: the error. Between: figures, or the reason.
+    """Whether guides may be shown, figures or the reason, and the error against its limit.
 
     Above the error a line for each other bone that is followed: rms figures make room for them, a
     reason or a question to the operator does not.
@@ -52,11 +52,11 @@ class PosePanel(TextView):
         others = others[: room - len(needed)]
         more = more[: room - len(needed) - len(others)]
         free = [Content("")] * (room - len(needed) - len(more) - len(others))
-        above = [navigable_line(view, width), *needed, *more, *free]
+        above = [format_navigable_line(view, width), *needed, *more, *free]
         return [*above, *others, *_error(view, width)]
 
 
-def navigable_line(view: View, width: int) -> Content:
+def format_navigable_line(view: View, width: int) -> Content:
     """The filled line that says yes or no."""
     word = "yes" if view.is_navigable else "NO"
     more = len(view.snapshot.reasons) - 1
@@ -69,7 +69,7 @@ def navigable_line(view: View, width: int) -> Content:
     return Content.styled(f"{text}{hint.rjust(width - len(text) - 1)} "[:width], view.level.band)
 
 
-def reason_lines(view: View, width: int) -> list[Content]:
+def format_reason_lines(view: View, width: int) -> list[Content]:
     """The first reason and its remedy, wrapped, with a free column at the right."""
     problem, remedy = view.reason
     room = max(width - 1, 1)
@@ -89,13 +89,13 @@ def _other_reasons(view: View, width: int) -> list[Content]:
 def _middle(view: View, width: int) -> tuple[list[Content], list[Content]]:
     """What must be read, and what may be left out."""
     if not view.is_navigable:
-        return reason_lines(view, width), _other_reasons(view, width)
+        return format_reason_lines(view, width), _other_reasons(view, width)
     snapshot = view.snapshot
     needed = [
         Content(""),
         _figure("age", Number.WHOLE, snapshot.pose_age_ms, "ms"),
-        _figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"),
-        _figure("occluded", Number.WHOLE, _occluded_percent(snapshot), "%"),
+        _figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"),
+        _figure("occluded", Number.WHOLE, _compute_occluded_percent(snapshot), "%"),
     ]
     return needed, _fit(snapshot)
 
@@ -128,7 +128,7 @@ def _candidate(view: View, width: int) -> list[Content]:
     status = Status.LOST if verdict is None else verdict.status
     level = _STATUS_LEVELS[status]
     lines = [Content.styled(f"{level.mark(view.symbols)} judged {status.value}", level.value)]
-    figures = [_figure("seen", Number.WHOLE, _seen_percent(snapshot), "%"), *_fit(snapshot)]
+    figures = [_figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"), *_fit(snapshot)]
     accept = ("a", "bold $foreground"), " accept   "
     asks = [
         Content.assemble(*(accept if is_acceptable(snapshot) else ()), ("r", "bold"), " reject")
@@ -156,11 +156,11 @@ def _figure(name: str, number: Number, value: float | None, unit: str) -> Conten
     )
 
 
-def _seen_percent(snapshot: Snapshot) -> float | None:
+def _compute_seen_percent(snapshot: Snapshot) -> float | None:
     return None if snapshot.verdict is None else 100.0 * snapshot.verdict.coverage
 
 
-def _occluded_percent(snapshot: Snapshot) -> float | None:
+def _compute_occluded_percent(snapshot: Snapshot) -> float | None:
     return None if snapshot.verdict is None else 100.0 * snapshot.verdict.occluded_share
 
 
@@ -181,7 +181,7 @@ def _error(view: View, width: int) -> list[Content]:
             ("  over" if is_over else "", style),
         ),
         Content.assemble(
-            (bar(error, tolerance, max(width - 5, 4), view.symbols), bar_style),
+            (draw_bar(error, tolerance, max(width - 5, 4), view.symbols), bar_style),
             (f"{tolerance:5.2f}", "$text-muted"),
         ),
     ]

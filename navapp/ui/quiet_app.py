@@ -1,4 +1,4 @@
-"""An application that ends in one sentence, never in a traceback on the screen."""
+"""An application that ends with a one-sentence error instead of a traceback."""
 
 import asyncio
 import signal
@@ -11,7 +11,7 @@ from navapp.errors import NavappError
 
 
 class QuietApp(App[int]):
-    """Keeps what ends it instead of drawing it.
+    """An application that stores a fatal error instead of drawing its traceback.
 
     Attributes:
         failure: what ended it, or None.

@@ -1,4 +1,4 @@
-"""What the screen needs of a session that runs elsewhere."""
+"""The interface of a session that the screen uses."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""The five stages in a row, and what the present one asks for."""
+"""The row of the five stages, with gates and measurements of the current one."""
 
 from textual.content import Content
 
@@ -25,8 +25,8 @@ class StageStepper(TextView):
             return [row]
         return [
             row,
-            _named("before the next stage", stage.gates, view, width),
-            _named("measured here", stage.measurements, view, width),
+            _format_row("before the next stage", stage.gates, view, width),
+            _format_row("measured here", stage.measurements, view, width),
         ]
 
 
@@ -45,6 +45,6 @@ def _step(stage: StageSpec, *, is_present: bool) -> tuple[str, str]:
     return f"{stage.number} {name}", "bold $primary" if is_present else "$text-muted"
 
 
-def _named(name: str, items: tuple[str, ...], view: View, width: int) -> Content:
+def _format_row(name: str, items: tuple[str, ...], view: View, width: int) -> Content:
     text = f" {view.symbols.dot} ".join(items) or "nothing"
     return Content.assemble((f" {name:<22} ", "$text-muted"), cut(text, width - 25, view.symbols))

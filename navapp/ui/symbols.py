@@ -78,7 +78,7 @@ ASCII = Symbols(
 )
 
 
-def symbols_for(encoding: str | None, environment: Mapping[str, str]) -> Symbols:
+def choose_symbols(encoding: str | None, environment: Mapping[str, str]) -> Symbols:
     """The set that a terminal can draw.
 
     Python reports UTF-8 in the C locale too, so a locale set to C or POSIX by name counts more.

@@ -1,4 +1,4 @@
-"""The terminal belongs to the screen: what libraries print goes to a log."""
+"""Takes over the terminal for the screen; output of libraries goes to a log."""
 
 import contextlib
 import os
@@ -24,7 +24,7 @@ def own_terminal(log_path: Path) -> Iterator[None]:
         raise UsageError(
             "the operator's screen needs a terminal", remedy="start it in one, or add --headless"
         )
-    log = _opened(log_path)
+    log = _open_log(log_path)
     sys.stdout.flush()
     sys.stderr.flush()
     saved = os.dup(1), os.dup(2)
@@ -51,7 +51,7 @@ def own_terminal(log_path: Path) -> Iterator[None]:
             os.close(descriptor)
 
 
-def _opened(log_path: Path) -> int:
+def _open_log(log_path: Path) -> int:
     try:
         log_path.parent.mkdir(parents=True, exist_ok=True)
         return os.open(log_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)

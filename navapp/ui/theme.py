@@ -1,4 +1,4 @@
-"""The colours: calm and dark; green, amber and red differ in brightness too."""
+"""The colour theme: dark; green, amber and red also differ in brightness."""
 
 from textual.theme import Theme
 

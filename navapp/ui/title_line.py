@@ -1,4 +1,4 @@
-"""The title line: what runs, on what, and in which state."""
+"""The title line: session, plan and state."""
 
 from textual.content import Content
 

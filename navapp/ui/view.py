@@ -1,4 +1,4 @@
-"""What a snapshot means to the operator: words, symbols and levels, without any widget."""
+"""A snapshot in words, symbols and levels for the operator, without widgets."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -11,7 +11,7 @@ _NS_PER_S = 1_000_000_000
 
 
 class Level(Enum):
-    """How something stands; the value is the style."""
+    """How good a state is; the value is the style."""
 
     OK = "bold $success"
     ATTENTION = "bold $warning"
@@ -166,11 +166,11 @@ class View:
         return f"{seconds // 60:02d}:{seconds % 60:02d}"
 
 
-def health_level(health: DeviceHealth) -> Level:
+def choose_health_level(health: DeviceHealth) -> Level:
     """Of a device."""
     return _HEALTH_LEVELS[health]
 
 
-def event_level(level: EventLevel) -> Level:
+def choose_event_level(level: EventLevel) -> Level:
     """Of an event."""
     return _EVENT_LEVELS[level]

@@ -1,9 +1,9 @@
-"""The line for long work: what it does, how far it is, how to cancel it."""
+"""The progress line of long work: what, how far, and how to cancel."""
 
 from textual.content import Content
 
 from navapp.control.states import SessionState
-from navapp.ui.gauges import Number, cut, share_bar
+from navapp.ui.gauges import Number, cut, draw_fraction_bar
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 
@@ -11,7 +11,7 @@ _BAR_WIDTH = 26
 
 
 class WorkLine(TextView):
-    """Always there, so that nothing jumps when work begins; empty when there is none."""
+    """Progress of long work; empty, but in place, when there is none."""
 
     def __init__(self) -> None:
         super().__init__("work")
@@ -32,7 +32,7 @@ class WorkLine(TextView):
         return [
             Content.assemble(
                 f" {cut(progress.what, room, view.symbols):<{room}} ",
-                (share_bar(progress.share, _BAR_WIDTH, view.symbols), "$primary"),
+                (draw_fraction_bar(progress.share, _BAR_WIDTH, view.symbols), "$primary"),
                 f" {Number.PERCENT.text(100.0 * progress.share)} %",
                 (hint, "bold $foreground"),
             )

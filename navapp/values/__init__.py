@@ -30,7 +30,7 @@ from navapp.values.contents import (
 from navapp.values.measured import DisparityMap, Origin, RowCheck, SurfaceCloud
 from navapp.values.pictures import OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
-from navapp.values.timings import LineTimings, Stopwatch
+from navapp.values.timings import FrameTimings, Stopwatch
 from navapp.values.verdicts import (
     PoseEstimate,
     Reason,
@@ -51,8 +51,8 @@ __all__ = [
     "DisparityMap",
     "DrillAxis",
     "FollowedBone",
+    "FrameTimings",
     "Landmark",
-    "LineTimings",
     "Origin",
     "OverlayMode",
     "OverlayPicture",

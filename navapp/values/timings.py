@@ -8,7 +8,7 @@ Part = Literal["rectify", "stereo", "fill", "estimate", "judge"]
 
 
 @dataclass(frozen=True, slots=True)
-class LineTimings:
+class FrameTimings:
     """How long the parts of one frame took, in real time."""
 
     rectify_ms: float = 0.0
@@ -43,6 +43,6 @@ class Stopwatch:
         self._lap_began_ns = now_ns
 
     @property
-    def timings(self) -> LineTimings:
+    def timings(self) -> FrameTimings:
         """The parts so far."""
-        return LineTimings(**self._parts_ms)
+        return FrameTimings(**self._parts_ms)

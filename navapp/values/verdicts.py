@@ -8,7 +8,7 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.measured import RowCheck
-from navapp.values.timings import LineTimings
+from navapp.values.timings import FrameTimings
 
 
 class Reason(Enum):
@@ -229,7 +229,7 @@ class TrackedFrame:
     bone: str
     estimate: PoseEstimate | None
     verdict: Verdict
-    timings: LineTimings
+    timings: FrameTimings
     rows: RowCheck | None = None
 
     @property

@@ -222,11 +222,11 @@ class ProjectorFirmware:
         if name == "MSEL":
             return parameter if parameter in ("00", "01", "02") else None
         if name in _KEYSTONES and parameter.isascii() and parameter.isdigit():
-            return _quantised(int(parameter))
+            return _quantise(int(parameter))
         return None
 
 
-def _quantised(value: int) -> str | None:
+def _quantise(value: int) -> str | None:
     """The nearest of 61 steps between 0 and 251."""
     if value > 255:
         return None

@@ -1,4 +1,4 @@
-"""A clock on which time passes faster: 40 s of warming up in a second."""
+"""A clock that runs faster than real time, to shorten warm-up times."""
 
 from drivers.clock import SystemClock
 

@@ -1,4 +1,4 @@
-"""The end of a wire as a driver's port, on a clock that moves when somebody waits."""
+"""A driver's port that is connected to a simulated wire."""
 
 from dataclasses import dataclass
 
@@ -43,7 +43,7 @@ class MemoryPort:
             DeviceLost: unplugged.
         """
         deadline_ns = self._clock.now_ns() + round(max(0.0, timeout_s) * 1e9)
-        while not (data := self._wire.arrived()):
+        while not (data := self._wire.take_arrived()):
             self._require_plug()
             now_ns = self._clock.now_ns()
             if now_ns >= deadline_ns:
@@ -66,7 +66,7 @@ class MemoryPort:
 
     def close(self) -> None:
         """What is still under way is lost."""
-        self._wire.arrived()
+        self._wire.take_arrived()
 
     def _require_plug(self) -> None:
         if not self._wire.is_connected:

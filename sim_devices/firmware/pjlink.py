@@ -1,4 +1,4 @@
-"""A PJLink class 1 projector as its own firmware sees the world: bytes in, bytes out.
+"""Simulated firmware of a PJLink class 1 projector: bytes in, bytes out.
 
 Written from the protocol's tables and not from the driver, so that an error in one is seen by the
 other. What a manual says in words is here in numbers: times by the injected clock.

@@ -1,4 +1,4 @@
-"""The end of a wire as a pseudo-terminal: any program opens it like a serial port."""
+"""Connects a simulated wire to a pseudo-terminal, which programs open like a serial port."""
 
 import errno
 import os
@@ -63,7 +63,7 @@ class PseudoTerminal:
                 with self._lock:
                     if data:
                         self._wire.receive(data)
-                    out = self._wire.arrived()
+                    out = self._wire.take_arrived()
                 if out:
                     os.write(master, out)
         finally:

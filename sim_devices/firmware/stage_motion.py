@@ -1,4 +1,4 @@
-"""A stage and how it travels: phases of constant acceleration, in microsteps and seconds."""
+"""Motion of a stage in phases of constant acceleration; microsteps and seconds."""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class StageModel:
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """A motion from a place.
+    """A motion from a place, as a function of time.
 
     Attributes:
         start_ns: when it began.
@@ -57,7 +57,7 @@ class Travel:
         return place, speed
 
 
-def to_place(start_ns: int, start: float, end: float, speed: float, acceleration: float) -> Travel:
+def travel_to(start_ns: int, start: float, end: float, speed: float, acceleration: float) -> Travel:
     """From rest to rest: speeds up, keeps its speed when the way is long enough, slows down."""
     distance = abs(end - start)
     sign = math.copysign(1.0, end - start)
@@ -69,7 +69,7 @@ def to_place(start_ns: int, start: float, end: float, speed: float, acceleration
     )
 
 
-def to_rest(start_ns: int, start: float, speed: float, acceleration: float) -> Travel:
+def travel_to_rest(start_ns: int, start: float, speed: float, acceleration: float) -> Travel:
     """Slows down at once."""
     phase = (abs(speed) / acceleration, math.copysign(acceleration, -speed))
     return Travel(start_ns, start, speed, (phase,))

@@ -1,4 +1,4 @@
-"""The cable between a firmware and a driver: what is sent may be split, late, lost or spoilt."""
+"""A simulated cable between firmware and driver that can split, delay, lose or spoil messages."""
 
 import random
 from collections import deque
@@ -13,7 +13,7 @@ Spoiler = Callable[[bytes], Pieces]
 
 
 class Firmware(Protocol):
-    """A device's program."""
+    """Protocol of a simulated device's firmware."""
 
     def receive(self, data: bytes) -> None:
         """Take bytes in; never fails."""
@@ -29,7 +29,7 @@ class Firmware(Protocol):
 
 
 class Wire:
-    """Carries bytes both ways.
+    """Carries bytes between a firmware and a driver, both ways.
 
     Attributes:
         firmware: at its far end.
@@ -59,7 +59,7 @@ class Wire:
         """Bytes that nobody asked for, now."""
         self._put([(0, data)])
 
-    def arrived(self) -> bytes:
+    def take_arrived(self) -> bytes:
         """What has reached the driver's end since the last call."""
         for message in self.firmware.messages():
             self._put(self.spoiler(message))
@@ -86,12 +86,12 @@ def whole(message: bytes) -> Pieces:
     return [(0, message)]
 
 
-def lost(message: bytes) -> Pieces:
+def lose(message: bytes) -> Pieces:
     """Never comes."""
     return []
 
 
-def doubled(message: bytes) -> Pieces:
+def double(message: bytes) -> Pieces:
     """Comes twice."""
     return [(0, message), (0, message)]
 
@@ -107,12 +107,12 @@ def late(delay_s: float) -> Spoiler:
     return lambda message: [(round(delay_s * 1e9), message)]
 
 
-def preceded_by(noise: bytes) -> Spoiler:
+def precede_by(noise: bytes) -> Spoiler:
     """Other bytes come just before."""
     return lambda message: [(0, noise + message)]
 
 
-def corrupted(random_bits: random.Random) -> Spoiler:
+def corrupt(random_bits: random.Random) -> Spoiler:
     """One bit is turned."""
 
     def spoil(message: bytes) -> Pieces:

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable
 
 from drivers.clock import Clock
-from sim_devices.firmware.stage_motion import StageModel, Travel, to_place, to_rest
+from sim_devices.firmware.stage_motion import StageModel, Travel, travel_to, travel_to_rest
 
 # The most urgent first.
 _FAULTS = ("FF", "FN", "FZ", "FH", "FV", "FO", "FC", "FM", "FD", "FQ", "FI", "FA", "FR", "FS", "FB")
@@ -129,12 +129,12 @@ class StageFirmware:
             share, self.stalls_at = self.stalls_at, None
             end = start + share * (end - start)
             self._at_end = self._stall
-        self._travel = to_place(self._clock.now_ns(), start, end, model.speed, model.acceleration)
+        self._travel = travel_to(self._clock.now_ns(), start, end, model.speed, model.acceleration)
 
     def _stall(self) -> None:
         self.flags.add("FS")
 
-    def _found_home(self) -> None:
+    def _mark_home(self) -> None:
         self._zero = 0.0
         self._place = 0.0
         self.flags -= {"WR", "WH"}
@@ -183,7 +183,7 @@ class StageFirmware:
                 return False, self.rejections.pop(0)
             case ["home"]:
                 self._forget()
-                self._set_off(0.0, self._found_home)
+                self._set_off(0.0, self._mark_home)
                 return True, "0"
             case ["move", ("abs" | "rel" | "min" | "max") as kind, *rest]:
                 return self._move(kind, rest)
@@ -231,7 +231,7 @@ class StageFirmware:
         now_ns = self._clock.now_ns()
         place, speed = self._travel.at(now_ns)
         self._at_end = _nothing
-        self._travel = to_rest(now_ns, place, speed, self.model.acceleration)
+        self._travel = travel_to_rest(now_ns, place, speed, self.model.acceleration)
         self.flags.add("NI")
 
     def _warnings(self, *, is_cleared: bool) -> str:

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.tracking import TrackState, make_tracker
 from navapp.tracking.verdict import OK_ERROR_MM
 from navapp.values import BoneModel, Prior, Reason, Status, TrackedFrame
@@ -46,7 +46,7 @@ def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
     for frame, true in zip(case.frames, case.poses, strict=True):
         answer, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         assert answer.left_from_bone is not None
-        error_mm = mean_tre_mm(answer.left_from_bone, true, bone, np.empty((0, 3)))
+        error_mm = compute_mean_tre_mm(answer.left_from_bone, true, bone, np.empty((0, 3)))
         found.append((answer, error_mm))
     return tuple(found)
 
@@ -78,7 +78,10 @@ def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(see
     answer = tracker.register(first.left, first.right, prior, GOAL)[0]
     assert answer.verdict.status is Status.OK
     bone = BoneModel("femur", case.mesh)
-    assert mean_tre_mm(answer.left_from_bone, case.poses[0], bone, np.empty((0, 3))) <= WRONG_MM
+    assert (
+        compute_mean_tre_mm(answer.left_from_bone, case.poses[0], bone, np.empty((0, 3)))
+        <= WRONG_MM
+    )
 
 
 @pytest.mark.slow

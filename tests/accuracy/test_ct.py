@@ -5,7 +5,7 @@ import pytest
 
 from navapp.geometry.ply import read_ply
 from navapp.geometry.simplify import is_closed
-from navapp.preop.drafts import Draft, draft_from_ct
+from navapp.preop.plan_drafts import Draft, make_draft_from_ct
 from navapp.preop.volume import read_ct
 from tests.bench.ct_pose_error import pose_errors_mm, surface_error_mm
 from tests.bench.ct_surfaces import BONES, errors_mm
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def draft(data) -> Draft:
     """The bones of the recorded phantom's CT, with defaults."""
-    return draft_from_ct(read_ct(data / "phantom_a" / "ct.nii.gz"))
+    return make_draft_from_ct(read_ct(data / "phantom_a" / "ct.nii.gz"))
 
 
 @pytest.mark.parametrize("name", BONES)

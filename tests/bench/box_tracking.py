@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivers.frames import StereoFrame
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, Tracker, TrackerSettings, TrackState, make_tracker
@@ -181,7 +181,7 @@ def follow_pose(scene: Scene, n_frames: int) -> str:
         was_away = was_away or seen < AWAY
         pose = answer.left_from_bone
         if pose is not None and status is Status.OK:
-            wrong = max(wrong, mean_tre_mm(pose, truth, scene.knee.bone, np.empty((0, 3))))
+            wrong = max(wrong, compute_mean_tre_mm(pose, truth, scene.knee.bone, np.empty((0, 3))))
         if was_away and seen >= LEAST_SEEN and back == "never":
             n_back += 1
             if status is Status.OK:

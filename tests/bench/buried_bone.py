@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Goal, Tracker, make_tracker
@@ -46,7 +46,7 @@ def main() -> int:
         pose, verdict = tracked.left_from_bone, tracked.verdict
         error = "-"
         if pose is not None:
-            error_mm = mean_tre_mm(pose, true, bone, np.empty((0, 3)))
+            error_mm = compute_mean_tre_mm(pose, true, bone, np.empty((0, 3)))
             error = f"{error_mm:.3f} mm"
             if verdict.status is Status.OK:
                 n_ok, worst_mm = n_ok + 1, max(worst_mm, error_mm)

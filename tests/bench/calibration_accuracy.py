@@ -22,12 +22,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calibration.rig.folds import look_at_rig
-from calibration.rig.lengths import triangulated_mm
-from calibration.rig.solve import Calibration, solve_rig
-from calibration.targets.boards import Board, board_from, read_board
+from calibration.rig.held_out_views import look_at_rig
+from calibration.rig.lengths import triangulate_mm
+from calibration.rig.rig_solution import Calibration, solve_rig
+from calibration.targets.boards import Board, parse_board, read_board
 from calibration.targets.detection import SeenBoard, find_board
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from drivers.recorded_sources import PictureFiles, open_folder
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
@@ -76,8 +76,8 @@ def main() -> int:
         phantom(place.parent)
     board = folder / "calib" / "opencv_chessboard"
     if board.is_dir():
-        pictures = looked_at(open_folder(board), board_from(_CHESSBOARD))
-        compare("opencv_chessboard", board_from(_CHESSBOARD), pictures, None, None)
+        pictures = looked_at(open_folder(board), parse_board(_CHESSBOARD))
+        compare("opencv_chessboard", parse_board(_CHESSBOARD), pictures, None, None)
     drawn(options.rigs)
     return 0
 
@@ -210,7 +210,7 @@ def off_mm(solved: StereoRig, true: StereoRig, points_mm: FloatArray) -> FloatAr
     """(n, 3) triangulated by the solved rig less true."""
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    return triangulated_mm(solved, left, right) - points_mm
+    return triangulate_mm(solved, left, right) - points_mm
 
 
 def bone(folder: Path) -> FloatArray:

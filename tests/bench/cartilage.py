@@ -17,15 +17,15 @@ from itertools import pairwise
 import numpy as np
 
 from drivers.frames import StereoFrame
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.preop.cartilage import MAPPED_SD_MM, even_cartilage
+from navapp.preop.cartilage import MAPPED_SD_MM, make_even_cartilage
 from navapp.tracking import Goal, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.surface_meter import Margins
 from navapp.values import BoneModel, Origin, Side, Status, TrackedFrame
-from sim_devices.relief import waves
+from sim_devices.relief import make_waves
 from sim_devices.scenario import Scenario
 from sim_devices.world import World
 from tests.knees import SimulatedKnee, nominal_prior
@@ -83,7 +83,7 @@ def patient(seed: int, n_frames: int, mean_mm: float = MEAN_MM) -> Patient:
 def smooth_error_mm(known: Patient) -> FloatArray:
     """(V,) of that standard deviation, as a segmentation of another picture may make it."""
     rng = np.random.default_rng([known.seed, 77])
-    return waves(rng, ERROR_MM, ERROR_WAVES_MM)(known.mesh.vertices_mm)
+    return make_waves(rng, ERROR_MM, ERROR_WAVES_MM)(known.mesh.vertices_mm)
 
 
 def exact(known: Patient) -> BoneModel:
@@ -99,7 +99,7 @@ def mapped(known: Patient) -> BoneModel:
 
 def one_mean(known: Patient) -> BoneModel:
     """The plan knows how thick it is on the joint surfaces on average."""
-    return even_cartilage(BoneModel("femur", known.mesh, known.side), MEAN_MM, SPREAD_MM)
+    return make_even_cartilage(BoneModel("femur", known.mesh, known.side), MEAN_MM, SPREAD_MM)
 
 
 def one_mean_on_joints(known: Patient) -> BoneModel:
@@ -158,7 +158,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
         number,
         verdict.status,
         reasons,
-        mean_tre_mm(pose, known.poses[number], bone, np.empty((0, 3))),
+        compute_mean_tre_mm(pose, known.poses[number], bone, np.empty((0, 3))),
         verdict.predicted_tre_mm or float("nan"),
         _ratio(verdict.rms_mm, verdict.expected_rms_mm),
         verdict.coverage,

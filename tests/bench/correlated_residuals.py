@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking.frame import NOISE_RATIO
 from navapp.tracking.verdict import Evidence, decide
@@ -83,7 +83,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             one.estimate.predicted_tre_mm(parts.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit, shown)
         )
-        error_mm = mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
+        error_mm = compute_mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
         evidence = Evidence(correlated_ratio=shown.variance_ratio / NOISE_RATIO**2)
         is_misfit = Reason.SURFACE_MISFIT in decide(evidence).reasons
         ratio = shown.variance_ratio**0.5

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.drafts import draft_from_ct
+from navapp.preop.plan_drafts import make_draft_from_ct
 from navapp.values import BoneModel
 from tests.bench.ct_surfaces import BONES, simulated
 
@@ -48,7 +48,7 @@ def main() -> None:
         spacing_mm, blur_mm = SCANS[(seed - FIRST_SEED) % len(SCANS)]
         voxels = " x ".join(f"{step:g}" for step in spacing_mm)
         case = simulated(seed, spacing_mm, blur_mm)
-        draft = draft_from_ct(case.read)
+        draft = make_draft_from_ct(case.read)
         for name in BONES:
             bone = draft.bones[name]
             error_mm = surface_error_mm(bone.mesh, case.bones[name])

@@ -23,9 +23,9 @@ from scipy.spatial import cKDTree
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import FloatArray
-from navapp.preop.drafts import CtSettings, Draft, draft_from_ct
+from navapp.preop.plan_drafts import CtSettings, Draft, make_draft_from_ct
 from navapp.preop.volume import CtVolume, read_ct
-from navapp.preop.volume.reading import CtSource, ReadCt
+from navapp.preop.volume.volume_reading import CtSource, ReadCt
 from sim_devices.anatomy import KneeSpec, make_knee
 from sim_devices.ct_volume import make_ct
 
@@ -147,7 +147,7 @@ def at_threshold(ct: CtVolume, true: TriangleMesh, level_hu: float) -> FloatArra
 
 def _rows(case: Case) -> Iterator[str]:
     started = time.process_time()
-    draft = draft_from_ct(case.read)
+    draft = make_draft_from_ct(case.read)
     cpu_s = time.process_time() - started
     peak_gb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     for name in BONES:
@@ -169,7 +169,7 @@ def _thresholds(seeds: range) -> None:
     print("|---|---|---|---|---|")
     for case in cases(seeds):
         drafts = [
-            draft_from_ct(case.read, CtSettings(threshold_hu=level)) for level in THRESHOLDS_HU
+            make_draft_from_ct(case.read, CtSettings(threshold_hu=level)) for level in THRESHOLDS_HU
         ]
         for name in BONES:
             pairs = (drafts[:2], drafts[1:], drafts[::2])

@@ -22,7 +22,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry import RigidTransform, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
@@ -145,7 +145,7 @@ def registered(tracker: BimccTracker, frame: Frame, prior: Prior) -> Answer:
     pose = tracked[0].left_from_bone if tracked else None
     if pose is None:
         return Answer(np.inf, False, seconds)
-    error_mm = mean_tre_mm(pose, frame.true, tracker.model.bone, np.empty((0, 3)))
+    error_mm = compute_mean_tre_mm(pose, frame.true, tracker.model.bone, np.empty((0, 3)))
     return Answer(error_mm, tracked[0].verdict.status is Status.OK, seconds)
 
 

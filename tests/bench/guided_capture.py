@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.lengths import triangulated_mm
-from calibration.rig.solve import solve_rig
-from calibration.targets.pairs import SeenPair
-from navapp.control.capture.wishes import next_wish
+from calibration.rig.lengths import triangulate_mm
+from calibration.rig.rig_solution import solve_rig
+from calibration.targets.seen_pairs import SeenPair
+from navapp.control.capture.next_view import plan_next_view
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_rig, seen_pair
@@ -41,22 +41,22 @@ def captured(seed: int, noise_px: float, stop_mm: float) -> Captured:
     rng = np.random.default_rng([seed, 16])
     true = drawn_rig(rng)
     pairs: list[SeenPair] = []
-    wish = next_wish(BOARD, pairs, SIZE, DEPTH_MM)
+    next_view = plan_next_view(BOARD, pairs, SIZE, DEPTH_MM)
     while len(pairs) < MOST_PAIRS:
-        pairs.append(reached(len(pairs), true, wish.left_from_board, rng, noise_px))
-        wish = next_wish(BOARD, pairs, SIZE, DEPTH_MM, wish)
-        is_known = wish.bound_mm is not None and wish.bound_mm <= stop_mm
+        pairs.append(reached(len(pairs), true, next_view.left_from_board, rng, noise_px))
+        next_view = plan_next_view(BOARD, pairs, SIZE, DEPTH_MM, next_view)
+        is_known = next_view.bound_mm is not None and next_view.bound_mm <= stop_mm
         if len(pairs) >= FEWEST_PAIRS and is_known:
             break
     found = solve_rig(BOARD, pairs, SIZE)
     points_mm = found.points_mm
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    errors = np.linalg.norm(triangulated_mm(found.rig, left, right) - points_mm, axis=1)
+    errors = np.linalg.norm(triangulate_mm(found.rig, left, right) - points_mm, axis=1)
     is_accepted = found.rig.quality is not None and found.rig.quality.is_accepted
     model = found.solved.model.name
     return Captured(
-        len(pairs), wish.bound_mm or np.inf, found.bounds_mm, errors, is_accepted, model
+        len(pairs), next_view.bound_mm or np.inf, found.bounds_mm, errors, is_accepted, model
     )
 
 

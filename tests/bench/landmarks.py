@@ -9,7 +9,7 @@ they have the same meaning. Sides are told from a bone alone, and from all three
 import numpy as np
 
 from navapp.preop.landmarks import estimate_landmarks
-from navapp.preop.side import estimate_side
+from navapp.preop.side_estimate import estimate_side
 from tests.preop.knees import bones_of, knees
 
 _SETS = (("femur",), ("tibia",), ("patella",), ("femur", "tibia", "patella"))

@@ -9,7 +9,7 @@ import argparse
 
 import numpy as np
 
-from calibration.latency.judge import judged_latency
+from calibration.latency.acceptance import measure_accepted_latency
 from navapp.errors import ResultError
 from tests.calibration.latency.scenes import CASES, drawn_bench
 
@@ -32,7 +32,9 @@ def _case(name: str, settings: dict[str, float], n_seeds: int) -> None:
     for seed in range(n_seeds):
         bench = drawn_bench(seed, **settings)
         try:
-            found = judged_latency(*bench.record(seed), refresh_hz=bench.refresh_hz or 240.0)
+            found = measure_accepted_latency(
+                *bench.record(seed), refresh_hz=bench.refresh_hz or 240.0
+            )
         except ResultError as error:
             refused.append(error.problem.split(":")[0])
             continue

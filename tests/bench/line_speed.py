@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from drivers.frames import StereoFrame
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
@@ -34,7 +34,7 @@ from navapp.overlay.layers import Scene, draw_bone
 from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Plan, StageSpec, Status
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import make_default_rig
 from sim_devices.scenario import Scenario
 from sim_devices.world import World
 from tests.bench.occlusion_speed import use_threads
@@ -54,7 +54,10 @@ Way = Callable[[int], tuple[RigidTransform, dict[str, float]]]
 
 def _long_lenses() -> StereoRig:
     """The simulated rig, with lenses that show the bone in a box of about 420 px."""
-    rig, scale = default_rig(), np.array([[_ZOOM, 1.0, 1.0], [1.0, _ZOOM, 1.0], [1.0, 1.0, 1.0]])
+    rig, scale = (
+        make_default_rig(),
+        np.array([[_ZOOM, 1.0, 1.0], [1.0, _ZOOM, 1.0], [1.0, 1.0, 1.0]]),
+    )
     left, right = (replace(one, matrix=one.matrix * scale) for one in (rig.left, rig.right))
     return replace(rig, left=left, right=right)
 
@@ -226,7 +229,9 @@ def best_runs(ways: dict[str, Way], recording: Recording, n_runs: int) -> dict[s
                 for part, ms in parts.items():
                     runs[name][0].setdefault(part, []).append(ms)
                 true = recording.poses[frame]
-                runs[name][1].append(mean_tre_mm(pose, true, recording.bone, np.empty((0, 3))))
+                runs[name][1].append(
+                    compute_mean_tre_mm(pose, true, recording.bone, np.empty((0, 3)))
+                )
         for name, run in runs.items():
             # The first pass compiles.
             if number and (name not in best or sum(run[0]["all"]) < sum(best[name][0]["all"])):

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
@@ -129,7 +129,7 @@ def joined(
         mesh = parts.model.bone.mesh
         targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
         bound_mm = one.estimate.predicted_tre_mm(parts.centre_mm, targets[:: len(targets) // 200])
-        answer += [mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
+        answer += [compute_mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
     yield answer[0], answer[1], answer[2], answer[3]
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import TrackState, make_tracker
 from navapp.values import BoneModel, Prior, Status, TrackedFrame
@@ -144,7 +144,10 @@ def followed(
         else:
             tracked, state = tracker.track(left, right, frame.captured_ns, state, GOAL)
         pose = tracked.left_from_bone
-        yield tracked, np.nan if pose is None else mean_tre_mm(pose, truth, own, np.empty((0, 3)))
+        yield (
+            tracked,
+            np.nan if pose is None else compute_mean_tre_mm(pose, truth, own, np.empty((0, 3))),
+        )
 
 
 def main() -> int:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking import Goal, Tracker, TrackState
 from navapp.values import BoneModel, Prior, Status, TrackedFrame, visible_vertices
@@ -215,6 +215,6 @@ def played(theatre: Theatre, tracker: Tracker, rate_hz: float, until_s: float) -
         tre_mm = (
             np.nan
             if pose is None
-            else mean_tre_mm(pose, theatre.truth(world_ns), bone, np.empty((0, 3)))
+            else compute_mean_tre_mm(pose, theatre.truth(world_ns), bone, np.empty((0, 3)))
         )
         yield Shown(world_ns / 1e9, tracked, tre_mm, took_ms)

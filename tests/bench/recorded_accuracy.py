@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from navapp.cli.main import run
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.values import BoneModel
@@ -122,7 +122,7 @@ def _scored(
         if frame["camera_from_model"] is not None:
             pose = RigidTransform("left", bone_name, frame["camera_from_model"])
             true = truth[frame["index"]]
-            tre_mm = mean_tre_mm(pose, true, bone, np.empty((0, 3)))
+            tre_mm = compute_mean_tre_mm(pose, true, bone, np.empty((0, 3)))
             turn_deg = rotation_angle_deg(pose, true)
         bound_mm = frame["predicted_tre_mm"]
         yield Scored(

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import BoneModel, Side, Status, TrackedFrame
 from sim_devices.scenario import Scenario
@@ -97,7 +97,7 @@ def operated(seed: int, situation: str, n_frames: int) -> Operation:
 def _answer(tracked: TrackedFrame, true, bone: BoneModel) -> Answer:
     if tracked.left_from_bone is None:
         return Answer(tracked.verdict.status, float("nan"), float("nan"))
-    error_mm = mean_tre_mm(tracked.left_from_bone, true, bone, np.empty((0, 3)))
+    error_mm = compute_mean_tre_mm(tracked.left_from_bone, true, bone, np.empty((0, 3)))
     return Answer(tracked.verdict.status, error_mm, tracked.verdict.predicted_tre_mm)
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import read_rig
@@ -104,7 +104,7 @@ def _followed(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[Row]:
             Reason.ROWS_DISAGREE in reasons,
             len(OF_LIGHT.intersection(reasons)),
             tracked.verdict.status is Status.OK,
-            np.nan if found is None else mean_tre_mm(found, truth, bone, _NO_TARGETS),
+            np.nan if found is None else compute_mean_tre_mm(found, truth, bone, _NO_TARGETS),
             cost_ms,
         )
 

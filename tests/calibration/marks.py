@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from calibration.targets.boards import Board, board_from
+from calibration.targets.boards import Board, parse_board
 from calibration.targets.detection import SeenBoard
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 
 WIDTH, HEIGHT = 1280, 720
-BOARD = board_from(
+BOARD = parse_board(
     {
         "type": "charuco", "squares_x": 11, "squares_y": 8, "square_mm": 15.0,
         "marker_mm": 11.0, "dictionary": "DICT_4X4_100",

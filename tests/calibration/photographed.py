@@ -6,10 +6,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from calibration.targets.boards import Board, board_from
-from calibration.targets.drawing import drawn, rastered
+from calibration.targets.boards import Board, parse_board
+from calibration.targets.drawing import make_drawing, rasterise
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import make_default_rig
 from sim_devices.sensor import Eye, SensorModel
 from sim_devices.sheet import PrintedSheet, SheetScene
 
@@ -17,8 +17,8 @@ KEYS = {
     "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 21.0,
     "marker_mm": 15.0, "dictionary": "DICT_4X4_50",
 }  # fmt: skip
-BOARD = board_from(KEYS)
-RIG = default_rig(640, 360)
+BOARD = parse_board(KEYS)
+RIG = make_default_rig(640, 360)
 _SCALE, _MARGIN_MM, _PX_PER_MM = 0.5, 8.0, 8.0
 # Where the board's middle is held, mm in the left camera's frame, and how it is turned, deg.
 GOOD_VIEWS = (
@@ -63,8 +63,8 @@ def photograph(folder: Path, poses: Sequence[RigidTransform], board: Board = BOA
 
 def _scene(board: Board, poses: Sequence[RigidTransform]) -> SheetScene:
     """The n-th pose at the n-th ns."""
-    drawing = drawn(board)
-    white = rastered(drawing, _PX_PER_MM, _MARGIN_MM)
+    drawing = make_drawing(board)
+    white = rasterise(drawing, _PX_PER_MM, _MARGIN_MM)
     left_mm, top_mm = drawing.low_mm - _MARGIN_MM
     sheet = PrintedSheet(white, _PX_PER_MM, float(left_mm), float(top_mm))
     return SheetScene(sheet, lambda number: poses[number])

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from calibration.targets.boards import Board
-from calibration.targets.drawing import drawn, rastered
+from calibration.targets.drawing import make_drawing, rasterise
 from navapp.geometry.camera import Camera
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 
@@ -52,8 +52,8 @@ def picture_of(
 @cache
 def _paper(board: Board) -> tuple[np.ndarray, np.ndarray]:
     """(2,) where its picture begins on the board, mm, and the (H, W) picture."""
-    drawing = drawn(board)
-    return drawing.low_mm - _MARGIN_MM, rastered(drawing, _PX_PER_MM, _MARGIN_MM)
+    drawing = make_drawing(board)
+    return drawing.low_mm - _MARGIN_MM, rasterise(drawing, _PX_PER_MM, _MARGIN_MM)
 
 
 def facing(board: Board, distance_mm: float, turn_rad: FloatArray) -> RigidTransform:

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from calibration.rig.lengths import triangulated_mm
-from calibration.rig.parameters import RigModel, packed
-from calibration.rig.uncertainty import working_points_mm
+from calibration.rig.lengths import triangulate_mm
+from calibration.rig.parameters import RigModel, pack
+from calibration.rig.uncertainty import make_working_points_mm
 from navapp.cli.main import run
 from navapp.geometry import read_rig
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import make_default_rig
 
 BOARD = {
     "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
@@ -32,12 +32,12 @@ def capture(board, out, *more, config=None):
 
 def true_error_mm(found):
     """Median over the working volume, against the rig that the simulated camera has."""
-    true = default_rig()
+    true = make_default_rig()
     model = RigModel(5, 0, true.width, true.height)
-    points_mm = working_points_mm(model, packed(model, true), (350.0, 550.0))
+    points_mm = make_working_points_mm(model, pack(model, true), (350.0, 550.0))
     left = true.left.project(points_mm)
     right = true.right.project(true.right_from_left.apply(points_mm))
-    off_mm = triangulated_mm(found, left, right) - points_mm
+    off_mm = triangulate_mm(found, left, right) - points_mm
     return float(np.median(np.linalg.norm(off_mm, axis=1)))
 
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from navapp.cli.main import run
-from navapp.inventory import looking
+from navapp.inventory import connected_devices
 from tests.inventory.inventories import EVERYTHING, NOTHING
 
 KINDS = {
@@ -48,7 +48,7 @@ SERIAL_PORT = """\
 
 
 def told(monkeypatch, capsys, found, *options):
-    monkeypatch.setattr(looking, "look", lambda: found)
+    monkeypatch.setattr(connected_devices, "list_all_devices", lambda: found)
     assert run(["devices", *options]) == 0
     return capsys.readouterr().out
 

@@ -9,14 +9,14 @@ import pytest
 
 from navapp.cli import software_checks
 from navapp.cli.main import run
-from navapp.inventory import looking
+from navapp.inventory import connected_devices
 from tests.inventory.inventories import NOTHING
 
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
     """Nothing connected, and of the packages only those that load at once."""
-    monkeypatch.setattr(looking, "look", lambda: NOTHING)
+    monkeypatch.setattr(connected_devices, "list_all_devices", lambda: NOTHING)
     kept = [one for one in software_checks._PACKAGES if one.name in ("numpy", "pyserial")]
     monkeypatch.setattr(software_checks, "_PACKAGES", tuple(kept))
 

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 import pytest
 
 from navapp.cli.diagnostics import Diagnostics
-from navapp.cli.live_session import controller_of, prepared
+from navapp.cli.live_session import make_controller, prepare_session
 from navapp.cli.main import _parser
 from navapp.config import parse
 
@@ -20,10 +20,10 @@ def test_pictures_are_withdrawn_as_much_earlier_as_they_are_seen_late(
     }
     options = _parser().parse_args(["run", "--headless"])
     with ExitStack() as undo:
-        session = prepared(parse(content, "test"), options, Diagnostics(is_quiet=True))
+        session = prepare_session(parse(content, "test"), options, Diagnostics(is_quiet=True))
         devices = session.opened.devices
         undo.callback(devices.close)
-        controller = controller_of(session, is_inline=True, on_frame=[], undo=undo)
+        controller = make_controller(session, is_inline=True, on_frame=[], undo=undo)
         undo.callback(controller.close)
         shown_until_ns = []
         devices.display.show = lambda _, until_ns: shown_until_ns.append(until_ns)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from navapp.cli.recorded_operation import moved_rig, operation, warnings
+from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
 from navapp.cli.session_folder import RecordedSession
 from navapp.control.operators import RecordedEvents
 from navapp.control.runner import run_headless
@@ -17,7 +17,7 @@ AFTER = 5
 
 
 def session(*, is_moved: bool = True) -> RecordedSession:
-    commands = [(0, Register()), (1, Accept()), *([(AFTER, FOUND)] if is_moved else [])]
+    commands = [(0, Register()), (1, Accept(None)), *([(AFTER, FOUND)] if is_moved else [])]
     here = Path()
     return RecordedSession(
         here, here, here, "bimcc", "opening", RecordedEvents(commands, [1], True)
@@ -32,10 +32,10 @@ def options(**given) -> argparse.Namespace:
     return argparse.Namespace(**(plain | given))
 
 
-def states(monkeypatch, recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
+def states(recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
     """Of 20 frames; the numbers of the pictures begin where the replay does."""
-    operator, executor = operation(recorded, given)
-    bench = Bench(monkeypatch, executor=executor, camera=FakeCamera(None, 20))
+    operator, executor = choose_operator(recorded, given)
+    bench = Bench(executor=executor, camera=FakeCamera(None, 20))
     bench.camera._sequence, bench.camera._n_frames = given.start, given.start + 20
     run_headless(bench.controller, operator)
     assert not any(r.is_navigable for r in bench.results if r.frame.sequence > AFTER)
@@ -50,8 +50,8 @@ def states(monkeypatch, recorded: RecordedSession, given: argparse.Namespace) ->
     ],
     ids=str,
 )  # fmt: skip
-def test_a_moved_rig_stays_moved_whatever_else_is_changed(monkeypatch, changed) -> None:
-    said = states(monkeypatch, session(), options(**changed))
+def test_a_moved_rig_stays_moved_whatever_else_is_changed(changed) -> None:
+    said = states(session(), options(**changed))
     n_before = AFTER + 1 - changed.get("start", 0)
     assert "fault" not in said[:n_before]
     assert set(said[n_before:]) == {"fault"}
@@ -59,24 +59,24 @@ def test_a_moved_rig_stays_moved_whatever_else_is_changed(monkeypatch, changed) 
         assert "navigating" in said[:n_before]
 
 
-def test_a_replay_that_starts_after_it_shows_nothing_at_all(monkeypatch) -> None:
-    assert set(states(monkeypatch, session(), options(start=9))) == {"fault"}
+def test_a_replay_that_starts_after_it_shows_nothing_at_all() -> None:
+    assert set(states(session(), options(start=9))) == {"fault"}
 
 
-def test_another_rig_is_not_the_one_that_moved(monkeypatch) -> None:
+def test_another_rig_is_not_the_one_that_moved() -> None:
     for given in (options(rig="r.yml"), options(rig="r.yml", method="icp")):
-        assert moved_rig(session(), given) is None
-        operator, executor = operation(session(), given)
-        bench = Bench(monkeypatch, executor=executor, camera=FakeCamera(None, 20))
+        assert find_moved_rig(session(), given) is None
+        operator, executor = choose_operator(session(), given)
+        bench = Bench(executor=executor, camera=FakeCamera(None, 20))
         run_headless(bench.controller, operator)
         assert bench.results[-1].state.value == "navigating"
 
 
 def test_to_and_fro_it_is_said_instead() -> None:
     given = options(order="pingpong")
-    assert moved_rig(session(), given) == (AFTER, FOUND)
-    (warning,) = warnings(session(), given)
+    assert find_moved_rig(session(), given) == (AFTER, FOUND)
+    (warning,) = list_warnings(session(), given)
     assert "moved after frame 5 (100 mm are 100.13 mm)" in warning
-    assert warnings(session(is_moved=False), given) == ()
-    assert warnings(session(), options(method="icp")) == ()
-    assert warnings(None, given) == ()
+    assert list_warnings(session(is_moved=False), given) == ()
+    assert list_warnings(session(), options(method="icp")) == ()
+    assert list_warnings(None, given) == ()

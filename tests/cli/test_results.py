@@ -5,11 +5,11 @@ from dataclasses import replace
 from navapp.cli.results import (
     frame_text,
     frame_to_json,
-    moved_rig_to_json,
+    rig_alarm_to_json,
     summarise,
     summary_text,
 )
-from navapp.control.results import FrameResult
+from navapp.control.frame_result import FrameResult
 from navapp.control.states import DistrustRig
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
@@ -19,12 +19,12 @@ OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies"}
 TIBIA = answer(Status.DEGRADED, Reason.COVERAGE_LOW, pose=a_pose("tibia", x_mm=4.0))
 
 
-def a_result(monkeypatch, **others) -> FrameResult:
-    return replace(navigating(Bench(monkeypatch)).results[-1], others=others)
+def a_result(**others) -> FrameResult:
+    return replace(navigating(Bench()).results[-1], others=others)
 
 
-def test_another_bone_has_the_keys_of_the_frames_own_pose(monkeypatch) -> None:
-    frame = frame_to_json(a_result(monkeypatch, tibia=TIBIA), {"femur": 0.1, "tibia": 0.7})
+def test_another_bone_has_the_keys_of_the_frames_own_pose() -> None:
+    frame = frame_to_json(a_result(tibia=TIBIA), {"femur": 0.1, "tibia": 0.7})
     tibia = frame["bodies"]["tibia"]
     assert set(tibia) == set(frame) - OF_THE_FRAME
     assert (frame["status"], tibia["status"]) == ("OK", "DEGRADED")
@@ -35,19 +35,19 @@ def test_another_bone_has_the_keys_of_the_frames_own_pose(monkeypatch) -> None:
     assert tibia["predicted_tre_mm"] == TIBIA.verdict.predicted_tre_mm
 
 
-def test_a_frame_in_which_no_other_bone_had_its_turn_says_nothing_of_one(monkeypatch) -> None:
-    frame = frame_to_json(a_result(monkeypatch), {})
+def test_a_frame_in_which_no_other_bone_had_its_turn_says_nothing_of_one() -> None:
+    frame = frame_to_json(a_result(), {})
     assert frame["bodies"] == {}
     assert frame["tre_mm"] is None
 
 
-def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
+def test_the_summary_counts_each_bone_for_itself() -> None:
     lost = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
     results = [
-        a_result(monkeypatch, tibia=TIBIA),
-        a_result(monkeypatch),
-        a_result(monkeypatch, tibia=lost),
-        a_result(monkeypatch, patella=answer(pose=a_pose("patella"))),
+        a_result(tibia=TIBIA),
+        a_result(),
+        a_result(tibia=lost),
+        a_result(patella=answer(pose=a_pose("patella"))),
     ]
     summary = summarise([frame_to_json(result, {}) for result in results], 1.0)
     counted = {key: summary[key] for key in ("frames", "ok", "degraded", "lost")}
@@ -61,13 +61,13 @@ def test_the_summary_counts_each_bone_for_itself(monkeypatch) -> None:
     assert "other bone, tibia: 2 frames: 0 OK, 1 degraded, 1 lost" in lines
 
 
-def test_a_line_a_frame_names_the_other_bones(monkeypatch) -> None:
-    assert frame_text(a_result(monkeypatch, tibia=TIBIA)).endswith(" | tibia DEGRADED 0 ms")
-    assert "tibia" not in frame_text(a_result(monkeypatch))
+def test_a_line_a_frame_names_the_other_bones() -> None:
+    assert frame_text(a_result(tibia=TIBIA)).endswith(" | tibia DEGRADED 0 ms")
+    assert "tibia" not in frame_text(a_result())
 
 
-def test_a_frame_of_a_moved_rig_says_so(monkeypatch) -> None:
-    bench = navigating(Bench(monkeypatch))
+def test_a_frame_of_a_moved_rig_says_so() -> None:
+    bench = navigating(Bench())
     bench.do(DistrustRig("bumped"))
     bench.frames(2)
     frame = frame_to_json(bench.results[-1], {})
@@ -77,7 +77,7 @@ def test_a_frame_of_a_moved_rig_says_so(monkeypatch) -> None:
 
 
 def test_a_replay_says_where_its_session_found_the_rig_moved() -> None:
-    assert moved_rig_to_json("sim", 5, DistrustRig("bumped")) == {
+    assert rig_alarm_to_json("sim", 5, DistrustRig("bumped")) == {
         "name": "sim",
         "alarm": "rig moved, recalibrate (bumped)",
         "moved_after_frame": 5,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from navapp.cli.main import run
-from navapp.cli.rig import text, toe_in_deg
+from navapp.cli.rig import compute_toe_in_deg, format_text
 from navapp.geometry import RigQuality, StereoRig, read_rig, write_rig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from tests.calibration.exchange import test_kalibr, test_ros
@@ -160,11 +160,11 @@ def test_a_person_is_told_everything(source, capsys) -> None:
 
 def test_the_verdict_and_the_end_of_its_time_are_told() -> None:
     rig = dataclasses.replace(plain_rig(), quality=QUALITY)
-    assert "good until 2026-08-28" in text(rig, date(2026, 8, 28))
-    assert "EXPIRED on 2026-08-28" in text(rig, date(2026, 8, 29))
+    assert "good until 2026-08-28" in format_text(rig, date(2026, 8, 28))
+    assert "EXPIRED on 2026-08-28" in format_text(rig, date(2026, 8, 29))
     bad = dataclasses.replace(rig, quality=RigQuality(False, ("too few views",)))
-    assert "NOT accepted by its calibration: too few views" in text(bad, date(2026, 8, 28))
-    assert "nobody says how good" in text(plain_rig(), date(2026, 8, 28))
+    assert "NOT accepted by its calibration: too few views" in format_text(bad, date(2026, 8, 28))
+    assert "nobody says how good" in format_text(plain_rig(), date(2026, 8, 28))
 
 
 def test_toe_in_is_positive_where_the_axes_meet() -> None:
@@ -175,5 +175,5 @@ def test_toe_in_is_positive_where_the_axes_meet() -> None:
         )
         return dataclasses.replace(plain_rig(), right_from_left=left_from_right.inverse())
 
-    assert toe_in_deg(turned(5.0)) == pytest.approx(5.0)
-    assert toe_in_deg(turned(-2.0)) == pytest.approx(-2.0)
+    assert compute_toe_in_deg(turned(5.0)) == pytest.approx(5.0)
+    assert compute_toe_in_deg(turned(-2.0)) == pytest.approx(-2.0)

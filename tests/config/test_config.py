@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
-from navapp.config import FILE_NAME, Configuration, as_toml, find_file, load, parse
+from navapp.config import FILE_NAME, Configuration, find_file, format_toml, load, parse
 from navapp.errors import ConfigurationError
 from sim_devices.faults import FaultKind
 
@@ -133,7 +133,7 @@ def nested(key: str, value: Any) -> dict[str, Any]:
 
 @pytest.mark.parametrize("with_comments", [False, True])
 def test_the_defaults_come_back(with_comments):
-    text = as_toml(Configuration(), with_comments)
+    text = format_toml(Configuration(), with_comments)
     assert parse(tomllib.loads(text), "x") == Configuration()
     assert parse({}, "x") == Configuration()
 
@@ -143,12 +143,12 @@ def test_every_key_of_every_section_comes_back(with_comments):
     configuration = parse(CHANGED, "x")
     for key in KEYS:
         assert value_at(configuration, key) != value_at(Configuration(), key), key
-    again = parse(tomllib.loads(as_toml(configuration, with_comments)), "x")
+    again = parse(tomllib.loads(format_toml(configuration, with_comments)), "x")
     assert again == configuration
 
 
 def test_a_file_to_start_from_explains_every_key_and_section():
-    text = as_toml(Configuration(), True)
+    text = format_toml(Configuration(), True)
     lines = text.splitlines()
     for name in Configuration.model_fields:
         assert f"[{name}]" in lines
@@ -188,7 +188,7 @@ def test_any_text_and_number_comes_back(text, positive, number, table):
         }
     }
     configuration = parse(content, "x")
-    assert parse(tomllib.loads(as_toml(configuration, True)), "x") == configuration
+    assert parse(tomllib.loads(format_toml(configuration, True)), "x") == configuration
 
 
 def test_tables_of_third_parties_pass_through():
@@ -209,7 +209,7 @@ def test_tables_of_third_parties_pass_through():
     zed = configuration.camera.model_extra["zed"]
     assert zed["gain"] == 3
     assert zed["limits"] == {"low": 1, "high est": True}
-    again = parse(tomllib.loads(as_toml(configuration, True)), "x")
+    again = parse(tomllib.loads(format_toml(configuration, True)), "x")
     assert again == configuration
     assert again.camera.model_extra == configuration.camera.model_extra
 

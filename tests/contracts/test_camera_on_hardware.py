@@ -4,7 +4,7 @@ import pytest
 
 from drivers.clock import SystemClock
 from drivers.contracts import CAMERA_CHECKS, CameraUnderTest
-from navapp.devices import real_camera
+from navapp.devices import make_real_camera
 
 # That every lockable camera has; a camera of another package may have none.
 _CONTROLS = {"opencv": ("exposure_ms", 5.0), "depthai": ("exposure_ms", 5.0)}
@@ -17,7 +17,7 @@ def test_the_connected_camera_keeps_its_contract(hardware, check):
 
     def make() -> CameraUnderTest:
         clock = SystemClock()
-        camera = real_camera(hardware, clock)
+        camera = make_real_camera(hardware, clock)
         return CameraUnderTest(camera, clock, _CONTROLS.get(hardware.camera.backend))
 
     check(make)

@@ -7,8 +7,8 @@ from tests.control.fakes import Bench
 
 
 @pytest.fixture
-def bench(monkeypatch) -> Bench:
-    return Bench(monkeypatch)
+def bench() -> Bench:
+    return Bench()
 
 
 @pytest.fixture

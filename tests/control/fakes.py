@@ -1,4 +1,4 @@
-"""A room without pictures: black frames, and a line that answers what the test says."""
+"""A room without pictures: black frames, and trackers that answer what the test says."""
 
 import threading
 import time
@@ -20,11 +20,12 @@ from drivers.interfaces import (
 )
 from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
-from navapp.control.controller import SessionController, SessionOptions
+from navapp.control.controller import SessionController
+from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
-from navapp.control.results import FrameResult
-from navapp.control.session import SessionHooks
-from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Snapshot
+from navapp.control.frame_result import FrameResult
+from navapp.control.specification import SessionSpecification
+from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Reject, Snapshot
 from navapp.errors import DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
@@ -32,7 +33,7 @@ from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import Goal, TrackState
 from navapp.values import (
     BoneModel,
-    LineTimings,
+    FrameTimings,
     Plan,
     PoseEstimate,
     Prior,
@@ -73,17 +74,22 @@ def answer(
     pose: RigidTransform | None = None,
     has_pose: bool = True,
 ) -> TrackedFrame:
-    """What the line says of a frame."""
+    """What a tracker says of a frame."""
     pose = pose or a_pose()
     estimate = PoseEstimate(pose, 0.01 * np.eye(6), 500, 0.9, 0.2, 0.2, 3, True)
     bound = 0.8 if has_pose else None
     verdict = Verdict(status, bound, reasons, 0.7, 0.0, 0.9, 0.2, 0.2)
-    return TrackedFrame(pose.source, estimate if has_pose else None, verdict, LineTimings())
+    return TrackedFrame(pose.source, estimate if has_pose else None, verdict, FrameTimings())
+
+
+def a_frame(captured_ns: int = 10**9, sequence: int = 0) -> StereoFrame:
+    picture = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
+    return StereoFrame(picture, picture, captured_ns, captured_ns, 0, sequence, "rig")
 
 
 @dataclass
 class Script:
-    """What the fake line answers; changed by the test as it goes."""
+    """What the fake trackers answer; changed by the test as it goes."""
 
     found: list[TrackedFrame] = field(default_factory=lambda: [answer()])
     tracked: TrackedFrame = field(default_factory=answer)
@@ -97,13 +103,11 @@ class Script:
     on_track: Callable[[str], object] = lambda bone: None
 
 
-class FakeLine:
-    """Stands for a `navapp.tracking.Tracker`."""
+class FakeTracker:
+    """Stands for `navapp.tracking.Line`."""
 
-    script: Script
-
-    def __init__(self, rig: StereoRig, bone: BoneModel, settings: object) -> None:
-        self.bone = bone
+    def __init__(self, script: Script, bone: BoneModel) -> None:
+        self.script, self.bone = script, bone
 
     def register(self, left, right, prior, goal, on_progress=lambda share: None):
         self.script.calls.append(f"register {self.bone.name}")
@@ -170,9 +174,7 @@ class FakeCamera:
         if self._n_frames is not None and self._sequence >= self._n_frames:
             raise EndOfSequence("over")
         self._clock.advance_ns(PERIOD_NS)
-        now_ns = self._clock.now_ns()
-        picture = np.zeros((HEIGHT, WIDTH), dtype=np.uint8)
-        frame = StereoFrame(picture, picture, now_ns, now_ns, 0, self._sequence, "rig")
+        frame = a_frame(self._clock.now_ns(), self._sequence)
         self._sequence += 1
         return frame
 
@@ -188,11 +190,12 @@ class Bench:
 
     def __init__(
         self,
-        monkeypatch,
         *,
         executor: Executor | None = None,
         plan: Plan | None = None,
-        options: SessionOptions | None = None,
+        prior: Prior | None = None,
+        others: tuple[str, ...] = (),
+        overlay_valid_ms: float = 500.0,
         can_reopen: bool = True,
         camera: StereoCamera | None = None,
         clock: Clock | None = None,
@@ -203,8 +206,7 @@ class Bench:
         make_display: Callable[[Clock, int, int], SimulatedDisplay] = SimulatedDisplay,
     ) -> None:
         self.script = Script()
-        line = type("ScriptedLine", (FakeLine,), {"script": self.script})
-        monkeypatch.setattr("navapp.control.pursuit.make_tracker", line)
+        self.trackers: dict[str, FakeTracker] = {}
         self.clock = clock or ManualClock(10**9)
         self.camera = camera or FakeCamera(self.clock)
         if isinstance(self.camera, FakeCamera):
@@ -221,20 +223,28 @@ class Bench:
                 self.camera, self.display, projector or NoProjector(),
                 mirror or FixedMirror(45.0), self.clock,
             ),
-            a_rig(),
-            plan or a_plan(),
-            Prior({"femur": a_pose()}),
+            SessionSpecification(
+                a_rig(),
+                plan or a_plan(),
+                prior or Prior({"femur": a_pose()}),
+                others=others,
+                overlay_valid_ms=overlay_valid_ms,
+            ),
             executor=executor or InlineExecutor(),
-            options=options,
             board_watch=board_watch,
+            make_tracker=self._make_tracker,
             hooks=replace(
                 given,
-                on_frame=(self.results.append,),
-                on_event=(self.events.append,),
-                on_take_over=(self.take_overs.append,),
+                on_frame=(self.results.append, *given.on_frame),
+                on_event=(self.events.append, *given.on_event),
+                on_take_over=(self.take_overs.append, *given.on_take_over),
                 reopen_camera=self._reopen if can_reopen else None,
             ),
         )  # fmt: skip
+
+    def _make_tracker(self, rig, bone: BoneModel, settings, aspects) -> FakeTracker:
+        self.trackers[bone.name] = FakeTracker(self.script, bone)
+        return self.trackers[bone.name]
 
     def _reopen(self) -> StereoCamera:
         self.camera.open()
@@ -279,6 +289,14 @@ class Bench:
         self.controller.submit(command)
         return self.controller.step()
 
+    def accept(self) -> Snapshot:
+        """What is under review, whether it was seen or not."""
+        return self.do(Accept(None))
+
+    def reject(self) -> Snapshot:
+        """What is under review, whether it was seen or not."""
+        return self.do(Reject(None))
+
     def refused(self) -> str:
         """What was refused last."""
         return next((e.text for e in reversed(self.events) if e.kind == "refused"), "")
@@ -289,16 +307,16 @@ def navigating(bench: Bench) -> Bench:
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     assert bench.state == "navigating"
     return bench
 
 
 @contextmanager
-def hanging_registration(monkeypatch) -> Iterator[Bench]:
+def hanging_registration() -> Iterator[Bench]:
     """A bench whose registration has begun on its worker and waits for the script's gate."""
-    bench = Bench(monkeypatch, executor=ThreadExecutor())
+    bench = Bench(executor=ThreadExecutor())
     gate = bench.script.gate = threading.Event()
     try:
         bench.frames(1)

@@ -4,10 +4,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from navapp.control.event_log import SessionHooks
 from navapp.control.executors import InlineExecutor
-from navapp.control.interlocks import navigable
+from navapp.control.interlocks import check_interlocks
 from navapp.control.recorder import RecordingStopped
-from navapp.control.session import SessionHooks
 from navapp.control.states import (
     Accept,
     Blank,
@@ -54,7 +54,7 @@ def test_registering_leads_to_review_and_accepting_to_navigation(bench: Bench) -
     assert bench.snapshot.is_candidate
     assert not bench.snapshot.is_navigable
     assert bench.take_overs == [1]
-    assert bench.do(Accept()).state.value == "navigating"
+    assert bench.accept().state.value == "navigating"
     assert bench.frames(1).is_navigable
     assert bench.shows_guides
 
@@ -129,8 +129,8 @@ def test_a_failed_registration_keeps_the_accepted_track(bench: Bench) -> None:
     assert bench.frames(1).state.value == "navigating"
 
 
-def test_a_running_registration_does_not_stop_the_pictures(monkeypatch) -> None:
-    with hanging_registration(monkeypatch) as bench:
+def test_a_running_registration_does_not_stop_the_pictures() -> None:
+    with hanging_registration() as bench:
         before = len(bench.results)
         snapshot = bench.frames(5)
         assert len(bench.results) == before + 5
@@ -142,7 +142,7 @@ def test_a_running_registration_does_not_stop_the_pictures(monkeypatch) -> None:
         assert bench.script.calls.count("register femur") == 1
 
 
-def test_a_worker_that_ends_between_two_frames_is_used_from_the_next_one(monkeypatch) -> None:
+def test_a_worker_that_ends_between_two_frames_is_used_from_the_next_one() -> None:
     """Recorded and replayed alike: its pose is followed into the first frame that shows it."""
 
     class Late(InlineExecutor):
@@ -154,7 +154,7 @@ def test_a_worker_that_ends_between_two_frames_is_used_from_the_next_one(monkeyp
             self.n_asked += 1
             return self.n_asked >= 3
 
-    bench = Bench(monkeypatch, executor=Late())
+    bench = Bench(executor=Late())
     bench.script.found = [answer(pose=a_pose(x_mm=7.0))]
     bench.frames(1)
     bench.do(Register())
@@ -174,10 +174,9 @@ def test_a_bug_in_the_search_is_not_hidden(bench: Bench) -> None:
         bench.frames(1)
 
 
-def test_without_a_prior_the_failure_says_what_is_missing(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_without_a_prior_the_failure_says_what_is_missing() -> None:
+    bench = Bench(prior=Prior())
     bench.script.found = []
-    bench.controller._pursuit._prior = Prior()
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
@@ -210,9 +209,9 @@ ACTIONS = st.lists(
     st.sampled_from(
         [
             *["frame"] * 8, "ok", "doubted", "lost", "nowhere", "late", "silent", "speaks",
-            "unplug", "plug", Register(), Register(), Accept(), Accept(), Reject(), Cancel(),
-            Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), EnterStage(1), EnterStage(2),
-            EnterStage(4), EnterStage(5), Reconnect(),
+            "unplug", "plug", Register(), Register(), Accept(None), Accept(None), Reject(None),
+            Cancel(), Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), EnterStage(1),
+            EnterStage(2), EnterStage(4), EnterStage(5), Reconnect(),
         ]
     ),
     min_size=5,
@@ -248,12 +247,12 @@ def act(bench: Bench, action) -> None:
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )  # fmt: skip
 @given(actions=ACTIONS)
-def test_guides_are_never_seen_when_they_must_not_be(monkeypatch, actions) -> None:
-    bench = Bench(monkeypatch)
-    for action in ["frame", Register(), "frame", Accept(), "frame", *actions]:
+def test_guides_are_never_seen_when_they_must_not_be(actions) -> None:
+    bench = Bench()
+    for action in ["frame", Register(), "frame", Accept(None), "frame", *actions]:
         act(bench, action)
         snapshot = bench.snapshot
-        assert snapshot.reasons == navigable(snapshot)
+        assert snapshot.reasons == check_interlocks(snapshot)
         if bench.shows_guides:
             is_candidate = snapshot.state.value == "review" and not snapshot.is_blanked
             assert snapshot.is_navigable or is_candidate
@@ -272,8 +271,8 @@ def test_guides_are_never_seen_when_they_must_not_be(monkeypatch, actions) -> No
     assert bench.is_dark
 
 
-def test_the_same_session_on_another_plan_knows_its_bones(monkeypatch) -> None:
-    bench = Bench(monkeypatch, plan=replace(a_plan("tibia")))
+def test_the_same_session_on_another_plan_knows_its_bones() -> None:
+    bench = Bench(plan=replace(a_plan("tibia")))
     bench.frames(1)
     assert not bench.snapshot.is_bone_planned
     bench.do(EnterStage(5))
@@ -293,10 +292,10 @@ def test_an_interruption_in_a_recording_forgets_what_the_camera_looked_at(bench:
     assert bench.do(Interrupt()).state.value == "suspended"
 
 
-def test_a_loss_of_the_camera_is_told_as_a_command_that_a_replay_can_give(monkeypatch) -> None:
+def test_a_loss_of_the_camera_is_told_as_a_command_that_a_replay_can_give() -> None:
     told = []
     hooks = SessionHooks(on_command=(lambda command, sequence: told.append((command, sequence)),))
-    bench = navigating(Bench(monkeypatch, hooks=hooks))
+    bench = navigating(Bench(hooks=hooks))
     bench.camera.error = DeviceLost("unplugged")
     bench.frames(1)
     assert told[-1] == (Interrupt(), bench.snapshot.sequence)
@@ -316,12 +315,11 @@ def test_a_failed_registration_hands_out_the_judges_reasons(bench: Bench) -> Non
     assert not bench.shows_guides
 
 
-def test_a_recording_that_stops_is_an_alarm_and_not_the_end(monkeypatch) -> None:
+def test_a_recording_that_stops_is_an_alarm_and_not_the_end() -> None:
     def stop(result) -> None:
         raise RecordingStopped("recording stopped: the disk is full")
 
-    bench = Bench(monkeypatch)
-    bench.controller._session.hooks = replace(bench.controller._session.hooks, on_frame=(stop,))
+    bench = Bench(hooks=SessionHooks(on_frame=(stop,)))
     bench.frames(2)
     assert bench.state == "ready"
     assert [e.level for e in bench.events if e.kind == "recording"] == [EventLevel.ALARM] * 2

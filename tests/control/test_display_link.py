@@ -3,13 +3,15 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivers.clock import ManualClock
+from drivers.fixed_mirror import FixedMirror
+from drivers.interfaces import MirrorInfo
 from navapp.control import display_link
-from navapp.control.device_watch import SlowDevices
 from navapp.control.display_link import DisplayLink
 from navapp.errors import DeviceNotFound
 from sim_devices.display import SimulatedDisplay
@@ -93,7 +95,7 @@ def test_nobody_waits_for_a_display_that_opens_slowly(cable) -> None:
     assert cable.n_attempts == 2
     cable.is_plugged = True
     cable.gate.set()
-    wait_until(lambda: not link._reopening.is_under_way)
+    wait_until(lambda: not link._reopener.is_under_way)
     assert not shown(link)
     link.show_again()
     assert shown(link)
@@ -126,16 +128,28 @@ def test_after_the_end_it_is_not_opened_any_more(cable) -> None:
     link.close()
     assert not shown(link)
     assert cable.n_attempts == 1
-    assert not link._reopening.is_under_way
+    assert not link._reopener.is_under_way
 
 
-def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(
-    cable, monkeypatch
-) -> None:
-    bench = Bench(monkeypatch, make_display=lambda clock, width, height: cable)
+class MovableMirror(FixedMirror):
+    """Stands where it should, and says when it is stopped."""
+
+    def __init__(self) -> None:
+        super().__init__(45.0)
+        self.stopped = threading.Event()
+
+    @property
+    def info(self) -> MirrorInfo:
+        return replace(super().info, is_movable=True)
+
+    def stop(self) -> None:
+        self.stopped.set()
+
+
+def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(cable) -> None:
+    mirror = MovableMirror()
+    bench = Bench(mirror=mirror, make_display=lambda clock, width, height: cable)
     bench.frames(1)
-    stopped = threading.Event()
-    monkeypatch.setattr(SlowDevices, "close", lambda devices: stopped.set())
     cable.unplug()
     cable.gate.clear()
     n_attempts = cable.n_attempts
@@ -143,7 +157,7 @@ def test_a_display_that_takes_long_to_open_keeps_no_device_from_being_stopped(
     ending = threading.Thread(target=bench.controller.close)
     ending.start()
     try:
-        assert stopped.wait(2.0)
+        assert mirror.stopped.wait(2.0)
         assert ending.is_alive()
     finally:
         cable.gate.set()

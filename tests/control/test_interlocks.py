@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from navapp.control.interlocks import MAX_POSE_AGE_MS, is_current, navigable
+from navapp.control.interlocks import MAX_POSE_AGE_MS, check_interlocks, is_current
 from navapp.control.stages import STAGES
 from navapp.control.states import OtherBone, SessionState, Snapshot
 from navapp.values import Reason, Status, Verdict
@@ -21,13 +21,13 @@ GOOD = Snapshot(
 
 
 def test_everything_in_order_is_navigable() -> None:
-    assert navigable(GOOD) == ()
-    assert navigable(replace(GOOD, pose_age_ms=MAX_POSE_AGE_MS)) == ()
+    assert check_interlocks(GOOD) == ()
+    assert check_interlocks(replace(GOOD, pose_age_ms=MAX_POSE_AGE_MS)) == ()
 
 
 @pytest.mark.parametrize("state", [s for s in SessionState if s is not SessionState.NAVIGATING])
 def test_no_other_state_is_navigable(state: SessionState) -> None:
-    assert navigable(replace(GOOD, state=state))
+    assert check_interlocks(replace(GOOD, state=state))
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_no_other_state_is_navigable(state: SessionState) -> None:
     ],
 )
 def test_each_thing_that_is_wrong_is_named_first(change, reason: Reason) -> None:
-    assert navigable(replace(GOOD, **change))[0] is reason
+    assert check_interlocks(replace(GOOD, **change))[0] is reason
 
 
 def test_everything_that_is_wrong_is_named_the_most_urgent_first() -> None:
@@ -58,7 +58,7 @@ def test_everything_that_is_wrong_is_named_the_most_urgent_first() -> None:
         GOOD, is_blanked=True, is_camera_silent=True, is_bone_planned=False, pose_age_ms=9e9,
         verdict=Verdict(Status.LOST, None, (Reason.OUT_OF_VIEW,)),
     )  # fmt: skip
-    assert navigable(bad) == (
+    assert check_interlocks(bad) == (
         Reason.BLANKED,
         Reason.CAMERA_SILENT,
         Reason.STAGE_WITHOUT_BONE,
@@ -68,7 +68,7 @@ def test_everything_that_is_wrong_is_named_the_most_urgent_first() -> None:
 
 
 def test_the_snapshots_own_answer_is_not_looked_at() -> None:
-    assert navigable(replace(GOOD, reasons=(Reason.BLANKED,))) == ()
+    assert check_interlocks(replace(GOOD, reasons=(Reason.BLANKED,))) == ()
 
 
 @pytest.mark.parametrize(
@@ -87,9 +87,9 @@ def test_another_bone_is_current_only_when_ok_and_fresh(verdict, age_ms, is_so: 
 
 def test_other_bones_neither_make_navigable_nor_prevent_it() -> None:
     lost = (OtherBone("tibia", Verdict(Status.LOST), 9e9),)
-    assert navigable(replace(GOOD, others=lost)) == ()
+    assert check_interlocks(replace(GOOD, others=lost)) == ()
     well = (OtherBone("tibia", Verdict(Status.OK, 0.1), 1.0),)
-    assert navigable(replace(GOOD, others=well, left_from_bone=None)) == (Reason.BONE_LOST,)
+    assert check_interlocks(replace(GOOD, others=well, left_from_bone=None)) == (Reason.BONE_LOST,)
 
 
 @pytest.mark.parametrize("reason", list(Reason))

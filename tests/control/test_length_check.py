@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from navapp.control.length_check import MOST_LOOKS, Finding, pooled
+from navapp.control.length_check import MOST_LOOKS, Finding, pool_lengths
 
 WORST = 0.0009
 SIGMA = 6e-5
@@ -27,15 +27,15 @@ def findings(ratios, sigma: float = SIGMA) -> list[Finding]:
     """Of one showing, after every look, as the watch asks."""
     given = [Look(float(ratio), sigma) for ratio in ratios]
     return [
-        pooled(given[max(0, k - MOST_LOOKS) : k], 0, WORST).finding
+        pool_lengths(given[max(0, k - MOST_LOOKS) : k], 0, WORST).finding
         for k in range(1, len(given) + 1)
     ]
 
 
 def test_a_right_length_is_within_and_a_wrong_one_is_off() -> None:
-    assert pooled(looks(1.0002), 7, WORST).finding is Finding.WITHIN
+    assert pool_lengths(looks(1.0002), 7, WORST).finding is Finding.WITHIN
     for wrong in (1.0 - 0.0012, 1.0 + 0.0012):
-        found = pooled(looks(wrong), 7, WORST)
+        found = pool_lengths(looks(wrong), 7, WORST)
         assert found.finding is Finding.OFF
         assert found.ratio == pytest.approx(wrong)
         assert found.captured_ns == 7
@@ -43,7 +43,7 @@ def test_a_right_length_is_within_and_a_wrong_one_is_off() -> None:
 
 def test_fewer_than_three_looks_judge_nothing() -> None:
     for n in (1, 2):
-        found = pooled(looks(1.01, n=n), 0, WORST)
+        found = pool_lengths(looks(1.01, n=n), 0, WORST)
         assert found.finding is Finding.NOT_JUDGED
         assert found.bound == pytest.approx(1.96 * 2e-5 / n**0.5, rel=1e-4)
         assert str(found) == f"{n} of 3 looks at the board"
@@ -51,15 +51,15 @@ def test_fewer_than_three_looks_judge_nothing() -> None:
 
 def test_one_pool_alone_is_a_doubt_and_two_of_one_mind_an_alarm() -> None:
     for n in (3, 4, 5):
-        assert pooled(looks(1.01, n=n), 0, WORST).finding is Finding.DOUBTFUL
-    assert pooled(looks(1.01, n=6), 0, WORST).finding is Finding.OFF
+        assert pool_lengths(looks(1.01, n=n), 0, WORST).finding is Finding.DOUBTFUL
+    assert pool_lengths(looks(1.01, n=6), 0, WORST).finding is Finding.OFF
     torn = [*looks(1.01, n=5), *looks(0.99, n=5)]
     assert Finding.OFF not in findings([one.ratio for one in torn])
 
 
 def test_a_board_moved_about_is_not_judged_and_that_is_said() -> None:
     """Between both exposures it is as much too small as too large."""
-    found = pooled(looks(1.0012, scatter=0.001), 0, WORST)
+    found = pool_lengths(looks(1.0012, scatter=0.001), 0, WORST)
     assert found.finding is Finding.NOT_JUDGED
     assert str(found) == "the board is not held still"
 
@@ -100,11 +100,11 @@ def test_the_bound_holds_in_19_of_20_for_looks_whose_errors_are_known_and_for_ot
     rng = np.random.default_rng(4)
     for n, known in ((3, 1e-4), (5, 1e-4), (3, 1e-9), (5, 1e-9)):
         errors = rng.normal(0.0, 1e-4, (2000, n))
-        checks = [pooled([Look(1.0 + e, known) for e in row], 0, WORST) for row in errors]
+        checks = [pool_lengths([Look(1.0 + e, known) for e in row], 0, WORST) for row in errors]
         held = np.mean([abs(one.ratio - 1.0) <= one.bound for one in checks])
         assert held > 0.94
 
 
 def test_it_reads_as_a_length() -> None:
-    text = str(pooled([Look(1.00123, 1e-4)] * 4, 0, WORST))
+    text = str(pool_lengths([Look(1.00123, 1e-4)] * 4, 0, WORST))
     assert text == "100 mm on the board are measured as 100.12 +- 0.01 mm"

@@ -1,9 +1,9 @@
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from navapp.control.event_log import SessionHooks
 from navapp.control.executors import RecordedExecutor, ThreadExecutor
 from navapp.control.operators import (
     RecordedOperator,
@@ -13,20 +13,21 @@ from navapp.control.operators import (
     read_events,
     read_script,
 )
+from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
 from navapp.control.states import Accept, Blank, EnterStage, Propose, Register, Reject, Show
-from navapp.errors import ConfigurationError, SequenceError, UsageError
+from navapp.errors import ConfigurationError, DeviceLost, SequenceError, UsageError
 from navapp.geometry.transform import rotation_angle_deg
 from navapp.values import Reason, Status
-from tests.control.fakes import Bench, FakeCamera, a_pose, answer
+from tests.control.fakes import Bench, FakeCamera, a_pose, answer, navigating
 
 LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
 GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
 
 
 @pytest.fixture
-def bench(monkeypatch) -> Bench:
-    return Bench(monkeypatch, camera=FakeCamera(None, n_frames=40))
+def bench() -> Bench:
+    return Bench(camera=FakeCamera(None, n_frames=40))
 
 
 def commands_of(bench: Bench, operator) -> list:
@@ -36,6 +37,16 @@ def commands_of(bench: Bench, operator) -> list:
     bench.controller.submit = lambda command: (given.append(command), submit(command))
     run_headless(bench.controller, operator)
     return given
+
+
+class NoFrames:
+    """A recorder's sink that keeps nothing."""
+
+    def add(self, frame, with_pictures: bool) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
 
 
 def kinds(commands) -> list[str]:
@@ -72,10 +83,10 @@ def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) 
     bench.script.tracked = GONE
     bench.frames(2)
     assert bench.snapshot.left_from_bone is None
-    assert operator.commands(bench.snapshot) == [Reject()]
+    assert operator.commands(bench.snapshot) == [Reject(1)]
 
 
-def test_steps_wait_for_their_frame(bench: Bench) -> None:
+def test_steps_wait_for_their_frame() -> None:
     steps = (
         ScriptStep(do="register"),
         ScriptStep(do="blank", at_frame=8),
@@ -83,11 +94,10 @@ def test_steps_wait_for_their_frame(bench: Bench) -> None:
         ScriptStep(do="stage", stage="drilling", at_frame=15),
     )
     dark = []
-    bench.controller._session.hooks = replace(
-        bench.controller._session.hooks, on_frame=(lambda r: dark.append(bench.is_dark),)
-    )
+    hooks = SessionHooks(on_frame=(lambda r: dark.append(bench.is_dark),))
+    bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
     given = commands_of(bench, ScriptedOperator(steps))
-    assert given == [Register(), Accept(), Blank(), Show(), EnterStage(2)]
+    assert given == [Register(), Accept(1), Blank(), Show(), EnterStage(2)]
     assert [number for number, is_dark in enumerate(dark) if is_dark] == [9, 10, 11, 12]
 
 
@@ -101,7 +111,7 @@ def test_a_replays_operator_rejects_a_lost_candidate(bench: Bench) -> None:
     bench.do(Register())
     bench.script.tracked = LOST
     bench.frames(2)
-    assert ReplayOperator().commands(bench.snapshot) == [Reject()]
+    assert ReplayOperator().commands(bench.snapshot) == [Reject(1)]
 
 
 def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
@@ -110,28 +120,29 @@ def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
     assert bench.script.calls.count("register femur") >= 39
 
 
-def test_a_recorded_operator_gives_each_command_after_the_same_frame(bench: Bench) -> None:
-    recorded = [(-1, Show()), (2, Register()), (5, Accept()), (5, Blank())]
+def test_a_recorded_operator_gives_each_command_after_the_same_frame() -> None:
+    recorded = [(-1, Show()), (2, Register()), (5, Accept(None)), (5, Blank())]
     told: list[tuple[int, object]] = []
-    bench.controller._session.hooks = replace(
-        bench.controller._session.hooks, on_command=(lambda c, s: told.append((s, c)),)
-    )
+    hooks = SessionHooks(on_command=(lambda c, s: told.append((s, c)),))
+    bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
     run_headless(bench.controller, RecordedOperator(list(recorded)))
     assert told == recorded
 
 
-def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
+def test_a_live_session_replays_with_the_same_states() -> None:
     """Worker, cancelled search and second search included."""
     import threading
 
-    live = Bench(monkeypatch, executor=ThreadExecutor(), camera=FakeCamera(None, n_frames=30))
     told: list[tuple[int, object]] = []
-    live.controller._session.hooks = replace(
-        live.controller._session.hooks, on_command=(lambda c, s: told.append((s, c)),)
+    executor = ThreadExecutor()
+    live = Bench(
+        executor=executor,
+        camera=FakeCamera(None, n_frames=30),
+        hooks=SessionHooks(on_command=(lambda c, s: told.append((s, c)),)),
     )
     from navapp.control.states import Cancel
-    from tests.control.fakes import wait_for
 
+    live.script.found = [answer(), answer(pose=a_pose(x_mm=5.0))]
     for number in (1, 2):
         live.script.gate = threading.Event()
         live.script.started.clear()
@@ -144,20 +155,23 @@ def test_a_live_session_replays_with_the_same_states(monkeypatch) -> None:
             live.script.gate.set()
         else:
             live.script.gate.set()
-            job = live.controller._pursuit._search.job
-            wait_for(lambda job=job: job.is_finished, "the second search")
+            executor.close()
     live.frames(3)
-    live.do(Accept())
+    live.do(Reject(live.snapshot.candidate_id))
+    live.do(Accept(1))
+    live.frames(1)
+    live.do(Accept(live.snapshot.candidate_id))
     live.frames(30)
     live.controller.close()
     assert live.take_overs
 
     again = Bench(
-        monkeypatch,
         executor=RecordedExecutor(live.take_overs),
         camera=FakeCamera(None, n_frames=30),
     )
+    again.script.found = live.script.found
     run_headless(again.controller, RecordedOperator(told))
+    assert live.refused() == again.refused() != ""
     assert [r.state for r in again.results] == [r.state for r in live.results]
     assert again.take_overs == live.take_overs
 
@@ -168,12 +182,46 @@ def test_events_are_read_back_as_commands_and_take_overs(tmp_path: Path) -> None
         {"type": "command", "sequence": 3, "command": "register"},
         {"type": "take_over", "sequence": 4},
         {"type": "command", "sequence": 6, "command": "stage", "number": 2},
+        {"type": "command", "sequence": 7, "command": "reject"},
+        {"type": "command", "sequence": 8, "command": "accept", "candidate_id": 2},
     ]
     path = tmp_path / "events.jsonl"
     path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     events = read_events(path)
-    assert events.commands == [(3, Register()), (6, EnterStage(2))]
+    assert events.commands == [
+        (3, Register()),
+        (6, EnterStage(2)),
+        # Older recordings do not say which candidate was meant.
+        (7, Reject(None)),
+        (8, Accept(2)),
+    ]
     assert events.take_overs == [4]
+
+
+def test_a_command_that_was_refused_is_not_given_again(tmp_path: Path) -> None:
+    """What refused it, a lost camera, is not there in the replay."""
+    recorder = SessionRecorder(tmp_path, NoFrames())
+    hooks = SessionHooks(
+        on_event=(recorder.on_event,),
+        on_command=(recorder.on_command,),
+        on_take_over=(recorder.on_take_over,),
+    )
+    live = navigating(Bench(camera=FakeCamera(None, n_frames=12), hooks=hooks))
+    live.camera.error = DeviceLost("unplugged")
+    live.frames(1)
+    live.do(Register())
+    assert "the camera is lost" in live.refused()
+    live.do(Blank())
+    live.camera.error = None
+    live.frames(40)
+    recorder.close()
+    events = read_events(tmp_path / "events.jsonl")
+    again = Bench(
+        executor=RecordedExecutor(events.take_overs), camera=FakeCamera(None, n_frames=12)
+    )
+    run_headless(again.controller, RecordedOperator(events.commands))
+    assert [r.state for r in again.results] == [r.state for r in live.results]
+    assert kinds(command for _, command in events.commands)[-1] == "Blank"
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,12 @@ from itertools import pairwise
 
 import pytest
 
-from navapp.control.controller import SessionOptions
 from navapp.control.interlocks import is_current
 from navapp.control.states import (
-    Accept,
     DistrustRig,
     EnterStage,
     OtherBone,
     Register,
-    Reject,
 )
 from navapp.errors import DeviceLost
 from navapp.values import Reason, Status
@@ -32,7 +29,7 @@ def accepted(bench: Bench, *bones: str) -> Bench:
         bench.script.found = [FOUND[bone]]
         bench.do(Register())
         bench.frames(1)
-        bench.do(Accept())
+        bench.accept()
     bench.frames(1)
     assert bench.state == "navigating"
     assert bench.snapshot.stage.bone == bones[-1]
@@ -60,8 +57,8 @@ def test_an_accepted_bone_is_followed_in_every_second_frame_of_anothers_stage(be
     assert [r.others["femur"] for r in bench.results[-8:] if r.others] == [FOUND["femur"]] * 4
 
 
-def test_two_others_take_turns_and_never_share_a_frame(monkeypatch) -> None:
-    bench = accepted(Bench(monkeypatch, plan=a_plan(*STAGE_OF)), "femur", "patella", "tibia")
+def test_two_others_take_turns_and_never_share_a_frame() -> None:
+    bench = accepted(Bench(plan=a_plan(*STAGE_OF)), "femur", "patella", "tibia")
     seen = turns(bench, 16)
     assert sorted(seen) == [""] * 8 + ["femur"] * 4 + ["patella"] * 4
     for name in ("femur", "patella"):
@@ -69,9 +66,9 @@ def test_two_others_take_turns_and_never_share_a_frame(monkeypatch) -> None:
         assert [b - a for a, b in pairwise(places)] == [4, 4, 4]
 
 
-def test_turns_are_counted_in_frames_whatever_the_time_and_the_number(monkeypatch) -> None:
-    quick = turns(accepted(Bench(monkeypatch), "femur", "tibia"), 6)
-    slow = accepted(Bench(monkeypatch), "femur", "tibia")
+def test_turns_are_counted_in_frames_whatever_the_time_and_the_number() -> None:
+    quick = turns(accepted(Bench(), "femur", "tibia"), 6)
+    slow = accepted(Bench(), "femur", "tibia")
     seen = []
     for number in range(6):
         slow.clock.advance_ns(number * 17 * PERIOD_NS)
@@ -173,10 +170,10 @@ def test_from_one_candidate_to_the_next_nothing_has_moved(bench: Bench) -> None:
     bench.script.tracked_of = dict(FOUND)
     bench.frames(2)
     assert expected_x_mm(bench, 2.0) == pytest.approx([2.0])
-    bench.do(Reject())
+    bench.reject()
     assert bench.state == "review"
     assert expected_x_mm(bench, 30.0) == pytest.approx([0.0])
-    bench.do(Accept())
+    bench.accept()
     # What was accepted is the candidate that was followed until then.
     assert expected_x_mm(bench, 31.0) == pytest.approx([1.0])
 
@@ -189,7 +186,7 @@ def test_a_new_registration_of_the_active_bone_moves_nothing(bench: Bench) -> No
     bench.script.found = [answer(pose=a_pose("tibia", x_mm=20.0))]
     bench.do(Register())
     bench.frames(1)
-    bench.do(Accept())
+    bench.accept()
     assert expected_x_mm(bench, 20.0, 21.0) == pytest.approx([0.0, 1.0])
 
 
@@ -273,8 +270,8 @@ def test_with_a_rig_that_moved_nothing_is_said_of_any_bone(bench: Bench) -> None
     assert other(bench) == OtherBone("femur")
 
 
-def test_a_bone_asked_for_is_not_registered_with_a_rig_that_moved(monkeypatch) -> None:
-    bench = replayed(monkeypatch, [FOUND["tibia"]])
+def test_a_bone_asked_for_is_not_registered_with_a_rig_that_moved() -> None:
+    bench = replayed([FOUND["tibia"]])
     bench.do(DistrustRig("a test"))
     assert turns(bench, 4) == [""] * 4
     assert bench.script.calls == []
@@ -283,24 +280,22 @@ def test_a_bone_asked_for_is_not_registered_with_a_rig_that_moved(monkeypatch) -
 # -- bones that a replay asks for ------------------------------------------------------------------
 
 
-def replayed(monkeypatch, found) -> Bench:
-    bench = Bench(monkeypatch, options=SessionOptions(others=("tibia",)))
+def replayed(found) -> Bench:
+    bench = Bench(others=("tibia",))
     bench.script.found = found
     bench.script.tracked_of = {**FOUND}
     return bench
 
 
-def test_a_bone_asked_for_is_registered_in_its_turn_and_followed_without_a_word(
-    monkeypatch,
-) -> None:
-    bench = replayed(monkeypatch, [FOUND["tibia"], LOST])
+def test_a_bone_asked_for_is_registered_in_its_turn_and_followed_without_a_word() -> None:
+    bench = replayed([FOUND["tibia"], LOST])
     assert turns(bench, 6) == ["tibia", "", "tibia", "", "tibia", ""]
     assert bench.script.calls == ["register tibia", "glance at tibia", "glance at tibia"]
     assert bench.state == "ready"
 
 
-def test_a_bone_asked_for_that_is_not_found_is_looked_for_in_its_next_turn(monkeypatch) -> None:
-    bench = replayed(monkeypatch, [LOST_OF["tibia"]])
+def test_a_bone_asked_for_that_is_not_found_is_looked_for_in_its_next_turn() -> None:
+    bench = replayed([LOST_OF["tibia"]])
     assert turns(bench, 4) == ["tibia", "", "tibia", ""]
     assert bench.script.calls == ["register tibia"] * 2
     assert other(bench).verdict.status is Status.LOST

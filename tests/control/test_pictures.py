@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from navapp.control.pictures import banner, fitted
-from navapp.control.states import Accept, Register
+from navapp.control.pictures import banner, fit_to_display
+from navapp.control.states import Register
 from tests.control.fakes import Bench
 
 
@@ -12,7 +12,7 @@ def picture(height: int, width: int) -> np.ndarray:
 
 def test_a_picture_of_the_displays_size_is_passed_on() -> None:
     image = picture(48, 64)
-    assert fitted(image, 64, 48) is image
+    assert fit_to_display(image, 64, 48) is image
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ def test_a_picture_of_the_displays_size_is_passed_on() -> None:
     ],
 )
 def test_a_picture_is_scaled_as_a_whole_with_black_beside_it(size, display, columns, rows) -> None:
-    out = fitted(picture(*size), *display)
+    out = fit_to_display(picture(*size), *display)
     assert out.shape == (display[1], display[0], 3)
     lit = np.argwhere(out[:, :, 0] > 0)
     assert lit.min(axis=0).tolist() == [rows[0], columns[0]]
@@ -33,13 +33,13 @@ def test_a_picture_is_scaled_as_a_whole_with_black_beside_it(size, display, colu
     assert (out[rows[0] : rows[1], columns[0] : columns[1]] == 200).all()
 
 
-def test_the_banner_says_what_the_picture_is(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_the_banner_says_what_the_picture_is() -> None:
+    bench = Bench()
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - NO GUIDES: no registration has been accepted"
     bench.do(Register())
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - CANDIDATE, not accepted"
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - NAVIGATING - error <= 0.80 mm"

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from navapp.control.event_log import SessionHooks
 from navapp.control.operators import read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
-from navapp.control.states import Accept, EnterStage, Propose, Register
+from navapp.control.states import EnterStage, Propose, Register
 from navapp.errors import InputError
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_pose, answer
@@ -27,17 +28,15 @@ class Sink:
         self.is_closed = True
 
 
-def recorded(monkeypatch, folder: Path, sink: Sink) -> tuple[Bench, SessionRecorder]:
-    bench = Bench(monkeypatch)
+def recorded(folder: Path, sink: Sink) -> tuple[Bench, SessionRecorder]:
     recorder = SessionRecorder(folder, sink, with_pictures=False)
-    bench.controller._session.hooks = replace(
-        bench.controller._session.hooks,
+    hooks = SessionHooks(
         on_frame=(recorder.on_frame,),
         on_event=(recorder.on_event,),
         on_command=(recorder.on_command,),
         on_take_over=(recorder.on_take_over,),
     )
-    return bench, recorder
+    return Bench(hooks=hooks), recorder
 
 
 def lines(path: Path) -> list[dict]:
@@ -46,8 +45,8 @@ def lines(path: Path) -> list[dict]:
     return [json.loads(line) for line in text.splitlines()]
 
 
-def test_every_line_is_whole_at_any_moment(monkeypatch, tmp_path: Path) -> None:
-    bench, recorder = recorded(monkeypatch, tmp_path, Sink())
+def test_every_line_is_whole_at_any_moment(tmp_path: Path) -> None:
+    bench, recorder = recorded(tmp_path, Sink())
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
@@ -57,13 +56,13 @@ def test_every_line_is_whole_at_any_moment(monkeypatch, tmp_path: Path) -> None:
     recorder.close()
 
 
-def test_a_session_is_recorded_with_all_that_a_replay_needs(monkeypatch, tmp_path: Path) -> None:
+def test_a_session_is_recorded_with_all_that_a_replay_needs(tmp_path: Path) -> None:
     sink = Sink()
-    bench, recorder = recorded(monkeypatch, tmp_path, sink)
+    bench, recorder = recorded(tmp_path, sink)
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
-    bench.do(Accept())
+    bench.accept()
     bench.frames(1)
     bench.script.tracked = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
     bench.frames(1)
@@ -87,16 +86,14 @@ def test_a_session_is_recorded_with_all_that_a_replay_needs(monkeypatch, tmp_pat
     assert poses[3]["camera_from_model"] is None
 
 
-def test_the_other_bones_are_kept_with_the_frame_whose_turn_they_were(
-    monkeypatch, tmp_path: Path
-) -> None:
-    bench, recorder = recorded(monkeypatch, tmp_path, Sink())
+def test_the_other_bones_are_kept_with_the_frame_whose_turn_they_were(tmp_path: Path) -> None:
+    bench, recorder = recorded(tmp_path, Sink())
     bench.script.tracked_of = {"tibia": answer(pose=a_pose("tibia", x_mm=5.0))}
     for stage in (5, 1):
         bench.do(EnterStage(stage))
         bench.do(Register())
         bench.frames(1)
-        bench.do(Accept())
+        bench.accept()
     bench.frames(4)
     recorder.close()
     poses = lines(tmp_path / "poses.jsonl")[-4:]
@@ -105,15 +102,15 @@ def test_the_other_bones_are_kept_with_the_frame_whose_turn_they_were(
     assert [line["bodies"] for line in poses] == [{"tibia": said}, {}] * 2
 
 
-def a_frame(monkeypatch, number: int):
-    frame = Bench(monkeypatch).camera.read(0.1)
+def a_frame(number: int):
+    frame = Bench().camera.read(0.1)
     return replace(frame, sequence=number)
 
 
-def test_frames_are_kept_in_the_background_all_and_in_order(monkeypatch) -> None:
+def test_frames_are_kept_in_the_background_all_and_in_order() -> None:
     sink = Sink()
     background = BackgroundSink(sink, max_waiting=2)
-    frame = a_frame(monkeypatch, 0)
+    frame = a_frame(0)
     for number in range(30):
         background.add(replace(frame, sequence=number), True)
     background.close()
@@ -121,19 +118,17 @@ def test_frames_are_kept_in_the_background_all_and_in_order(monkeypatch) -> None
     assert sink.is_closed
 
 
-def test_what_goes_wrong_in_the_background_is_raised_at_the_latest_at_the_end(monkeypatch) -> None:
+def test_what_goes_wrong_in_the_background_is_raised_at_the_latest_at_the_end() -> None:
     sink = Sink(error_at=0)
     background = BackgroundSink(sink)
-    background.add(a_frame(monkeypatch, 0), True)
+    background.add(a_frame(0), True)
     with pytest.raises(InputError, match="disk is full"):
         background.close()
     assert sink.is_closed
 
 
-def test_a_full_disk_stops_the_recording_once_and_the_rest_is_ignored(
-    monkeypatch, tmp_path: Path
-) -> None:
-    bench, recorder = recorded(monkeypatch, tmp_path, Sink(error_at=2))
+def test_a_full_disk_stops_the_recording_once_and_the_rest_is_ignored(tmp_path: Path) -> None:
+    bench, recorder = recorded(tmp_path, Sink(error_at=2))
     bench.frames(5)
     told = [event for event in bench.snapshot.events if event.kind == "recording"]
     assert bench.state == "ready"
@@ -143,8 +138,8 @@ def test_a_full_disk_stops_the_recording_once_and_the_rest_is_ignored(
     assert not read_events(tmp_path / "events.jsonl").is_complete
 
 
-def test_a_recording_that_ran_to_its_end_says_so(monkeypatch, tmp_path: Path) -> None:
-    bench, recorder = recorded(monkeypatch, tmp_path, Sink())
+def test_a_recording_that_ran_to_its_end_says_so(tmp_path: Path) -> None:
+    bench, recorder = recorded(tmp_path, Sink())
     bench.frames(2)
     assert not read_events(tmp_path / "events.jsonl").is_complete
     recorder.close()

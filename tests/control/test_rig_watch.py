@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from navapp.control.board_watch import BoardWatch
+from navapp.control.event_log import SessionHooks
 from navapp.control.executors import InlineExecutor
 from navapp.control.rig_watch import RowWatch
-from navapp.control.session import SessionHooks
 from navapp.control.states import (
     Accept,
     DeviceHealth,
@@ -133,10 +133,10 @@ def test_a_moved_rig_is_said_in_words_rings_and_is_dark(moved: Bench) -> None:
     assert moved.controller.failure.remedy == Reason.RIG_MOVED.remedy
 
 
-def test_what_the_rows_have_found_is_told_to_a_recording(monkeypatch) -> None:
+def test_what_the_rows_have_found_is_told_to_a_recording() -> None:
     told = []
     hooks = SessionHooks(on_command=(lambda command, sequence: told.append((command, sequence)),))
-    bench = after_rows(navigating(Bench(monkeypatch, hooks=hooks)), LOW, 6.0)
+    bench = after_rows(navigating(Bench(hooks=hooks)), LOW, 6.0)
     (found,) = [one for one in told if isinstance(one[0], DistrustRig)]
     first = next(result for result in bench.results if result.state.value == "fault")
     assert found == (
@@ -149,7 +149,7 @@ def test_no_good_frame_and_no_command_brings_it_back(moved: Bench) -> None:
     after_rows(moved, GOOD, 30.0)
     assert moved.state == "fault"
     for command in (
-        Register(), Accept(), Propose(a_pose()), Show(), EnterStage(5), EnterStage(1),
+        Register(), Accept(None), Propose(a_pose()), Show(), EnterStage(5), EnterStage(1),
         Reconnect(), Interrupt(), DistrustRig("again"),
     ):  # fmt: skip
         moved.do(command)
@@ -183,16 +183,15 @@ def test_rows_that_are_off_for_a_moment_only_hide_the_guides(bench: Bench) -> No
     assert not any(event.level is EventLevel.ALARM for event in bench.events)
 
 
-def board_bench(monkeypatch, looks: Callable[[], Look | None], **options) -> Bench:
+def board_bench(looks: Callable[[], Look | None], **options) -> Bench:
     return Bench(
-        monkeypatch,
         board_watch=BoardWatch(lambda left, right: looks(), WORST, InlineExecutor(), lambda: 0),
         **options,
     )
 
 
-def test_a_board_that_is_measured_right_is_an_event_and_a_line_with_its_age(monkeypatch) -> None:
-    bench = board_bench(monkeypatch, lambda: Look(1.0002))
+def test_a_board_that_is_measured_right_is_an_event_and_a_line_with_its_age() -> None:
+    bench = board_bench(lambda: Look(1.0002))
     bench.frames(1)
     (line,) = [line for line in bench.snapshot.devices if line.kind == "rig"]
     assert line.detail == "not checked: show the board"
@@ -207,13 +206,11 @@ def test_a_board_that_is_measured_right_is_an_event_and_a_line_with_its_age(monk
     assert bench.shows_guides
 
 
-def test_a_board_that_is_measured_wrong_ends_the_trust(monkeypatch) -> None:
+def test_a_board_that_is_measured_wrong_ends_the_trust() -> None:
     told = []
     hooks = SessionHooks(on_command=(lambda command, sequence: told.append((command, sequence)),))
     length = [Look(1.0)]
-    bench = after_rows(
-        navigating(board_bench(monkeypatch, lambda: length[0], hooks=hooks)), GOOD, 8.0
-    )
+    bench = after_rows(navigating(board_bench(lambda: length[0], hooks=hooks)), GOOD, 8.0)
     assert bench.shows_guides
     length[0] = None
     bench.frames(200)
@@ -233,9 +230,9 @@ def test_a_board_that_is_measured_wrong_ends_the_trust(monkeypatch) -> None:
     assert first.frame.sequence == sequence + 1
 
 
-def test_a_board_that_cannot_be_measured_well_is_a_warning(monkeypatch) -> None:
+def test_a_board_that_cannot_be_measured_well_is_a_warning() -> None:
     ratios = iter([1.0007, 1.0009] * 100)
-    bench = board_bench(monkeypatch, lambda: Look(next(ratios)))
+    bench = board_bench(lambda: Look(next(ratios)))
     bench.frames(120)
     (event,) = [event for event in bench.events if event.kind == "rig"]
     assert event.level is EventLevel.WARNING

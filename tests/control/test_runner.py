@@ -11,14 +11,14 @@ def pipeline_threads() -> list[threading.Thread]:
     return [thread for thread in threading.enumerate() if thread.name == "pipeline"]
 
 
-def test_a_runner_turns_the_crank_and_leaves_no_thread(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_runner_turns_the_crank_and_leaves_no_thread() -> None:
+    bench = Bench()
     runner = SessionRunner(bench.controller)
     runner.start()
     wait_for(lambda: runner.snapshot().state.value == "ready", "readiness")
     runner.submit(Register())
     wait_for(lambda: runner.snapshot().state.value == "review", "review")
-    runner.submit(Accept())
+    runner.submit(Accept(None))
     wait_for(lambda: runner.snapshot().is_navigable, "navigation")
     runner.stop()
     runner.stop()
@@ -29,8 +29,8 @@ def test_a_runner_turns_the_crank_and_leaves_no_thread(monkeypatch) -> None:
     assert not runner.snapshot().is_navigable
 
 
-def test_quitting_ends_the_thread_by_itself(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_quitting_ends_the_thread_by_itself() -> None:
+    bench = Bench()
     runner = SessionRunner(bench.controller)
     runner.start()
     runner.submit(Quit())
@@ -39,8 +39,8 @@ def test_quitting_ends_the_thread_by_itself(monkeypatch) -> None:
     runner.stop()
 
 
-def test_an_error_in_the_thread_is_kept_and_the_display_is_dark(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_an_error_in_the_thread_is_kept_and_the_display_is_dark() -> None:
+    bench = Bench()
     runner = SessionRunner(bench.controller)
     runner.start()
     wait_for(lambda: not bench.is_dark, "a picture")
@@ -52,16 +52,16 @@ def test_an_error_in_the_thread_is_kept_and_the_display_is_dark(monkeypatch) -> 
     runner.stop()
 
 
-def test_a_runner_that_never_started_closes_the_devices(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_runner_that_never_started_closes_the_devices() -> None:
+    bench = Bench()
     bench.frames(1)
     SessionRunner(bench.controller).stop()
     assert bench.is_dark
     assert not bench.camera.is_open
 
 
-def test_a_headless_run_ends_when_the_camera_stays_away(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+def test_a_headless_run_ends_when_the_camera_stays_away() -> None:
+    bench = Bench()
     bench.frames(1)
     bench.camera.error = DeviceLost("unplugged")
     bench.camera.opening_error = DeviceNotFound("still unplugged")
@@ -72,7 +72,7 @@ def test_a_headless_run_ends_when_the_camera_stays_away(monkeypatch) -> None:
 
 
 def test_stopping_a_runner_darkens_the_display_before_it_waits(monkeypatch) -> None:
-    bench = Bench(monkeypatch)
+    bench = Bench()
     runner = SessionRunner(bench.controller)
     order = []
     monkeypatch.setattr(bench.controller, "darken", lambda: order.append("dark"))

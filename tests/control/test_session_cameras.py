@@ -26,8 +26,8 @@ BACK_S = 20.0
 class Room:
     """A session in front of a camera, and what came of a fault of it."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, camera: StereoCamera) -> None:
-        self.bench = Bench(monkeypatch, camera=camera, clock=SystemClock())
+    def __init__(self, camera: StereoCamera) -> None:
+        self.bench = Bench(camera=camera, clock=SystemClock())
 
     def begin(self) -> None:
         self.bench.until(lambda: self.bench.state == "ready", 5.0)
@@ -65,10 +65,10 @@ class Room:
 class UsbRoom(Room):
     """Two USB cameras above fake capture objects."""
 
-    def __init__(self, monkeypatch, tmp_path) -> None:
+    def __init__(self, tmp_path) -> None:
         self.usb = UsbRig(tmp_path, rate_hz=30.0, exposure_ms=5.0)
         eye = replace(self.usb.settings.eye, width=WIDTH, height=HEIGHT)
-        super().__init__(monkeypatch, self.usb.stereo(replace(self.usb.settings, eye=eye)))
+        super().__init__(self.usb.stereo(replace(self.usb.settings, eye=eye)))
 
     def stall(self) -> None:
         """Grabs fail late, but three of them before three seconds of silence are over."""
@@ -82,9 +82,9 @@ class UsbRoom(Room):
 
 
 @pytest.fixture
-def usb(monkeypatch, tmp_path) -> Iterator[UsbRoom]:
+def usb(tmp_path) -> Iterator[UsbRoom]:
     with ExitStack() as stack:
-        room = UsbRoom(monkeypatch, tmp_path)
+        room = UsbRoom(tmp_path)
         stack.callback(room.bench.controller.close)
         room.begin()
         yield room
@@ -149,7 +149,7 @@ class OakRoom(Room):
         self.oak.shape = (HEIGHT, WIDTH)
         settings = DepthaiSettings("", WIDTH, HEIGHT, rate_hz=30.0)
         camera = DepthaiStereo(settings, SystemClock(), open_device=self.oak.open_parts)
-        super().__init__(monkeypatch, camera)
+        super().__init__(camera)
 
 
 @pytest.fixture

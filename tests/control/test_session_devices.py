@@ -6,8 +6,7 @@ import pytest
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState
 from drivers.no_projector import NoProjector
-from navapp.control.controller import SessionOptions
-from navapp.control.device_care import MIRROR_TOLERANCE_DEG
+from navapp.control.device_handlers import MIRROR_TOLERANCE_DEG
 from navapp.control.states import (
     DeviceHealth,
     DeviceLine,
@@ -101,8 +100,8 @@ def test_a_bug_in_opening_a_camera_again_is_told_and_does_not_end_the_attempts(
     assert bench.frames(2).is_navigable
 
 
-def test_a_camera_that_nobody_can_reopen_ends_the_session(monkeypatch) -> None:
-    bench = Bench(monkeypatch, can_reopen=False)
+def test_a_camera_that_nobody_can_reopen_ends_the_session() -> None:
+    bench = Bench(can_reopen=False)
     bench.frames(1)
     bench.camera.error = DeviceLost("gone")
     assert bench.frames(1).is_over
@@ -123,9 +122,9 @@ def test_a_silent_camera_turns_everything_dark(bench: Bench) -> None:
     assert bench.line("camera").health is DeviceHealth.OK
 
 
-def test_guides_leave_the_display_when_their_pose_is_too_old(monkeypatch) -> None:
+def test_guides_leave_the_display_when_their_pose_is_too_old() -> None:
     """However long a picture is said to stay valid."""
-    bench = navigating(Bench(monkeypatch, options=SessionOptions(overlay_valid_ms=60_000.0)))
+    bench = navigating(Bench(overlay_valid_ms=60_000.0))
     bench.camera.is_silent = True
     bench.controller.step(0.3)
     assert bench.shows_guides
@@ -173,8 +172,8 @@ def device_line(bench: Bench, kind: str) -> DeviceLine:
     return next(line for line in bench.snapshot.devices if line.kind == kind)
 
 
-def test_a_projector_that_does_not_answer_is_told_and_everything_is_dark(monkeypatch) -> None:
-    bench = Bench(monkeypatch, projector=BrokenProjector())
+def test_a_projector_that_does_not_answer_is_told_and_everything_is_dark() -> None:
+    bench = Bench(projector=BrokenProjector())
     try:
         navigating(bench)
         line = device_line(bench, "projector")
@@ -187,12 +186,12 @@ def test_a_projector_that_does_not_answer_is_told_and_everything_is_dark(monkeyp
     assert NoProjector().status().power is PowerState.ABSENT
 
 
-def test_a_mirror_that_does_not_answer_is_told_and_everything_is_dark(monkeypatch) -> None:
+def test_a_mirror_that_does_not_answer_is_told_and_everything_is_dark() -> None:
     class Broken(FixedMirror):
         def position_deg(self) -> float:
             raise DeviceLost("the mirror's cable is out")
 
-    bench = Bench(monkeypatch, mirror=Broken(45.0))
+    bench = Bench(mirror=Broken(45.0))
     navigating(bench)
     line = device_line(bench, "mirror")
     assert line.health is DeviceHealth.LOST
@@ -201,7 +200,7 @@ def test_a_mirror_that_does_not_answer_is_told_and_everything_is_dark(monkeypatc
     assert bench.is_dark
 
 
-def test_a_mirror_away_from_its_calibrated_angle_makes_everything_dark(monkeypatch) -> None:
+def test_a_mirror_away_from_its_calibrated_angle_makes_everything_dark() -> None:
     class Turnable(FixedMirror):
         angle_deg = 45.0
 
@@ -209,7 +208,7 @@ def test_a_mirror_away_from_its_calibrated_angle_makes_everything_dark(monkeypat
             return self.angle_deg
 
     mirror = Turnable(45.0)
-    bench = navigating(Bench(monkeypatch, mirror=mirror))
+    bench = navigating(Bench(mirror=mirror))
     assert bench.shows_guides
     mirror.angle_deg = 45.0 + 2.0 * MIRROR_TOLERANCE_DEG
     snapshot = bench.frames(1)
@@ -224,10 +223,10 @@ def test_a_mirror_away_from_its_calibrated_angle_makes_everything_dark(monkeypat
     assert "no longer" in bench.events[-1].text
 
 
-def test_no_frame_is_shown_between_a_turned_mirror_and_the_dark(monkeypatch) -> None:
+def test_no_frame_is_shown_between_a_turned_mirror_and_the_dark() -> None:
     """What was shown before is darkened also when no new frame comes."""
     mirror = FixedMirror(45.0)
-    bench = navigating(Bench(monkeypatch, mirror=mirror))
+    bench = navigating(Bench(mirror=mirror))
     mirror._angle_deg = 46.0
     bench.camera.is_silent = True
     bench.controller.step(0.01)

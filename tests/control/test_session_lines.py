@@ -41,13 +41,13 @@ class Room:
 
 
 @pytest.fixture
-def with_mirror(monkeypatch, tmp_path) -> Iterator[Room]:
+def with_mirror(tmp_path) -> Iterator[Room]:
     """Navigating with a mirror that was brought to its place."""
     with ExitStack() as stack:
         terminal = stack.enter_context(stage_terminal(tmp_path))
         mirror = mirror_at(terminal)
         mirror.open()
-        bench = Bench(monkeypatch, mirror=mirror)
+        bench = Bench(mirror=mirror)
         stack.callback(bench.controller.close)
         assert bench.is_dark
         assert Reason.MIRROR_AWAY in bench.snapshot.reasons
@@ -131,13 +131,13 @@ def test_a_mirror_that_stalls_on_its_way_back_is_told_and_stays_dark(with_mirror
 @pytest.fixture
 def with_projector(monkeypatch, tmp_path) -> Iterator[Room]:
     """Navigating with a projector whose lamp is on."""
-    monkeypatch.setattr("navapp.control.device_watch.PROJECTOR_TIMES_S", (0.2, 20.0))
+    monkeypatch.setattr("navapp.control.device_monitor.PROJECTOR_TIMES_S", (0.2, 20.0))
     with ExitStack() as stack:
         terminal = stack.enter_context(projector_terminal(tmp_path))
         projector = projector_at(terminal)
         projector.open()
         projector.set_power(True, 20.0)
-        bench = Bench(monkeypatch, projector=projector)
+        bench = Bench(projector=projector)
         stack.callback(bench.controller.close)
         room = Room(bench, terminal)
         navigating(bench)
@@ -218,14 +218,14 @@ class Ending(InlineExecutor):
         self.noted.append(self._is_so())
 
 
-def test_closing_a_session_ends_a_motion_before_anything_else(monkeypatch, tmp_path) -> None:
+def test_closing_a_session_ends_a_motion_before_anything_else(tmp_path) -> None:
     with stage_terminal(tmp_path, speed=0.2) as terminal:
         stage = terminal.wire.firmware
         begin_deg = stage.true_deg
         mirror = mirror_at(terminal)
         mirror.open()
         executor = Ending(lambda: stage.is_busy)
-        bench = Bench(monkeypatch, mirror=mirror, executor=executor)
+        bench = Bench(mirror=mirror, executor=executor)
         wait_for(lambda: abs(stage.true_deg - begin_deg) > 0.1, "a motion")
         bench.controller.close()
         assert executor.noted == [False]

@@ -21,7 +21,7 @@ from tests.control.fakes import Bench, navigating
 class Room:
     """A session, its projector, and the socket between."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, stack: ExitStack) -> None:
+    def __init__(self, stack: ExitStack) -> None:
         self.firmware = pjlink.PjlinkProjector(FastClock(200.0))
         self.server = PjlinkServer(self.firmware)
         self.server.start()
@@ -30,7 +30,7 @@ class Room:
         projector = PjlinkProjector("127.0.0.1", SystemClock(), connect)
         projector.open()
         projector.set_power(True, 20.0)
-        self.bench = Bench(monkeypatch, projector=projector)
+        self.bench = Bench(projector=projector)
         stack.callback(self.bench.controller.close)
 
     def unplug(self) -> None:
@@ -46,9 +46,9 @@ class Room:
 
 @pytest.fixture
 def room(monkeypatch) -> Iterator[Room]:
-    monkeypatch.setattr("navapp.control.device_watch.PROJECTOR_TIMES_S", (0.2, 20.0))
+    monkeypatch.setattr("navapp.control.device_monitor.PROJECTOR_TIMES_S", (0.2, 20.0))
     with ExitStack() as stack:
-        made = Room(monkeypatch, stack)
+        made = Room(stack)
         navigating(made.bench)
         made.bench.until(lambda: made.bench.shows_guides, 5.0)
         yield made

@@ -11,7 +11,6 @@ import pytest
 from drivers.clock import Clock
 from drivers.window_display import WindowDisplay
 from drivers.window_process import WindowSettings
-from navapp.control.controller import SessionOptions
 from navapp.control.states import DeviceHealth, EventLevel
 from tests.control.fakes import HEIGHT, WIDTH, Bench, navigating, wait_for
 from tests.x_servers import seen, xvfb
@@ -36,8 +35,7 @@ def test_a_window_that_dies_or_freezes_is_dark_told_and_opened_again(monkeypatch
     with xvfb(WIDTH, HEIGHT) as server:
         monkeypatch.setenv("DISPLAY", server)
         # No picture expires by itself here.
-        options = SessionOptions(overlay_valid_ms=60_000.0)
-        bench = Bench(monkeypatch, options=options, make_display=partial(SeenWindow, server))
+        bench = Bench(overlay_valid_ms=60_000.0, make_display=partial(SeenWindow, server))
         try:
             navigating(bench)
             bench.until(lambda: bench.shows_guides, 10.0)

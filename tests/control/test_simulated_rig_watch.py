@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calibration.rig.known_length import LengthMeter
-from calibration.targets.boards import board_from
+from calibration.targets.boards import parse_board
 from navapp.control.board_watch import BoardWatch
 from navapp.control.executors import InlineExecutor
 from navapp.control.length_check import Finding
@@ -15,12 +15,12 @@ from navapp.control.states import Accept, EventLevel, Register
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import Reason, Status
 from sim_devices.faults import Fault, FaultKind, FaultScript
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import make_default_rig
 from sim_devices.sheet import SheetInView
 from tests.control.test_simulated_session import SimulatedRoom
 from tests.sim_devices.test_sheet import sheet_of
 
-BOARD = board_from(
+BOARD = parse_board(
     {
         "type": "charuco", "squares_x": 9, "squares_y": 6, "square_mm": 10.0,
         "marker_mm": 7.5, "dictionary": "DICT_4X4_100",
@@ -29,7 +29,7 @@ BOARD = board_from(
 S = 1_000_000_000
 # 0.4 mm at 450 mm.
 WORST = 0.4 / 450.0
-THIRD_OF_A_PIXEL_DEG = math.degrees(0.3 / default_rig().right.focal_px)
+THIRD_OF_A_PIXEL_DEG = math.degrees(0.3 / make_default_rig().right.focal_px)
 
 
 def bumped(turn_deg: tuple[float, float, float], start_s: float, lasts_s: float = math.inf):
@@ -40,7 +40,7 @@ def navigating(room: SimulatedRoom) -> SimulatedRoom:
     room.frames(1)
     room.controller.submit(Register())
     room.frames(2)
-    room.controller.submit(Accept())
+    room.controller.submit(Accept(None))
     room.frames(2)
     assert room.state == "navigating"
     return room
@@ -84,7 +84,7 @@ def with_board(undo: ExitStack, faults: FaultScript) -> SimulatedRoom:
     place_mm = np.array([-110.0, -60.0, 420.0]) - rotation @ BOARD.points_mm.mean(axis=0)
     pose = RigidTransform.from_parts("left", "board", rotation, place_mm)
     sheet = sheet_of(BOARD)
-    watch = BoardWatch(LengthMeter(BOARD, default_rig()), WORST, InlineExecutor(), lambda: 0)
+    watch = BoardWatch(LengthMeter(BOARD, make_default_rig()), WORST, InlineExecutor(), lambda: 0)
     return SimulatedRoom(
         undo, faults=faults, rate_hz=1.0, board_watch=watch,
         seen=lambda world: SheetInView(world, sheet, lambda time_ns: pose, (0, 60 * S)),

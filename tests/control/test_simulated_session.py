@@ -11,10 +11,11 @@ from drivers.interfaces import DeviceSet
 from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
 from navapp.control.controller import SessionController
+from navapp.control.event_log import SessionHooks
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.operators import ScriptedOperator
 from navapp.control.runner import SessionRunner, run_headless
-from navapp.control.session import SessionHooks
+from navapp.control.specification import SessionSpecification
 from navapp.control.states import Accept, Propose, Register, Reject
 from navapp.errors import WrongDevice
 from navapp.values import Plan, Status
@@ -40,7 +41,7 @@ class SimulatedRoom:
         seen: Callable[[World], Scene] = lambda world: world,
         board_watch: BoardWatch | None = None,
     ) -> None:  # fmt: skip
-        world = World(Scenario(seed=SEED, motion="still"))
+        world = self.world = World(Scenario(seed=SEED, motion="still"))
         self.clock = SystemClock() if is_live else ManualClock()
         self.camera = SimulatedCamera(
             seen(world), self.clock, is_stepped=not is_live, scale=scale, n_frames=n_frames,
@@ -55,9 +56,7 @@ class SimulatedRoom:
         self.commands = []
         self.controller = SessionController(
             DeviceSet(self.camera, self.display, NoProjector(), FixedMirror(45.0), self.clock),
-            rig,
-            Plan({"femur": femur_of(world)}),
-            nominal_prior(world),
+            SessionSpecification(rig, Plan({"femur": femur_of(world)}), nominal_prior(world)),
             executor=ThreadExecutor() if is_live else InlineExecutor(),
             board_watch=board_watch,
             hooks=SessionHooks(
@@ -103,7 +102,7 @@ def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right
     for result in room.results:
         if result.is_navigable:
             true = room.oracle.left_from_body("femur", result.frame.captured_ns)
-            centre = room.controller._pursuit._lines["femur"].centre_mm
+            centre = femur_of(room.world).mesh.vertices_mm.mean(axis=0)
             shift = result.tracked.left_from_bone.apply(centre) - true.apply(centre)
             assert (shift**2).sum() ** 0.5 < 2.0
     assert any(result.is_navigable for result in room.results)
@@ -118,7 +117,7 @@ def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
     room.frames(1)
     room.controller.submit(Register())
     room.frames(2)
-    room.controller.submit(Accept())
+    room.controller.submit(Accept(None))
     room.frames(2)
     assert room.state == "navigating"
     while room.state == "navigating":
@@ -145,7 +144,7 @@ def test_a_blackout_suspends_and_light_resumes(undo) -> None:
     room.frames(1)
     room.controller.submit(Register())
     room.frames(2)
-    room.controller.submit(Accept())
+    room.controller.submit(Accept(None))
     room.frames(8)
     assert room.states()[2:4] == ["navigating", "navigating"]
     assert room.states()[4:7] == ["suspended"] * 3
@@ -165,7 +164,8 @@ def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
         lambda: room.state == "review" and runner.snapshot().verdict is not None, "the judge's word"
     )
     assert runner.snapshot().verdict.status is not Status.LOST
-    runner.submit(Accept())
+    assert runner.snapshot().rates.latency_ms > 0.0
+    runner.submit(Accept(None))
     wait_for(lambda: room.state == "navigating", "navigation")
     runner.submit(Register())
     wait_for(lambda: room.state == "registering", "the search")

@@ -8,8 +8,8 @@ import pytest
 from navapp.control.stages import STAGES, stage_by_name, stage_by_number, stage_of
 from navapp.control.states import EnterStage
 from navapp.errors import UsageError
-from navapp.preop.contents_tables import StagesTable
-from navapp.preop.targets import with_defaults
+from navapp.preop.contents_file_tables import StagesTable
+from navapp.preop.default_targets import with_defaults
 from navapp.values import Plan, StageContent, SurgicalContent
 from tests.control.fakes import Bench, a_plan
 from tests.preop.knees import bones_of, knees
@@ -21,8 +21,8 @@ def planned(**stages: StageContent) -> Plan:
     return replace(a_plan(), targets=TARGETS, content=SurgicalContent(stages=stages), digest="")
 
 
-def test_a_stage_follows_the_bone_that_the_plan_names_and_is_judged_there(monkeypatch) -> None:
-    bench = Bench(monkeypatch, plan=planned(drilling=StageContent("tibia", ("tibia/mine",))))
+def test_a_stage_follows_the_bone_that_the_plan_names_and_is_judged_there() -> None:
+    bench = Bench(plan=planned(drilling=StageContent("tibia", ("tibia/mine",))))
     bench.frames(1)
     entered = bench.do(EnterStage(2)).stage
     assert (entered.name, entered.bone, entered.targets) == ("drilling", "tibia", ("tibia/mine",))
@@ -30,8 +30,8 @@ def test_a_stage_follows_the_bone_that_the_plan_names_and_is_judged_there(monkey
     assert bench.do(EnterStage(3)).stage is stage_by_number(3)
 
 
-def test_entering_the_stage_that_is_in_force_changes_nothing(monkeypatch) -> None:
-    bench = Bench(monkeypatch, plan=planned(drilling=StageContent("tibia", ("tibia/mine",))))
+def test_entering_the_stage_that_is_in_force_changes_nothing() -> None:
+    bench = Bench(plan=planned(drilling=StageContent("tibia", ("tibia/mine",))))
     bench.frames(1)
     bench.do(EnterStage(2))
     n_events = len(bench.events)

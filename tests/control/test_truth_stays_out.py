@@ -48,16 +48,16 @@ def reachable(root: object, not_through: set[int]) -> list[object]:
 @pytest.fixture
 def built():
     from navapp.cli.diagnostics import Diagnostics
-    from navapp.cli.live_session import controller_of, prepared
+    from navapp.cli.live_session import make_controller, prepare_session
     from navapp.cli.main import _parser
     from navapp.config import parse
 
     configuration = parse({"camera": {"simulated": {"scale": 0.2}}}, "test")
     options = _parser().parse_args(["run", "--headless"])
     with ExitStack() as undo:
-        session = prepared(configuration, options, Diagnostics(is_quiet=True))
+        session = prepare_session(configuration, options, Diagnostics(is_quiet=True))
         undo.callback(session.opened.devices.close)
-        controller = controller_of(session, is_inline=True, on_frame=[], undo=undo)
+        controller = make_controller(session, is_inline=True, on_frame=[], undo=undo)
         undo.callback(controller.close)
         controller.step()
         yield session, controller

@@ -17,9 +17,9 @@ from navapp.config import parse
 from navapp.devices import open_live
 from navapp.errors import WrongDevice
 from navapp.geometry import write_rig
-from navapp.inventory.installed import list_installed
-from navapp.inventory.looking import choosing
-from tests.devices.installed import install
+from navapp.inventory.camera_packages import list_installed
+from navapp.inventory.connected_devices import make_choice_toml
+from tests.devices.package_cameras import install
 from tests.sim_devices.plain_world import plain_rig
 
 SOURCE = Path(__file__).resolve().parents[2] / "docs" / "example_device"
@@ -80,7 +80,7 @@ def configuration(site, tmp_path):
     assert listing.unseen == ()
     (camera,) = listing.found
     assert camera.package == "navapp-example-camera 1.0"
-    content = tomllib.loads(choosing(camera))
+    content = tomllib.loads(make_choice_toml(camera))
     content["camera"] |= {"rig": str(tmp_path / "rig.yml"), "example": {"rate_hz": 50.0}}
     return parse(content, "x")
 

@@ -5,7 +5,7 @@ import pytest
 from navapp.config import parse
 from navapp.devices import open_latency
 from navapp.errors import ConfigurationError, DeviceLost, DeviceNotFound
-from tests.devices.installed import Entry, announce
+from tests.devices.package_cameras import Entry, announce
 
 SMALL = {"simulated": {"scale": 0.1}}
 

@@ -49,7 +49,7 @@ class StandIn:
 @pytest.fixture
 def oak(monkeypatch):
     oak = StandIn()
-    monkeypatch.setattr(drivers.depthai_parts, "depthai", lambda: oak.module)
+    monkeypatch.setattr(drivers.depthai_parts, "import_depthai", lambda: oak.module)
     return oak
 
 

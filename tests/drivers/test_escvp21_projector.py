@@ -310,10 +310,10 @@ def test_a_pulled_plug_is_lost_and_opening_brings_it_back() -> None:
 ONE_FAULT = {
     "split": wire.split(0.002),
     "late": wire.late(2.0),
-    "doubled": wire.doubled,
-    "noise": wire.preceded_by(b"\x00\xffIMEV\r:"),
-    "an event": wire.preceded_by(b"IMEVENT=0001 02 00000000 00000000 T1 F1\r:"),
-    "other answer": wire.preceded_by(b"LAMP=1\r:"),
+    "doubled": wire.double,
+    "noise": wire.precede_by(b"\x00\xffIMEV\r:"),
+    "an event": wire.precede_by(b"IMEVENT=0001 02 00000000 00000000 T1 F1\r:"),
+    "other answer": wire.precede_by(b"LAMP=1\r:"),
 }
 
 
@@ -328,9 +328,9 @@ def test_a_line_that_is_always_spoilt_in_this_way_still_works(spoiler) -> None:
 
 
 SOMETIMES = {
-    "lost": wire.lost,
+    "lost": wire.lose,
     "too late": wire.late(3.5),
-    "corrupted": wire.corrupted(random.Random(3)),
+    "corrupted": wire.corrupt(random.Random(3)),
     "garbage": lambda message: wire.whole(b"\x80\x81:"),
 }
 
@@ -434,7 +434,7 @@ def test_a_projector_that_wants_a_password_is_not_opened() -> None:
 
 def test_a_port_of_a_network_that_does_not_greet_is_silence() -> None:
     projector, line = networked(wants_password=False)
-    line.spoiler = wire.lost
+    line.spoiler = wire.lose
     with pytest.raises(DeviceTimeout, match="does not answer"):
         projector.open()
 

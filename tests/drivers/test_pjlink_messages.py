@@ -6,7 +6,7 @@ from navapp.errors import DeviceProtocolError
 
 
 def test_digest_is_the_documented_one() -> None:
-    found = messages.digest("498e4a67", "JBMIAProjectorLink")
+    found = messages.compute_digest("498e4a67", "JBMIAProjectorLink")
     assert found == "5d8409bc1c3fa39749434aa3a5c38682"
 
 
@@ -34,47 +34,50 @@ def test_other_greetings_are_refused(greeting) -> None:
 
 @pytest.mark.parametrize("line", ["PJLINK ERRA", "pjlink erra"])
 def test_a_refused_password_is_named_wherever_it_is_told(line) -> None:
-    for take in (messages.salt_of, lambda line: messages.parsed_reply(line, "POWR")):
+    for take in (messages.salt_of, lambda line: messages.parse_reply(line, "POWR")):
         with pytest.raises(messages.PasswordRefused, match="refuses the password"):
             take(line)
 
 
 def test_replies() -> None:
-    assert messages.parsed_reply("%1POWR=1", "POWR") == messages.Reply("1")
-    assert messages.parsed_reply("%1powr=ok", "POWR") == messages.Reply("ok")
-    assert messages.parsed_reply("%1NAME=", "NAME") == messages.Reply("")
-    assert messages.parsed_reply("%1INF1=ACME", "INF1") == messages.Reply("ACME")
+    assert messages.parse_reply("%1POWR=1", "POWR") == messages.Reply("1")
+    assert messages.parse_reply("%1powr=ok", "POWR") == messages.Reply("ok")
+    assert messages.parse_reply("%1NAME=", "NAME") == messages.Reply("")
+    assert messages.parse_reply("%1INF1=ACME", "INF1") == messages.Reply("ACME")
     for error in ("ERR1", "ERR2", "ERR3", "ERR4"):
-        assert messages.parsed_reply(f"%1INPT={error}", "INPT") == messages.Reply("", error)
+        assert messages.parse_reply(f"%1INPT={error}", "INPT") == messages.Reply("", error)
 
 
 @pytest.mark.parametrize("line", ["", "%1POWR", "%2POWR=1", "%1AVMT=31", "POWR=1", "%1POWR=\x00"])
 def test_other_replies_are_refused(line) -> None:
     with pytest.raises(DeviceProtocolError, match="to POWR"):
-        messages.parsed_reply(line, "POWR")
+        messages.parse_reply(line, "POWR")
 
 
 def test_values() -> None:
-    states = [messages.power_state(value) for value in "0123"]
+    states = [messages.parse_power_state(value) for value in "0123"]
     assert states == [
         PowerState.STANDBY, PowerState.ON, PowerState.COOLING, PowerState.WARMING
     ]  # fmt: skip
     hidden = {value for value in ("10", "11", "20", "21", "30", "31") if messages.is_hidden(value)}
     assert hidden == {"11", "31"}
-    assert messages.source("31") == "31"
-    assert messages.lamp_hours("1633 1 20 0") == (1633, 20)
-    assert messages.faults("000000") == ()
-    assert messages.faults("012001") == ("lamp warning", "temperature error", "other warning")
+    assert messages.parse_source("31") == "31"
+    assert messages.parse_lamp_hours("1633 1 20 0") == (1633, 20)
+    assert messages.parse_faults("000000") == ()
+    assert messages.parse_faults("012001") == ("lamp warning", "temperature error", "other warning")
 
 
 @pytest.mark.parametrize(
     ("read", "wrong"),
     [
-        (messages.power_state, ("", "4", "01", "on")),
+        (messages.parse_power_state, ("", "4", "01", "on")),
         (messages.is_hidden, ("", "1", "32", "40")),
-        (messages.source, ("", "3", "60", "10", "311")),
-        (messages.lamp_hours, ("", "1633", "1633 2", "1633 1 20", "-5 1", "1 0" + " 1 0" * 8)),
-        (messages.faults, ("", "00000", "000003", "0000000")),
+        (messages.parse_source, ("", "3", "60", "10", "311")),
+        (
+            messages.parse_lamp_hours,
+            ("", "1633", "1633 2", "1633 1 20", "-5 1", "1 0" + " 1 0" * 8),
+        ),
+        (messages.parse_faults, ("", "00000", "000003", "0000000")),
     ],
 )
 def test_values_that_mean_nothing_are_refused(read, wrong) -> None:

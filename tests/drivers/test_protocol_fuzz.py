@@ -35,9 +35,9 @@ class Fuzz:
         self.share = 0.0
         self.heard: list[bytes] = []
         self.ways: list[wire.Spoiler] = [
-            wire.lost,
-            wire.doubled,
-            wire.corrupted(self.random),
+            wire.lose,
+            wire.double,
+            wire.corrupt(self.random),
             wire.split(0.001),
             wire.late(0.7),
             wire.late(4.0),

@@ -37,7 +37,7 @@ def test_a_port_tells_which_camera_stands_there_now(bus):
 
 
 def test_every_camera_is_listed_once_though_it_has_three_links(bus):
-    assert sorted(camera.serial for camera in bus.names.connected()) == ["A1", "B2"]
+    assert sorted(camera.serial for camera in bus.names.list_cameras()) == ["A1", "B2"]
 
 
 def test_a_number_that_changes_is_refused(bus):
@@ -67,12 +67,12 @@ def test_two_cameras_of_one_serial_number_are_told_apart_by_port_only(tmp_path):
 def test_a_camera_without_a_serial_number_is_named_by_its_link(tmp_path):
     bus = FakeBus(tmp_path)
     bus.plug("Webcam", 1, told="")
-    assert bus.names.connected()[0].serial == "usb-Acme_Cam_Webcam"
+    assert bus.names.list_cameras()[0].serial == "usb-Acme_Cam_Webcam"
     assert bus.names.find("usb-Acme_Cam_Webcam").node.name == "video2"
 
 
 def test_without_any_camera_the_folders_are_missing(tmp_path):
     names = V4lNames(tmp_path / "v4l", tmp_path / "sysfs")
-    assert names.connected() == ()
+    assert names.list_cameras() == ()
     with pytest.raises(DeviceNotFound, match="connected: none"):
         names.find("A1")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from drivers.window_child import Keeper
-from drivers.window_memory import HANG_LIMIT_NS, Field, WindowMemory, memory_bytes
+from drivers.window_memory import HANG_LIMIT_NS, Field, WindowMemory, count_memory_bytes
 
 S = 10**9
 
@@ -43,7 +43,7 @@ class Rig:
 
     def __init__(self) -> None:
         descriptor = os.memfd_create("test")
-        os.ftruncate(descriptor, memory_bytes(1, 1))
+        os.ftruncate(descriptor, count_memory_bytes(1, 1))
         self.memory = WindowMemory(descriptor, 1, 1)
         os.close(descriptor)
         self.woken, self.wake = os.pipe()

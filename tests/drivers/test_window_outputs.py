@@ -1,6 +1,6 @@
 import pytest
 
-from drivers.window_outputs import Output, chosen
+from drivers.window_outputs import Output, choose_output
 from navapp.errors import DeviceNotFound, WrongDevice
 
 DESK = Output(0, 'DELL 24"', 0, 0, 1920, 1200)
@@ -8,11 +8,11 @@ PROJECTOR = Output(1, "EPSON PJ", 1920, 0, 1920, 1080)
 
 
 def test_the_named_output_is_chosen() -> None:
-    assert chosen([DESK, PROJECTOR], "EPSON PJ", 1920, 1080) is PROJECTOR
+    assert choose_output([DESK, PROJECTOR], "EPSON PJ", 1920, 1080) is PROJECTOR
 
 
 def test_without_a_name_the_only_output_is_chosen() -> None:
-    assert chosen([PROJECTOR], "", 1920, 1080) is PROJECTOR
+    assert choose_output([PROJECTOR], "", 1920, 1080) is PROJECTOR
 
 
 @pytest.mark.parametrize(
@@ -26,9 +26,9 @@ def test_without_a_name_the_only_output_is_chosen() -> None:
 )
 def test_what_is_missing_or_ambiguous_is_refused_with_what_there_is(found, name, text) -> None:
     with pytest.raises(DeviceNotFound, match=text):
-        chosen(found, name, 1920, 1080)
+        choose_output(found, name, 1920, 1080)
 
 
 def test_an_output_of_another_size_is_refused() -> None:
     with pytest.raises(WrongDevice, match=r"EPSON PJ \(1920x1080\) has another size than 1280x720"):
-        chosen([PROJECTOR], "EPSON PJ", 1280, 720)
+        choose_output([PROJECTOR], "EPSON PJ", 1280, 720)

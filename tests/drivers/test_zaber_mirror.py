@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from drivers import zaber_warnings
-from drivers.zaber_line import Reply, checksum
+from drivers.zaber_line import Reply, compute_checksum
 from drivers.zaber_mirror import ZaberMirror
 from navapp.errors import (
     DeviceError,
@@ -41,7 +41,7 @@ def at_45() -> StageRig:
 
 @pytest.mark.parametrize(("text", "expected"), CHECKSUMS.items())
 def test_checksums_are_those_of_others(text, expected) -> None:
-    assert checksum(text) == expected
+    assert compute_checksum(text) == expected
 
 
 def test_it_homes_and_goes_where_it_is_sent() -> None:
@@ -230,15 +230,15 @@ def test_a_flag_behind_a_more_urgent_one_is_seen() -> None:
 
 def test_an_alert_between_two_replies_counts() -> None:
     rig = at_45()
-    alert = f"!01 1 IDLE WM:{checksum('01 1 IDLE WM')}\r\n".encode()
-    rig.wire.spoiler = wire.first(1, wire.preceded_by(alert))
+    alert = f"!01 1 IDLE WM:{compute_checksum('01 1 IDLE WM')}\r\n".encode()
+    rig.wire.spoiler = wire.first(1, wire.precede_by(alert))
     assert rig.driver.position_deg() is None
 
 
 def test_an_alert_of_another_axis_does_not() -> None:
     rig = at_45()
-    alert = f"!02 1 IDLE WM:{checksum('02 1 IDLE WM')}\r\n".encode()
-    rig.wire.spoiler = wire.preceded_by(alert)
+    alert = f"!02 1 IDLE WM:{compute_checksum('02 1 IDLE WM')}\r\n".encode()
+    rig.wire.spoiler = wire.precede_by(alert)
     assert rig.driver.position_deg() == pytest.approx(45.0, abs=0.001)
 
 
@@ -435,10 +435,10 @@ def test_a_wrong_number_on_the_line_is_silence_or_a_rejection(axis) -> None:
 ALWAYS = {
     "split": wire.split(0.001),
     "late": wire.late(0.2),
-    "doubled": wire.doubled,
-    "noise": wire.preceded_by(b"\x00\xff@01\r\n"),
-    "noise without end": wire.preceded_by(b"\x00#!@\xff"),
-    "info": wire.preceded_by(b"#01 0 hello\r\n"),
+    "doubled": wire.double,
+    "noise": wire.precede_by(b"\x00\xff@01\r\n"),
+    "noise without end": wire.precede_by(b"\x00#!@\xff"),
+    "info": wire.precede_by(b"#01 0 hello\r\n"),
 }
 
 
@@ -453,9 +453,9 @@ def test_a_line_that_is_always_spoilt_in_this_way_still_works(spoiler) -> None:
 
 
 SOMETIMES = {
-    "lost": wire.lost,
+    "lost": wire.lose,
     "too late": wire.late(0.7),
-    "corrupted": wire.corrupted(random.Random(3)),
+    "corrupted": wire.corrupt(random.Random(3)),
     "garbage": lambda message: wire.whole(b"\x80\x81\r\n"),
 }
 

@@ -16,9 +16,9 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import write_ply
 from navapp.preop import write_plan
 from navapp.values import Plan
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import make_default_rig
 from tests.bones import femur_model
-from tests.devices.installed import Entry, announce
+from tests.devices.package_cameras import Entry, announce
 from tests.sim_devices.plain_world import plain_rig
 
 
@@ -31,7 +31,7 @@ def plan(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def rig(tmp_path: Path) -> Path:
-    write_rig(tmp_path / "rig.yml", default_rig(320, 180))
+    write_rig(tmp_path / "rig.yml", make_default_rig(320, 180))
     return tmp_path / "rig.yml"
 
 
@@ -85,7 +85,7 @@ def test_a_damaged_rig(pairs, rig, plan, prior, capsys) -> None:
 
 
 def test_a_rig_of_another_size(pairs, rig, plan, prior, tmp_path, capsys) -> None:
-    write_rig(rig, default_rig(640, 360))
+    write_rig(rig, make_default_rig(640, 360))
     out = tmp_path / "o.json"
     arguments = [*replay(pairs, rig, plan, prior), "--json", str(out), "--overlay", str(out) + "d"]
     refused(arguments, capsys, 3, "320x180", "640x360")
@@ -94,7 +94,7 @@ def test_a_rig_of_another_size(pairs, rig, plan, prior, tmp_path, capsys) -> Non
 
 
 def test_a_rig_that_was_not_accepted(pairs, rig, plan, prior, capsys) -> None:
-    good = default_rig(320, 180)
+    good = make_default_rig(320, 180)
     bad = StereoRig(
         good.left, good.right, good.right_from_left, quality=RigQuality(False, ("too few views",))
     )
@@ -300,7 +300,7 @@ def test_the_configurations_path_is_null_without_a_file(tmp_path, monkeypatch, c
 
 
 def test_a_rig_with_its_cameras_swapped(pairs, rig, plan, prior, tmp_path, capsys) -> None:
-    good = default_rig(320, 180)
+    good = make_default_rig(320, 180)
     swapped = StereoRig(
         good.right,
         good.left,

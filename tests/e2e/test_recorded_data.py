@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from navapp.cli.main import run
-from navapp.evaluation import mean_tre_mm
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform
 from navapp.values import BoneModel
@@ -64,7 +64,7 @@ def test_most_frames_of_a_recorded_operation_get_a_pose(
     }
     bone = BoneModel("femur", read_ply(root / "femur.ply")[0])
     errors_mm = [
-        mean_tre_mm(
+        compute_mean_tre_mm(
             RigidTransform("left", "femur", frame["camera_from_model"]),
             truth[frame["index"]],
             bone,

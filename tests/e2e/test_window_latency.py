@@ -4,15 +4,15 @@ import mss
 import numpy as np
 import pytest
 
-from calibration.latency.code import pauses_ms
-from calibration.latency.judge import judged_latency
+from calibration.latency.acceptance import measure_accepted_latency
+from calibration.latency.light_code import draw_pauses_ms
 from drivers.clock import SystemClock
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo
 from drivers.window_display import WindowDisplay
 from drivers.window_process import WindowSettings
-from navapp.control.latency.player import CodePlayer
-from navapp.control.latency.watching import watch
+from navapp.control.display_delay.code_player import CodePlayer
+from navapp.control.display_delay.code_recording import record_code
 from tests.x_servers import seen, shot, xvfb
 
 WIDTH, HEIGHT = 320, 200
@@ -55,13 +55,13 @@ def test_a_window_is_seen_some_milliseconds_after_the_call(monkeypatch) -> None:
         display.open()
         try:
             with mss.MSS(display=server) as eye:
-                player = CodePlayer(display, clock, pauses_ms(7.0, 0))
-                recording = watch(ScreenCamera(clock, eye), player, clock, lambda _: None)
+                player = CodePlayer(display, clock, draw_pauses_ms(7.0, 0))
+                recording = record_code(ScreenCamera(clock, eye), player, clock, lambda _: None)
             clock.wait_until_ns(clock.now_ns() + 200_000_000)
             assert not seen(server, 0, 0, WIDTH, HEIGHT).any()
         finally:
             display.close()
     # This screen has no refresh to wait for.
-    found = judged_latency(recording.switches, recording.left, recording.right, 1000.0)
+    found = measure_accepted_latency(recording.switches, recording.left, recording.right, 1000.0)
     assert 0.0 < found.delay.value_ms < 40.0
     assert found.late.value_ms == pytest.approx(RIGHT_LATE_NS * 1e-6, abs=3.0)

@@ -13,8 +13,8 @@ from drivers.discovery import (
     UsbCamera,
 )
 from drivers.window_outputs import Output
-from navapp.inventory.installed import InstalledCamera
-from navapp.inventory.looking import Inventory
+from navapp.inventory.camera_packages import InstalledCamera
+from navapp.inventory.connected_devices import Inventory
 
 WHY = Unseen("thing", "it cannot be looked at", "let me look")
 USB = UsbCamera(

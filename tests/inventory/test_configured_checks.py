@@ -7,7 +7,7 @@ import pytest
 
 from drivers.discovery import Listing, Unseen
 from navapp.config import parse
-from navapp.inventory.configured_checks import configured_findings
+from navapp.inventory.configured_checks import check_configured_devices
 from navapp.inventory.finding import Health
 from tests.drivers.fake_capture import FakeBus
 from tests.inventory.inventories import ACME, BEAMER, DESK, EVERYTHING, NOTHING, OAK, WHY
@@ -16,12 +16,12 @@ OK, WARNING, FAILED = Health.OK, Health.WARNING, Health.FAILED
 
 
 def finding(name, found=NOTHING, names=None, **tables):
-    findings = configured_findings(parse(tables, "x"), found, names)
+    findings = check_configured_devices(parse(tables, "x"), found, names)
     return next(one for one in findings if one.name == name)
 
 
 def test_a_simulated_session_needs_nothing():
-    findings = configured_findings(parse({}, "x"), NOTHING)
+    findings = check_configured_devices(parse({}, "x"), NOTHING)
     assert {one.name: (one.health, one.detail) for one in findings} == {
         "camera": (OK, "simulated"),
         "display": (OK, "simulated"),

@@ -11,7 +11,7 @@ from drivers.discovery.oak_cameras import UDEV_RULE
 from navapp.config import Configuration, parse
 from navapp.inventory import system_checks
 from navapp.inventory.finding import Health
-from navapp.inventory.system_checks import system_findings
+from navapp.inventory.system_checks import check_system
 from tests.inventory.inventories import BEAMER, EVERYTHING, NOTHING, PORT, USB
 
 USB_PAIR = parse({"camera": {"backend": "opencv", "opencv": {"left": "A1"}}}, "x")
@@ -27,11 +27,11 @@ def _stranger(monkeypatch):
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     monkeypatch.setattr(os, "getegid", lambda: 99999)
     monkeypatch.setattr(os, "getgroups", list)
-    monkeypatch.setattr(system_checks, "oak_nodes", tuple)
+    monkeypatch.setattr(system_checks, "list_oak_nodes", tuple)
 
 
 def finding(name, configuration=None, found=NOTHING):
-    findings = system_findings(configuration or Configuration(), found)
+    findings = check_system(configuration or Configuration(), found)
     return {one.name: one for one in findings}.get(name)
 
 
@@ -85,7 +85,7 @@ def test_a_line_over_the_network_needs_no_group():
 def test_the_udev_rule_is_seen_on_the_camera_itself(tmp_path, monkeypatch):
     node = tmp_path / "005"
     node.touch()
-    monkeypatch.setattr(system_checks, "oak_nodes", lambda: (node,))
+    monkeypatch.setattr(system_checks, "list_oak_nodes", lambda: (node,))
     assert finding("udev rule for OAK").health is Health.OK
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     forbidden = finding("udev rule for OAK")

@@ -12,7 +12,7 @@ from navapp.overlay.layers import (
     TARGET_COLOUR,
     Scene,
 )
-from navapp.overlay.tint_kernels import shares_of_faces, tint_pixels
+from navapp.overlay.tint_kernels import compute_face_tints, tint_pixels
 from navapp.values import BoneModel, Defect, Plan, RiskStructure, SurgicalContent
 from tests.geometry.shapes import sphere
 from tests.overlay.scenes import BEHIND, CAMERA, HEIGHT, MESH, POSE, TARGET, WIDTH, scene, video
@@ -59,8 +59,8 @@ def test_every_pixel_is_tinted_once() -> None:
     view, mesh = drawn.view, drawn.drawn_mesh
     box = view.box
     expected = video()[box.y : box.y + box.height, box.x : box.x + box.width]
-    share = shares_of_faces(
-        mesh.normals, mesh.faces, POSE.rotation[2], layers._LEAST_SHARE, layers._STEEP_SHARE
+    share = compute_face_tints(
+        mesh.normals, mesh.faces, POSE.rotation[2], layers._LEAST_FRACTION, layers._STEEP_FRACTION
     )
     tint_pixels(expected, view.face_index, share, GUIDE_COLOUR)
     LAYERS["bone"](image, drawn)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navapp.overlay.tint_kernels import shares_of_faces, tint_pixels
+from navapp.overlay.tint_kernels import compute_face_tints, tint_pixels
 
 
 def test_pixels_of_the_mesh_are_blended_and_no_others() -> None:
@@ -25,6 +25,6 @@ def test_a_steep_triangle_has_a_larger_share() -> None:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     faces = rng.integers(0, 30, (50, 3)).astype(np.int32)
     towards = np.array([0.6, 0.0, -0.8])
-    found = shares_of_faces(normals, faces, towards, 0.1, 0.35)
+    found = compute_face_tints(normals, faces, towards, 0.1, 0.35)
     facing = np.abs(normals @ towards)[faces].mean(axis=1)
     np.testing.assert_allclose(found, 0.1 + 0.35 * (1.0 - facing), rtol=1e-6)

@@ -7,8 +7,8 @@ from navapp.errors import PlanError
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh
 from navapp.preop import AspectSettings, build_aspects, read_aspects, write_aspects
-from navapp.preop.aspects_kernels import contour_segments, spread_out
-from navapp.preop.bone_edges import creases, near_ends
+from navapp.preop.aspects_kernels import find_contour_segments, select_spread
+from navapp.preop.bone_edges import find_creases, find_near_ends
 from navapp.values import AspectGraph, BoneModel
 from tests.bones import femur_model
 from tests.reference.aspects_reference import contour_pieces, farthest_first
@@ -122,7 +122,7 @@ def test_the_ends_of_a_shaft_are_no_edges(cap: bool) -> None:
     graph = build_aspects(BoneModel("shaft", mesh), (1, 0, 0), 25.0)
     assert graph.points_mm[:, 2].min() > 2.5
     assert graph.points_mm[:, 2].max() < 75.5
-    ends = near_ends(mesh)
+    ends = find_near_ends(mesh)
     assert ends[mesh.vertices_mm[:, 2] < 1.0].all()
     assert not ends[np.abs(mesh.vertices_mm[:, 2] - 39.0) < 20.0].any()
 
@@ -138,12 +138,12 @@ def test_what_a_stage_has_removed_is_no_edge() -> None:
 def test_a_ridge_is_a_crease_along_itself() -> None:
     y, x = np.meshgrid(np.linspace(-30, 30, 61), np.linspace(-30, 30, 61))
     mesh = grid_mesh(x, y, -0.9 * np.sqrt(x * x + 1.0) - 0.005 * (x * x + y * y))
-    found = creases(mesh, ~near_ends(mesh))
+    found = find_creases(mesh, ~find_near_ends(mesh))
     assert len(found.points_mm) > 30
     assert np.abs(found.points_mm[:, 0]).max() < 2.5
     assert np.abs(found.tangents[:, 1]).min() > 0.9
     flat = grid_mesh(x, y, 0.002 * x * x)
-    assert len(creases(flat, ~near_ends(flat)).points_mm) == 0
+    assert len(find_creases(flat, ~find_near_ends(flat)).points_mm) == 0
 
 
 def test_views_that_look_the_same_are_one() -> None:
@@ -208,7 +208,7 @@ def test_contours_are_those_of_the_reference() -> None:
     facing = mesh.vertices_mm @ (0.3, 0.5, 0.8) - 4.0
     middles, tangents = np.empty((2, len(mesh.faces), 3))
     vertices, faces = np.array(mesh.vertices_mm), np.array(mesh.faces)
-    n = contour_segments(vertices, faces, facing, middles, tangents)
+    n = find_contour_segments(vertices, faces, facing, middles, tangents)
     pieces = contour_pieces(vertices, faces, facing)
     assert n == len(pieces) > 50
     np.testing.assert_allclose(middles[:n], pieces.mean(axis=1), atol=1e-9)
@@ -220,10 +220,10 @@ def test_contours_are_those_of_the_reference() -> None:
 def test_spreading_is_that_of_the_reference() -> None:
     points = np.random.default_rng(3).normal(size=(80, 3))
     order = np.empty(20, dtype=np.int64)
-    assert spread_out(points, order) == 20
+    assert select_spread(points, order) == 20
     assert order.tolist() == farthest_first(points, 20)
     twice = np.concatenate([points[:5], points[:5]])
-    assert spread_out(twice, order) == 5
+    assert select_spread(twice, order) == 5
 
 
 def test_views_of_a_cone_are_those_of_the_whole_graph() -> None:

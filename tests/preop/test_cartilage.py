@@ -4,11 +4,11 @@ import pytest
 from navapp.errors import InputError, PlanError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import write_ply
-from navapp.preop import even_cartilage, figures_of, import_cartilage
+from navapp.preop import figures_of, import_cartilage, make_even_cartilage
 from navapp.preop.cartilage import MAPPED_SD_MM
 from navapp.values import BoneModel
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.cartilage import cartilage_thickness_mm
+from sim_devices.cartilage import make_cartilage_thickness_mm
 from tests.geometry.shapes import cube, sphere
 
 CENTRE = (5.0, -20.0, 100.0)
@@ -134,7 +134,7 @@ def test_the_cartilage_of_a_knee_is_found_again_from_its_outer_surface(tmp_path,
     """Also in the notch and where bare bone goes over into cartilage."""
     knee = make_knee(KneeSpec(4))
     mesh = TriangleMesh(knee.bones[name].vertices_mm, knee.bones[name].faces)
-    true = cartilage_thickness_mm(knee, name, 2.0, 4)
+    true = make_cartilage_thickness_mm(knee, name, 2.0, 4)
     true[true < 0.1] = 0.0
     write_ply(tmp_path / "cartilage.ply", raised(true, mesh))
     found = import_cartilage(BoneModel(name, mesh), tmp_path / "cartilage.ply").bone.cartilage_mm
@@ -150,7 +150,7 @@ def test_another_unit_or_a_missing_file_is_refused(covered, tmp_path):
 
 
 def test_one_thickness_covers_a_whole_bone():
-    bone = even_cartilage(BONE, 2.0, 0.6)
+    bone = make_even_cartilage(BONE, 2.0, 0.6)
     assert (bone.cartilage_mm == 2.0).all()
     assert (bone.cartilage_sd_mm == 0.6).all()
 
@@ -159,14 +159,14 @@ def test_one_thickness_leaves_flat_ends_bare():
     shaft = TriangleMesh(
         np.clip(BONE.mesh.vertices_mm, None, (np.inf, np.inf, CENTRE[2] + 30.0)), BONE.mesh.faces
     )
-    bone = even_cartilage(BoneModel("femur", shaft), 2.0, 0.6)
+    bone = make_even_cartilage(BoneModel("femur", shaft), 2.0, 0.6)
     np.testing.assert_array_equal(bone.cartilage_mm, np.where(HEIGHT >= 30.0, 0.0, 2.0))
     np.testing.assert_array_equal(bone.cartilage_sd_mm, np.where(HEIGHT >= 30.0, 0.0, 0.6))
 
 
 def test_one_thickness_leaves_open_borders_bare():
     bowl = part(BONE.mesh, HEIGHT < 30.0)
-    bone = even_cartilage(BoneModel("femur", bowl), 2.0, 0.6)
+    bone = make_even_cartilage(BoneModel("femur", bowl), 2.0, 0.6)
     border = HEIGHT[np.unique(bowl.faces)].max()
     is_bare = np.abs(HEIGHT - border) < 1e-6
     np.testing.assert_array_equal(bone.cartilage_mm == 0.0, is_bare)
@@ -177,7 +177,7 @@ def test_one_thickness_leaves_open_borders_bare():
 )
 def test_an_impossible_thickness_is_refused(mean_mm, sd_mm):
     with pytest.raises(ValueError, match="not possible"):
-        even_cartilage(BONE, mean_mm, sd_mm)
+        make_even_cartilage(BONE, mean_mm, sd_mm)
 
 
 def test_the_figures_are_of_the_covered_part(covered):

@@ -9,9 +9,9 @@ from navapp.geometry.ply import read_ply
 from navapp.preop.cut_ends import (
     anatomy_of,
     ends_of,
+    find_whole_until_mm,
     on_cut_borders,
     on_flat_caps,
-    whole_until_mm,
 )
 from navapp.values import BoneModel
 from tests.geometry.shapes import cube, sphere
@@ -142,5 +142,5 @@ def test_the_caps_of_real_bones_are_found_and_nothing_else(name) -> None:
 def test_slices_are_whole_up_to_the_lowest_point_of_an_oblique_cut() -> None:
     along = np.array([0.0, 10.0, 20.0, 30.0, 40.0])
     is_border = np.array([True, False, False, True, True])
-    assert whole_until_mm(along, is_border, 5.0) == 30.0
-    assert whole_until_mm(along, np.zeros(5, dtype=bool), 5.0) == 40.0
+    assert find_whole_until_mm(along, is_border, 5.0) == 30.0
+    assert find_whole_until_mm(along, np.zeros(5, dtype=bool), 5.0) == 40.0

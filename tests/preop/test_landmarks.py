@@ -9,9 +9,9 @@ import pytest
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
 from navapp.preop.cut_ends import anatomy_of
-from navapp.preop.femur_landmarks import femur_landmarks
+from navapp.preop.femur_landmarks import estimate_femur_landmarks
 from navapp.preop.landmarks import estimate_landmarks
-from navapp.preop.tibia_landmarks import patella_landmarks, tibia_landmarks
+from navapp.preop.tibia_landmarks import estimate_patella_landmarks, estimate_tibia_landmarks
 from navapp.values import BoneModel
 from tests.geometry.shapes import sphere
 from tests.preop.knees import bones_of, knees, obliquely_cut
@@ -99,7 +99,8 @@ def test_a_cut_shaft_is_no_landmark() -> None:
     squeezed = np.minimum(mesh.vertices_mm[:, 2], 22.0)
     cut = TriangleMesh(np.column_stack([mesh.vertices_mm[:, :2], squeezed]), mesh.faces)
     ours, whole = (
-        femur_landmarks(anatomy_of(BoneModel("femur", one)), "right") for one in (cut, mesh)
+        estimate_femur_landmarks(anatomy_of(BoneModel("femur", one)), "right")
+        for one in (cut, mesh)
     )
     assert "femur/shaft_distal" not in ours
     for name in ("femur/medial_condyle", "femur/medial_posterior_condyle", "femur/knee_centre"):
@@ -129,7 +130,8 @@ def test_a_hole_in_a_shaft_is_no_cut() -> None:
     hole = int(np.argmin(np.abs(middle[:, 2] - middle[:, 2].min() - 52.0)))
     holed = TriangleMesh(mesh.vertices_mm, np.delete(mesh.faces, hole, axis=0))
     ours, whole = (
-        femur_landmarks(anatomy_of(BoneModel("femur", one)), "right") for one in (holed, mesh)
+        estimate_femur_landmarks(anatomy_of(BoneModel("femur", one)), "right")
+        for one in (holed, mesh)
     )
     assert set(ours) == set(whole)
 
@@ -141,22 +143,22 @@ def test_a_patella_that_was_cut_has_no_centre() -> None:
             place = mesh.vertices_mm[:, axis]
             is_off = place > place.max() - 0.3 * np.ptp(place)
             removed = BoneModel("patella", mesh, is_removed=is_off)
-            assert patella_landmarks(anatomy_of(removed)) == {}
+            assert estimate_patella_landmarks(anatomy_of(removed)) == {}
         squeezed = np.array(mesh.vertices_mm)
         squeezed[:, 0] = np.minimum(squeezed[:, 0], np.quantile(squeezed[:, 0], 0.7))
         flat = BoneModel("patella", TriangleMesh(squeezed, mesh.faces))
-        assert patella_landmarks(anatomy_of(flat)) == {}
+        assert estimate_patella_landmarks(anatomy_of(flat)) == {}
 
 
 def test_what_is_no_knee_has_no_landmarks_of_one() -> None:
     ball = sphere(40.0, 40)
-    assert femur_landmarks(ball, "right") == {}
-    assert patella_landmarks(ball.flipped()) == {}
+    assert estimate_femur_landmarks(ball, "right") == {}
+    assert estimate_patella_landmarks(ball.flipped()) == {}
 
 
 def test_the_centre_of_a_ball_is_its_middle_however_its_vertices_lie() -> None:
     ball = sphere(20.0, 30, (5.0, 6.0, 7.0))
-    found = patella_landmarks(ball)["patella/centre"]
+    found = estimate_patella_landmarks(ball)["patella/centre"]
     assert np.linalg.norm(found.point_mm - (5.0, 6.0, 7.0)) < 0.1
 
 
@@ -164,7 +166,7 @@ def test_the_centre_of_a_ball_is_its_middle_however_its_vertices_lie() -> None:
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_condyles_of_real_femurs_are_outermost_and_apart(number) -> None:
     mesh = read_ply(BONES / "pymskt" / f"femur_{number}.ply")[0]
-    ours = femur_landmarks(anatomy_of(BoneModel("femur", mesh)), "right")
+    ours = estimate_femur_landmarks(anatomy_of(BoneModel("femur", mesh)), "right")
     medial, lateral = (ours[f"femur/{side}_condyle"].point_mm for side in ("medial", "lateral"))
     centre = ours["femur/knee_centre"].point_mm
     assert lateral[0] < centre[0] < medial[0]
@@ -180,7 +182,8 @@ def test_one_tibia_segmented_twice_has_the_same_landmarks() -> None:
     first = read_ply(BONES / "knee_dess_R" / "tibia.ply")[0]
     second = read_ply(BONES / "pymskt" / "tibia_2.ply")[0]
     one, other = (
-        tibia_landmarks(anatomy_of(BoneModel("tibia", mesh)), "right") for mesh in (first, second)
+        estimate_tibia_landmarks(anatomy_of(BoneModel("tibia", mesh)), "right")
+        for mesh in (first, second)
     )
     assert set(one) == set(other)
     for name in one:

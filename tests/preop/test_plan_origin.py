@@ -5,7 +5,7 @@ import json
 import pytest
 
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
-from navapp.preop.summary import summary_page
+from navapp.preop.plan_summary import make_summary_page
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
 
@@ -33,7 +33,7 @@ def test_programs_are_told_of_no_volume_where_there_was_none() -> None:
 
 
 def test_the_page_says_what_is_needed_to_decide(tmp_path) -> None:
-    page = summary_page(Plan({"femur": BoneModel("femur", sphere(40.0, 20))}), CT, tmp_path)
+    page = make_summary_page(Plan({"femur": BoneModel("femur", sphere(40.0, 20))}), CT, tmp_path)
     for words in (
         "Knee &lt;right&gt; 0.6", "400 x 300 x 200 of 0.5 x 0.5 x 0.8 mm", "above 200 HU",
         "1210 HU, found in this CT", "0.52 mm in the slices, 0.61 mm across",

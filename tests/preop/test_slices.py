@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from navapp.preop.slices import contour, draw_slices
+from navapp.preop.slices import cut_contour, draw_slices
 from navapp.preop.volume import CtVolume
 from tests.geometry.shapes import sphere
 
@@ -15,7 +15,7 @@ RADIUS_MM = 15.0
 @pytest.mark.parametrize("height_mm", [0.0, 7.3])
 def test_a_ball_is_cut_in_a_circle(axis, height_mm) -> None:
     ball = sphere(RADIUS_MM, 60)
-    ends = contour(ball.vertices_mm, ball.faces, axis, height_mm)
+    ends = cut_contour(ball.vertices_mm, ball.faces, axis, height_mm)
     assert np.abs(ends[..., axis] - height_mm).max() < 1e-9
     radius = np.linalg.norm(np.delete(ends, axis, axis=2), axis=2)
     assert np.abs(radius - np.sqrt(RADIUS_MM**2 - height_mm**2)).max() < 0.1
@@ -25,7 +25,7 @@ def test_a_ball_is_cut_in_a_circle(axis, height_mm) -> None:
 
 def test_what_a_plane_does_not_cross_has_no_contour() -> None:
     ball = sphere(RADIUS_MM, 20)
-    assert len(contour(ball.vertices_mm, ball.faces, 2, 20.0)) == 0
+    assert len(cut_contour(ball.vertices_mm, ball.faces, 2, 20.0)) == 0
 
 
 @pytest.mark.parametrize("flips", [(1, 1, 1), (-1, 1, -1), (1, -1, -1)])

@@ -11,13 +11,13 @@ from sim_devices.implicit import (
     Rough,
     Scaled,
     Union,
-    gradient,
-    loft,
+    compute_gradient,
+    make_loft,
     project,
     smooth_max,
     smooth_min,
 )
-from sim_devices.relief import waves
+from sim_devices.relief import make_waves
 
 
 @pytest.fixture
@@ -36,7 +36,9 @@ def test_a_ball_s_value_is_its_distance_and_its_gradient_the_radial_direction(po
     relative = points - [1.0, 2.0, 3.0]
     distance = np.linalg.norm(relative, axis=1)
     np.testing.assert_allclose(ball(points), distance - 10.0, atol=1e-9)
-    np.testing.assert_allclose(gradient(ball, points), relative / distance[:, None], atol=1e-5)
+    np.testing.assert_allclose(
+        compute_gradient(ball, points), relative / distance[:, None], atol=1e-5
+    )
 
 
 def test_an_ellipsoid_is_finite_and_negative_at_its_centre():
@@ -54,12 +56,12 @@ def test_a_cone_is_the_least_distance_to_its_family_of_balls(points):
 def test_a_loft_with_equal_radii_is_a_cylinder(points):
     rows = [[z, 2.0, -1.0, 7.0, 7.0, 7.0, 7.0] for z in (-40.0, 0.0, 40.0)]
     radius = np.hypot(points[:, 0] - 2.0, points[:, 1] + 1.0)
-    np.testing.assert_allclose(loft(rows, 2.0)(points), radius - 7.0, atol=1e-6)
+    np.testing.assert_allclose(make_loft(rows, 2.0)(points), radius - 7.0, atol=1e-6)
 
 
 def test_a_twisted_loft_turns_with_height():
     rows = [[z, 0.0, 0.0, 10.0, 10.0, 5.0, 5.0] for z in (-50.0, 50.0)]
-    quarter = loft(rows, 2.0, twist_rad_per_mm=np.pi / 2.0 / 40.0)
+    quarter = make_loft(rows, 2.0, twist_rad_per_mm=np.pi / 2.0 / 40.0)
     np.testing.assert_allclose(
         quarter(np.array([[10.0, 0.0, 0.0], [0.0, 10.0, 40.0]])), 0.0, atol=1e-6
     )
@@ -99,7 +101,7 @@ def test_a_negative_scale_mirrors(points):
 
 def test_relief_has_the_asked_for_height_and_moves_the_surface_outwards():
     points = np.random.default_rng(6).uniform(-200.0, 200.0, (20000, 3))
-    relief = waves(np.random.default_rng(7), 0.3, (6.0, 25.0))
+    relief = make_waves(np.random.default_rng(7), 0.3, (6.0, 25.0))
     assert relief(points).std() == pytest.approx(0.3, rel=0.1)
     flat = Below(lambda p: np.zeros(len(p)), axis=2)
     rough = Rough(flat, relief)

@@ -8,9 +8,9 @@ from sim_devices.motion import (
     JUMP_TAKES_S,
     SWEEP_PERIOD_S,
     LegMotion,
-    drill_motion,
+    compute_drill_motion,
+    compute_sweep_offset_mm,
     smooth_step,
-    sweep_offset_mm,
 )
 
 FRAME_S = 1.0 / 15.0
@@ -73,21 +73,26 @@ def test_seeds_change_the_direction():
 
 def test_the_hand_comes_and_goes_with_its_period():
     distance = [
-        np.linalg.norm(sweep_offset_mm("sweep", t)) for t in np.linspace(0, SWEEP_PERIOD_S, 61)
+        np.linalg.norm(compute_sweep_offset_mm("sweep", t))
+        for t in np.linspace(0, SWEEP_PERIOD_S, 61)
     ]
     assert min(distance) < 40.0
     assert distance[0] > 300.0
     np.testing.assert_allclose(
-        sweep_offset_mm("sweep", 2.5), sweep_offset_mm("sweep", 2.5 + SWEEP_PERIOD_S), atol=1e-9
+        compute_sweep_offset_mm("sweep", 2.5),
+        compute_sweep_offset_mm("sweep", 2.5 + SWEEP_PERIOD_S),
+        atol=1e-9,
     )
-    np.testing.assert_array_equal(sweep_offset_mm("none", 2.5), sweep_offset_mm("none", 0.0))
+    np.testing.assert_array_equal(
+        compute_sweep_offset_mm("none", 2.5), compute_sweep_offset_mm("none", 0.0)
+    )
 
 
 def test_the_drill_points_along_the_hole_turns_and_is_in_it_at_times():
     entry, axis = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.6, 0.8])
     depths = []
     for t in np.linspace(0.0, 5.0, 50):
-        pose = drill_motion(entry, axis, t, turns=True)
+        pose = compute_drill_motion(entry, axis, t, turns=True)
         np.testing.assert_allclose(pose[:3, 2], axis, atol=1e-12)
         offset = pose[:3, 3] - entry
         depths.append(offset @ axis)
@@ -95,8 +100,8 @@ def test_the_drill_points_along_the_hole_turns_and_is_in_it_at_times():
             np.testing.assert_allclose(offset, depths[-1] * axis, atol=1e-9)
     assert max(depths) == pytest.approx(18.0)
     assert min(depths) < -30.0
-    still = drill_motion(entry, axis, 0.1, turns=False)
-    assert not np.allclose(drill_motion(entry, axis, 0.1, turns=True)[:3, 0], still[:3, 0])
+    still = compute_drill_motion(entry, axis, 0.1, turns=False)
+    assert not np.allclose(compute_drill_motion(entry, axis, 0.1, turns=True)[:3, 0], still[:3, 0])
 
 
 def test_smooth_step_has_flat_ends():

@@ -1,17 +1,19 @@
 import numpy as np
 
-from sim_devices.relief import Bumps, waves
+from sim_devices.relief import Bumps, make_waves
 
 
 def test_equal_generators_give_equal_waves():
     points = np.random.default_rng(1).uniform(-50.0, 50.0, (100, 3))
-    first, again, other = (waves(np.random.default_rng(s), 0.2, (6.0, 25.0)) for s in (3, 3, 4))
+    first, again, other = (
+        make_waves(np.random.default_rng(s), 0.2, (6.0, 25.0)) for s in (3, 3, 4)
+    )
     np.testing.assert_array_equal(first(points), again(points))
     assert np.abs(first(points) - other(points)).max() > 0.1
 
 
 def test_waves_are_the_sum_they_say():
-    relief = waves(np.random.default_rng(3), 0.2, (6.0, 25.0), count=4)
+    relief = make_waves(np.random.default_rng(3), 0.2, (6.0, 25.0), count=4)
     points = np.random.default_rng(2).uniform(-120.0, 120.0, (50, 3))
     expected = sum(
         a * np.cos(points @ k + phase)

@@ -5,10 +5,10 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.materials import MaterialId, material_table
+from sim_devices.materials import MaterialId, make_material_table
 from sim_devices.renderer import Part, Renderer, Surfaces
-from sim_devices.rigs import default_rig
-from sim_devices.textures import noise_tile
+from sim_devices.rigs import make_default_rig
+from sim_devices.textures import make_noise_tile
 from tests.reference import shading_reference
 
 LAMPS = np.array([[-0.3, -0.4, -0.9, 0.6], [0.5, -0.1, -0.8, 0.4]])
@@ -20,8 +20,8 @@ POSE = RigidTransform.from_parts(
 
 def surfaces(**changes):
     values = {
-        "materials": material_table(0.05, 0.0),
-        "tile": noise_tile(1, size=64),
+        "materials": make_material_table(0.05, 0.0),
+        "tile": make_noise_tile(1, size=64),
         "lamps": LAMPS,
     }
     return Surfaces(**(values | changes))
@@ -80,7 +80,7 @@ def test_depth_and_coverage_agree_with_ray_casting(femur, pinhole):
 
 
 def test_a_pattern_of_dots_lands_where_the_distorted_camera_projects_it():
-    rig = default_rig()
+    rig = make_default_rig()
     places = [(x, y, 450.0) for x in (-170.0, -60.0, 70.0, 175.0) for y in (-85.0, 5.0, 90.0)]
     parts = [
         Part(f"dot{k}", disc(np.array(p), 14.0), MaterialId.STEEL) for k, p in enumerate(places)
@@ -101,7 +101,7 @@ def test_a_pattern_of_dots_lands_where_the_distorted_camera_projects_it():
 
 def test_texture_sticks_to_the_body_in_both_views(femur, monkeypatch):
     monkeypatch.setattr(Renderer, "_occlusion", lambda self: np.ones((180, 320), dtype=np.float32))
-    rig = default_rig()
+    rig = make_default_rig()
     plain = surfaces(lamps=LAMPS * (1, 1, 1, 0), ambient=1.0, vignetting=0.0)
     parts = [Part("femur", femur, MaterialId.BONE)]
     moved = POSE.moved((3.0, -2.0, 8.0, 0.05, -0.08, 0.1), POSE.translation_mm)
@@ -151,7 +151,7 @@ def test_a_small_picture_agrees_with_the_reference(monkeypatch):
     pose = RigidTransform.from_parts(
         "camera", "plate", rotation_from_vector((0.3, -0.4, 0.1)), (2.0, -3.0, 400.0)
     )
-    look = surfaces(materials=material_table(0.05, 0.6))
+    look = surfaces(materials=make_material_table(0.05, 0.6))
     renderer = Renderer(camera, [part], look)
     picture = renderer.render({"plate": pose}, NO_LAMPS)
     depth = renderer.depth({"plate": pose}, NO_LAMPS)

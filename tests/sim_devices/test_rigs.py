@@ -8,12 +8,12 @@ from sim_devices.rigs import (
     TOE_IN_DEG,
     WORKING_DISTANCE_MM,
     camera_from_left,
-    default_rig,
+    make_default_rig,
 )
 
 
 def test_the_rig_has_the_promised_size_baseline_and_focal_length():
-    rig = default_rig()
+    rig = make_default_rig()
     assert (rig.width, rig.height) == (1280, 720)
     assert rig.baseline_mm == pytest.approx(BASELINE_MM)
     assert rig.left.focal_px == pytest.approx(1400.0, rel=0.01)
@@ -26,31 +26,31 @@ def test_the_rig_has_the_promised_size_baseline_and_focal_length():
 
 
 def test_the_cameras_converge():
-    rig = default_rig()
+    rig = make_default_rig()
     axis_of_right = rig.right_from_left.rotation[2]
     assert axis_of_right[0] < -0.05
 
 
 def test_the_rig_can_be_rectified_and_sees_the_working_distance_inside_the_pictures():
-    geometry = Rectifier(default_rig()).geometry
+    geometry = Rectifier(make_default_rig()).geometry
     assert 150.0 < geometry.disparity_px(WORKING_DISTANCE_MM) < 300.0
 
 
 def test_another_size_is_the_same_rig_scaled():
-    half = default_rig(640, 360)
-    np.testing.assert_allclose(half.left.matrix, default_rig().scaled(0.5).left.matrix)
+    half = make_default_rig(640, 360)
+    np.testing.assert_allclose(half.left.matrix, make_default_rig().scaled(0.5).left.matrix)
     assert (half.width, half.height) == (640, 360)
 
 
 def test_another_shape_is_refused():
     with pytest.raises(ValueError, match="16:9"):
-        default_rig(640, 480)
+        make_default_rig(640, 480)
 
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_turned_right_eye_shows_everything_elsewhere(axis: int) -> None:
     """About x its picture moves across the rows, about y along them; the left one stays."""
-    rig, turn = default_rig(), [0.0, 0.0, 0.0]
+    rig, turn = make_default_rig(), [0.0, 0.0, 0.0]
     turn[axis] = np.radians(0.02)
     point = np.array([[5.0, -8.0, 450.0]])
     before = rig.right.project(rig.right_from_left.apply(point))

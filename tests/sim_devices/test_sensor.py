@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from sim_devices.sensor import SensorModel, _noise, tone_curve, tone_table
+from sim_devices.sensor import SensorModel, _noise, compute_tone_curve, make_tone_table
 from sim_devices.sensor_kernels import expose_rows
 from tests.reference.sensor_reference import expose_reference
 
@@ -13,7 +13,7 @@ def flat(level: float, shape: tuple[int, int] = (120, 160)) -> np.ndarray:
 
 
 def grey_value(signal: float) -> float:
-    return float(255.0 * tone_curve(np.array([signal]))[0])
+    return float(255.0 * compute_tone_curve(np.array([signal]))[0])
 
 
 def test_kernel_equals_reference():
@@ -24,7 +24,7 @@ def test_kernel_equals_reference():
     parameters = SensorModel(exposure=0.9).kernel_parameters()
     picture = np.empty((37, 90), np.uint8)
     scratch = np.empty(90, np.int32)
-    curve = tone_table(1.3)
+    curve = make_tone_table(1.3)
     expose_rows(radiance, noise, starts, parameters, curve, scratch, picture)
     expected = expose_reference(radiance, noise, starts, parameters, curve)
     difference = np.abs(picture.astype(int) - expected)
@@ -85,17 +85,19 @@ def test_right_eye_is_four_percent_brighter():
 
 
 def test_exposure_and_gain_brighten_up_to_saturation():
-    assert QUIET.adjusted(2.0, 0.0).picture(flat(0.2), "left", 0)[0, 0, 0] == round(grey_value(0.4))
+    assert QUIET.with_exposure(2.0, 0.0).picture(flat(0.2), "left", 0)[0, 0, 0] == round(
+        grey_value(0.4)
+    )
     doubled = 20.0 * np.log10(2.0)
-    assert QUIET.adjusted(1.0, doubled).picture(flat(0.2), "left", 0)[0, 0, 0] == round(
+    assert QUIET.with_exposure(1.0, doubled).picture(flat(0.2), "left", 0)[0, 0, 0] == round(
         grey_value(0.4)
     )
     assert SensorModel(exposure=8.0).picture(flat(0.5), "left", 0).min() == 255
 
 
 def test_gain_raises_noise_that_exposure_would_not():
-    exposed = SensorModel().adjusted(4.0, 0.0).picture(flat(0.1), "left", 0).astype(float)
-    amplified = SensorModel().adjusted(1.0, 12.041).picture(flat(0.1), "left", 0).astype(float)
+    exposed = SensorModel().with_exposure(4.0, 0.0).picture(flat(0.1), "left", 0).astype(float)
+    amplified = SensorModel().with_exposure(1.0, 12.041).picture(flat(0.1), "left", 0).astype(float)
     assert amplified.mean() == pytest.approx(exposed.mean(), abs=0.5)
     assert amplified.std() > 1.5 * exposed.std()
 
@@ -110,7 +112,7 @@ def test_lens_blurs_a_point_without_losing_light():
     assert blurred[60, 80, 0] < sharp[60, 80, 0]
     # The tone curve is undone to add up light.
     levels = np.linspace(0.0, 1.0, 20001)
-    back = np.interp(blurred[..., 0] / 255.0, tone_curve(levels), levels)
+    back = np.interp(blurred[..., 0] / 255.0, compute_tone_curve(levels), levels)
     assert back.sum() == pytest.approx(0.5, rel=0.03)
 
 
@@ -123,7 +125,7 @@ def test_grey_sensor_gives_one_channel():
 
 
 def test_tone_curve_is_continuous_and_covers_all_grey_values():
-    table = tone_table(1.0).astype(int)
+    table = make_tone_table(1.0).astype(int)
     assert table[0] == 0
     assert table[-1] == 255
     assert set(np.diff(table)) <= {0, 1}

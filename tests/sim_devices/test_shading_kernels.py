@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 
-from sim_devices.materials import MaterialId, material_table
-from sim_devices.shading_kernels import albedo_at, light_at, sample_tile
-from sim_devices.textures import noise_tile
+from sim_devices.materials import MaterialId, make_material_table
+from sim_devices.shading_kernels import compute_albedo, compute_light, sample_tile
+from sim_devices.textures import make_noise_tile
 from tests.reference import shading_reference
 
 
 @pytest.fixture(scope="module")
 def tile():
-    return noise_tile(5, size=32).values
+    return make_noise_tile(5, size=32).values
 
 
 def test_tile_lookup_agrees_with_the_reference_and_is_periodic(tile):
@@ -27,12 +27,12 @@ def test_tile_lookup_agrees_with_the_reference_and_is_periodic(tile):
 @pytest.mark.parametrize("material", list(MaterialId))
 def test_albedo_agrees_with_the_reference(material):
     rng = np.random.default_rng(3)
-    table = material_table(0.05, 0.5)
+    table = make_material_table(0.05, 0.5)
     out = np.empty(5, np.float32)
     for _ in range(100):
         fine, coarse = rng.standard_normal((2, 5)).astype(np.float32)
         mark = np.float32(rng.uniform())
-        albedo_at(table, int(material), fine, coarse, mark, out)
+        compute_albedo(table, int(material), fine, coarse, mark, out)
         expected = shading_reference.albedo(table[material].astype(float), fine, coarse, mark)
         np.testing.assert_allclose(out, expected, rtol=2e-4, atol=2e-5)
 
@@ -48,7 +48,9 @@ def test_light_agrees_with_the_reference():
         normal /= np.linalg.norm(normal)
         point, eye = rng.uniform(-50, 50, 3), rng.uniform(200, 500, 3)
         single = [np.ascontiguousarray(value, np.float32) for value in (normal, point, eye)]
-        light_at(lamps[None].astype(np.float32), 0, *single, np.float32(0.2), np.float32(60.0), out)
+        compute_light(
+            lamps[None].astype(np.float32), 0, *single, np.float32(0.2), np.float32(60.0), out
+        )
         expected = shading_reference.light(lamps, normal, point, eye, 0.2, 60.0)
         np.testing.assert_allclose(out, expected, rtol=2e-3, atol=1e-5)
         seen_highlight = max(seen_highlight, float(out[1]))

@@ -6,17 +6,17 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.targets.boards import board_from
+from calibration.targets.boards import parse_board
 from calibration.targets.detection import find_board
-from calibration.targets.drawing import drawn, rastered
+from calibration.targets.drawing import make_drawing, rasterise
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from sim_devices.rigs import default_rig
+from sim_devices.rigs import make_default_rig
 from sim_devices.sensor import SensorModel
 from sim_devices.sheet import PrintedSheet, SheetInView, SheetScene
 from sim_devices.sheet_kernels import draw_sheet
 from tests.reference.sheet_reference import sheet_reference
 
-BOARD = board_from(
+BOARD = parse_board(
     {
         "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
         "marker_mm": 14.0, "dictionary": "DICT_4X4_100",
@@ -42,7 +42,7 @@ def off_px(eye: str, pose: RigidTransform, take) -> np.ndarray:
     seen = find_board(take(SheetScene(sheet_of(), lambda time_ns: pose).render(eye, 0)), BOARD)
     assert seen is not None
     assert len(seen.ids) == len(BOARD.points_mm)
-    rig = default_rig()
+    rig = make_default_rig()
     camera, in_camera = rig.left, pose
     if eye == "right":
         camera, in_camera = rig.right, rig.right_from_left @ pose
@@ -50,8 +50,8 @@ def off_px(eye: str, pose: RigidTransform, take) -> np.ndarray:
 
 
 def sheet_of(board=BOARD, px_per_mm: float = 12.0) -> PrintedSheet:
-    drawing = drawn(board)
-    white = rastered(drawing, px_per_mm, MARGIN_MM)
+    drawing = make_drawing(board)
+    white = rasterise(drawing, px_per_mm, MARGIN_MM)
     left_mm, top_mm = drawing.low_mm - MARGIN_MM
     return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))
 
@@ -93,7 +93,7 @@ def test_only_the_box_is_drawn_and_it_holds_the_whole_sheet():
     picture = scene.render("left", 0)
     ground = picture[0, 0, 0]
     rows, columns = np.nonzero(picture[:, :, 0] != ground)
-    corners = default_rig().left.project(pose.apply(sheet_of(px_per_mm=4.0).corners_mm))
+    corners = make_default_rig().left.project(pose.apply(sheet_of(px_per_mm=4.0).corners_mm))
     corners = np.clip(corners, 0, (1279, 719))
     assert columns.min() == pytest.approx(corners[:, 0].min(), abs=2.5)
     assert columns.max() == pytest.approx(corners[:, 0].max(), abs=2.5)
@@ -119,7 +119,7 @@ def test_a_sheet_is_a_grey_picture_with_a_size():
 
 def test_a_sheet_hides_what_is_behind_it_while_it_is_held() -> None:
     class Bright:
-        rig = default_rig()
+        rig = make_default_rig()
 
         def render(self, eye, time_ns, *how) -> np.ndarray:
             return np.full((720, 1280, 3), 0.77, np.float32)

@@ -3,12 +3,12 @@ import pytest
 
 from sim_devices.implicit import Difference, Ellipsoid, Union
 from sim_devices.surface_nets import (
-    cell_codes,
-    grid_around,
+    compute_cell_codes,
+    make_grid,
+    make_surface_net,
     mesh_solid,
     repair_ambiguous,
     sample,
-    surface_net,
 )
 
 
@@ -56,7 +56,7 @@ def test_sampling_is_exact_near_the_surface_and_has_the_right_sign_elsewhere():
     solid = Difference(
         Ellipsoid((0.0, 0.0, 0.0), (20.0, 15.0, 12.0)), Ellipsoid((0, 12.0, 0), (6.0,) * 3), 2.0
     )
-    grid = grid_around(*box(23.0), 1.0)
+    grid = make_grid(*box(23.0), 1.0)
     index = np.stack(np.meshgrid(*map(np.arange, grid.shape), indexing="ij"), -1).reshape(-1, 3)
     exact = solid(grid.points(index)).reshape(grid.shape)
     sampled = sample(solid, grid)
@@ -68,14 +68,14 @@ def test_sampling_is_exact_near_the_surface_and_has_the_right_sign_elsewhere():
 def test_even_noise_gives_a_manifold():
     values = np.random.default_rng(3).standard_normal((12, 13, 14))
     values[[0, -1]] = values[:, [0, -1]] = values[:, :, [0, -1]] = 1.0
-    grid = grid_around(np.zeros(3), np.array([11.0, 12.0, 13.0]), 1.0)
-    mesh = surface_net(values, grid)
+    grid = make_grid(np.zeros(3), np.array([11.0, 12.0, 13.0]), 1.0)
+    mesh = make_surface_net(values, grid)
     assert (edge_use(mesh.faces) == 2).all()
     assert directed_edges_are_unique(mesh.faces)
 
 
 def test_repair_leaves_unambiguous_samples_alone():
-    grid = grid_around(*box(12.0), 1.0)
+    grid = make_grid(*box(12.0), 1.0)
     values = sample(Ellipsoid((0.0, 0.0, 0.0), (9.0,) * 3), grid)
     np.testing.assert_array_equal(repair_ambiguous(values), values)
 
@@ -83,7 +83,7 @@ def test_repair_leaves_unambiguous_samples_alone():
 def test_cell_codes_number_the_corners_x_first():
     inside = np.zeros((2, 2, 2), dtype=bool)
     inside[1, 0, 1] = True
-    assert cell_codes(inside)[0, 0, 0] == 1 << 5
+    assert compute_cell_codes(inside)[0, 0, 0] == 1 << 5
 
 
 @pytest.mark.parametrize("radius", [0.1, 30.0])

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh
-from sim_devices.tissue import DRAPE_HOLE_MM, SHEET_RADIUS_MM, make_drape, make_tissue, trimmed
+from sim_devices.tissue import DRAPE_HOLE_MM, SHEET_RADIUS_MM, make_drape, make_tissue, trim
 
 
 def ball(radius_mm, centre):
@@ -88,7 +88,7 @@ def test_the_drape_has_its_hole_and_covers_the_rest(sheet):
 
 
 def test_a_trimmed_sheet_ends_under_the_drape(sheet):
-    short = trimmed(sheet)
+    short = trim(sheet)
     radius = np.hypot(*short.mesh.vertices_mm[:, :2].T)
     assert DRAPE_HOLE_MM + 10.0 < radius.max() < SHEET_RADIUS_MM
     assert len(short.mark) == len(short.exposure) == len(radius)

@@ -9,7 +9,7 @@ from navapp.tracking.box.picture_box import PictureBox
 from navapp.tracking.box.tracker import BoxState
 from navapp.tracking.verdict import is_worth_a_search, with_cause
 from navapp.values import (
-    LineTimings,
+    FrameTimings,
     PoseEstimate,
     Reason,
     RowCheck,
@@ -29,7 +29,7 @@ def frame(pose: RigidTransform | None, status: Status = Status.OK) -> TrackedFra
     estimate = None
     if pose is not None:
         estimate = PoseEstimate(pose, np.eye(6), 500, 1.0, 0.2, 0.2, 3, True)
-    return TrackedFrame("femur", estimate, Verdict(status), LineTimings())
+    return TrackedFrame("femur", estimate, Verdict(status), FrameTimings())
 
 
 def moved(pose: RigidTransform, twist) -> RigidTransform:

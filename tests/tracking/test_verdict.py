@@ -21,7 +21,7 @@ from navapp.tracking.verdict import (
     is_place_doubted,
     with_cause,
 )
-from navapp.values import LineTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
+from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
 DOCS = Path(__file__).parents[2] / "docs" / "registration.md"
 POSE = RigidTransform.identity("left_rect", "femur")
@@ -257,7 +257,7 @@ def test_some_reasons_speak_against_the_place(reason: Reason) -> None:
 
 def test_the_cause_comes_first_and_once_and_an_ok_has_none() -> None:
     verdict = Verdict(Status.LOST, None, (Reason.TOO_FEW_POINTS,))
-    lost = TrackedFrame("femur", None, verdict, LineTimings())
+    lost = TrackedFrame("femur", None, verdict, FrameTimings())
     assert with_cause(lost, None) is lost
     named = with_cause(lost, Reason.PICTURES_SWAPPED)
     assert named.verdict.reasons == (Reason.PICTURES_SWAPPED, Reason.TOO_FEW_POINTS)

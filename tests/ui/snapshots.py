@@ -129,7 +129,7 @@ def review(**changes: Any) -> Snapshot:
         "state": SessionState.REVIEW,
         "stage": STAGES[0],
         "reasons": (Reason.NOT_NAVIGATING,),
-        "is_candidate": True,
+        "candidate_id": 4,
         "verdict": dataclasses.replace(GOOD, predicted_tre_mm=0.34),
     }
     return navigating(**{**values, **changes})

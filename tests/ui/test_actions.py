@@ -28,7 +28,7 @@ def test_nothing_is_accepted_on_an_old_word() -> None:
 
 @pytest.mark.parametrize("state", list(SessionState))
 def test_accept_and_reject_need_a_candidate(state: SessionState) -> None:
-    snapshot = snapshots.review(state=state, is_candidate=False)
+    snapshot = snapshots.review(state=state, candidate_id=None)
     assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
     assert not is_possible(ACTION_OF_NAME["reject"], snapshot, is_silent=False)
 

@@ -74,8 +74,8 @@ def press(*keys: str) -> Script:
         (snapshots.starting(), "space", Blank()),
         (snapshots.blanked(), "space", Blank()),
         (snapshots.blanked(), "v", Show()),
-        (snapshots.review(), "a", Accept()),
-        (snapshots.review(), "r", Reject()),
+        (snapshots.review(), "a", Accept(4)),
+        (snapshots.review(), "r", Reject(4)),
         (snapshots.suspended(), "g", Register()),
         (snapshots.registering(), "c", Cancel()),
         (snapshots.navigating(), "right_square_bracket", EnterStage(3)),
@@ -160,7 +160,7 @@ def test_the_palette_offers_actions_of_the_table() -> None:
         await pilot.press("enter", "enter")
         await pilot.pause()
 
-    assert play(snapshots.review(), script).session.commands == [Accept()]
+    assert play(snapshots.review(), script).session.commands == [Accept(4)]
 
 
 class TestQuitting:

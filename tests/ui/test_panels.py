@@ -15,9 +15,9 @@ from navapp.control.states import (
     Snapshot,
 )
 from navapp.ui.devices_panel import DevicesPanel
-from navapp.ui.event_list import event_line
+from navapp.ui.event_list import format_event_line
 from navapp.ui.footer import KeyFooter
-from navapp.ui.pose_panel import PosePanel, reason_lines
+from navapp.ui.pose_panel import PosePanel, format_reason_lines
 from navapp.ui.stepper import StageStepper
 from navapp.ui.symbols import ASCII, UNICODE, Symbols
 from navapp.ui.text_view import TextView
@@ -41,8 +41,8 @@ def lines_of(widget: TextView, view: View, width: int, height: int) -> list[str]
 @pytest.mark.parametrize("reason", list(Reason))
 def test_every_reason_with_its_remedy_fits_the_small_panel(reason: Reason) -> None:
     view = view_of(snapshots.suspended(reasons=(reason,)))
-    assert len(reason_lines(view, WIDTH)) <= POSE_LINES - 3
-    text = " ".join(line.plain for line in reason_lines(view, WIDTH))
+    assert len(format_reason_lines(view, WIDTH)) <= POSE_LINES - 3
+    text = " ".join(line.plain for line in format_reason_lines(view, WIDTH))
     assert reason.value in text
     assert reason.remedy in text
 
@@ -314,7 +314,7 @@ def test_an_event_is_one_line_without_control_codes() -> None:
     event = Event(
         snapshots.START_NS + 3_725 * snapshots.S, "x", "a\nb \x1b[2J" + "c" * 99, EventLevel.ALARM
     )
-    line = event_line(view_of(snapshots.navigating()), event, 60).plain
+    line = format_event_line(view_of(snapshots.navigating()), event, 60).plain
     assert line.startswith("  62:05 ✗ ALARM a b ")
     assert "\x1b" not in line
     assert "\n" not in line

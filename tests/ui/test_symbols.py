@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 
-from navapp.ui.symbols import ASCII, UNICODE, Symbols, symbols_for
+from navapp.ui.symbols import ASCII, UNICODE, Symbols, choose_symbols
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ from navapp.ui.symbols import ASCII, UNICODE, Symbols, symbols_for
 def test_the_set_follows_the_terminal(
     encoding: str | None, environment: dict[str, str], expected: Symbols
 ) -> None:
-    assert symbols_for(encoding, environment) is expected
+    assert choose_symbols(encoding, environment) is expected
 
 
 def test_the_plain_set_is_ascii() -> None:

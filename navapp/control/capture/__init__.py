@@ -1,1 +1,1 @@
-"""Guided capture of a calibration: what is seen, what is kept, what is wanted next."""
+"""Guided capture of a calibration: board views, kept pairs, the next view."""

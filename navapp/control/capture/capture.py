@@ -1,5 +1,6 @@
-"""A guided capture: one step a frame."""
+"""A guided capture of calibration pairs: one step for each frame."""
 
+from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
 from calibration.targets.boards import Board
@@ -7,11 +8,14 @@ from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
 from navapp.control.camera_link import CameraLink, Reopen
-from navapp.control.capture.following import Following
+from navapp.control.capture.board_move import BoardMove, find_move
+from navapp.control.capture.board_view import BoardView, detect_board
+from navapp.control.capture.hand_control import HandControl
 from navapp.control.capture.interfaces import BoardHand, CaptureSettings, PairStore, Solve
-from navapp.control.capture.kept import KeptPairs
-from navapp.control.capture.looks import Look, Shutter, look_at
-from navapp.control.capture.previews import previews
+from navapp.control.capture.kept_pairs import KeptPairs
+from navapp.control.capture.next_view import N_STARTING, NextView, measure_pose, plan_next_view
+from navapp.control.capture.previews import make_previews
+from navapp.control.capture.shutter import Shutter
 from navapp.control.capture.states import (
     Another,
     CaptureCommand,
@@ -26,8 +30,6 @@ from navapp.control.capture.states import (
     Outcome,
     Take,
 )
-from navapp.control.capture.wishes import N_STARTING, Wish, measured_pose, next_wish
-from navapp.control.capture.words import Way, way
 from navapp.control.executors import Executor, Job
 from navapp.control.states import Progress
 from navapp.errors import DeviceError, NavappError
@@ -42,18 +44,22 @@ _SLACK_OF_GUESS = 3.0
 
 
 class Capture:
-    """Looks, keeps, asks for more, solves. `step` from one thread, the rest from any.
+    """Detects the board, keeps pairs, asks for the next view, solves.
+
+    `step` is called from one thread, `submit` and `snapshot` from any.
+
 
     Args:
         camera: opened; closed with the capture.
         clock: of its frames.
         board: that is shown.
         settings: when it is enough.
-        executor: runs looks, wishes and the solve.
+        executor: runs detection, planning and the solve.
         store: of the raw pairs.
         solve: what `Finish` does with the pairs; runs in the executor.
         hand: that holds a simulated board, else None.
         reopen: opens a lost camera again; None: its loss is the end.
+        detect: finds the board in the pictures of a frame.
     """
 
     def __init__(
@@ -68,30 +74,31 @@ class Capture:
         solve: Solve,
         hand: BoardHand | None = None,
         reopen: Reopen | None = None,
+        detect: Callable[[StereoFrame, Board], BoardView] = detect_board,
     ) -> None:
         info = camera.info
         self._name, self._size = info.name, (info.width, info.height)
         self._camera, self._clock = CameraLink(camera, clock, reopen), clock
         self._board, self._settings, self._executor = board, settings, executor
-        self._solve, self._following = solve, Following(hand)
+        self._solve, self._detect, self._hand = solve, detect, HandControl(hand)
         self._middle_mm = board.points_mm.mean(axis=0)
         self._commands: SimpleQueue[CaptureCommand] = SimpleQueue()
         self._phase = CapturePhase.CAPTURING
         self._kept = KeptPairs(store, self._size)
         self._shutter, self._events = Shutter(), list[str]()
         self._frame: StereoFrame | None = None
-        self._look: Look | None = None
+        self._board_view: BoardView | None = None
         self._checks: tuple[Check, ...] = ()
-        self._way: Way | None = None
+        self._move: BoardMove | None = None
         self._is_told_to_take = False
         self._avoid: list[FloatArray] = []
-        self._wish = next_wish(board, [], self._size, settings.depth_mm)
-        self._looking: Job[Look] | None = None
-        self._wishing: Job[Wish] | None = None
+        self._next_view = plan_next_view(board, [], self._size, settings.depth_mm)
+        self._detection: Job[BoardView] | None = None
+        self._planning: Job[NextView] | None = None
         self._solving: Job[Outcome] | None = None
         self._outcome: Outcome | None = None
         self._n_least = settings.fewest_pairs if settings.n_pairs is None else settings.n_pairs
-        self.snapshot = self._told()
+        self.snapshot = self._make_snapshot()
 
     def submit(self, command: CaptureCommand) -> None:
         """Hand a command over; what became of it is in a later snapshot."""
@@ -109,19 +116,19 @@ class Capture:
         frame = self._next_frame()
         if frame is not None:
             self._frame = frame
-            if self._looking is None and self._phase is CapturePhase.CAPTURING:
-                self._looking = Job(lambda report: look_at(frame, self._board))
-                self._executor.start(self._looking)
-        self._take_wish()
-        self._take_look()
+            if self._detection is None and self._phase is CapturePhase.CAPTURING:
+                self._detection = Job(lambda report: self._detect(frame, self._board))
+                self._executor.start(self._detection)
+        self._take_next_view()
+        self._take_board_view()
         self._take_outcome()
         self._move_hand()
-        self.snapshot = self._told()
+        self.snapshot = self._make_snapshot()
         return self.snapshot
 
     def close(self) -> None:
         """Stop what runs; the camera is closed."""
-        for job in (self._looking, self._wishing, self._solving):
+        for job in (self._detection, self._planning, self._solving):
             if job is not None:
                 job.cancel()
         self._executor.close()
@@ -130,7 +137,7 @@ class Capture:
     @property
     def is_enough(self) -> bool:
         """The limit is reached, by pairs that are all in the prediction."""
-        n, bound, asked = len(self._kept), self._wish.bound_mm, self._settings
+        n, bound, asked = len(self._kept), self._next_view.bound_mm, self._settings
         if n < self._n_least:
             return False
         return asked.n_pairs is not None or (bound is not None and bound <= asked.stop_mm)
@@ -138,7 +145,7 @@ class Capture:
     def _next_frame(self) -> StereoFrame | None:
         if self._camera.is_down:
             if self._camera.wait_for_return(_WAIT_S):
-                self._tell(f"camera {self._name} is back")
+                self._add_event(f"camera {self._name} is back")
             return None
         try:
             return self._camera.take(_WAIT_S)
@@ -146,12 +153,12 @@ class Capture:
             if not self._camera.can_return:
                 raise
             # What was seen before says nothing of what is held there afterwards.
-            if self._looking is not None:
-                self._looking.cancel()
-            self._looking = self._frame = self._look = self._way = None
+            if self._detection is not None:
+                self._detection.cancel()
+            self._detection = self._frame = self._board_view = self._move = None
             self._checks, self._is_told_to_take = (), False
             self._shutter.forget_last()
-            self._tell(str(error))
+            self._add_event(str(error))
             return None
 
     def _next_command(self) -> CaptureCommand | None:
@@ -165,87 +172,89 @@ class Capture:
             case Leave():
                 self._phase = CapturePhase.OVER
             case Follow(is_on):
-                self._following.turn(is_on=is_on)
+                self._hand.switch(is_on=is_on)
             case Nudge(shift_mm, turn_rad):
-                self._following.nudge(shift_mm, turn_rad)
+                self._hand.nudge(shift_mm, turn_rad)
             case _ if self._phase is not CapturePhase.CAPTURING:
                 pass
             case Take():
                 self._is_told_to_take = not self._camera.is_down
             case DropLast():
                 if (pair := self._kept.drop_last()) is not None:
-                    self._tell(f"pair {pair.index} dropped")
-                    self._ask()
-            case Another() if self._wish.left_from_board is not None:
-                self._avoid.append(self._wish.left_from_board.rotation)
-                self._ask()
+                    self._add_event(f"pair {pair.index} dropped")
+                    self._begin_planning()
+            case Another() if self._next_view.left_from_board is not None:
+                self._avoid.append(self._next_view.left_from_board.rotation)
+                self._begin_planning()
             case Finish() if len(self._kept) >= N_STARTING:
                 pairs = self._kept.pairs
                 self._solving = Job(lambda report: self._solve(pairs, report))
                 self._phase = CapturePhase.SOLVING
                 self._executor.start(self._solving)
             case Finish():
-                self._tell(f"{len(self._kept)} pairs are too few to solve, {N_STARTING} are needed")
+                self._add_event(
+                    f"{len(self._kept)} pairs are too few to solve, {N_STARTING} are needed"
+                )
 
-    def _take_look(self) -> None:
-        job = self._looking
+    def _take_board_view(self) -> None:
+        job = self._detection
         if job is None or not job.is_finished:
             return
-        self._looking = None
+        self._detection = None
         if job.error is not None:
             raise job.error
-        look = self._look = job.result
-        if look is None or self._phase is not CapturePhase.CAPTURING:
+        seen = self._board_view = job.result
+        if seen is None or self._phase is not CapturePhase.CAPTURING:
             return
-        self._checks = self._shutter.checks(look, self._kept.pairs)
-        self._way = self._way_from(look)
+        self._checks = self._shutter.check(seen, self._kept.pairs)
+        self._move = self._find_move(seen)
         is_good = all(check.is_met for check in self._checks)
-        is_there = self._way is not None and self._way.is_there
-        # A wish that is being thought over is not one that a view can meet.
-        is_due = is_good and is_there and self._wishing is None and not self.is_enough
+        is_there = self._move is not None and self._move.is_there
+        # While the next view is being planned, no view can be the wanted one.
+        is_due = is_good and is_there and self._planning is None and not self.is_enough
         if self._is_told_to_take or is_due:
-            self._keep(look)
+            self._keep(seen)
         self._is_told_to_take = False
 
-    def _keep(self, look: Look) -> None:
-        pair = self._kept.add(look)
+    def _keep(self, seen: BoardView) -> None:
+        pair = self._kept.add(seen)
         if pair is None:
-            self._tell("nothing was taken: the board is not seen by both cameras")
+            self._add_event("nothing was taken: the board is not seen by both cameras")
             return
-        self._tell(f"pair {pair.index} kept: {len(pair.common()[0])} marks by both")
-        self._ask()
+        self._add_event(f"pair {pair.index} kept: {len(pair.common()[0])} marks by both")
+        self._begin_planning()
 
-    def _ask(self) -> None:
-        """Think over what is wanted, with the pairs of now."""
+    def _begin_planning(self) -> None:
+        """Plan the next view with the pairs that are kept now."""
         self._outcome = None
-        if self._wishing is not None:
-            self._wishing.cancel()
-        pairs, last, avoid = self._kept.pairs, self._wish, list(self._avoid)
-        self._wishing = Job(
-            lambda report: next_wish(
+        if self._planning is not None:
+            self._planning.cancel()
+        pairs, last, avoid = self._kept.pairs, self._next_view, list(self._avoid)
+        self._planning = Job(
+            lambda report: plan_next_view(
                 self._board, pairs, self._size, self._settings.depth_mm, last, avoid
             )
         )
-        self._executor.start(self._wishing)
+        self._executor.start(self._planning)
 
-    def _take_wish(self) -> None:
-        job = self._wishing
+    def _take_next_view(self) -> None:
+        job = self._planning
         if job is None or not job.is_finished:
             return
-        self._wishing = None
+        self._planning = None
         if job.error is not None:
             raise job.error
         if job.result is None:
             return
-        known = {one.index for one in self._wish.misfits}
+        known = {one.index for one in self._next_view.misfits}
         for one in job.result.misfits:
             if one.index not in known:
-                self._tell(f"pair {one.index} does not count: {one.reason}")
+                self._add_event(f"pair {one.index} does not count: {one.reason}")
         was_enough = self.is_enough
-        self._wish = job.result
-        self._following.begin()
+        self._next_view = job.result
+        self._hand.begin()
         if self.is_enough and not was_enough:
-            self._tell("this is enough: finish, or take more")
+            self._add_event("this is enough: finish, or take more")
 
     def _take_outcome(self) -> None:
         job = self._solving
@@ -263,45 +272,45 @@ class Capture:
         if self._outcome is not None and not self._outcome.is_accepted:
             self._n_least = len(self._kept) + _MORE_AFTER_REFUSAL
 
-    def _way_from(self, look: Look) -> Way | None:
-        wanted = self._wish.left_from_board
-        if look.left is None or wanted is None:
+    def _find_move(self, seen: BoardView) -> BoardMove | None:
+        wanted = self._next_view.left_from_board
+        if seen.left is None or wanted is None:
             return None
-        now = measured_pose(self._board, look.left, self._wish.left)
-        slack = 1.0 if self._wish.rig is not None else _SLACK_OF_GUESS
-        return None if now is None else way(now, wanted, self._middle_mm, slack)
+        now = measure_pose(self._board, seen.left, self._next_view.left)
+        slack = 1.0 if self._next_view.rig is not None else _SLACK_OF_GUESS
+        return None if now is None else find_move(now, wanted, self._middle_mm, slack)
 
     def _move_hand(self) -> None:
-        wanted, frame = self._wish.left_from_board, self._frame
-        if wanted is None or frame is None or self._wishing is not None or self.is_enough:
+        wanted, frame = self._next_view.left_from_board, self._frame
+        if wanted is None or frame is None or self._planning is not None or self.is_enough:
             return
-        if not self._following.step(wanted, frame.captured_ns):
+        if not self._hand.step(wanted, frame.captured_ns):
             self._do(Another())
 
-    def _tell(self, text: str) -> None:
+    def _add_event(self, text: str) -> None:
         self._events = [*self._events, text][-_MOST_EVENTS:]
 
-    def _told(self) -> CaptureSnapshot:
-        look, wish = self._look, self._wish
-        seen = [look.left, look.right] if look is not None else [None, None]
-        counts = [0 if one is None else len(one.ids) for one in seen]
+    def _make_snapshot(self) -> CaptureSnapshot:
+        seen, next_view = self._board_view, self._next_view
+        sides = [seen.left, seen.right] if seen is not None else [None, None]
+        counts = [0 if side is None else len(side.ids) for side in sides]
         job = self._solving
         return CaptureSnapshot(
             time_ns=self._clock.now_ns(),
             phase=self._phase,
             camera=self._name,
             trouble=self._trouble,
-            has_hand=self._following.has_hand,
-            is_following=self._following.is_on,
-            pictures=previews(
-                self._board, self._frame, look, None if self.is_enough else self._wish
+            has_hand=self._hand.has_hand,
+            is_following=self._hand.is_on,
+            pictures=make_previews(
+                self._board, self._frame, seen, None if self.is_enough else self._next_view
             ),
             n_seen=(counts[0], counts[1], len(self._board.points_mm)),
             checks=self._checks,
-            wish=self._wish_text(),
+            instruction=self._instruction(),
             n_kept=len(self._kept),
-            bound_mm=wish.bound_mm,
-            worst_mm=wish.worst_mm,
+            bound_mm=next_view.bound_mm,
+            worst_mm=next_view.worst_mm,
             stop_mm=self._settings.stop_mm,
             is_enough=self.is_enough,
             covered=self._kept.covered,
@@ -316,13 +325,13 @@ class Capture:
             return f"{self._camera.trouble or 'the camera is lost'}; it is opened again, wait"
         return "the camera sends no picture: check its cable" if self._camera.is_silent else ""
 
-    def _wish_text(self) -> str:
+    def _instruction(self) -> str:
         if self._phase is CapturePhase.SOLVING:
             return "solving: this takes a while"
         if self.is_enough:
             return "nothing: this is enough"
-        if self._wishing is not None:
+        if self._planning is not None:
             return "thinking about the next view"
-        if self._way is None:
+        if self._move is None:
             return "show the board to both cameras, as the outline is drawn"
-        return str(self._way)
+        return str(self._move)

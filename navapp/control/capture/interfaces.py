@@ -6,7 +6,7 @@ from typing import Protocol
 
 from numpy.typing import ArrayLike
 
-from calibration.targets.pairs import SeenPair
+from calibration.targets.seen_pairs import SeenPair
 from drivers.frames import StereoFrame
 from navapp.control.capture.states import Outcome
 from navapp.geometry.transform import RigidTransform

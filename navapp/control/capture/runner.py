@@ -1,4 +1,4 @@
-"""Steps a capture in a thread of its own; what a screen needs of it never blocks."""
+"""Steps a capture in a thread of its own; `snapshot` and `submit` never block."""
 
 import threading
 

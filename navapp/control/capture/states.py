@@ -1,4 +1,4 @@
-"""What a capture shows of itself, and what it can be told."""
+"""Commands, phases and snapshots of a guided capture."""
 
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -102,7 +102,7 @@ class CaptureSnapshot:
         pictures: left and right, small, BGR, with marks and the outline of the wanted view.
         n_seen: marks in the left and right picture, of how many.
         checks: conditions of the automatic shutter.
-        wish: where the board is wanted, in words.
+        instruction: where the board is wanted, in words.
         n_kept: pairs.
         bound_mm: predicted 95 % error in half of the working volume; None before there is a rig.
         worst_mm: the same in nearly all of it.
@@ -122,7 +122,7 @@ class CaptureSnapshot:
     pictures: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None
     n_seen: tuple[int, int, int]
     checks: tuple[Check, ...]
-    wish: str
+    instruction: str
     n_kept: int
     bound_mm: float | None
     worst_mm: float | None

@@ -1,4 +1,4 @@
-"""What a scanner's blur does at a surface, by its direction and by its curvature."""
+"""A scanner's blur at a surface: by the normal's direction, and the shift of curved edges."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -13,7 +13,7 @@ _SHARPEST_PER_MM = 0.25
 _CURVATURE_ROUNDS = 5
 
 
-def axial_share(ct: CtVolume, normals: FloatArray) -> FloatArray:
+def compute_axial_fractions(ct: CtVolume, normals: FloatArray) -> FloatArray:
     """(N,) cosine between normals and the slices' normal."""
     i, j = ct.lps_from_index[:3, 0], ct.lps_from_index[:3, 1]
     across = np.cross(i, j)
@@ -21,7 +21,7 @@ def axial_share(ct: CtVolume, normals: FloatArray) -> FloatArray:
     return share
 
 
-def blur_shift_mm(
+def compute_blur_shift_mm(
     mesh: TriangleMesh, neighbours: csr_array, ct: CtVolume, scan: Scan
 ) -> FloatArray:
     """(V,) how much further out a curved edge lies than its blurred profile says.
@@ -30,7 +30,7 @@ def blur_shift_mm(
     variance times the mean curvature.
     """
     curvature = _mean_curvature(mesh, neighbours)
-    shift: FloatArray = scan.blur_mm(axial_share(ct, mesh.normals)) ** 2 * curvature
+    shift: FloatArray = scan.blur_mm(compute_axial_fractions(ct, mesh.normals)) ** 2 * curvature
     return shift
 
 

@@ -1,4 +1,4 @@
-"""Bone surfaces of a segmented CT, where the cortex's edge is and not where a threshold puts it."""
+"""Surfaces of segmented bones, placed at the edge of the cortex by a model of the blur."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import simplified
 from navapp.geometry.transform import FloatArray
-from navapp.preop.ct_surface.blur import axial_share
+from navapp.preop.ct_surface.blur import compute_axial_fractions
 from navapp.preop.ct_surface.cortex_model import Scan, sample_positions_mm
-from navapp.preop.ct_surface.isosurface import surface_around
-from navapp.preop.ct_surface.profiles import along, cubic
+from navapp.preop.ct_surface.isosurface import make_isosurface
+from navapp.preop.ct_surface.profiles import make_cubic_interpolation, sample_along
 from navapp.preop.ct_surface.refinement import refine_surface
 from navapp.preop.ct_surface.scan_estimate import UNKNOWN_SCAN, estimate_scan
 from navapp.preop.segmentation import Segmentation
@@ -36,7 +36,7 @@ _PADDING_VOXELS = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoneSurface:
-    """One bone.
+    """Surface of one bone from a CT.
 
     Attributes:
         mesh: LPS mm, closed, normals outward.
@@ -53,7 +53,7 @@ class BoneSurface:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtSurfaces:
-    """Surfaces by name, and what the scanner was found to do.
+    """Surfaces of all bones of a CT, with the scanner's estimated blur.
 
     Attributes:
         bones: by name.
@@ -66,14 +66,16 @@ class CtSurfaces:
     pose_sd_mm: float
 
 
-def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: None) -> CtSurfaces:
+def make_surfaces(
+    found: Segmentation, tell: Callable[[str], None] = lambda step: None
+) -> CtSurfaces:
     """The surface of each named bone.
 
     In each round the scanner is estimated on the surfaces so far, and they are moved with it:
     normals that lean make its blur look wider than it is.
     """
     tell("laying first surfaces")
-    density = cubic(found.ct)
+    density = make_cubic_interpolation(found.ct)
     bones = {name: _first_surface(found, number) for name, number in found.names.items()}
     scan = UNKNOWN_SCAN
     for reach_mm in _REACHES_MM:
@@ -90,9 +92,9 @@ def surfaces_of(found: Segmentation, tell: Callable[[str], None] = lambda step: 
     return CtSurfaces(working, scan, _POSE_SD_VOXELS * float(found.ct.spacing_mm.max()))
 
 
-def surface_of_labels(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
+def make_label_surface(mask: NDArray[np.bool_], volume: LabelVolume) -> BoneSurface:
     """The surface of a ready segmentation: voxels are all that is known of it."""
-    mesh, left_out = surface_around(mask, volume)
+    mesh, left_out = make_isosurface(mask, volume)
     surface = BoneSurface(mesh, _is_cut(mesh, volume), np.zeros(len(mesh.vertices_mm), dtype=bool))
     return replace(_working(surface, volume), left_out=left_out)
 
@@ -107,7 +109,7 @@ def _working(surface: BoneSurface, volume: CtVolume | LabelVolume) -> BoneSurfac
 
 
 def _first_surface(found: Segmentation, number: int) -> BoneSurface:
-    mesh, _ = surface_around(found.bones == number, found.ct)
+    mesh, _ = make_isosurface(found.bones == number, found.ct)
     return BoneSurface(mesh, _is_cut(mesh, found.ct), np.zeros(len(mesh.vertices_mm), dtype=bool))
 
 
@@ -121,8 +123,8 @@ def _scan(
     points = np.concatenate([bone.mesh.vertices_mm[~bone.is_cut] for bone in bones.values()])
     normals = np.concatenate([bone.mesh.normals[~bone.is_cut] for bone in bones.values()])
     every = np.linspace(0, len(points) - 1, min(_N_PROFILES, len(points))).astype(np.intp)
-    profiles = along(points[every], normals[every], sample_positions_mm(), density)
-    return estimate_scan(profiles, axial_share(ct, normals[every]), reach_mm, start)
+    profiles = sample_along(points[every], normals[every], sample_positions_mm(), density)
+    return estimate_scan(profiles, compute_axial_fractions(ct, normals[every]), reach_mm, start)
 
 
 def _is_cut(mesh: TriangleMesh, volume: CtVolume | LabelVolume) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Where the surface of a bone lies in a density profile across its cortex, unbiased by thin cortex.
+"""Fits the edge of a blurred plate of cortex to density profiles across a bone's surface.
 
 A scanner blurs. The half-maximum of a blurred plate lies at its edge only when the plate is thick;
 cortex at the condyles is as thin as the blur is wide: its peak is lower, and the half-maximum lies
@@ -29,7 +29,7 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What blurs a plate of cortex in one CT.
+    """Densities and blur of one CT.
 
     Attributes:
         cortex_hu: density of the plate.
@@ -44,16 +44,17 @@ class Scan:
     blur_axial_mm: float
     fading_mm: float = 0.0
 
-    def blur_mm(self, axial_share: FloatArray) -> FloatArray:
+    def blur_mm(self, axial_fraction: FloatArray) -> FloatArray:
         """(N,) blur along directions whose cosine with the slices' normal is given."""
-        plane2, axial2 = self.blur_in_plane_mm**2, self.blur_axial_mm**2
-        result: FloatArray = np.sqrt(plane2 + (axial2 - plane2) * axial_share**2)
+        plane_squared, axial_squared = self.blur_in_plane_mm**2, self.blur_axial_mm**2
+        squared = plane_squared + (axial_squared - plane_squared) * axial_fraction**2
+        result: FloatArray = np.sqrt(squared)
         return result
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Best explanation of N profiles.
+    """Edges fitted to N profiles.
 
     Attributes:
         offset_mm: (N,) of the edge along the outward normal.
@@ -91,7 +92,7 @@ def fit_edges(
     n_used = int((positions <= until_mm + 1e-9).sum())
     model = _model(n_used, round(blur_mm, 3), scan.fading_mm, scan.cortex_hu, reach_mm)
     parts = [
-        _fitted(model, profiles_hu[first : first + _CHUNK, :n_used], scan)
+        _fit_model(model, profiles_hu[first : first + _CHUNK, :n_used], scan)
         for first in range(0, len(profiles_hu), _CHUNK)
     ]
     columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
@@ -100,7 +101,7 @@ def fit_edges(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Model:
-    """Of every tried pair of offset and thickness, offsets first.
+    """Predicted profiles for every tried pair of offset and thickness, offsets first.
 
     Attributes:
         offsets_mm: (m,).
@@ -142,7 +143,7 @@ def _model(
     )
 
 
-def _fitted(model: _Model, profiles_hu: FloatArray, scan: Scan) -> tuple[FloatArray, ...]:
+def _fit_model(model: _Model, profiles_hu: FloatArray, scan: Scan) -> tuple[FloatArray, ...]:
     known = np.full((len(profiles_hu), 1), scan.soft_hu * _NOISE_HU / _SOFT_SD_HU)
     values = np.hstack([profiles_hu, known])
     left = (values**2).sum(axis=1)[:, None] - 2.0 * values @ model.plates.T

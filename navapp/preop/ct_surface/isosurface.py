@@ -1,11 +1,11 @@
-"""The first surface of a bone: around its voxels, smooth, closed."""
+"""A smooth closed surface around a mask of voxels, the start of the refinement."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import simplified
-from navapp.preop.segmentation.masks import bounds
+from navapp.preop.segmentation.masks import find_bounds
 from navapp.preop.volume import CtVolume, LabelVolume
 
 _SMOOTHING_MM = 0.6
@@ -15,7 +15,7 @@ _VERTICES_PER_MM2 = 1.0
 _WITHIN_MM = 0.3
 
 
-def surface_around(
+def make_isosurface(
     mask: NDArray[np.bool_], volume: CtVolume | LabelVolume
 ) -> tuple[TriangleMesh, float]:
     """A closed surface around the largest piece of a mask, LPS mm, normals outward.
@@ -30,7 +30,7 @@ def surface_around(
     import open3d
     from scipy.ndimage import gaussian_filter
 
-    box = bounds(mask, np.zeros(3, dtype=np.intp))
+    box = find_bounds(mask, np.zeros(3, dtype=np.intp))
     padded = np.pad(mask[box], _PADDING).astype(np.float32)
     smooth = gaussian_filter(padded, _SMOOTHING_MM / volume.spacing_mm[::-1], truncate=3.0)
     found = open3d.t.geometry.TriangleMesh.create_isosurfaces(

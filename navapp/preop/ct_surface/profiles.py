@@ -10,7 +10,7 @@ from navapp.preop.volume import CtVolume
 _CHUNK = 8192
 
 
-def cubic(ct: CtVolume) -> Callable[[FloatArray], FloatArray]:
+def make_cubic_interpolation(ct: CtVolume) -> Callable[[FloatArray], FloatArray]:
     """Density at LPS points (..., 3), by cubic splines; the border is continued."""
     from scipy.ndimage import map_coordinates, spline_filter
 
@@ -27,7 +27,7 @@ def cubic(ct: CtVolume) -> Callable[[FloatArray], FloatArray]:
     return at
 
 
-def along(
+def sample_along(
     points_mm: FloatArray,
     normals: FloatArray,
     positions_mm: FloatArray,

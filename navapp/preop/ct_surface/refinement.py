@@ -1,4 +1,4 @@
-"""A bone's surface moved to where its density profiles say that it is."""
+"""Moves the vertices of a bone's surface to the edges found in its density profiles."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,9 +9,13 @@ from scipy.sparse import csr_array
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.ct_surface.blur import axial_share, blur_shift_mm, neighbours_of
+from navapp.preop.ct_surface.blur import (
+    compute_axial_fractions,
+    compute_blur_shift_mm,
+    neighbours_of,
+)
 from navapp.preop.ct_surface.cortex_model import Scan, fit_edges, sample_positions_mm
-from navapp.preop.ct_surface.profiles import along
+from navapp.preop.ct_surface.profiles import sample_along
 from navapp.preop.volume import CtVolume
 
 # Samples are used up to half way to another bone, in these classes.
@@ -25,8 +29,8 @@ _MOST_WEIGHT = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Refined:
-    """A surface on the edges of its cortex.
+class RefinedSurface:
+    """A surface whose vertices lie on the edge of the cortex.
 
     Attributes:
         mesh: LPS mm.
@@ -45,7 +49,7 @@ def refine_surface(
     density: Callable[[FloatArray], FloatArray],
     scan: Scan,
     reach_mm: float,
-) -> Refined:
+) -> RefinedSurface:
     """Move each vertex along its normal to the edge in its profile.
 
     Args:
@@ -53,22 +57,22 @@ def refine_surface(
         is_cut: (V,) where the volume ends, so that there is no edge.
         ct: the volume.
         is_other: (D, H, W) voxels of other bones.
-        density: of LPS points (`profiles.cubic`).
+        density: of LPS points (`profiles.make_cubic_interpolation`).
         scan: of this CT.
         reach_mm: how far off the mesh may be.
     """
     neighbours = neighbours_of(mesh.faces, len(mesh.vertices_mm))
-    offset, weight = _measured(mesh, ct, is_other, density, scan, reach_mm)
+    offset, weight = _measure_offsets(mesh, ct, is_other, density, scan, reach_mm)
     weight[is_cut] = 0.0
     is_measured = weight > 0.0
-    even = _evened(offset, weight, neighbours)
-    even += np.where(is_measured, blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
+    even = _smooth_offsets(offset, weight, neighbours)
+    even += np.where(is_measured, compute_blur_shift_mm(mesh, neighbours, ct, scan), 0.0)
     even[is_cut] = 0.0
     mesh = TriangleMesh(mesh.vertices_mm + even[:, None] * mesh.normals, mesh.faces)
-    return Refined(mesh, is_measured)
+    return RefinedSurface(mesh, is_measured)
 
 
-def _measured(
+def _measure_offsets(
     mesh: TriangleMesh,
     ct: CtVolume,
     is_other: NDArray[np.bool_],
@@ -78,8 +82,8 @@ def _measured(
 ) -> tuple[FloatArray, FloatArray]:
     """Offset and weight of each vertex."""
     positions = sample_positions_mm()
-    profiles = along(mesh.vertices_mm, mesh.normals, positions, density)
-    blur = scan.blur_mm(axial_share(ct, mesh.normals))
+    profiles = sample_along(mesh.vertices_mm, mesh.normals, positions, density)
+    blur = scan.blur_mm(compute_axial_fractions(ct, mesh.normals))
     blur_class = np.digitize(blur, np.linspace(blur.min(), blur.max(), _BLUR_CLASSES + 1)[1:-1])
     until_class = _until_class(mesh, ct, is_other)
     offset, weight = (np.zeros(len(blur)) for _ in range(2))
@@ -109,7 +113,7 @@ def _until_class(mesh: TriangleMesh, ct: CtVolume, is_other: NDArray[np.bool_]) 
     return np.maximum(np.searchsorted(_UNTIL_MM, half_mm, side="right") - 1, 0)
 
 
-def _evened(values: FloatArray, weight: FloatArray, neighbours: csr_array) -> FloatArray:
+def _smooth_offsets(values: FloatArray, weight: FloatArray, neighbours: csr_array) -> FloatArray:
     """(V,) weighted means over neighbours; what has no weight follows them."""
     degree = np.maximum(neighbours.sum(axis=1), 1.0)
     for _ in range(_EVENING_ROUNDS):

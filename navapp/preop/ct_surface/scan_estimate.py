@@ -21,7 +21,7 @@ _PLATEAU_MM, _DENSEST = 1.0, 0.95
 
 
 def estimate_scan(
-    profiles_hu: FloatArray, axial_share: FloatArray, reach_mm: float, start: Scan
+    profiles_hu: FloatArray, axial_fraction: FloatArray, reach_mm: float, start: Scan
 ) -> Scan:
     """The density of thick cortex, and the blurs that explain many profiles best with it.
 
@@ -30,14 +30,14 @@ def estimate_scan(
 
     Args:
         profiles_hu: (N, n) at `sample_positions_mm`, spread over the bones.
-        axial_share: (N,) cosines of their directions with the slices' normal.
+        axial_fraction: (N,) cosines of their directions with the slices' normal.
         reach_mm: how far the edges may be from the profiles' zeros.
         start: a guess.
     """
     from scipy.optimize import minimize
 
     soft_hu, cortex_hu = float(np.median(profiles_hu[:, -1])), _plateau_hu(profiles_hu)
-    groups = np.array_split(np.argsort(np.abs(axial_share)), _GROUPS)
+    groups = np.array_split(np.argsort(np.abs(axial_fraction)), _GROUPS)
     until_mm = float(sample_positions_mm()[-1])
 
     def scan_of(parameters: FloatArray) -> Scan:
@@ -49,7 +49,7 @@ def estimate_scan(
         left = np.concatenate([
             fit_edges(
                 profiles_hu[group], until_mm,
-                float(scan.blur_mm(axial_share[group]).mean()), scan, reach_mm,
+                float(scan.blur_mm(axial_fraction[group]).mean()), scan, reach_mm,
             ).misfit_hu2
             for group in groups
         ])  # fmt: skip

@@ -1,7 +1,7 @@
-"""From the density of a CT to named bones."""
+"""Segments a CT of the knee into named bones."""
 
-from navapp.preop.segmentation.naming import BONES
-from navapp.preop.segmentation.segment import (
+from navapp.preop.segmentation.bone_naming import BONES
+from navapp.preop.segmentation.knee_segmentation import (
     DEFAULT_THRESHOLD_HU,
     NO_SEEDS,
     Segmentation,

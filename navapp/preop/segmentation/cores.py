@@ -1,4 +1,4 @@
-"""Cores: the inside of each bone, apart from all others however narrow the joint is."""
+"""Finds cores: the inside of each bone, separate from all others."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
-from navapp.preop.segmentation.masks import BoolArray, LabelArray, components, depth_mm
+from navapp.preop.segmentation.masks import (
+    BoolArray,
+    LabelArray,
+    compute_depth_mm,
+    label_components,
+)
 from navapp.preop.segmentation.plates import Plates
 
 # How curved a valley must be to part two bones, HU per mm2: the first that tells bones apart
@@ -28,11 +33,11 @@ def find_cores(plates: Plates, solid: BoolArray, spacing_mm: FloatArray) -> Iter
     inside. But their plates of cortex have valleys at their feet, inside and in the gap: without
     these the insides hang together no more.
     """
-    near_plate = depth_mm(is_ridge(plates), spacing_mm) >= -_BESIDE_MM
+    near_plate = compute_depth_mm(is_ridge(plates), spacing_mm) >= -_BESIDE_MM
     for valley in _VALLEYS:
         inside = solid & ~(near_plate & (plates.valley > valley))
-        deep = depth_mm(inside, spacing_mm) > _THREAD_MM
-        cores = components(deep, spacing_mm, _LEAST_MM3)
+        deep = compute_depth_mm(inside, spacing_mm) > _THREAD_MM
+        cores = label_components(deep, spacing_mm, _LEAST_MM3)
         cores[cores > _MOST_CORES] = 0
         yield cores
 

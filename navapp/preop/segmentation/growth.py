@@ -1,4 +1,4 @@
-"""Growth: each core takes the cortex around it, up to the valley between two bones."""
+"""Grows each core to its bone, up to the cortex or the valley between two bones."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +8,14 @@ from navapp.preop.segmentation.cores import is_ridge
 from navapp.preop.segmentation.masks import (
     BoolArray,
     LabelArray,
-    as_image,
-    bounds,
-    closed,
-    depth_mm,
-    largest,
+    close_gaps,
+    compute_depth_mm,
+    find_bounds,
+    make_image,
+    select_largest,
 )
 from navapp.preop.segmentation.plates import Plates
-from navapp.preop.volume.itk_package import simple_itk, voxels_of
+from navapp.preop.volume.itk_package import import_simple_itk, voxels_of
 
 # What the core lost by erosion and the plate's inner foot: no core is further from its plate.
 _TO_PLATE_MM = 4.5
@@ -40,7 +40,7 @@ def grow(
 
     Source: Meyer 1991, watershed by flooding from markers.
     """
-    basins = _flooded(-hu, _up_to_plates(cores, plates, solid, spacing_mm), solid, spacing_mm)
+    basins = _flood(-hu, _up_to_plates(cores, plates, solid, spacing_mm), solid, spacing_mm)
     bones = np.zeros(cores.shape, dtype=np.uint8)
     for bone in range(1, int(cores.max()) + 1):
         _put_bone(bones, bone, basins, (hu > threshold_hu) | (cores == bone), spacing_mm)
@@ -52,9 +52,9 @@ def _up_to_plates(
 ) -> NDArray[np.uint8]:
     """The cores with what lies between them and their plates, and the first voxels of these."""
     plate = solid & is_ridge(plates)
-    away_mm = -depth_mm(cores > 0, spacing_mm)
+    away_mm = -compute_depth_mm(cores > 0, spacing_mm)
     free = solid & ~plate & (away_mm < _TO_PLATE_MM)
-    grown = _flooded(away_mm, cores.astype(np.uint8), free, spacing_mm)
+    grown = _flood(away_mm, cores.astype(np.uint8), free, spacing_mm)
     grown[grown == _OUTSIDE] = 0
     inner = grown.copy()
     for axis in range(3):
@@ -73,19 +73,19 @@ def _nearest_core(cores: LabelArray, spacing_mm: FloatArray) -> NDArray[np.uint8
     nearest = np.zeros(cores.shape, dtype=np.uint8)
     least_mm = np.full(cores.shape, np.inf, dtype=np.float32)
     for core in range(1, int(cores.max()) + 1):
-        away_mm = -depth_mm(cores == core, spacing_mm)
+        away_mm = -compute_depth_mm(cores == core, spacing_mm)
         nearest[away_mm < least_mm] = core
         np.minimum(least_mm, away_mm, out=least_mm)
     return nearest
 
 
-def _flooded(
+def _flood(
     height: NDArray[np.float32], markers: NDArray[np.uint8], free: BoolArray, spacing_mm: FloatArray
 ) -> NDArray[np.uint8]:
     """Basins of the markers within what is free; `_OUTSIDE` elsewhere."""
     held = np.where(free | (markers > 0), markers, _OUTSIDE).astype(np.uint8)
-    basins = simple_itk().MorphologicalWatershedFromMarkers(
-        as_image(height, spacing_mm), as_image(held, spacing_mm), False, True
+    basins = import_simple_itk().MorphologicalWatershedFromMarkers(
+        make_image(height, spacing_mm), make_image(held, spacing_mm), False, True
     )
     return voxels_of(basins).astype(np.uint8)
 
@@ -98,9 +98,9 @@ def _put_bone(
     spacing_mm: FloatArray,
 ) -> None:
     margin = np.ceil(2.0 * _CLOSING_MM / spacing_mm[::-1]).astype(np.intp)
-    box = bounds(basins == bone, margin)
+    box = find_bounds(basins == bone, margin)
     mine = basins[box] == bone
-    whole = closed(mine & is_bony[box], spacing_mm, _CLOSING_MM)
+    whole = close_gaps(mine & is_bony[box], spacing_mm, _CLOSING_MM)
     # Closing must not reach into a neighbour.
     whole &= mine | (basins[box] == _OUTSIDE)
-    bones[box][largest(whole, spacing_mm)] = bone
+    bones[box][select_largest(whole, spacing_mm)] = bone

@@ -1,4 +1,4 @@
-"""Plates of cortex, and the narrow valleys between two of them, by the curvature of the density."""
+"""Plates of cortex and the valleys between them, from the curvature of the density."""
 
 from dataclasses import dataclass
 

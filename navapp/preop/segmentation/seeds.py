@@ -1,12 +1,12 @@
-"""Seeds: points by which an operator names bones."""
+"""Names bones by points that an operator gives."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
+from navapp.preop.segmentation.bone_naming import NamedParts, Part, name_parts
 from navapp.preop.segmentation.masks import LabelArray
-from navapp.preop.segmentation.naming import Named, Part, name_parts
 from navapp.preop.volume import CtVolume
 
 # A core is a bone without its cortex: a point that was clicked on the surface is this far from it.
@@ -15,7 +15,7 @@ _REACH_MM = 12.0
 
 def with_seeds(
     parts: list[Part], cores: LabelArray, ct: CtVolume, seeds: Mapping[str, FloatArray]
-) -> Named:
+) -> NamedParts:
     """Names by seeds first; what has no seed is named by its place in the seeded knee.
 
     A seed that is near no core, or near the core of another seed, names nothing, and its name is
@@ -28,7 +28,7 @@ def with_seeds(
             by_seed[name] = core
     named = name_parts(parts, by_seed)
     bones = {name: n for name, n in named.bones.items() if name in by_seed or name not in seeds}
-    return Named(bones, named.has_two_knees)
+    return NamedParts(bones, named.has_two_knees)
 
 
 def _nearest_core(cores: LabelArray, ct: CtVolume, point_mm: FloatArray) -> int:

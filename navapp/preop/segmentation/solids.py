@@ -1,12 +1,18 @@
-"""Solids: all that the soft tissue around does not reach, marrow included."""
+"""Finds solids: bone with its marrow, all that the soft tissue around does not reach."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
-from navapp.preop.segmentation.masks import BoolArray, as_image, bounds, components, depth_mm
+from navapp.preop.segmentation.masks import (
+    BoolArray,
+    compute_depth_mm,
+    find_bounds,
+    label_components,
+    make_image,
+)
 from navapp.preop.volume.hounsfield import PADDING_HU
-from navapp.preop.volume.itk_package import simple_itk
+from navapp.preop.volume.itk_package import import_simple_itk
 
 # A channel narrower than twice this leads no tissue into a bone: pores, vessels, thin cortex.
 _PORE_MM = 1.0
@@ -33,7 +39,7 @@ def find_solids(hu: NDArray[np.float32], spacing_mm: FloatArray, threshold_hu: f
     """
     padding = _padding(hu, spacing_mm)
     solid = ~_outside(hu, spacing_mm, (hu < threshold_hu) & ~padding) & ~padding
-    parts = components(solid, spacing_mm, _LEAST_MM3)
+    parts = label_components(solid, spacing_mm, _LEAST_MM3)
     return _in_flesh(parts, hu, spacing_mm)
 
 
@@ -45,24 +51,26 @@ def _padding(hu: NDArray[np.float32], spacing_mm: FloatArray) -> BoolArray:
     is_lowest: BoolArray = hu <= PADDING_HU
     if not is_lowest.any():
         return is_lowest
-    broad = depth_mm(is_lowest, spacing_mm) > _PORE_MM
+    broad = compute_depth_mm(is_lowest, spacing_mm) > _PORE_MM
     if not broad.any():
         return broad
-    around: BoolArray = depth_mm(broad, spacing_mm) >= -(_PORE_MM + float(np.max(spacing_mm)))
+    around: BoolArray = compute_depth_mm(broad, spacing_mm) >= -(
+        _PORE_MM + float(np.max(spacing_mm))
+    )
     return around & is_lowest
 
 
 def _outside(hu: NDArray[np.float32], spacing_mm: FloatArray, is_low: BoolArray) -> BoolArray:
-    open_space = depth_mm(is_low, spacing_mm) > _PORE_MM
-    parts = components(open_space, spacing_mm, 0.0)
-    statistics = simple_itk().LabelIntensityStatisticsImageFilter()
-    statistics.Execute(as_image(parts, spacing_mm), as_image(hu, spacing_mm))
+    open_space = compute_depth_mm(is_low, spacing_mm) > _PORE_MM
+    parts = label_components(open_space, spacing_mm, 0.0)
+    statistics = import_simple_itk().LabelIntensityStatisticsImageFilter()
+    statistics.Execute(make_image(parts, spacing_mm), make_image(hu, spacing_mm))
     reached = [
         part for part in statistics.GetLabels() if part == 1 or statistics.GetMedian(part) < _AIR_HU
     ]
     is_reached = np.isin(parts, reached)
     voxel_mm = 0.5 * float(np.max(spacing_mm))
-    around: BoolArray = depth_mm(is_reached, spacing_mm) >= -(_PORE_MM + voxel_mm)
+    around: BoolArray = compute_depth_mm(is_reached, spacing_mm) >= -(_PORE_MM + voxel_mm)
     return around & is_low
 
 
@@ -73,9 +81,9 @@ def _in_flesh(
     kept = np.zeros(parts.shape, dtype=bool)
     margin = np.ceil(_SHELL_MM[1] / spacing_mm[::-1]).astype(np.intp)
     for part in range(1, int(parts.max()) + 1):
-        box = bounds(parts == part, margin)
+        box = find_bounds(parts == part, margin)
         inside = parts[box] == part
-        outer_mm = -depth_mm(inside, spacing_mm)
+        outer_mm = -compute_depth_mm(inside, spacing_mm)
         shell = (outer_mm > _SHELL_MM[0]) & (outer_mm < _SHELL_MM[1]) & (parts[box] == 0)
         if not shell.any() or (hu[box][shell] < _AIR_HU).mean() <= _MOST_AIR:
             kept[box] |= inside

@@ -1,4 +1,4 @@
-"""Volumes: an array of voxels and the affine map that says where each of them lies."""
+"""Volumes: an array of voxels and the affine map from indices to LPS mm."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -12,7 +12,7 @@ _LAST_ROW = (0.0, 0.0, 0.0, 1.0)
 
 
 class _Placed:
-    """What any volume knows of its place. Indices are (i, j, k): against the array's axes k, j, i.
+    """A volume's place. Indices are (i, j, k): against the array's axes k, j, i.
 
     `lps_from_index` is any invertible affine map: its axes may be oblique, left-handed (flips of a
     NIfTI file), and not at right angles (a tilted gantry: the step from slice to slice leans, and
@@ -43,7 +43,7 @@ class _Placed:
             raise ValueError("lps_from_index must be a finite affine 4x4 matrix")
         if self._voxels.ndim != 3 or self._voxels.size == 0:
             raise ValueError("a volume has three axes and at least one voxel")
-        if spacing.shape != (3,) or not np.allclose(spacing, steps_mm(matrix), rtol=1e-6):
+        if spacing.shape != (3,) or not np.allclose(spacing, compute_steps_mm(matrix), rtol=1e-6):
             raise ValueError("spacing_mm must be the lengths of the matrix's columns")
         if not is_invertible(matrix):
             raise ValueError("the axes of lps_from_index lie in one plane")
@@ -63,13 +63,13 @@ class _Placed:
 
     def points_lps_mm(self, indices_ijk: ArrayLike) -> FloatArray:
         """(N, 3) LPS points of (N, 3) indices, which need not be whole."""
-        return _mapped(self.lps_from_index, indices_ijk)
+        return _map_points(self.lps_from_index, indices_ijk)
 
     def indices_of(self, points_lps_mm: ArrayLike) -> FloatArray:
         """(N, 3) fractional indices i, j, k of (N, 3) LPS points; also outside the volume."""
-        return _mapped(self.index_from_lps, points_lps_mm)
+        return _map_points(self.index_from_lps, points_lps_mm)
 
-    def cropped(self, lower_ijk: ArrayLike, upper_ijk: ArrayLike) -> Self:
+    def crop(self, lower_ijk: ArrayLike, upper_ijk: ArrayLike) -> Self:
         """A copy of the voxels from `lower_ijk` up to, without, `upper_ijk`, at the same place.
 
         Raises:
@@ -145,7 +145,7 @@ class LabelVolume(_Placed):
         return replace(self, labels=voxels, lps_from_index=lps_from_index)
 
 
-def steps_mm(lps_from_index: FloatArray) -> FloatArray:
+def compute_steps_mm(lps_from_index: FloatArray) -> FloatArray:
     """(3,) lengths of one step along i, j, k."""
     lengths: FloatArray = np.sqrt((lps_from_index[:3, :3] ** 2).sum(axis=0))
     return lengths
@@ -159,10 +159,10 @@ def is_invertible(lps_from_index: FloatArray) -> bool:
     if not np.isfinite(lps_from_index).all():
         return False
     volume_mm3 = abs(float(np.linalg.det(lps_from_index[:3, :3])))
-    return bool(volume_mm3 > 1e-3 * float(steps_mm(lps_from_index).prod()) > 0.0)
+    return bool(volume_mm3 > 1e-3 * float(compute_steps_mm(lps_from_index).prod()) > 0.0)
 
 
-def _mapped(matrix: FloatArray, points: ArrayLike) -> FloatArray:
+def _map_points(matrix: FloatArray, points: ArrayLike) -> FloatArray:
     rows = np.asarray(points, dtype=np.float64)
     mapped: FloatArray = rows @ matrix[:3, :3].T + matrix[:3, 3]
     return mapped

@@ -1,4 +1,4 @@
-"""One DICOM file's header, as far as a volume needs it. pydicom is imported here alone."""
+"""Reads the tags of one DICOM file that a volume needs. Only this module imports pydicom."""
 
 import logging
 import warnings
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
-from navapp.preop.volume.dicom_identity import NAMING_TAGS, naming_values
+from navapp.preop.volume.dicom_identity import NAMING_TAGS, find_naming_values
 from navapp.values import Side
 
 _SLICE_TAGS = (
@@ -110,15 +110,15 @@ def read_header(file: Path) -> tuple[SliceHeader | OtherFile, set[str]]:
                 force=True,
                 specific_tags=[*_SLICE_TAGS, *NAMING_TAGS],
             )
-            names = naming_values(header)
+            names = find_naming_values(header)
         except OSError as error:
             return OtherFile(file, NO_UID, f"it cannot be opened ({error.strerror})"), set()
         except Exception:  # noqa: BLE001 (as in _understood)
             return OtherFile(file, NO_UID, "its header is damaged"), set()
-        return _understood(file, header), names
+        return _parse_header(file, header), names
 
 
-def _understood(file: Path, header: Any) -> SliceHeader | OtherFile:
+def _parse_header(file: Path, header: Any) -> SliceHeader | OtherFile:
     # Values are converted when they are asked for, and pydicom raises whatever wrong bytes lead to.
     with suppress(Exception):
         return _slice(file, header)

@@ -1,4 +1,4 @@
-"""Keeping a patient's identity out of everything that is said about a DICOM series."""
+"""Removes a patient's identity from texts about a DICOM series."""
 
 import re
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ _SHORT = 3
 
 
 class Identity:
-    """The words that identify a patient; `hidden_in` takes them out of a text."""
+    """The words that identify a patient; `hide_in` takes them out of a text."""
 
     def __init__(self, values: Iterable[str] = ()) -> None:
         texts = {value.strip() for value in values}
@@ -27,12 +27,12 @@ class Identity:
         patterns = [_pattern(word) for word in ordered]
         self._any_word = re.compile("|".join(patterns), re.IGNORECASE) if patterns else None
 
-    def hidden_in(self, text: object) -> str:
+    def hide_in(self, text: object) -> str:
         """The text without any of the words."""
         return self._any_word.sub(_HIDDEN, str(text)) if self._any_word else str(text)
 
 
-def naming_values(header: Any) -> set[str]:
+def find_naming_values(header: Any) -> set[str]:
     """Values of a header's naming tags; `header` is pydicom's."""
     return {str(header.get(tag) or "") for tag in NAMING_TAGS} - {""}
 

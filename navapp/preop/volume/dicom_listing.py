@@ -1,4 +1,4 @@
-"""What DICOM series a folder holds."""
+"""Lists the DICOM series in a folder, and chooses one."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -35,12 +35,12 @@ class SeriesInfo:
 
     def __str__(self) -> str:
         words = self.description or "no description"
-        return f"{self.uid} ({self.modality} '{words}', {_counted(self.n_slices, 'slice')})"
+        return f"{self.uid} ({self.modality} '{words}', {_count_text(self.n_slices, 'slice')})"
 
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """Everything a folder's DICOM headers say.
+    """All DICOM headers of a folder.
 
     Attributes:
         shown: the folder's path, fit to be shown.
@@ -56,13 +56,13 @@ class Folder:
     n_foreign: int
     identity: Identity
 
-    def refused(self, problem: str, remedy: str) -> InputError:
+    def make_error(self, problem: str, remedy: str) -> InputError:
         """An error about this folder; the problem follows the folder's name."""
         return InputError(f"{self.shown} {problem}", subject=self.shown, remedy=remedy)
 
     def name_of(self, file: Path) -> str:
         """A file's name, fit to be shown."""
-        return self.identity.hidden_in(file.name)
+        return self.identity.hide_in(file.name)
 
     def infos(self) -> tuple[SeriesInfo, ...]:
         """Its series, the one with most slices first."""
@@ -73,7 +73,7 @@ class Folder:
         first = slices[0]
         return SeriesInfo(
             uid,
-            self.identity.hidden_in(first.description),
+            self.identity.hide_in(first.description),
             first.modality,
             len(slices),
             (first.columns, first.rows),
@@ -120,7 +120,7 @@ def scan_folder(path: Path) -> Folder:
         if isinstance(header, SliceHeader):
             series.setdefault(header.series_uid, []).append(header)
     folder = Folder(
-        identity.hidden_in(path),
+        identity.hide_in(path),
         series,
         tuple(header for header in found if isinstance(header, OtherFile)),
         len(files) - len(dicom),
@@ -142,13 +142,13 @@ def choose_series(folder: Folder, uid: str | None) -> tuple[SeriesInfo, list[str
     if uid is not None:
         named = [info for info in infos if info.uid == uid]
         if not named:
-            raise folder.refused(
+            raise folder.make_error(
                 "holds no series of that UID", remedy=f"choose one with --series UID: {listed}"
             )
         return named[0], []
     volumes = [info for info in infos if info.n_slices > 1 and not info.is_localizer]
     if len(volumes) > 1 or (not volumes and len(infos) > 1):
-        raise folder.refused(
+        raise folder.make_error(
             f"holds {len(infos)} series", remedy=f"choose one with --series UID: {listed}"
         )
     chosen = volumes[0] if volumes else infos[0]
@@ -167,38 +167,38 @@ def check_others(folder: Folder, uid: str) -> list[str]:
     unusable = [other for other in folder.others if other.why]
     for other in unusable:
         if other.series_uid in (NO_UID, uid):
-            raise folder.refused(
+            raise folder.make_error(
                 f"holds the file {folder.name_of(other.file)}, and {other.why}",
                 remedy="export the series again, or move that file away if it is not of the series",
             )
     warnings = []
     if unusable:
-        files = _counted(len(unusable), "file")
+        files = _count_text(len(unusable), "file")
         warnings.append(f"left out: {files} of another series, because {unusable[0].why}")
     if folder.n_foreign:
-        warnings.append(f"left out: {_counted(folder.n_foreign, 'file')} without DICOM in it")
+        warnings.append(f"left out: {_count_text(folder.n_foreign, 'file')} without DICOM in it")
     return warnings
 
 
-def _counted(count: int, what: str) -> str:
+def _count_text(count: int, what: str) -> str:
     return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _without_slices(folder: Folder, n_files: int) -> InputError:
     if not n_files:
-        return folder.refused("is empty", remedy="name the folder of a DICOM series")
+        return folder.make_error("is empty", remedy="name the folder of a DICOM series")
     whys = Counter(other.why for other in folder.others if other.why)
     if whys:
         why, count = whys.most_common(1)[0]
-        return folder.refused(
+        return folder.make_error(
             f"holds no slice that can be used: of {count} files each fails because {why}",
             remedy="export the series again as single slices, or as NIfTI",
         )
     if folder.others:
-        return folder.refused(
+        return folder.make_error(
             "holds DICOM files but no pictures", remedy="name the folder of a CT series"
         )
-    return folder.refused(
+    return folder.make_error(
         "holds no DICOM file",
         remedy="name the folder of a DICOM series, or a NIfTI, NRRD or MHA file itself",
     )

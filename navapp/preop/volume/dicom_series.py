@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.preop.volume.ct_volume import CtVolume, steps_mm
+from navapp.preop.volume.ct_volume import CtVolume, compute_steps_mm
 from navapp.preop.volume.dicom_headers import SliceHeader
 from navapp.preop.volume.dicom_listing import (
     Folder,
@@ -17,14 +17,14 @@ from navapp.preop.volume.dicom_listing import (
     scan_folder,
 )
 from navapp.preop.volume.dicom_stack import (
-    in_order,
+    compute_stack_matrix,
     is_same_place,
-    stack_matrix,
-    thickness_warnings,
-    tilt_warnings,
+    make_thickness_warnings,
+    make_tilt_warnings,
+    sort_slices,
 )
-from navapp.preop.volume.hounsfield import PADDING_HU, HuArray, compact, without_padding
-from navapp.preop.volume.itk_package import codecs_heard, read_image, voxels_of
+from navapp.preop.volume.hounsfield import PADDING_HU, HuArray, convert_compactly, replace_padding
+from navapp.preop.volume.itk_package import listen_to_codecs, read_image, voxels_of
 from navapp.values import Side
 
 _HasComplained = Callable[[], bool]
@@ -60,19 +60,19 @@ def read_series(path: Path, series_uid: str | None) -> DicomVolume:
     folder = scan_folder(path)
     info, warnings = choose_series(folder, series_uid)
     warnings += check_others(folder, info.uid)
-    ordered = in_order(folder, folder.series[info.uid])
-    with codecs_heard() as has_complained:
+    ordered = sort_slices(folder, folder.series[info.uid])
+    with listen_to_codecs() as has_complained:
         ordered, dropped = _without_duplicates(folder, ordered, has_complained)
-        matrix = stack_matrix(folder, ordered)
-        warnings += tilt_warnings(folder, ordered, matrix) + dropped
+        matrix = compute_stack_matrix(folder, ordered)
+        warnings += make_tilt_warnings(folder, ordered, matrix) + dropped
         slices = [_slice_hu(folder, header, has_complained) for header in ordered]
-    warnings += thickness_warnings(ordered, matrix)
+    warnings += make_thickness_warnings(ordered, matrix)
     if info.modality != "CT":
         warnings.append(f"the series is {info.modality or 'of no kind'}, not CT: no HU in it")
     sides = {header.side for header in ordered}
     if len(sides) > 1:
         warnings.append("the laterality tags of the slices differ: none is taken")
-    volume = CtVolume(compact(np.stack(slices)), matrix, steps_mm(matrix))
+    volume = CtVolume(convert_compactly(np.stack(slices)), matrix, compute_steps_mm(matrix))
     side = next(iter(sides)) if len(sides) == 1 else None
     thickness_mm = ordered[0].thickness_mm
     return DicomVolume(folder.shown, volume, info, thickness_mm, side, tuple(warnings))
@@ -95,7 +95,7 @@ def _without_duplicates(
         is_shifted = np.abs(header.position_mm - kept[-1].position_mm).max() >= 0.01
         if is_shifted or not np.array_equal(one, other):
             place = "({:.2f}, {:.2f}, {:.2f})".format(*header.position_mm)
-            raise folder.refused(
+            raise folder.make_error(
                 f"holds two different slices at {place}: two recordings are mixed under one UID",
                 "separate them into folders of their own, or export the series again",
             )
@@ -119,13 +119,13 @@ def _slice_hu(folder: Folder, header: SliceHeader, has_complained: _HasComplaine
         # Its text may quote anything from the file.
         hu = None
     if hu is None or hu.shape != (1, header.rows, header.columns) or has_complained():
-        raise folder.refused(
+        raise folder.make_error(
             f"holds the file {folder.name_of(header.file)}, whose picture is damaged, cut short "
             "or in an encoding that is not known",
             "export the series again, uncompressed if it still fails",
         )
-    picture = without_padding(hu[0])
+    picture = replace_padding(hu[0])
     if header.padding_hu is not None:
         lowest, highest = header.padding_hu
         picture[(picture >= lowest) & (picture <= highest)] = PADDING_HU
-    return compact(picture)
+    return convert_compactly(picture)

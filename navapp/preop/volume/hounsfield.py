@@ -1,4 +1,4 @@
-"""Arrays of Hounsfield units: what is no measurement becomes air; the smallest type that fits."""
+"""Arrays of Hounsfield units: padding becomes air, and the smallest type that fits is used."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ HuArray = NDArray[np.int16] | NDArray[np.float32]
 PADDING_HU = -1024
 
 
-def without_padding(values: NDArray[Any]) -> NDArray[Any]:
+def replace_padding(values: NDArray[Any]) -> NDArray[Any]:
     """A copy in which everything below air, and everything that is no number, is air."""
     if np.issubdtype(values.dtype, np.floating):
         values = np.nan_to_num(values, nan=PADDING_HU, posinf=PADDING_HU, neginf=PADDING_HU)
@@ -23,7 +23,7 @@ def without_padding(values: NDArray[Any]) -> NDArray[Any]:
     return floored
 
 
-def compact(values: NDArray[Any]) -> HuArray:
+def convert_compactly(values: NDArray[Any]) -> HuArray:
     """Whole numbers that fit as int16, everything else as float32."""
     if np.issubdtype(values.dtype, np.integer):
         limits = np.iinfo(np.int16)

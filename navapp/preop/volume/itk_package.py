@@ -1,4 +1,4 @@
-"""SimpleITK, imported at first use, and kept quiet: what its codecs say is read, not shown."""
+"""Imports SimpleITK at first use, and captures what its codecs print."""
 
 import os
 import re
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 _COMPLAINT = re.compile(rb"corrupt|premature|not read completely|error", re.IGNORECASE)
 
 
-def simple_itk() -> Any:
+def import_simple_itk() -> Any:
     """The module, its C++ warnings switched off, leaning NIfTI axes allowed (see volume_files)."""
     import SimpleITK as module  # noqa: N813 (a package's name)
 
@@ -27,7 +27,7 @@ def simple_itk() -> Any:
 
 def voxels_of(image: Any) -> NDArray[Any]:
     """A copy of an image's voxels, axes k, j, i."""
-    voxels: NDArray[Any] = np.asarray(simple_itk().GetArrayFromImage(image))
+    voxels: NDArray[Any] = np.asarray(import_simple_itk().GetArrayFromImage(image))
     return voxels
 
 
@@ -40,7 +40,7 @@ def lps_from_index_of(image: Any) -> NDArray[np.float64]:
 
 
 @contextmanager
-def codecs_heard() -> Iterator[Callable[[], bool]]:
+def listen_to_codecs() -> Iterator[Callable[[], bool]]:
     """Nothing written to file descriptor 2 shows; the value tells whether a codec complained.
 
     A JPEG codec that meets wrong bytes says so there alone, and its picture counts as read.
@@ -67,7 +67,7 @@ def read_image(path: Path, image_io: str = "") -> Any:
     Raises:
         RuntimeError: SimpleITK cannot read it; the text may name anything that is in the file.
     """
-    reader = simple_itk().ImageFileReader()
+    reader = import_simple_itk().ImageFileReader()
     if image_io:
         reader.SetImageIO(image_io)
     reader.SetFileName(str(path))

@@ -1,4 +1,4 @@
-"""What SimpleITK does not tell of a NIfTI file: whether it is whole, and axes that lean.
+"""Reads from a NIfTI header what SimpleITK does not tell: completeness, and leaning axes.
 
 Fields by nifti1.h and nifti2.h of the NIfTI Data Format Working Group.
 """
@@ -46,24 +46,24 @@ def read_nifti_header(path: Path) -> NiftiHeader | None:
     None when it is damaged, or no NIfTI file.
     """
     try:
-        with _opened(path) as stream:
+        with _open(path) as stream:
             start = stream.read(_LONGEST_HEADER)
             n_bytes = len(start)
             while chunk := stream.read(_CHUNK):
                 n_bytes += len(chunk)
-        return _understood(start, n_bytes)
+        return _parse_header(start, n_bytes)
     except (OSError, EOFError, zlib.error, struct.error, ValueError, OverflowError):
         return None
 
 
-def _opened(path: Path) -> io.BufferedReader:
+def _open(path: Path) -> io.BufferedReader:
     """The file's content: some that are named .nii.gz are not compressed, and the reverse."""
     with path.open("rb") as stream:
         is_compressed = stream.read(2) == b"\x1f\x8b"
     return io.BufferedReader(gzip.GzipFile(path)) if is_compressed else path.open("rb")
 
 
-def _understood(start: bytes, n_bytes: int) -> NiftiHeader:
+def _parse_header(start: bytes, n_bytes: int) -> NiftiHeader:
     for order in "<>":
         (size,) = struct.unpack_from(f"{order}i", start)
         if size not in _LAYOUTS:

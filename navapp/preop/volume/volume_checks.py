@@ -1,4 +1,4 @@
-"""What a CT's voxels and size say about whether a plan can be made from it."""
+"""Checks of a CT's size and values: refusals and warnings."""
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def refusal_of(volume: CtVolume) -> tuple[str, str] | None:
     return None
 
 
-def content_warnings(volume: CtVolume) -> list[str]:
+def make_content_warnings(volume: CtVolume) -> list[str]:
     """What a person must know who has to trust a plan from this volume."""
     return [*_resolution(volume), *_field(volume), *_values(volume)]
 

@@ -12,7 +12,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.volume.ct_volume import is_invertible
 from navapp.preop.volume.dicom_headers import is_dicom
 from navapp.preop.volume.itk_package import (
-    codecs_heard,
+    listen_to_codecs,
     lps_from_index_of,
     read_image,
     voxels_of,
@@ -52,15 +52,15 @@ def read_file(path: Path) -> FileVolume:
     header = read_nifti_header(path) if suffix in _NIFTI else None
     if suffix in _NIFTI and (header is None or not header.is_whole):
         # SimpleITK fills what is missing with zeros, without a word.
-        raise _damaged(path)
-    with codecs_heard() as has_complained:
+        raise _make_damage_error(path)
+    with listen_to_codecs() as has_complained:
         try:
             image = read_image(path)
             values = voxels_of(image)
         except RuntimeError:
-            raise _damaged(path) from None
+            raise _make_damage_error(path) from None
         if has_complained():
-            raise _damaged(path)
+            raise _make_damage_error(path)
     if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1 or len(values) < 2:
         raise InputError(
             f"{path} is no volume of one value a voxel, but {' x '.join(map(str, image.GetSize()))}"
@@ -140,13 +140,13 @@ def _space_warnings(path: Path, suffix: str, image: Any) -> list[str]:
     return [] if is_said else [f"{path.name} names no coordinate space: {assumed}, check the side"]
 
 
-def _damaged(path: Path) -> InputError:
+def _make_damage_error(path: Path) -> InputError:
     return InputError(
         f"{path} is damaged or cut short", subject=str(path), remedy="export or copy it again"
     )
 
 
-def whole_numbers(values: NDArray[Any]) -> NDArray[np.integer[Any]] | None:
+def convert_to_whole(values: NDArray[Any]) -> NDArray[np.integer[Any]] | None:
     """The values as an integer type; None when they are no whole numbers."""
     if np.issubdtype(values.dtype, np.integer):
         return values

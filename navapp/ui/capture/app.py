@@ -22,12 +22,12 @@ from navapp.ui.capture.panels import (
     CheckLine,
     CoverageMap,
     GaugeLine,
+    InstructionLines,
     SmallCapture,
-    WishLines,
 )
 from navapp.ui.picture_view import HalfBlocks
 from navapp.ui.quiet_app import QuietApp, drive, say
-from navapp.ui.symbols import UNICODE, Symbols, symbols_for
+from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
 from navapp.ui.text_view import Lines
 from navapp.ui.theme import NAVAPP_THEME
@@ -68,7 +68,7 @@ class CaptureScreen(Screen[None]):
             with Horizontal(id="pictures"):
                 yield HalfBlocks("left")
                 yield HalfBlocks("right")
-            yield WishLines("wish")
+            yield InstructionLines("wish")
             yield CheckLine("checks")
             yield GaugeLine("gauge")
             with Horizontal(id="kept"):
@@ -166,7 +166,7 @@ def run_capture_app(session: CaptureSession, log_path: Path) -> int:
         Exit code. After a failure of the screen one sentence is on the standard error.
     """
     with own_terminal(log_path):
-        symbols = symbols_for(getattr(sys.__stdout__, "encoding", None), os.environ)
+        symbols = choose_symbols(getattr(sys.__stdout__, "encoding", None), os.environ)
         app = CaptureApp(session, symbols=symbols)
         code = asyncio.run(drive(app))
         if app.failure is not None:

@@ -1,4 +1,4 @@
-"""What can be done during a capture: one table for keys and footer."""
+"""The table of a capture's keys, for key handling and footer."""
 
 import math
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _STEP_MM, _TURN_RAD = 20.0, math.radians(6.0)
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One key.
+    """One key of the capture and its command.
 
     Attributes:
         key: as Textual names it.

@@ -1,4 +1,4 @@
-"""The lines of the capture's screen."""
+"""Widgets of the capture's screen."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ from textual.content import Content
 
 from navapp.control.capture.states import CapturePhase, CaptureSnapshot
 from navapp.ui.capture.keys import HAND_HINT, KEYS, is_possible
-from navapp.ui.gauges import Number, bar, cut, share_bar
+from navapp.ui.gauges import Number, cut, draw_bar, draw_fraction_bar
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines
 from navapp.ui.view import Level
@@ -58,7 +58,7 @@ class CaptureTitle(Lines[CaptureView]):
         return [Content.assemble(left, right)]
 
 
-class WishLines(Lines[CaptureView]):
+class InstructionLines(Lines[CaptureView]):
     """Where the board is wanted, or what became of the solve; first of all a camera's trouble."""
 
     def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
@@ -68,21 +68,21 @@ class WishLines(Lines[CaptureView]):
             level = Level.OK if outcome.is_accepted else Level.BAD
             what = "accepted: rig.yml and report.html are written" if outcome.is_accepted else "no:"
             text = " ".join([what, *outcome.sentences])
-            first, rest = _broken(text, width - 10)
+            first, rest = _break_line(text, width - 10)
         else:
             level = Level.OK if view.snapshot.is_enough else Level.ATTENTION
-            first, rest = _broken(view.snapshot.wish, width - 10)
+            first, rest = _break_line(view.snapshot.instruction, width - 10)
         head = "outcome " if outcome is not None else "wanted  "
         if view.snapshot.trouble:
             head, level = "camera  ", Level.BAD
-            first, rest = _broken(view.snapshot.trouble, width - 10)
+            first, rest = _break_line(view.snapshot.trouble, width - 10)
         return [
             Content.assemble((f" {head}", "$text-muted"), (first, level.value)),
             Content.assemble("         ", (cut(rest, max(width - 10, 0), symbols), level.value)),
         ]
 
 
-def _broken(text: str, width: int) -> tuple[str, str]:
+def _break_line(text: str, width: int) -> tuple[str, str]:
     """The words that fit into a line, and the others."""
     if len(text) <= width:
         return text, ""
@@ -122,7 +122,7 @@ class GaugeLine(Lines[CaptureView]):
             return [
                 Content.assemble(
                     (" solving ", "$text-muted"),
-                    (share_bar(snapshot.progress.share, _WORK_WIDTH, symbols), "$primary"),
+                    (draw_fraction_bar(snapshot.progress.share, _WORK_WIDTH, symbols), "$primary"),
                     f" {Number.PERCENT.text(100.0 * snapshot.progress.share)} %",
                 )
             ]
@@ -130,7 +130,7 @@ class GaugeLine(Lines[CaptureView]):
         return [
             Content.assemble(
                 (" error   ", "$text-muted"),
-                (bar(snapshot.bound_mm, snapshot.stop_mm, _GAUGE_WIDTH, symbols), level.value),
+                (draw_bar(snapshot.bound_mm, snapshot.stop_mm, _GAUGE_WIDTH, symbols), level.value),
                 f" {Number.MM.text(snapshot.bound_mm)} mm, enough at {snapshot.stop_mm:.2f}",
                 (f"; everywhere {Number.MM.text(snapshot.worst_mm).strip()}", "$text-muted"),
             ).truncate(width)
@@ -199,7 +199,7 @@ class SmallCapture(Lines[CaptureView]):
         word, level = view.state
         return [
             Content.styled(word, level.value),
-            Content(view.snapshot.wish),
+            Content(view.snapshot.instruction),
             Content(f"{view.snapshot.n_kept} pairs"),
             Content.styled("make the terminal 80 x 24", "$text-muted"),
         ]

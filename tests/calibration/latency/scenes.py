@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from calibration.latency.area import Watched
-from calibration.latency.code import Switches, pauses_ms
+from calibration.latency.display_area import WatchedCells
+from calibration.latency.light_code import Switches, draw_pauses_ms
 
 N_CELLS = 48
 # Cells that see the display.
@@ -57,9 +57,9 @@ class Bench:
         wait_ms = 500.0 / self.refresh_hz if self.refresh_hz else 0.0
         return self.delay_ms + wait_ms + self.late_share * self.late_ms
 
-    def record(self, seed: int) -> tuple[Switches, Watched, Watched]:
+    def record(self, seed: int) -> tuple[Switches, WatchedCells, WatchedCells]:
         rng = np.random.default_rng((seed, 77))
-        told = np.concatenate([[0.0], np.cumsum(pauses_ms(self.seconds, seed))])
+        told = np.concatenate([[0.0], np.cumsum(draw_pauses_ms(self.seconds, seed))])
         share = told / told[-1]
         lit = told + self.delay_ms + self.drift_ms * share + self.jump_ms * (share > 0.5)
         lit = lit + self.late_ms * (rng.random(len(told)) < self.late_share)
@@ -84,7 +84,7 @@ class Bench:
             cells[:, AREA] = grey[:, None]
             cells = 255.0 * cells + rng.normal(0.0, self.noise_levels, cells.shape)
             stamps = middles + claimed + rng.normal(0.0, 1.0, len(middles)) * self.stamp_noise_ms
-            eyes.append(Watched(stamps, np.rint(np.clip(cells, 0, 255)).astype(np.float32)))
+            eyes.append(WatchedCells(stamps, np.rint(np.clip(cells, 0, 255)).astype(np.float32)))
         return Switches(told), eyes[0], eyes[1]
 
     def _light(self, middles: np.ndarray, lit: np.ndarray) -> np.ndarray:

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.rig.known_length import LengthMeter, measured_length
+from calibration.rig.known_length import LengthMeter, measure_length
 from navapp.geometry.transform import RigidTransform
 from tests.calibration.marks import BOARD, drawn_pairs, drawn_rig
-from tests.calibration.rig.test_check import shifted
+from tests.calibration.rig.test_rig_check import shifted
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def world():
 
 
 def lengths(rig, pairs) -> tuple[np.ndarray, np.ndarray]:
-    found = [measured_length(BOARD, rig, pair) for pair in pairs]
+    found = [measure_length(BOARD, rig, pair) for pair in pairs]
     return np.array([one.ratio for one in found]), np.array([one.sigma for one in found])
 
 
@@ -60,14 +60,14 @@ def test_too_few_common_marks_tell_nothing(world) -> None:
     few = replace(
         seen, ids=seen.ids[:11], pixels=seen.pixels[:11], sigma_px=seen.sigma_px[:11]
     )  # fmt: skip
-    assert measured_length(BOARD, rig, replace(pairs[0], right=few)) is None
+    assert measure_length(BOARD, rig, replace(pairs[0], right=few)) is None
 
 
 def test_a_board_that_would_be_behind_a_camera_tells_nothing(world) -> None:
     """A rig that is not that of the pictures: its right camera is beyond the board."""
     rig, pairs = world
     turned = RigidTransform.from_parts("right", "left", np.eye(3), (-80.0, 0.0, -600.0))
-    assert measured_length(BOARD, replace(rig, right_from_left=turned), pairs[0]) is None
+    assert measure_length(BOARD, replace(rig, right_from_left=turned), pairs[0]) is None
 
 
 def test_a_detector_that_stumbles_has_seen_nothing(world, monkeypatch) -> None:

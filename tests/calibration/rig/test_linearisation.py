@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from calibration.rig.initial_rig import vector_of
 from calibration.rig.linearisation import Linearisation, NormalEquations, Views
-from calibration.rig.parameters import RigModel, packed
-from calibration.rig.start import vector_of
+from calibration.rig.parameters import RigModel, pack
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig, seen_pair
 
 
@@ -18,7 +18,7 @@ def test_a_step_goes_down_the_slope_of_the_cost(n_marks) -> None:
     # Beyond Huber's limit, and marks that are not where they should be.
     pairs[0].left.pixels[:2] += 4.0
     views = Views.of(BOARD, pairs, model)
-    shared = np.concatenate([packed(RigModel(5, 0, WIDTH, HEIGHT), true), np.zeros(3 * n_marks)])
+    shared = np.concatenate([pack(RigModel(5, 0, WIDTH, HEIGHT), true), np.zeros(3 * n_marks)])
     shared[model.n_rig :] = rng.normal(0.0, 0.05, 3 * n_marks)
     start = np.array([vector_of(pose.matrix) for pose in poses])
     linear = Linearisation(views, shared, start)
@@ -40,7 +40,7 @@ def test_the_first_step_lowers_the_cost_and_a_rig_at_rest_stays() -> None:
     true, model = drawn_rig(rng), RigModel(5, 0, WIDTH, HEIGHT)
     poses = [drawn_pose(rng) for _ in range(8)]
     views = Views.of(BOARD, [seen_pair(i, true, p, rng) for i, p in enumerate(poses)], model)
-    shared, start = packed(model, true), np.array([vector_of(pose.matrix) for pose in poses])
+    shared, start = pack(model, true), np.array([vector_of(pose.matrix) for pose in poses])
     costs = []
     for _ in range(4):
         linear = Linearisation(views, shared, start)

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.rig.parameters import N_COEFFICIENTS, RigModel, packed
-from calibration.rig.projection import projected
-from calibration.rig.start import vector_of
+from calibration.rig.initial_rig import vector_of
+from calibration.rig.parameters import N_COEFFICIENTS, RigModel, pack
+from calibration.rig.projection import project
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig
 
 POINTS_MM = BOARD.points_mm[::9] + np.linspace(-1.0, 1.0, 24).reshape(8, 3)
@@ -16,7 +16,7 @@ def numbers(n_coefficients: int) -> tuple[RigModel, np.ndarray, np.ndarray]:
     """A rig with every coefficient at work, and a pose of the board."""
     rng = np.random.default_rng(14)
     model = RigModel(n_coefficients, 0, WIDTH, HEIGHT)
-    shared = packed(model, drawn_rig(rng))
+    shared = pack(model, drawn_rig(rng))
     for number in range(2):
         first = number * model.n_camera + 8
         shared[first : first + n_coefficients - 4] += rng.normal(0.0, 0.02, n_coefficients - 4)
@@ -51,7 +51,7 @@ def differences(function, at: np.ndarray, steps: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("n_coefficients", N_COEFFICIENTS)
 def test_slopes_are_numeric_differences(n_coefficients: int, number: int) -> None:
     model, shared, pose = numbers(n_coefficients)
-    pixels, by_rig, by_pose, by_point = projected(POINTS_MM, pose, model, shared, number)
+    pixels, by_rig, by_pose, by_point = project(POINTS_MM, pose, model, shared, number)
     np.testing.assert_allclose(
         pixels.ravel(), pixels_of(model, shared, pose, POINTS_MM, number), atol=1e-9
     )

@@ -3,18 +3,22 @@
 import numpy as np
 import pytest
 
-from calibration.rig.parameters import RigModel, packed, unpacked
-from calibration.rig.uncertainty import bounds_mm, triangulation_slopes, working_points_mm
+from calibration.rig.parameters import RigModel, pack, unpack
+from calibration.rig.uncertainty import (
+    compute_bounds_mm,
+    compute_triangulation_slopes,
+    make_working_points_mm,
+)
 from tests.calibration.marks import HEIGHT, WIDTH, drawn_rig
 
 MODEL = RigModel(5, 0, WIDTH, HEIGHT)
-SHARED = packed(MODEL, drawn_rig(np.random.default_rng(21)))
-POINTS_MM = working_points_mm(MODEL, SHARED, (350.0, 550.0))[::7].copy()
+SHARED = pack(MODEL, drawn_rig(np.random.default_rng(21)))
+POINTS_MM = make_working_points_mm(MODEL, SHARED, (350.0, 550.0))[::7].copy()
 
 
 def pixels_of(shared: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
     """(n, 4) in both pictures."""
-    rig = unpacked(MODEL, shared)
+    rig = unpack(MODEL, shared)
     right = rig.right.project(rig.right_from_left.apply(points_mm))
     return np.hstack([rig.left.project(points_mm), right])
 
@@ -37,7 +41,7 @@ def triangulated(shared: np.ndarray, pixels: np.ndarray, start_mm: np.ndarray) -
 
 def test_slopes_are_those_of_triangulation() -> None:
     pixels = pixels_of(SHARED, POINTS_MM)
-    slopes = triangulation_slopes(MODEL, SHARED, POINTS_MM)
+    slopes = compute_triangulation_slopes(MODEL, SHARED, POINTS_MM)
     steps = [*[0.01] * 4, *[1e-4] * 5] * 2 + [1e-5] * 3 + [0.01] * 3
     for k, step in enumerate(steps):
         off = np.zeros(MODEL.n_shared)
@@ -54,7 +58,7 @@ def test_so_many_rigs_of_a_covariance_err_by_less_than_the_bound() -> None:
     sigma = np.array([*[0.3] * 4, *[1e-3] * 2, *[1e-4] * 2, 1e-3] * 2 + [2e-4] * 3 + [0.02] * 3)
     mixed = rng.normal(size=(MODEL.n_rig, MODEL.n_rig)) / MODEL.n_rig**0.5
     root = sigma[:, None] * mixed
-    bounds = bounds_mm(MODEL, SHARED, root @ root.T, POINTS_MM)
+    bounds = compute_bounds_mm(MODEL, SHARED, root @ root.T, POINTS_MM)
     pixels = pixels_of(SHARED, POINTS_MM)
     held = [
         np.linalg.norm(triangulated(SHARED + off, pixels, POINTS_MM) - POINTS_MM, axis=1) < bounds

@@ -2,7 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.targets.boards import board_from
+from calibration.targets.boards import parse_board
 from calibration.targets.detection import find_board
 from navapp.geometry.camera import Camera
 from tests.calibration.pictures import facing, picture_of
@@ -14,25 +14,25 @@ CAMERA = Camera(
     480,
 )
 BOARDS = {
-    "charuco": board_from(
+    "charuco": parse_board(
         {
             "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
             "marker_mm": 14.0, "dictionary": "DICT_4X4_100",
         }
     ),
-    "legacy": board_from(
+    "legacy": parse_board(
         {
             "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
             "marker_mm": 14.0, "dictionary": "DICT_4X4_100", "legacy_pattern": True,
         }
     ),
-    "chessboard": board_from(
+    "chessboard": parse_board(
         {"type": "chessboard", "squares_x": 9, "squares_y": 6, "square_mm": 18.0}
     ),
-    "circles": board_from(
+    "circles": parse_board(
         {"type": "circles", "circles_x": 8, "circles_y": 5, "spacing_mm": 20.0}
     ),
-    "circles_asymmetric": board_from(
+    "circles_asymmetric": parse_board(
         {"type": "circles_asymmetric", "circles_x": 4, "circles_y": 9, "spacing_mm": 14.0}
     ),
 }  # fmt: skip

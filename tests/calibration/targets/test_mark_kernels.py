@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import sqrtm
 
 from calibration.targets import circle_kernels, corner_kernels
-from calibration.targets.mark_kernels import edge
+from calibration.targets.mark_kernels import compute_edge
 from navapp.geometry.camera import Camera
 from tests.reference import mark_reference
 
@@ -48,8 +48,8 @@ def test_a_disc_has_the_grey_values_of_its_equation_everywhere(place):
 
 
 def test_a_step_has_its_slope():
-    high, low = (edge(0.4 + h, 0.9)[0] for h in (1e-6, -1e-6))
-    assert edge(0.4, 0.9)[1] == pytest.approx((high - low) / 2e-6)
+    high, low = (compute_edge(0.4 + h, 0.9)[0] for h in (1e-6, -1e-6))
+    assert compute_edge(0.4, 0.9)[1] == pytest.approx((high - low) / 2e-6)
 
 
 def test_a_disc_begins_as_its_linear_map_has_it():
@@ -73,6 +73,6 @@ def test_the_centre_of_a_disc_is_where_the_camera_sees_it():
     shape = sqrtm(conic[:2, :2] / -level).real
     p = np.array([*middle, shape[0, 0], shape[0, 1], shape[1, 1]])
     seen = homography @ (0.0, 0.0, 1.0)
-    found = circle_kernels.pole_of_horizon(p, to_board.T @ (0.0, 0.0, 1.0))
+    found = circle_kernels.find_pole(p, to_board.T @ (0.0, 0.0, 1.0))
     np.testing.assert_allclose(found, seen[:2] / seen[2], atol=1e-6)
     assert np.linalg.norm(middle - seen[:2] / seen[2]) > 0.5

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from calibration.targets.boards import board_from, keys_of
+from calibration.targets.boards import keys_of, parse_board
 from calibration.targets.detection import find_board
-from calibration.targets.drawing import drawn
-from calibration.targets.printing import Sheet, printed
+from calibration.targets.drawing import make_drawing
+from calibration.targets.printing import Sheet, render_page
 from tests.calibration.targets.test_detection import BOARDS
 
 MM_PER_PT = 25.4 / 72.0
@@ -57,7 +57,7 @@ def length_mm(text: str) -> float:
 @pytest.mark.parametrize("name", BOARDS)
 def test_the_page_is_as_large_as_it_says(name: str) -> None:
     sheet = Sheet(BOARDS[name])
-    root = ET.fromstring(printed(sheet, "svg"))
+    root = ET.fromstring(render_page(sheet, "svg"))
     size_mm = length_mm(root.get("width")), length_mm(root.get("height"))
     assert size_mm == pytest.approx((sheet.width_mm, sheet.height_mm), abs=1e-4)
     box = np.array(root.get("viewBox").split(), dtype=float) * MM_PER_PT
@@ -67,9 +67,9 @@ def test_the_page_is_as_large_as_it_says(name: str) -> None:
 @pytest.mark.parametrize("name", ["charuco", "legacy", "chessboard"])
 def test_every_square_lies_where_the_board_has_it(name: str) -> None:
     sheet = Sheet(BOARDS[name])
-    expected = drawn(sheet.board).rectangles_mm
+    expected = make_drawing(sheet.board).rectangles_mm
     found = np.array(
-        [[*o.min(axis=0), *o.max(axis=0)] for o in group(printed(sheet, "svg"), "board")]
+        [[*o.min(axis=0), *o.max(axis=0)] for o in group(render_page(sheet, "svg"), "board")]
     )
     assert len(found) == len(expected)
     moved = found - expected
@@ -87,7 +87,7 @@ def test_what_is_printed_is_found_as_the_board(name: str) -> None:
     size = np.ceil(np.array([sheet.height_mm, sheet.width_mm]) * px_per_mm).astype(int)
     fine = 4
     picture = np.full(size * fine, 255, dtype=np.uint8)
-    svg = printed(sheet, "svg")
+    svg = render_page(sheet, "svg")
     for outline in group(svg, "board") + group(svg, "ruler"):
         # fillPoly counts from pixel centres, the page from the corner of the first.
         corners = np.rint((outline * px_per_mm * fine - 0.5) * 256).astype(np.int32)
@@ -106,7 +106,7 @@ def test_what_is_printed_is_found_as_the_board(name: str) -> None:
 
 
 def test_the_ruler_is_a_hundred_millimetres_long() -> None:
-    lines = group(printed(Sheet(BOARDS["charuco"]), "svg"), "ruler")
+    lines = group(render_page(Sheet(BOARDS["charuco"]), "svg"), "ruler")
     level, ticks = lines[0], lines[1:]
     assert np.ptp(level, axis=0) == pytest.approx([100.0, 0.0], abs=1e-4)
     places = np.array([tick[0, 0] for tick in ticks])
@@ -116,15 +116,15 @@ def test_the_ruler_is_a_hundred_millimetres_long() -> None:
 @pytest.mark.parametrize("name", BOARDS)
 def test_the_caption_is_the_boards_file(name: str) -> None:
     sheet = Sheet(BOARDS[name])
-    comments = re.findall(r"<!-- (.*?) -->", printed(sheet, "svg").decode(), flags=re.DOTALL)
+    comments = re.findall(r"<!-- (.*?) -->", render_page(sheet, "svg").decode(), flags=re.DOTALL)
     text = " ".join(comments)
     keys = json.loads(text[text.index("{") : text.index("}") + 1])
-    assert board_from(keys) == sheet.board == board_from(keys_of(sheet.board))
+    assert parse_board(keys) == sheet.board == parse_board(keys_of(sheet.board))
 
 
 def test_the_pdf_holds_the_same_squares() -> None:
     sheet = Sheet(BOARDS["chessboard"])
-    pdf = printed(sheet, "pdf")
+    pdf = render_page(sheet, "pdf")
     box = re.search(rb"/MediaBox \[ ?([^\]]*)\]", pdf)
     assert box is not None
     size_mm = np.array(box.group(1).split(), dtype=float) * MM_PER_PT
@@ -135,7 +135,7 @@ def test_the_pdf_holds_the_same_squares() -> None:
     corners_mm = np.array(starts, dtype=float) * MM_PER_PT
     # PDF counts from below.
     corners_mm[:, 1] = sheet.height_mm - corners_mm[:, 1]
-    for corner in drawn(sheet.board).rectangles_mm[:, :2] + sheet.page_from_board_mm:
+    for corner in make_drawing(sheet.board).rectangles_mm[:, :2] + sheet.page_from_board_mm:
         assert np.linalg.norm(corners_mm - corner, axis=1).min() < 1e-3
 
 
@@ -152,10 +152,10 @@ def inflated(stream: bytes) -> bytes:
 )
 def test_the_paper_that_is_needed(columns, rows, square_mm, paper) -> None:
     keys = {"type": "chessboard", "squares_x": columns, "squares_y": rows, "square_mm": square_mm}
-    assert Sheet(board_from(keys)).paper == paper
+    assert Sheet(parse_board(keys)).paper == paper
 
 
 def test_the_same_board_gives_the_same_file() -> None:
     sheet = Sheet(BOARDS["circles"])
     for form in ("svg", "pdf"):
-        assert printed(sheet, form) == printed(sheet, form)
+        assert render_page(sheet, form) == render_page(sheet, form)

@@ -5,9 +5,9 @@ import numpy as np
 from drivers.clock import ManualClock
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo
+from navapp.control.capture.board_view import BoardView
 from navapp.control.capture.capture import Capture
 from navapp.control.capture.interfaces import CaptureSettings
-from navapp.control.capture.looks import Look
 from navapp.control.capture.states import Outcome
 from navapp.control.executors import InlineExecutor
 from navapp.geometry.camera import Camera
@@ -55,12 +55,12 @@ class Room:
     def close(self) -> None:
         self.is_closed = True
 
-    def look(self, frame: StereoFrame, board: object) -> Look:
+    def look(self, frame: StereoFrame, board: object) -> BoardView:
         if self.pose is None:
-            return Look(frame, None, None)
+            return BoardView(frame, None, None)
         pair = seen_pair(0, self.rig, self.pose, self.rng, noise_px=self.noise_px)
         views = [view if len(view.ids) >= 6 else None for view in (pair.left, pair.right)]
-        return Look(frame, *views)
+        return BoardView(frame, *views)
 
     def move_to(self, left_from_body: RigidTransform) -> None:
         off = self.rng.normal(0.0, 1.0, 6) * np.repeat((self.off_mm, 0.02), 3)
@@ -76,8 +76,7 @@ class Room:
         del self.kept[index]
 
 
-def capture_in(room: Room, monkeypatch, solve=None, reopen=None, executor=None, **asked) -> Capture:
-    monkeypatch.setattr("navapp.control.capture.capture.look_at", room.look)
+def capture_in(room: Room, solve=None, reopen=None, executor=None, **asked) -> Capture:
     settings = CaptureSettings(DEPTH_MM, **{"stop_mm": 0.15, **asked})
     return Capture(
         room, room.clock, BOARD, settings,
@@ -86,6 +85,8 @@ def capture_in(room: Room, monkeypatch, solve=None, reopen=None, executor=None, 
         solve=solve or (lambda pairs, report: Outcome(True, ())),
         hand=room,
         reopen=reopen,
+        # A test may change how the room is seen.
+        detect=lambda frame, board: room.look(frame, board),
     )  # fmt: skip
 
 

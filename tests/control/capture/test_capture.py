@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from navapp.control.capture.looks import Look
+from navapp.control.capture.board_view import BoardView
+from navapp.control.capture.next_view import starting_view
 from navapp.control.capture.states import (
     Another,
     CapturePhase,
@@ -15,7 +16,6 @@ from navapp.control.capture.states import (
     Outcome,
     Take,
 )
-from navapp.control.capture.wishes import starting_view
 from navapp.control.executors import InlineExecutor, Job
 from navapp.errors import DeviceLost, InputError, ResultError
 from navapp.geometry.transform import RigidTransform
@@ -43,20 +43,20 @@ def followed(capture, until, most: int = 400):
     raise AssertionError(f"not after {most} frames: {capture.snapshot}")
 
 
-def test_a_board_that_is_held_still_where_it_is_wanted_is_kept_once(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_a_board_that_is_held_still_where_it_is_wanted_is_kept_once(room):
+    capture = capture_in(room)
     at_start(room)
     assert steps(capture, 1).n_kept == 0  # nothing is known of its motion yet
     assert steps(capture, 6).n_kept == 1
     assert list(room.kept) == [0]
 
 
-def test_a_board_elsewhere_or_in_motion_is_not_kept(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_a_board_elsewhere_or_in_motion_is_not_kept(room):
+    capture = capture_in(room)
     at_start(room, aside_mm=120.0)
     snapshot = steps(capture, 4)
     assert snapshot.n_kept == 0
-    assert "mm to the left" in snapshot.wish
+    assert "mm to the left" in snapshot.instruction
     for k in range(6):
         at_start(room, aside_mm=2.0 * (-1) ** k)
         snapshot = capture.step()
@@ -64,14 +64,14 @@ def test_a_board_elsewhere_or_in_motion_is_not_kept(room, monkeypatch):
     assert [check.name for check in snapshot.checks if not check.is_met] == ["still"]
 
 
-def test_it_asks_for_the_board_while_a_camera_does_not_see_it(room, monkeypatch):
-    snapshot = steps(capture_in(room, monkeypatch), 2)
+def test_it_asks_for_the_board_while_a_camera_does_not_see_it(room):
+    snapshot = steps(capture_in(room), 2)
     assert snapshot.n_seen[:2] == (0, 0)
-    assert "show the board" in snapshot.wish
+    assert "show the board" in snapshot.instruction
 
 
-def test_space_keeps_what_is_seen_wherever_it_is(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_space_keeps_what_is_seen_wherever_it_is(room):
+    capture = capture_in(room)
     capture.submit(Take())
     assert "not seen by both" in steps(capture, 1).events[-1]
     at_start(room, aside_mm=60.0)
@@ -79,8 +79,8 @@ def test_space_keeps_what_is_seen_wherever_it_is(room, monkeypatch):
     assert steps(capture, 1).n_kept == 1
 
 
-def test_the_last_pair_is_dropped_with_its_pictures_and_its_number(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_the_last_pair_is_dropped_with_its_pictures_and_its_number(room):
+    capture = capture_in(room)
     for aside in (0.0, 60.0):
         at_start(room, aside)
         capture.submit(Take())
@@ -93,24 +93,24 @@ def test_the_last_pair_is_dropped_with_its_pictures_and_its_number(room, monkeyp
     assert list(room.kept) == [0, 2]
 
 
-def test_a_hand_that_follows_brings_the_error_below_the_limit(room, monkeypatch):
-    capture = capture_in(room, monkeypatch, stop_mm=0.4)
+def test_a_hand_that_follows_brings_the_error_below_the_limit(room):
+    capture = capture_in(room, stop_mm=0.4)
     snapshot = followed(capture, lambda s: s.is_enough)
     assert 8 <= snapshot.n_kept <= 20
     assert snapshot.bound_mm <= 0.4 <= snapshot.worst_mm or snapshot.worst_mm <= 0.4
     assert snapshot.covered.mean() > 0.4
     n_kept = snapshot.n_kept
     assert steps(capture, 20).n_kept == n_kept  # the shutter rests
-    assert "enough" in capture.snapshot.wish
+    assert "enough" in capture.snapshot.instruction
 
 
-def test_it_is_enough_with_the_pairs_that_were_asked_for(room, monkeypatch):
-    capture = capture_in(room, monkeypatch, n_pairs=5)
+def test_it_is_enough_with_the_pairs_that_were_asked_for(room):
+    capture = capture_in(room, n_pairs=5)
     assert followed(capture, lambda s: s.is_enough).n_kept == 5
 
 
-def test_a_pair_that_does_not_fit_is_named_and_left_out(room, monkeypatch):
-    capture = capture_in(room, monkeypatch, stop_mm=0.01)
+def test_a_pair_that_does_not_fit_is_named_and_left_out(room):
+    capture = capture_in(room, stop_mm=0.01)
     followed(capture, lambda s: s.n_kept == 8)
     look = room.look
 
@@ -120,7 +120,7 @@ def test_a_pair_that_does_not_fit_is_named_and_left_out(room, monkeypatch):
         other = look(frame, board)
         return type(found)(frame, found.left, other.right)
 
-    monkeypatch.setattr("navapp.control.capture.capture.look_at", torn)
+    room.look = torn
     capture.submit(Follow(is_on=False))
     capture.submit(Take())
     snapshot = steps(capture, 2)
@@ -128,7 +128,7 @@ def test_a_pair_that_does_not_fit_is_named_and_left_out(room, monkeypatch):
     assert any("pair 8 does not count" in text for text in snapshot.events)
 
 
-def test_finish_solves_with_what_is_kept_and_tells(room, monkeypatch):
+def test_finish_solves_with_what_is_kept_and_tells(room):
     given = []
 
     def solve(pairs, report):
@@ -136,7 +136,7 @@ def test_finish_solves_with_what_is_kept_and_tells(room, monkeypatch):
         given.extend(pairs)
         return Outcome(True, ("well",))
 
-    capture = capture_in(room, monkeypatch, solve, n_pairs=4)
+    capture = capture_in(room, solve, n_pairs=4)
     capture.submit(Finish())
     assert "too few" in steps(capture, 1).events[-1]
     followed(capture, lambda s: s.is_enough)
@@ -146,11 +146,11 @@ def test_finish_solves_with_what_is_kept_and_tells(room, monkeypatch):
     assert snapshot.outcome == Outcome(True, ("well",))
 
 
-def test_a_rig_that_is_refused_asks_for_more_pairs(room, monkeypatch):
+def test_a_rig_that_is_refused_asks_for_more_pairs(room):
     def solve(pairs, report):
         raise ResultError("no rig explains these views", remedy="look at the pictures")
 
-    capture = capture_in(room, monkeypatch, solve, n_pairs=4)
+    capture = capture_in(room, solve, n_pairs=4)
     followed(capture, lambda s: s.is_enough)
     capture.submit(Finish())
     snapshot = steps(capture, 1)
@@ -160,31 +160,31 @@ def test_a_rig_that_is_refused_asks_for_more_pairs(room, monkeypatch):
     assert followed(capture, lambda s: s.is_enough).n_kept == 8
 
 
-def test_a_view_that_cannot_be_had_is_not_asked_for_again(room, monkeypatch):
-    capture = capture_in(room, monkeypatch, stop_mm=0.3)
+def test_a_view_that_cannot_be_had_is_not_asked_for_again(room):
+    capture = capture_in(room, stop_mm=0.3)
     followed(capture, lambda s: s.n_kept == 6)
     look, tilts_deg = room.look, []
 
     def only_flat(frame, board):
         tilts_deg.append(np.degrees(np.arccos(room.pose.rotation[2, 2])))
-        return look(frame, board) if tilts_deg[-1] < 20.0 else Look(frame, None, None)
+        return look(frame, board) if tilts_deg[-1] < 20.0 else BoardView(frame, None, None)
 
-    monkeypatch.setattr("navapp.control.capture.capture.look_at", only_flat)
+    room.look = only_flat
     snapshot = followed(capture, lambda s: s.n_kept == 8, most=900)
     assert max(tilts_deg) > 30.0
     assert snapshot.n_kept == 8
 
 
-def test_n_asks_for_another_view(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_n_asks_for_another_view(room):
+    capture = capture_in(room)
     at_start(room, aside_mm=150.0)
-    first = steps(capture, 2).wish
+    first = steps(capture, 2).instruction
     capture.submit(Another())
-    assert steps(capture, 2).wish != first
+    assert steps(capture, 2).instruction != first
 
 
-def test_keys_move_the_hand_and_end_the_following(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_keys_move_the_hand_and_end_the_following(room):
+    capture = capture_in(room)
     capture.submit(Follow(is_on=True))
     assert steps(capture, 1).is_following
     capture.submit(Nudge(shift_mm=(20.0, 0.0, 0.0)))
@@ -192,8 +192,8 @@ def test_keys_move_the_hand_and_end_the_following(room, monkeypatch):
     assert room.nudges == [((20.0, 0.0, 0.0), (0.0, 0.0, 0.0))]
 
 
-def test_leaving_ends_it_and_closing_closes_the_camera(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_leaving_ends_it_and_closing_closes_the_camera(room):
+    capture = capture_in(room)
     capture.submit(Leave())
     assert steps(capture, 1).phase is CapturePhase.OVER
     capture.close()
@@ -201,7 +201,7 @@ def test_leaving_ends_it_and_closing_closes_the_camera(room, monkeypatch):
 
 
 def test_a_full_disk_ends_the_capture_in_a_sentence(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+    capture = capture_in(room)
     at_start(room)
 
     def full(index, frame):
@@ -231,13 +231,13 @@ def lose_camera(room, capture) -> None:
     room.plug_in = plug_in
 
 
-def reopening(room, monkeypatch, executor=None):
+def reopening(room, executor=None):
     def reopen():
         room.open()
         return room
 
     room.open = lambda: None
-    return capture_in(room, monkeypatch, reopen=reopen, executor=executor)
+    return capture_in(room, reopen=reopen, executor=executor)
 
 
 class SlowExecutor(InlineExecutor):
@@ -254,8 +254,8 @@ class SlowExecutor(InlineExecutor):
             self.held.pop(0).run()
 
 
-def test_a_lost_camera_is_said_waited_for_and_everything_kept_stays(room, monkeypatch):
-    capture = reopening(room, monkeypatch)
+def test_a_lost_camera_is_said_waited_for_and_everything_kept_stays(room):
+    capture = reopening(room)
     at_start(room)
     before = steps(capture, 6)
     assert before.n_kept == 1
@@ -283,8 +283,8 @@ def test_a_lost_camera_is_said_waited_for_and_everything_kept_stays(room, monkey
     assert snapshot.phase is CapturePhase.CAPTURING
 
 
-def test_a_board_is_not_called_still_by_what_was_seen_before_the_loss(room, monkeypatch):
-    capture = reopening(room, monkeypatch)
+def test_a_board_is_not_called_still_by_what_was_seen_before_the_loss(room):
+    capture = reopening(room)
     at_start(room, aside_mm=60.0)
     steps(capture, 4)
     lose_camera(room, capture)
@@ -295,9 +295,9 @@ def test_a_board_is_not_called_still_by_what_was_seen_before_the_loss(room, monk
     assert not next(check for check in first.checks if check.name == "still").is_met
 
 
-def test_a_picture_from_before_the_loss_is_not_kept_after_it(room, monkeypatch):
+def test_a_picture_from_before_the_loss_is_not_kept_after_it(room):
     executor = SlowExecutor()
-    capture = reopening(room, monkeypatch, executor)
+    capture = reopening(room, executor)
     at_start(room)
     capture.step()
     assert executor.held
@@ -313,8 +313,8 @@ def test_a_picture_from_before_the_loss_is_not_kept_after_it(room, monkeypatch):
     assert all(sequence > n_before for sequence in room.kept.values())
 
 
-def test_the_loss_of_a_camera_that_nobody_opens_again_is_the_end(room, monkeypatch):
-    capture = capture_in(room, monkeypatch)
+def test_the_loss_of_a_camera_that_nobody_opens_again_is_the_end(room):
+    capture = capture_in(room)
     steps(capture, 2)
     with pytest.raises(DeviceLost, match="unplugged"):
         lose_camera(room, capture)

@@ -22,8 +22,8 @@ def room() -> Room:
     return Room()
 
 
-def test_it_ends_when_it_is_left(room, monkeypatch):
-    runner = CaptureRunner(capture_in(room, monkeypatch))
+def test_it_ends_when_it_is_left(room):
+    runner = CaptureRunner(capture_in(room))
     runner.start()
     runner.submit(Leave())
     assert over(runner)
@@ -38,7 +38,7 @@ def test_a_lost_camera_ends_it_and_is_told(room, monkeypatch):
         raise DeviceLost("the camera is gone")
 
     monkeypatch.setattr(room, "read", lost)
-    runner = CaptureRunner(capture_in(room, monkeypatch))
+    runner = CaptureRunner(capture_in(room))
     runner.start()
     assert over(runner)
     runner.stop()

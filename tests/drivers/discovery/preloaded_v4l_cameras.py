@@ -12,7 +12,7 @@ import pytest
 from drivers.discovery import Listing, PictureSize, list_usb_cameras
 from navapp.cli.main import run
 from navapp.config import parse
-from navapp.inventory import looking
+from navapp.inventory import connected_devices
 from tests.drivers.preloaded_v4l2 import FORBIDDEN, Bus
 
 RATES_HZ = (15.0, 30.0)
@@ -44,7 +44,7 @@ def test_two_cameras_say_what_they_are_and_can(bus):
 
 def test_what_is_listed_chooses_the_camera(bus):
     for camera in list_usb_cameras(bus.names).found:
-        text = looking.choosing(camera)
+        text = connected_devices.make_choice_toml(camera)
         wanted = parse(tomllib.loads(text), "x").camera
         assert wanted.backend == "opencv"
         assert bus.names.find(wanted.opencv.left).node == camera.node
@@ -78,7 +78,7 @@ def test_two_cameras_of_one_serial_number_are_chosen_by_their_ports(bus):
 
 
 def test_the_command_lists_them_for_people_and_programs(bus, monkeypatch, capsys):
-    monkeypatch.setattr(looking, "V4lNames", lambda: bus.names)
+    monkeypatch.setattr(connected_devices, "V4lNames", lambda: bus.names)
     assert run(["devices"]) == 0
     told = capsys.readouterr().out
     assert "Fake camera 2, serial number LEFT" in told

@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import pytest
 
 from drivers.discovery import OakCamera, list_oak_cameras
-from drivers.discovery.oak_cameras import UDEV_RULE, oak_nodes
+from drivers.discovery.oak_cameras import UDEV_RULE, list_oak_nodes
 
 dai = pytest.importorskip("depthai", reason="the package depthai is not installed (navapp[oak])")
 
@@ -100,4 +100,4 @@ def test_what_is_unplugged_meanwhile_or_nonsense_is_passed_over(bus):
     (bus.devices / "1-5" / "devnum").unlink()
     bus.plug(6)
     (bus.devices / "1-6" / "busnum").write_text("?\n")
-    assert oak_nodes(bus.devices, bus.nodes) == ()
+    assert list_oak_nodes(bus.devices, bus.nodes) == ()

@@ -3,7 +3,11 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.preop.ct_surface.blur import axial_share, blur_shift_mm, neighbours_of
+from navapp.preop.ct_surface.blur import (
+    compute_axial_fractions,
+    compute_blur_shift_mm,
+    neighbours_of,
+)
 from navapp.preop.ct_surface.cortex_model import Scan
 from tests.geometry.shapes import cube
 from tests.preop.ct_phantoms import ball, ct_of, cylinder, lattice, leaning_axes
@@ -45,7 +49,7 @@ def cylinder_mesh(radius_mm, n_rings=25):
 
 
 def shifts_mm(mesh, scan=EVEN, ct=STRAIGHT):
-    return blur_shift_mm(mesh, neighbours_of(mesh.faces, len(mesh.vertices_mm)), ct, scan)
+    return compute_blur_shift_mm(mesh, neighbours_of(mesh.faces, len(mesh.vertices_mm)), ct, scan)
 
 
 @pytest.mark.parametrize("radius_mm", [6.0, 12.0, 25.0])
@@ -94,7 +98,7 @@ def test_the_corner_of_a_mesh_is_no_curve():
 @pytest.mark.parametrize("axes", [np.eye(3), leaning_axes(20.0), np.diag([1.0, -1.0, 1.0])])
 def test_slices_are_crossed_along_their_normal_however_they_are_stacked(axes):
     ct = ct_of(np.zeros((3, 3, 3)), lattice((3, 3, 3), (0.5, 0.5, 2.0), axes))
-    share = axial_share(ct, np.eye(3))
+    share = compute_axial_fractions(ct, np.eye(3))
     np.testing.assert_allclose(np.abs(share), [0.0, 0.0, 1.0], atol=1e-12)
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.simplify import is_closed, is_within
-from navapp.preop.ct_surface import bone_surfaces, surface_of_labels, surfaces_of
+from navapp.preop.ct_surface import bone_surfaces, make_label_surface, make_surfaces
 from navapp.preop.segmentation import segment
 from navapp.preop.volume import CtVolume, LabelVolume
 from navapp.preop.volume.hounsfield import PADDING_HU
@@ -41,7 +41,7 @@ def scanned(axes, n_j=54):
 def straight():
     """The CT, and its surfaces from two thresholds."""
     ct, steps = scanned(np.eye(3)), []
-    found = [surfaces_of(segment(ct, hu, SEEDS), steps.append) for hu in (150.0, 350.0)]
+    found = [make_surfaces(segment(ct, hu, SEEDS), steps.append) for hu in (150.0, 350.0)]
     assert steps[:4] == [
         "laying first surfaces",
         "estimating the density of cortex and the blur of the scanner",
@@ -54,7 +54,7 @@ def straight():
 @pytest.fixture(scope="module")
 def leaning():
     ct = scanned(leaning_axes(), 70)
-    return ct, [surfaces_of(segment(ct, seeds=SEEDS))]
+    return ct, [make_surfaces(segment(ct, seeds=SEEDS))]
 
 
 @pytest.fixture(params=[("straight", 0), ("straight", 1), ("leaning", 0)], ids=str)
@@ -146,7 +146,7 @@ def test_a_shaft_that_padding_cuts_is_cut_there(straight):
     hu = np.where(points @ slope > CUT_MM, np.int16(PADDING_HU), ct.hu)
     found = segment(CtVolume(hu, ct.lps_from_index, ct.spacing_mm), seeds=SEEDS)
     assert any(said.startswith("femur: cut off by padding") for said in found.warnings)
-    shaft = surfaces_of(found).bones["femur"]
+    shaft = make_surfaces(found).bones["femur"]
     above_mm = (shaft.mesh.vertices_mm - SHAFT_MM) @ slope - CUT_MM
     middle_mm = np.hypot(*(shaft.mesh.vertices_mm - SHAFT_MM)[:, :2].T)
     on_cap = (above_mm > -0.5) & (middle_mm < 0.8 * SHAFT_RADIUS_MM)
@@ -162,7 +162,7 @@ def test_a_ready_segmentation_is_laid_around_its_voxels(axes):
     beside = points_of(size, matrix) - PLACE_MM
     labels = 7 * (np.hypot(beside[..., 0], beside[..., 1]) < SHAFT_RADIUS_MM).astype(np.int16)
     volume = LabelVolume(labels, matrix, np.linalg.norm(matrix[:3, :3], axis=0))
-    surface = surface_of_labels(labels == 7, volume)
+    surface = make_label_surface(labels == 7, volume)
     assert is_closed(surface.mesh)
     assert not surface.is_measured.any()
     k = volume.indices_of(surface.mesh.vertices_mm)[:, 2]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.simplify import is_closed
-from navapp.preop.ct_surface.isosurface import surface_around
+from navapp.preop.ct_surface.isosurface import make_isosurface
 from navapp.preop.volume import LabelVolume
 from tests.preop.ct_phantoms import OBLIQUE, lattice, leaning_axes, points_of
 
@@ -31,7 +31,7 @@ def middle_mm(mesh):
 def test_a_ball_is_closed_outward_and_as_large_as_it_is(axes):
     matrix = lattice(SIZE, SPACING_MM, axes, CENTRE_MM)
     mask = np.linalg.norm(points_of(SIZE, matrix) - CENTRE_MM, axis=-1) < 18.0
-    mesh, _ = surface_around(mask, volume_of(mask, matrix))
+    mesh, _ = make_isosurface(mask, volume_of(mask, matrix))
     assert is_closed(mesh)
     assert mesh.volume_mm3() == pytest.approx(4.0 / 3.0 * np.pi * 18.0**3, rel=0.005)
     np.testing.assert_allclose(middle_mm(mesh), CENTRE_MM, atol=0.03)
@@ -46,7 +46,7 @@ def test_where_the_volume_ends_the_surface_is_closed_flat():
     matrix = lattice((40, 40, 30), (0.7, 0.7, 0.9), middle_mm=CENTRE_MM)
     points = points_of((40, 40, 30), matrix) - CENTRE_MM
     mask = np.hypot(points[..., 0], points[..., 1]) < 9.0
-    mesh, _ = surface_around(mask, volume_of(mask, matrix))
+    mesh, _ = make_isosurface(mask, volume_of(mask, matrix))
     assert is_closed(mesh)
     half = 0.5 * 30 * 0.9
     z = mesh.vertices_mm[:, 2] - CENTRE_MM[2]
@@ -58,9 +58,9 @@ def test_crumbs_and_holes_beside_the_bone_are_no_surface():
     matrix = lattice(SIZE, SPACING_MM)
     points = points_of(SIZE, matrix)
     mask = np.linalg.norm(points, axis=-1) < 14.0
-    alone, nothing = surface_around(mask, volume_of(mask, matrix))
+    alone, nothing = make_isosurface(mask, volume_of(mask, matrix))
     mask |= np.linalg.norm(points - [17.5, 17.5, 17.5], axis=-1) < 3.0
-    with_crumb, left_out = surface_around(mask, volume_of(mask, matrix))
+    with_crumb, left_out = make_isosurface(mask, volume_of(mask, matrix))
     assert with_crumb.volume_mm3() == pytest.approx(alone.volume_mm3(), rel=1e-3)
     assert nothing == 0.0
     assert left_out == pytest.approx(3.0**3 / (3.0**3 + 14.0**3), rel=0.3)
@@ -70,6 +70,6 @@ def test_a_hollow_is_no_piece_that_is_left_out():
     matrix = lattice(SIZE, SPACING_MM)
     radius = np.linalg.norm(points_of(SIZE, matrix), axis=-1)
     mask = (radius < 14.0) & (radius > 8.0)
-    mesh, left_out = surface_around(mask, volume_of(mask, matrix))
+    mesh, left_out = make_isosurface(mask, volume_of(mask, matrix))
     assert left_out == 0.0
     assert mesh.volume_mm3() == pytest.approx(4.0 / 3.0 * np.pi * 14.0**3, rel=0.01)

@@ -5,7 +5,7 @@ import pytest
 
 from navapp.preop.ct_surface.blur import neighbours_of
 from navapp.preop.ct_surface.cortex_model import Scan
-from navapp.preop.ct_surface.refinement import _evened, _until_class, refine_surface
+from navapp.preop.ct_surface.refinement import _smooth_offsets, _until_class, refine_surface
 from tests.geometry.shapes import sphere
 from tests.preop.ct_phantoms import (
     SOFT_HU,
@@ -103,12 +103,12 @@ def test_evening_takes_noise_and_keeps_what_all_say():
     n = len(mesh.vertices_mm)
     neighbours = neighbours_of(mesh.faces, n)
     noise = np.random.default_rng(0).normal(0.0, 0.1, n)
-    even = _evened(0.3 + noise, np.ones(n), neighbours)
+    even = _smooth_offsets(0.3 + noise, np.ones(n), neighbours)
     assert even.mean() == pytest.approx(0.3, abs=0.02)
     assert even.std() < 0.5 * noise.std()
-    np.testing.assert_allclose(_evened(np.full(n, 0.3), np.ones(n), neighbours), 0.3)
-    assert not _evened(noise, np.zeros(n), neighbours).any()
+    np.testing.assert_allclose(_smooth_offsets(np.full(n, 0.3), np.ones(n), neighbours), 0.3)
+    assert not _smooth_offsets(noise, np.zeros(n), neighbours).any()
     # One wild value without weight is not heard at all.
     weight, wild = np.ones(n), np.full(n, 0.3)
     weight[n // 2], wild[n // 2] = 0.0, 50.0
-    np.testing.assert_allclose(_evened(wild, weight, neighbours), 0.3)
+    np.testing.assert_allclose(_smooth_offsets(wild, weight, neighbours), 0.3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.simplify import is_closed
-from navapp.preop.ct_surface import surfaces_of
+from navapp.preop.ct_surface import make_surfaces
 from navapp.preop.segmentation import segment
 from navapp.preop.volume import CtVolume
 from sim_devices.anatomy import KneeSpec, make_knee
@@ -24,7 +24,7 @@ def found(knee):
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = made.direction * made.spacing_mm, made.origin_mm
     segmentation = segment(CtVolume(made.hounsfield, matrix, made.spacing_mm))
-    return segmentation, surfaces_of(segmentation)
+    return segmentation, make_surfaces(segmentation)
 
 
 def to_mesh_mm(points, mesh):

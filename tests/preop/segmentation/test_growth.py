@@ -7,7 +7,7 @@ import pytest
 
 from navapp.preop.segmentation.cores import find_cores
 from navapp.preop.segmentation.growth import _put_bone, _up_to_plates, grow
-from navapp.preop.segmentation.masks import components
+from navapp.preop.segmentation.masks import label_components
 from navapp.preop.segmentation.plates import find_plates
 from navapp.preop.segmentation.solids import find_solids
 from tests.preop.ct_phantoms import (
@@ -79,7 +79,7 @@ def boxes(points, gap_mm):
 )
 def test_two_bones_a_millimetre_apart_come_apart(shapes, size, threshold_hu):
     hu, depths_mm = shapes(points_of(size, lattice(size, SPACING_MM)), 1.3)
-    one = components(hu > 200.0, SPACING_MM, 100.0)
+    one = label_components(hu > 200.0, SPACING_MM, 100.0)
     assert one[depths_mm[0] > RIM_MM].max() == one[depths_mm[1] > RIM_MM].max()
     assert_bones_are(parted(hu, 2, threshold_hu), depths_mm)
 
@@ -115,7 +115,7 @@ def test_three_and_four_bones_of_one_component(n_bones):
         ((5.4, -11, 1), (22, 11, 20)),
     ][:n_bones]
     hu = SOFT_HU + sum(hollow_box(points, *edges) for edges in edges_mm)
-    assert components(hu > 200.0, SPACING_MM, 100.0).max() == 1
+    assert label_components(hu > 200.0, SPACING_MM, 100.0).max() == 1
     assert_bones_are(parted(hu, n_bones), [in_box(points, *edges) for edges in edges_mm])
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from navapp.preop.segmentation.naming import parts_of
+from navapp.preop.segmentation.bone_naming import parts_of
 from navapp.preop.segmentation.seeds import with_seeds
 from navapp.preop.volume import CtVolume
 from tests.preop.ct_phantoms import OBLIQUE, lattice, leaning_axes, points_of

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from navapp.preop.segmentation.masks import components, depth_mm
+from navapp.preop.segmentation.masks import compute_depth_mm, label_components
 from navapp.preop.segmentation.solids import find_solids
 from navapp.preop.volume.hounsfield import PADDING_HU
 from tests.preop.ct_phantoms import (
@@ -38,7 +38,7 @@ def test_a_hollow_bone_is_one_solid_with_its_marrow():
     solid = find_solids(noisy(bone()), SPACING_MM, 200.0)
     assert solid[within(LOWER_MM, UPPER_MM, 0.6)].all()
     assert not solid[~within(LOWER_MM, UPPER_MM, -1.2)].any()
-    assert components(solid, SPACING_MM, 0.0).max() == 1
+    assert label_components(solid, SPACING_MM, 0.0).max() == 1
 
 
 @pytest.mark.parametrize("threshold_hu", [150.0, 350.0])
@@ -58,7 +58,7 @@ def test_a_shaft_that_ends_in_padding_keeps_its_marrow():
     r = np.hypot(POINTS[..., 0], POINTS[..., 1])
     assert solid[(r < 11.4) & ~is_padding].all()
     # A sheet of voxels may stay where flesh ends obliquely, too thin for any core.
-    assert depth_mm(solid & ((r > 13.2) | is_padding), SPACING_MM).max() < 1.0
+    assert compute_depth_mm(solid & ((r > 13.2) | is_padding), SPACING_MM).max() < 1.0
 
 
 def test_a_table_in_air_and_debris_are_left_out():

@@ -34,7 +34,7 @@ def test_points_and_indices_are_inverse_also_between_and_outside_voxels():
 def test_a_crop_stays_where_it_is():
     volume = leaning()
     lower, upper = np.array([1, 2, 1]), np.array([5, 4, 3])
-    crop = volume.cropped(lower, upper)
+    crop = volume.crop(lower, upper)
     assert crop.size == (4, 2, 2)
     for index in np.ndindex(4, 2, 2):
         there = np.array(index) + lower
@@ -47,7 +47,7 @@ def test_a_crop_stays_where_it_is():
 def test_a_crop_of_labels_is_labels():
     volume = leaning()
     labels = LabelVolume(volume.hu.astype(np.uint8), volume.lps_from_index, volume.spacing_mm)
-    assert isinstance(labels.cropped((0, 0, 0), (1, 2, 3)), LabelVolume)
+    assert isinstance(labels.crop((0, 0, 0), (1, 2, 3)), LabelVolume)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_a_crop_of_labels_is_labels():
 )
 def test_a_crop_beyond_the_volume_or_of_nothing_is_refused(lower, upper):
     with pytest.raises(ValueError, match="not inside"):
-        leaning().cropped(lower, upper)
+        leaning().crop(lower, upper)
 
 
 def test_the_place_cannot_be_written():

@@ -107,10 +107,10 @@ def test_errors_do_not_name_the_patient(folder, spoil, caplog, capfd):
 
 def test_short_words_are_hidden_where_they_stand_alone():
     identity = Identity({"Li^Bo", "7"})
-    assert identity.hidden_in("Li's spline of BO 1.7_li") == (
+    assert identity.hide_in("Li's spline of BO 1.7_li") == (
         "[hidden]'s spline of [hidden] 1.7_[hidden]"
     )
 
 
 def test_nothing_is_hidden_where_nothing_is_known():
-    assert Identity({"", " "}).hidden_in("Knee 1.0") == "Knee 1.0"
+    assert Identity({"", " "}).hide_in("Knee 1.0") == "Knee 1.0"

@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 import SimpleITK as sitk  # noqa: N813
 
-from navapp.preop.volume.itk_package import codecs_heard, lps_from_index_of, simple_itk, voxels_of
+from navapp.preop.volume.itk_package import (
+    import_simple_itk,
+    listen_to_codecs,
+    lps_from_index_of,
+    voxels_of,
+)
 
 
 def test_what_is_written_to_the_terminal_by_a_codec_is_heard_and_not_shown(capfd):
-    with codecs_heard() as has_complained:
+    with listen_to_codecs() as has_complained:
         assert not has_complained()
         os.write(2, b"progress 12 %\n")
         assert not has_complained()
@@ -22,7 +27,7 @@ def test_what_is_written_to_the_terminal_by_a_codec_is_heard_and_not_shown(capfd
 
 def test_the_terminal_comes_back_after_an_error(capfd):
     n_open = len(os.listdir("/proc/self/fd"))
-    with pytest.raises(ZeroDivisionError), codecs_heard():
+    with pytest.raises(ZeroDivisionError), listen_to_codecs():
         os.write(2, b"hidden\n" * (1 // 0))
     os.write(2, b"shown\n")
     assert capfd.readouterr().err == "shown\n"
@@ -30,7 +35,7 @@ def test_the_terminal_comes_back_after_an_error(capfd):
 
 
 def test_warnings_of_the_package_are_off():
-    assert not simple_itk().ProcessObject.GetGlobalWarningDisplay()
+    assert not import_simple_itk().ProcessObject.GetGlobalWarningDisplay()
 
 
 def test_a_matrix_is_what_simpleitk_does_with_an_index():

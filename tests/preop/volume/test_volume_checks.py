@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.preop.volume import CtVolume
-from navapp.preop.volume.volume_checks import content_warnings, refusal_of
+from navapp.preop.volume.volume_checks import make_content_warnings, refusal_of
 
 
 def knee(spacing=(1.0, 1.0, 1.0), size=(90, 90, 90), flesh_hu=50):
@@ -16,7 +16,7 @@ def knee(spacing=(1.0, 1.0, 1.0), size=(90, 90, 90), flesh_hu=50):
 
 def test_a_good_ct_has_nothing_to_say():
     assert refusal_of(knee()) is None
-    assert content_warnings(knee()) == []
+    assert make_content_warnings(knee()) == []
 
 
 def test_air_and_padding_only_are_refused():
@@ -55,7 +55,7 @@ def test_voxels_of_another_unit_are_refused(spacing):
 )
 def test_coarse_or_long_voxels_are_said(spacing, is_said):
     size = tuple(int(np.ceil(81.0 / step)) for step in spacing)
-    said = content_warnings(knee(spacing, size))
+    said = make_content_warnings(knee(spacing, size))
     assert any("voxels are" in warning for warning in said) == is_said
     assert len(said) == is_said
 
@@ -63,19 +63,19 @@ def test_coarse_or_long_voxels_are_said(spacing, is_said):
 def test_metal_is_said_with_its_volume():
     volume = knee()
     volume.hu[40:50, 40:50, 40:50] = 3071
-    (said,) = content_warnings(volume)
+    (said,) = make_content_warnings(volume)
     assert said.startswith("metal: 1 cm3")
     volume.hu[40:50, 40:50, 40:50] = 3070
-    assert content_warnings(volume) == []
+    assert make_content_warnings(volume) == []
 
 
 def test_a_small_field_of_view_is_said():
-    (said,) = content_warnings(knee(size=(90, 90, 79)))
+    (said,) = make_content_warnings(knee(size=(90, 90, 79)))
     assert "90 x 90 x 79 mm, too small" in said
 
 
 def test_values_without_air_are_said():
     volume = knee()
     volume.hu[volume.hu < 0] = 0
-    (said,) = content_warnings(volume)
+    (said,) = make_content_warnings(volume)
     assert "may not be Hounsfield" in said

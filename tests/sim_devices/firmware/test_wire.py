@@ -41,7 +41,7 @@ def arrivals(spoiler: wire.Spoiler, *messages: bytes) -> list[tuple[float, bytes
     talker.out = list(messages)
     found = []
     while True:
-        if data := line.arrived():
+        if data := line.take_arrived():
             found.append((clock.now_ns() / 1e9, data))
         if (next_ns := line.next_ns()) is None:
             return found
@@ -50,13 +50,13 @@ def arrivals(spoiler: wire.Spoiler, *messages: bytes) -> list[tuple[float, bytes
 
 def test_what_happens_to_messages() -> None:
     assert arrivals(wire.whole, b"ab", b"c") == [(0.0, b"abc")]
-    assert arrivals(wire.lost, b"ab") == []
-    assert arrivals(wire.doubled, b"ab") == [(0.0, b"abab")]
+    assert arrivals(wire.lose, b"ab") == []
+    assert arrivals(wire.double, b"ab") == [(0.0, b"abab")]
     assert arrivals(wire.split(0.5), b"ab") == [(0.5, b"a"), (1.0, b"b")]
     assert arrivals(wire.late(2.0), b"ab") == [(2.0, b"ab")]
-    assert arrivals(wire.preceded_by(b"x"), b"ab") == [(0.0, b"xab")]
-    assert arrivals(wire.first(1, wire.lost), b"ab", b"cd") == [(0.0, b"cd")]
-    ((_, data),) = arrivals(wire.corrupted(random.Random(1)), b"abcd")
+    assert arrivals(wire.precede_by(b"x"), b"ab") == [(0.0, b"xab")]
+    assert arrivals(wire.first(1, wire.lose), b"ab", b"cd") == [(0.0, b"cd")]
+    ((_, data),) = arrivals(wire.corrupt(random.Random(1)), b"abcd")
     assert bin(int.from_bytes(data, "big") ^ int.from_bytes(b"abcd", "big")).count("1") == 1
 
 

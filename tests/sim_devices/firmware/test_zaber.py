@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from drivers.clock import ManualClock
-from sim_devices.firmware.stage_motion import to_place, to_rest
+from sim_devices.firmware.stage_motion import travel_to, travel_to_rest
 from sim_devices.firmware.zaber import StageFirmware
 from tests.sim_devices.firmware.terminals import Terminal
 
@@ -78,7 +78,7 @@ def test_random_bytes_do_it_no_harm() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [(0.0, 1000.0), (50.0, 0.0), (0.0, 1.0), (3.0, 3.0)])
 def test_a_travel_is_smooth_and_ends_where_it_should(start, end) -> None:
-    travel = to_place(0, start, end, 100.0, 500.0)
+    travel = travel_to(0, start, end, 100.0, 500.0)
     moments_ns = range(0, travel.end_ns + 1_000_000, 1_000_000)
     places = [travel.at(t)[0] for t in moments_ns]
     steps = [abs(b - a) for a, b in pairwise(places)]
@@ -88,6 +88,6 @@ def test_a_travel_is_smooth_and_ends_where_it_should(start, end) -> None:
 
 
 def test_stopping_takes_its_way() -> None:
-    travel = to_rest(0, 10.0, -100.0, 500.0)
+    travel = travel_to_rest(0, 10.0, -100.0, 500.0)
     assert travel.at(travel.end_ns)[0] == pytest.approx(0.0)
     assert travel.end_ns == 200_000_000

@@ -5,7 +5,7 @@ import pytest
 
 from navapp.tracking.box.picture_box import PictureBox
 from navapp.tracking.box.tracker import BoxState, BoxTracker, follow_box, place_box, reduced
-from navapp.values import LineTimings, PoseEstimate, Status, TrackedFrame, Verdict
+from navapp.values import FrameTimings, PoseEstimate, Status, TrackedFrame, Verdict
 from tests.tracking.box.pictures import BOX, box_at, empty, enlarged, scene
 from tests.tracking.rooms import room
 
@@ -147,7 +147,7 @@ def test_only_an_ok_frame_teaches() -> None:
     a = room()
     truth, left = a.truth(a.frames[0]), a.frames[0].left
     estimate = PoseEstimate(truth, np.eye(6), 500, 1.0, 0.2, 0.2, 3, True)
-    ok = TrackedFrame("femur", estimate, Verdict(Status.OK), LineTimings())
+    ok = TrackedFrame("femur", estimate, Verdict(Status.OK), FrameTimings())
     doubted = replace(ok, verdict=Verdict(Status.DEGRADED))
     lost = replace(ok, verdict=Verdict(Status.LOST))
     assert boxes().place(None, left, ok).memory is not None

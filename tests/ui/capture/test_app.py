@@ -21,7 +21,7 @@ from navapp.control.capture.states import (
 )
 from navapp.control.states import Progress
 from navapp.ui.capture.app import CaptureApp
-from navapp.ui.capture.panels import CaptureView, CoverageMap, WishLines
+from navapp.ui.capture.panels import CaptureView, CoverageMap, InstructionLines
 from navapp.ui.symbols import ASCII, UNICODE
 
 
@@ -44,7 +44,7 @@ SEEKING = CaptureSnapshot(
         Check("still", False, "41 px/s"),
         Check("new", True),
     ),
-    wish="move it 40 mm to the left, 60 mm nearer; tilt its top away by 20 deg; turn it "
+    instruction="move it 40 mm to the left, 60 mm nearer; tilt its top away by 20 deg; turn it "
     "clockwise by 90 deg",
     n_kept=12,
     bound_mm=0.21,
@@ -165,7 +165,9 @@ def test_the_outcome_is_said_with_its_reasons():
 
 
 def test_enough_is_said():
-    text = play(change(SEEKING, is_enough=True, bound_mm=0.14, wish="nothing: this is enough"))[2]
+    text = play(
+        change(SEEKING, is_enough=True, bound_mm=0.14, instruction="nothing: this is enough")
+    )[2]
     assert "ENOUGH" in text
 
 
@@ -226,6 +228,6 @@ def test_a_lost_camera_comes_before_everything_else() -> None:
     )  # fmt: skip
     view = CaptureView(snapshot, UNICODE)
     assert view.state[0] == "NO CAMERA"
-    lines = [line.plain for line in WishLines("wish").build(view, 80, 2)]
+    lines = [line.plain for line in InstructionLines("wish").build(view, 80, 2)]
     assert "the camera was unplugged" in lines[0]
     assert "accepted" not in " ".join(lines)

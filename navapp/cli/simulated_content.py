@@ -1,0 +1,113 @@
+"""Surgical content of a plan for the simulated knee, constructed from its landmarks."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from navapp.devices import Simulation
+from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from navapp.values import (
+    ANKLE_CENTRE,
+    HIP_CENTRE,
+    Box,
+    Cylinder,
+    Defect,
+    DrillAxis,
+    Landmark,
+    Part,
+    ResectionPlane,
+    RiskStructure,
+    StageContent,
+    SurgicalContent,
+)
+
+# By the book: as much bone as the component is thick, the tibia's cut falling to the back.
+_RESECTION_MM, _SLOPE_DEG = 9.0, 3.0
+_DRILL_DIAMETER_MM, _DRILL_DEPTH_MM = 9.0, 25.0
+_SAFETY_MM = 5.0
+# Lengths of a thigh and a shank, by way of the knee's own size.
+_HIP_ABOVE, _ANKLE_BELOW = 5.4, 4.6
+
+_UP, _BACK = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+
+
+def make_built_in_content(simulation: Simulation) -> SurgicalContent:
+    """All that a plan can hold, of the simulated patient."""
+    points = {name: np.asarray(point) for name, point in simulation.targets.items()}
+    planes = _planes(points)
+    entry = DrillAxis(
+        "femur",
+        simulation.drill_entry_mm,
+        simulation.drill_direction,
+        _DRILL_DEPTH_MM,
+        _DRILL_DIAMETER_MM,
+    )
+    return SurgicalContent(
+        planes=planes,
+        drills={"femoral_guide": entry},
+        parts=_parts(planes),
+        risks={name: RiskStructure("femur", _SAFETY_MM) for name in simulation.curves},
+        landmarks=_landmarks(points),
+        defects={"worn_medial": Defect("femur", simulation.worn_vertices)},
+        stages={
+            "opening": StageContent("femur", risks=tuple(simulation.curves)),
+            "drilling": StageContent(
+                "femur", drills=("femoral_guide",), risks=tuple(simulation.curves)
+            ),
+            "implant": StageContent("femur", planes=("femur_distal",), parts=("femoral_implant",)),
+            "patella": StageContent("patella", planes=("patella",), parts=("patellar_implant",)),
+            "spacer": StageContent("tibia", planes=("tibia_proximal",), parts=("spacer",)),
+        },
+    )
+
+
+def _planes(points: Mapping[str, FloatArray]) -> dict[str, ResectionPlane]:
+    lowest = min(
+        (points["femur/medial_condyle"], points["femur/lateral_condyle"]), key=lambda p: p[2]
+    )
+    distal = np.array([*points["femur/notch"][:2], lowest[2] + _RESECTION_MM])
+    plateaus = np.stack([points["tibia/medial_plateau"], points["tibia/lateral_plateau"]])
+    proximal = np.append(plateaus[:, :2].mean(axis=0), plateaus[:, 2].max() - _RESECTION_MM)
+    slope = rotation_from_vector((-np.radians(_SLOPE_DEG), 0.0, 0.0)) @ _UP
+    return {
+        "femur_distal": ResectionPlane("femur", distal, -_UP, (80.0, 60.0)),
+        "tibia_proximal": ResectionPlane("tibia", proximal, slope, (80.0, 55.0)),
+        "patella": ResectionPlane(
+            "patella", points["patella/ridge"] - _RESECTION_MM * _BACK, _BACK, (45.0, 40.0)
+        ),
+    }
+
+
+def _parts(planes: Mapping[str, ResectionPlane]) -> dict[str, Part]:
+    """Components on their cuts, as thick as what was removed."""
+    plate = Box((66.0, 52.0, _RESECTION_MM))
+    button = Cylinder(30.0, _RESECTION_MM)
+    liner = Box((68.0, 44.0, _RESECTION_MM))
+    return {
+        "femoral_implant": Part("implant", plate, _on(planes["femur_distal"], "femoral_implant")),
+        "patellar_implant": Part("implant", button, _on(planes["patella"], "patellar_implant")),
+        "spacer": Part("spacer", liner, _on(planes["tibia_proximal"], "spacer")),
+    }
+
+
+def _on(plane: ResectionPlane, name: str) -> RigidTransform:
+    """`bone_from_part`: its z along the plane's normal, its lower face on the cut."""
+    corners = plane.corners_mm()
+    across = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
+    rotation = np.column_stack([across, np.cross(plane.normal, across), plane.normal])
+    return RigidTransform.from_parts(
+        plane.bone, name, rotation, plane.point_mm + 0.5 * _RESECTION_MM * plane.normal
+    )
+
+
+def _landmarks(points: Mapping[str, FloatArray]) -> dict[str, Landmark]:
+    """The simulator's own are exact; the far joints are where a leg of that size has them."""
+    width_mm = float(
+        np.linalg.norm(points["femur/medial_epicondyle"] - points["femur/lateral_epicondyle"])
+    )
+    middle = 0.5 * (points["tibia/medial_plateau"] + points["tibia/lateral_plateau"])
+    centres = {
+        HIP_CENTRE: points["femur/notch"] + _HIP_ABOVE * width_mm * _UP,
+        ANKLE_CENTRE: middle - _ANKLE_BELOW * width_mm * _UP,
+    }
+    return {name: Landmark(p, 0.0, "simulation") for name, p in {**points, **centres}.items()}

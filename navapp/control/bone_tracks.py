@@ -1,0 +1,177 @@
+"""Poses of the session's bones: accepted tracks, and candidates under review."""
+
+from dataclasses import dataclass, replace
+
+from drivers.frames import StereoFrame
+from navapp.control.registration_job import Registration
+from navapp.control.trackers import Trackers
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking import TrackState
+from navapp.values import FrameTimings, StageSpec, Status, TrackedFrame, Verdict
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A pose of the stage's bone that waits for the operator's decision.
+
+    Attributes:
+        track: where it is now.
+        tracked: the tracker's newest answer for it.
+        is_held: judged as it stands (proposed by hand), not followed.
+        number: it is the n-th ...
+        count: ... of how many.
+    """
+
+    track: TrackState
+    tracked: TrackedFrame
+    is_held: bool = False
+    number: int = 1
+    count: int = 1
+
+
+class BoneTracks:
+    """The accepted track of each bone, and the candidates of the stage's bone, best first.
+
+    Args:
+        trackers: of the bones.
+
+    Attributes:
+        track_number: of the candidate or track by which the stage's bone is followed: the same from
+            frame to frame, another after a new search or with another candidate.
+    """
+
+    def __init__(self, trackers: Trackers) -> None:
+        self._trackers = trackers
+        self._tracks: dict[str, TrackState] = {}
+        self._candidates: list[Candidate] = []
+        self._n_reviewed = 0
+        self.track_number = 0
+
+    @property
+    def candidate(self) -> Candidate | None:
+        """The pose under review."""
+        return self._candidates[0] if self._candidates else None
+
+    @property
+    def candidate_id(self) -> int | None:
+        """Of the pose under review, another one for each of a session; None when there is none.
+
+        It counts what came under review, which a replay of a recorded session does in the same way.
+        """
+        return self._n_reviewed if self._candidates else None
+
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """Bones of which a pose was accepted, in that order."""
+        return tuple(self._tracks)
+
+    def is_accepted(self, stage: StageSpec) -> bool:
+        """A pose of the stage's bone was accepted before."""
+        return stage.bone in self._tracks
+
+    def offer(self, registration: Registration) -> None:
+        """Put the answers of a registration under review, all but the lost ones."""
+        self.drop_candidates()
+        self._n_reviewed += 1
+        found = [
+            (answer, answer.left_from_bone)
+            for answer in registration.answers
+            if answer.verdict.status is not Status.LOST
+        ]
+        self._candidates = [
+            Candidate(
+                TrackState.at_rest(pose, registration.captured_ns, answer.verdict.cause),
+                answer,
+                False,
+                number,
+                len(found),
+            )
+            for number, (answer, pose) in enumerate(found, start=1)
+            if pose is not None
+        ]
+
+    def propose(self, bone: str, pose: RigidTransform, now_ns: int) -> None:
+        """Put a pose under review that will be judged as it stands."""
+        self.drop_candidates()
+        self._n_reviewed += 1
+        track = TrackState.at_rest(pose, now_ns)
+        self._candidates = [Candidate(track, _make_unjudged(bone), is_held=True)]
+
+    def drop_candidates(self) -> None:
+        """Forget the candidates; accepted tracks stay."""
+        self._candidates = []
+        self.track_number += 1
+
+    def forget_verdicts(self) -> None:
+        """The candidates must be judged anew before one can be accepted."""
+        self._candidates = [
+            replace(candidate, tracked=_make_unjudged(candidate.tracked.bone))
+            for candidate in self._candidates
+        ]
+
+    def accept(self, stage: StageSpec) -> None:
+        """The candidate is the bone's pose from now on."""
+        self._tracks[stage.bone] = self._candidates[0].track
+        self._candidates = []
+
+    def reject(self) -> Candidate:
+        """Take the candidate out; the next one, if any, comes under review."""
+        self.track_number += 1
+        self._n_reviewed += 1
+        return self._candidates.pop(0)
+
+    def review(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Follow the candidate into a frame, or judge a proposed pose where it stands."""
+        candidate = self._candidates[0]
+        tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
+        left, right, track = frame.left, frame.right, candidate.track
+        if candidate.is_held:
+            tracked = tracker.assess(left, right, track.left_from_bone, goal)
+        else:
+            tracked, track = tracker.track(left, right, frame.captured_ns, track, goal)
+        self._candidates[0] = replace(candidate, tracked=tracked, track=track)
+        return tracked
+
+    def follow(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Follow the accepted bone into a frame."""
+        tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
+        track = self._tracks[stage.bone]
+        tracked, track = tracker.track(frame.left, frame.right, frame.captured_ns, track, goal)
+        self._tracks[stage.bone] = track
+        return tracked
+
+    def glance(
+        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None
+    ) -> TrackedFrame:
+        """Follow an accepted bone into a frame if it is near where it is expected.
+
+        Args:
+            stage: whose bone, and by whose goal.
+            frame: the next one.
+            moved: in the left camera, how something that the bone goes with has moved meanwhile.
+        """
+        tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
+        track = self._tracks[stage.bone]
+        if moved is not None:
+            track = track.carried(moved)
+        tracked, track = tracker.glance(frame.left, frame.right, frame.captured_ns, track, goal)
+        self._tracks[stage.bone] = track
+        return tracked
+
+    def register_now(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
+        """Register a bone without a review: the best answer, if not lost, is its pose from now on.
+
+        For replays, where nobody is there to be asked.
+        """
+        answers = self._trackers.register(stage, frame)
+        best = answers[0] if answers else _make_unjudged(stage.bone)
+        pose, verdict = best.left_from_bone, best.verdict
+        if pose is not None and verdict.status is not Status.LOST:
+            track = TrackState.at_rest(pose, frame.captured_ns, verdict.cause)
+            self._tracks[stage.bone] = track
+        return best
+
+
+def _make_unjudged(bone: str) -> TrackedFrame:
+    """Of a pose that no frame has judged: it counts as lost and cannot be accepted."""
+    return TrackedFrame(bone, None, Verdict(Status.LOST), FrameTimings())

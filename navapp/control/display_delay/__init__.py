@@ -1,0 +1,1 @@
+"""How late the display is seen: a code shown on it and recorded with the camera."""

@@ -1,0 +1,109 @@
+"""The snapshot of a session, with the interlocks' answer in it."""
+
+from dataclasses import dataclass, replace
+
+from navapp.control.camera_link import CameraLink
+from navapp.control.device_handlers import DeviceReport
+from navapp.control.device_lines import camera_line, display_line, rig_line
+from navapp.control.device_monitor import MonitoredDevices
+from navapp.control.display_link import DisplayLink
+from navapp.control.interlocks import check_interlocks
+from navapp.control.rig_watch import RigWatch
+from navapp.control.session import Session
+from navapp.control.stages import STAGES
+from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
+from navapp.geometry.rig import StereoRig
+from navapp.values import Plan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SnapshotMaker:
+    """Makes the snapshots of a session and its devices.
+
+    Attributes:
+        session: what is known.
+        camera: in use.
+        display: in use.
+        monitored: projector and mirror.
+        rig: of the camera.
+        rig_watch: that watches it.
+        plan: of the operation.
+        is_recording: the session is kept in a folder.
+    """
+
+    session: Session
+    camera: CameraLink
+    display: DisplayLink
+    monitored: MonitoredDevices
+    rig: StereoRig
+    rig_watch: RigWatch
+    plan: Plan
+    is_recording: bool
+
+    def make(self) -> Snapshot:
+        """As of now."""
+        session = self.session
+        now_ns = session.now_ns
+        tracked = session.tracked
+        # A candidate that was not followed into a frame yet is not on the screen.
+        is_candidate = session.state is SessionState.REVIEW and tracked is not None
+        reports = self.monitored.reports
+        bone = self.plan.bones.get(session.stage.bone)
+        draft = Snapshot(
+            time_ns=now_ns,
+            state=session.state,
+            stage=session.stage,
+            stages=STAGES,
+            reasons=(),
+            is_blanked=self.display.is_blanked,
+            verdict=None if tracked is None else tracked.verdict,
+            left_from_bone=None if tracked is None else tracked.left_from_bone,
+            candidate_id=session.candidate_id if is_candidate else None,
+            pose_age_ms=session.pose_age_ms(now_ns),
+            others=session.other_bones(now_ns),
+            preview=session.preview,
+            rates=session.rates(self.camera.n_dropped),
+            devices=self._device_lines(reports),
+            events=session.events,
+            progress=self._progress(),
+            rig_name=self.rig.name,
+            is_simulated=self._is_simulated,
+            is_recording=self.is_recording,
+            plan_name=self.plan.name,
+            plan_digest=self.plan.digest,
+            side="" if bone is None or bone.side is None else bone.side,
+            sequence=session.sequence,
+            is_bone_planned=bone is not None,
+            device_reasons=tuple(report.reason for report in reports if report.reason is not None),
+            is_camera_silent=self.camera.is_silent,
+            rig_alarm="" if session.rig_error is None else session.rig_error.problem,
+            length_check=self.rig_watch.length_check,
+            is_over=session.is_over,
+        )
+        return replace(draft, reasons=check_interlocks(draft))
+
+    @property
+    def _is_simulated(self) -> bool:
+        """The pictures are not of this world; a replayed rig still says so by its name."""
+        return self.camera.camera.info.is_simulated or self.rig.name.startswith("sim:")
+
+    def _device_lines(self, reports: tuple[DeviceReport, ...]) -> tuple[DeviceLine, ...]:
+        lines = (
+            camera_line(self.camera.camera.info, self.camera.trouble, self.camera.silence),
+            display_line(self.display.display.info, self.display.trouble),
+            *(report.line for report in reports),
+        )
+        if self.session.rig_error is None and not self.rig_watch.has_board:
+            return lines
+        problem = "" if self.session.rig_error is None else self.session.rig_error.problem
+        watch, now_ns = self.rig_watch, self.session.now_ns
+        line = rig_line(self.rig.name, problem, watch.length_check, now_ns, watch.unjudged)
+        return (*lines, line)
+
+    def _progress(self) -> Progress | None:
+        share = self.session.search_progress
+        if share is not None:
+            return Progress(f"searching for the {self.session.stage.bone}", share)
+        if self.session.state is SessionState.STARTING:
+            return Progress("waiting for the first picture", 0.0)
+        return None

@@ -1,0 +1,84 @@
+"""What a session is about, before any device is opened."""
+
+from dataclasses import dataclass
+
+from navapp.config import Configuration
+from navapp.control.stages import STAGES
+from navapp.geometry.rig import StereoRig
+from navapp.tracking import Method, TrackerSettings
+from navapp.values import Plan, Prior, StageSpec
+
+_DEPTH_MM = TrackerSettings().depth_mm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionSpecification:
+    """Everything that a session is started with, except its devices.
+
+    Attributes:
+        rig: of the pictures.
+        plan: of the operation.
+        prior: where the bones may be before a first registration.
+        stage: in force at the start.
+        method: of pose estimation.
+        depth_mm: nearest and farthest surface of the working volume.
+        others: bones that are registered from the prior and followed, too, unasked.
+        overlay_valid_ms: how long a picture may stay on the display without a newer one.
+        mirror_deg: where the mirror stood when the display was calibrated.
+        is_recording: the session is kept in a folder.
+    """
+
+    rig: StereoRig
+    plan: Plan
+    prior: Prior
+    stage: StageSpec = STAGES[0]
+    method: Method = "bimcc"
+    depth_mm: tuple[float, float] = _DEPTH_MM
+    others: tuple[str, ...] = ()
+    overlay_valid_ms: float = 500.0
+    mirror_deg: float = 45.0
+    is_recording: bool = False
+
+    @property
+    def tracker_settings(self) -> TrackerSettings:
+        """Of all trackers of the session."""
+        return TrackerSettings(self.method, depth_mm=self.depth_mm)
+
+
+def specify_session(
+    configuration: Configuration,
+    rig: StereoRig,
+    plan: Plan,
+    prior: Prior,
+    stage: StageSpec,
+    *,
+    is_live: bool,
+    method: Method | None = None,
+    others: tuple[str, ...] = (),
+) -> SessionSpecification:
+    """What is configured, for given rig, plan, prior and stage.
+
+    Args:
+        configuration: of everything else.
+        rig: of the pictures.
+        plan: of the operation.
+        prior: where the bones may be before a first registration.
+        stage: in force at the start.
+        is_live: the display shows pictures as late as it was measured, and the session may be
+            recorded; neither is true of a replay.
+        method: of pose estimation; None: the configured one.
+        others: bones that are registered and followed unasked.
+    """
+    display = configuration.display
+    return SessionSpecification(
+        rig,
+        plan,
+        prior,
+        stage,
+        method or configuration.tracking.method,
+        configuration.camera.depth_mm,
+        others,
+        display.withdrawn_ms if is_live else display.valid_ms,
+        configuration.mirror.calibrated_deg,
+        is_live and configuration.recording.folder is not None,
+    )

@@ -1,0 +1,106 @@
+"""Opens the devices of a session, from a configuration or a recording."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from calibration.targets.boards import Board
+from drivers.clock import Clock, ManualClock, SystemClock
+from drivers.interfaces import DeviceSet, StereoCamera
+from drivers.replay_camera import ReplayCamera, ReplaySettings
+from navapp.config import Configuration
+from navapp.devices.cameras import make_real_camera
+from navapp.devices.peripherals import make_device_set
+from navapp.devices.rig_match import make_reopener, open_matching, read_configured_rig
+from navapp.devices.simulated_room import (
+    Pace,
+    Simulation,
+    make_simulated_camera,
+    scenario_of,
+    simulation_of,
+    with_board,
+)
+from navapp.errors import DeviceError
+from navapp.geometry import StereoRig
+from sim_devices.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedDevices:
+    """Opened devices with the rig that took the pictures."""
+
+    devices: DeviceSet
+    rig: StereoRig
+    reopen_camera: Callable[[], StereoCamera]
+    simulation: Simulation | None = None
+
+
+def open_live(
+    configuration: Configuration, *, is_headless: bool, board: Board | None = None
+) -> OpenedDevices:
+    """Open the configured devices.
+
+    Args:
+        configuration: in force.
+        board: that is held into a simulated view, when the configuration says so.
+        is_headless: nobody watches; a simulated camera then waits to be read.
+
+    Raises:
+        DeviceError, RigError, ConfigurationError.
+    """
+    if configuration.camera.backend == "simulated":
+        return _open_simulated(configuration, board, is_headless=is_headless)
+    return _open_real(configuration)
+
+
+def open_recording(
+    source: str, settings: ReplaySettings, rig: StereoRig, configuration: Configuration
+) -> OpenedDevices:
+    """Open a recorded source as the camera of a stepped session.
+
+    Raises:
+        SequenceError: the source; RigError: pictures of another size than the rig's.
+    """
+    clock = ManualClock()
+    camera = ReplayCamera(source, clock, settings, rig_id=rig.rig_id)
+    open_matching(camera, rig)
+    devices = make_device_set(configuration, camera, clock, rig, is_live=False)
+    return OpenedDevices(devices, rig, _no_reopening)
+
+
+def _open_simulated(
+    configuration: Configuration, board: Board | None, *, is_headless: bool
+) -> OpenedDevices:
+    settings = configuration.camera.simulated
+    world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=is_headless)
+    scene = with_board(world, board, settings)
+    camera = make_simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
+    if configuration.camera.rig is not None:
+        rig = read_configured_rig(configuration)
+    else:
+        rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
+    simulation = simulation_of(world, camera)
+    return _open_devices(configuration, camera, pace.clock, rig, simulation)
+
+
+def _open_real(configuration: Configuration) -> OpenedDevices:
+    clock = SystemClock()
+    rig = read_configured_rig(configuration)
+    camera = make_real_camera(configuration, clock, rig.rig_id)
+    return _open_devices(configuration, camera, clock, rig)
+
+
+def _open_devices(
+    configuration: Configuration,
+    camera: StereoCamera,
+    clock: Clock,
+    rig: StereoRig,
+    simulation: Simulation | None = None,
+) -> OpenedDevices:
+    open_matching(camera, rig)
+    reopen = make_reopener(camera, lambda: open_matching(camera, rig))
+    devices = make_device_set(configuration, camera, clock, rig)
+    return OpenedDevices(devices, rig, reopen, simulation)
+
+
+def _no_reopening() -> StereoCamera:
+    raise DeviceError("a recording cannot be reopened")
