@@ -100,7 +100,7 @@ class SimulatedCamera:
         self._is_stepped = is_stepped
         self._rate_hz = rate_hz
         self._scale = scale
-        self._rig = world.rig if scale == 1.0 else world.rig.scaled(scale)
+        self._rig = world.rig if scale == 1.0 else world.rig.scale(scale)
         self._nominal_sensor = sensor or SensorModel()
         self._faults = faults or FaultScript()
         self._skew_ns = skew_ns

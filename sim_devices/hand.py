@@ -44,7 +44,7 @@ class Hand:
     def move_to(self, left_from_body: RigidTransform) -> None:
         """Go there, nearly: the hand ends up a little beside."""
         off = self._rng.normal(0.0, 1.0, 6) * np.repeat((_OFF_MM, _OFF_RAD), 3)
-        self._go(left_from_body.moved(off, left_from_body.apply(self._grip_mm)))
+        self._go(left_from_body.move(off, left_from_body.apply(self._grip_mm)))
 
     def nudge(self, shift_mm: ArrayLike, turn_rad: ArrayLike) -> None:
         """Go on from where the hand wants to be: a shift and a turn along the left camera's axes.
@@ -56,7 +56,7 @@ class Hand:
         with self._lock:
             wanted = self._to
         twist = np.concatenate([np.asarray(shift_mm, float), np.asarray(turn_rad, float)])
-        self._go(wanted.moved(twist, wanted.apply(self._grip_mm)))
+        self._go(wanted.move(twist, wanted.apply(self._grip_mm)))
 
     def left_from_body(self, time_ns: int) -> RigidTransform:
         """Where it is at a world time; a picture's time is also when commands since then begin."""
@@ -66,7 +66,7 @@ class Hand:
         seconds = time_ns / 1e9
         waves = np.sin(2.0 * np.pi * np.array(_TREMOR_HZ)[:, None] * seconds + self._phases)
         twist = waves.mean(axis=0) * np.repeat((_TREMOR_MM, _TREMOR_RAD), 3)
-        return pose.moved(twist, pose.apply(self._grip_mm))
+        return pose.move(twist, pose.apply(self._grip_mm))
 
     def _go(self, target: RigidTransform) -> None:
         place_mm = target.apply(self._grip_mm)
@@ -87,7 +87,7 @@ class Hand:
             return self._to
         away_mm, turn_rad = _between(self._from, self._to, self._grip_mm)
         twist = done * np.concatenate([away_mm, turn_rad])
-        return self._from.moved(twist, self._from.apply(self._grip_mm))
+        return self._from.move(twist, self._from.apply(self._grip_mm))
 
 
 def _between(

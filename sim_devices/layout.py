@@ -46,7 +46,7 @@ def misplace(nominal: RigidTransform, seed: int) -> RigidTransform:
     turn, shift = rng.standard_normal((2, 3))
     turn *= np.radians(rng.uniform(*_PLACEMENT_DEG)) / np.linalg.norm(turn)
     shift *= rng.uniform(*_PLACEMENT_MM) / np.linalg.norm(shift)
-    return nominal.moved(np.concatenate([shift, turn]), nominal.translation_mm)
+    return nominal.move(np.concatenate([shift, turn]), nominal.translation_mm)
 
 
 def flex_knee(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
@@ -56,7 +56,7 @@ def flex_knee(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
     centre = np.array([0.0, condyles[:, 1].max() - 21.0, bottom + 22.0])
     rotation = rotation_from_vector((np.radians(_FLEXION_DEG), 0.0, 0.0))
     turned = RigidTransform.from_parts("femur", "tibia", rotation, centre - rotation @ centre)
-    gap = _gap_mm(femur.transformed(turned.inverse().renamed("tibia", "femur")), tibia)
+    gap = _gap_mm(femur.transform(turned.inverse().rename("tibia", "femur")), tibia)
     along = rotation @ (0.0, 0.0, gap - _JOINT_GAP_MM)
     return RigidTransform.from_parts("femur", "tibia", rotation, turned.translation_mm + along)
 

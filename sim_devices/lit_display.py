@@ -127,7 +127,7 @@ class DisplayInView:
         # Before this moment the display may still be told something that this picture shows.
         self._clock.wait_until_ns(until_ns - self._display.delay_ns)
         light = self._display.mean_light(from_ns, until_ns)
-        rig = self.rig if scale == 1.0 else self.rig.scaled(scale)
+        rig = self.rig if scale == 1.0 else self.rig.scale(scale)
         picture = np.full((rig.height, rig.width, 3), _WALL, np.float32)
         shift = _DISPARITY if eye == "right" else 0.0
         top, bottom = (round(share * rig.height) for share in _ROWS)

@@ -236,6 +236,18 @@ class Renderer:
                     self._screen, faces, first, box, self._inverse_depth, self._triangle
                 )
 
+    def _turn_lamps(
+        self, body_from_camera: list[RigidTransform], camera_from_lamps: RigidTransform
+    ) -> FloatImage:
+        """(parts, lamps, 4) direction to each lamp in each part's frame, and its strength."""
+        directions = camera_from_lamps.rotate(self._surfaces.lamps[:, :3])
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        lamps = np.empty((len(body_from_camera), len(directions), 4), dtype=np.float32)
+        for k, pose in enumerate(body_from_camera):
+            lamps[k, :, :3] = pose.rotate(directions)
+            lamps[k, :, 3] = self._surfaces.lamps[:, 3]
+        return lamps
+
     def _shade(
         self,
         box: NDArray[np.int64],
@@ -244,13 +256,8 @@ class Renderer:
         image: FloatImage,
     ) -> None:
         geometry, surfaces = self._geometry, self._surfaces
-        directions = camera_from_lamps.rotate(surfaces.lamps[:, :3])
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         inverse = [poses[part.body].inverse() for part in geometry.parts]
-        lamps = np.empty((len(inverse), len(directions), 4), dtype=np.float32)
-        for k, body_from_camera in enumerate(inverse):
-            lamps[k, :, :3] = body_from_camera.rotate(directions)
-            lamps[k, :, 3] = surfaces.lamps[:, 3]
+        lamps = self._turn_lamps(inverse, camera_from_lamps)
         corner_px2 = 0.25 * (self._camera.width**2 + self._camera.height**2)
         constants = np.array(
             [1.0 / FINE_VOXEL_MM, 1.0 / COARSE_VOXEL_MM, surfaces.vignetting / corner_px2],

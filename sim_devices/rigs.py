@@ -38,7 +38,7 @@ def make_default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> 
         ("SIM-L", "SIM-R"),
         name="sim:rig",
     )
-    return rig if factor == 1.0 else rig.scaled(factor)
+    return rig if factor == 1.0 else rig.scale(factor)
 
 
 def camera_from_left(rig: StereoRig, eye: Eye, turn_rad: Turn = NO_TURN) -> RigidTransform:

@@ -145,7 +145,7 @@ class SheetScene:
     def _optics(self, eye: Eye, scale: float) -> tuple[Camera, FloatArray]:
         key = (eye, scale)
         if key not in self._rays:
-            rig = self.rig if scale == 1.0 else self.rig.scaled(scale)
+            rig = self.rig if scale == 1.0 else self.rig.scale(scale)
             camera = rig.left if eye == "left" else rig.right
             u, v = np.meshgrid(
                 np.arange(camera.width + 1) - 0.5, np.arange(camera.height + 1) - 0.5

@@ -190,7 +190,7 @@ class World:
                 self._parts[stage] = parts
             key = (stage, eye, scale, turn_rad)
             if key not in self._renderers:
-                rig = self.rig if scale == 1.0 else self.rig.scaled(scale)
+                rig = self.rig if scale == 1.0 else self.rig.scale(scale)
                 camera = rig.left if eye == "left" else rig.right
                 self._renderers[key] = Renderer(
                     camera, parts, self._surfaces_at(scale), frozenset({"drape"})
@@ -220,7 +220,7 @@ class World:
         """As for a right knee."""
         twist = self._motion.twist(time_s)
         centre = self._start.translation_mm
-        femur = self._start.moved(twist, centre)
+        femur = self._start.move(twist, centre)
         if body == "femur":
             return femur
         if body == "tibia":
@@ -229,7 +229,7 @@ class World:
             return femur @ turned @ self._femur_from_tibia
         if body == "tissue":
             rest = RigidTransform.identity("table", "tissue")
-            return rest.moved(_TISSUE_FOLLOWS * twist, centre)
+            return rest.move(_TISSUE_FOLLOWS * twist, centre)
         if body == "drape":
             return RigidTransform.identity("table", "drape")
         if body == "hand":
@@ -290,7 +290,7 @@ class World:
     def _make_site(self, right: dict[str, TriangleMesh]) -> Site:
         femur = self._start
         laid = {"femur": femur, "tibia": femur @ self._femur_from_tibia}
-        on_table = [right[name].transformed(pose) for name, pose in laid.items()]
+        on_table = [right[name].transform(pose) for name, pose in laid.items()]
         bare = [
             select_side(
                 right["femur"], float(right["femur"].vertices_mm[:, 2].min()) + _BARE_FEMUR_MM, -1.0
@@ -299,7 +299,7 @@ class World:
                 right["tibia"], float(right["tibia"].vertices_mm[:, 2].max()) - _BARE_TIBIA_MM, 1.0
             ),
         ]
-        exposed = [mesh.transformed(pose) for mesh, pose in zip(bare, laid.values(), strict=True)]
+        exposed = [mesh.transform(pose) for mesh, pose in zip(bare, laid.values(), strict=True)]
         tissue = make_tissue(exposed, on_table, self.scenario.seed)
         top = -min(float(bone.vertices_mm[:, 2].min()) for bone in on_table)
         mirror = np.array([-1.0, 1.0, 1.0]) if self._is_left else np.ones(3)

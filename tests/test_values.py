@@ -47,11 +47,11 @@ def test_the_predicted_error_bounds_the_sampled_one(seed):
         direction = rng.normal(size=6) * [0.5, 0.5, 0.5, 0.01, 0.01, 0.01]
         covariance = np.outer(direction, direction)
     centre, targets = rng.normal(size=3) * 10, rng.normal(size=(5, 3)) * 40
-    bound = estimate(covariance).predicted_tre_mm(centre, targets)
+    bound = estimate(covariance).predict_tre_mm(centre, targets)
     twists = rng.multivariate_normal(np.zeros(6), covariance, 2000, method="eigh")
     true = POSE.apply(targets)
     errors = [
-        np.linalg.norm(POSE.moved(twist, POSE.apply(centre)).apply(targets) - true, axis=1).mean()
+        np.linalg.norm(POSE.move(twist, POSE.apply(centre)).apply(targets) - true, axis=1).mean()
         for twist in twists
     ]
     assert np.mean(np.array(errors) <= bound) >= 0.95
@@ -61,7 +61,7 @@ def test_the_predicted_error_bounds_the_sampled_one(seed):
 
 def test_the_predicted_error_of_a_shift_is_its_chi_square_quantile():
     covariance = np.diag([0.01, 0.01, 0.01, 0, 0, 0])
-    bound = estimate(covariance).predicted_tre_mm(np.zeros(3), np.eye(3) * 70)
+    bound = estimate(covariance).predict_tre_mm(np.zeros(3), np.eye(3) * 70)
     assert bound == pytest.approx(0.1 * np.sqrt(7.815), rel=1e-4)
 
 
@@ -69,7 +69,7 @@ def test_the_predicted_error_grows_with_the_distance_from_the_centre():
     covariance = np.diag([0, 0, 0, 1e-4, 1e-4, 1e-4])
     centre = np.array([5.0, 6.0, 7.0])
     bounds = [
-        estimate(covariance).predicted_tre_mm(centre, np.add(centre, [[d, 0.0, 0.0]]))
+        estimate(covariance).predict_tre_mm(centre, np.add(centre, [[d, 0.0, 0.0]]))
         for d in (0.0, 10.0, 20.0)
     ]
     np.testing.assert_allclose(bounds, np.array([0, 0.1, 0.2]) * np.sqrt(5.991), rtol=1e-4)
@@ -82,16 +82,16 @@ def test_a_turn_that_a_shift_undoes_leaves_its_point_without_error():
     offset = POSE.rotate(target[0] - centre)
     twist = np.r_[-np.cross(turn, offset), turn]
     covariance = np.outer(twist, twist)
-    assert estimate(covariance).predicted_tre_mm(centre, target) < 1e-6
+    assert estimate(covariance).predict_tre_mm(centre, target) < 1e-6
     # On the other side of the centre both add up.
-    opposite = estimate(covariance).predicted_tre_mm(centre, 2 * centre - target)
+    opposite = estimate(covariance).predict_tre_mm(centre, 2 * centre - target)
     expected = 2 * np.linalg.norm(np.cross(turn, offset)) * np.sqrt(3.841)
     assert opposite == pytest.approx(expected, rel=1e-4)
 
 
 def test_no_targets_have_no_predicted_error():
     with pytest.raises(ValueError, match="no targets"):
-        estimate(np.eye(6)).predicted_tre_mm(np.zeros(3), np.empty((0, 3)))
+        estimate(np.eye(6)).predict_tre_mm(np.zeros(3), np.empty((0, 3)))
 
 
 def test_vertices_that_face_the_camera_are_visible():
@@ -102,7 +102,7 @@ def test_vertices_that_face_the_camera_are_visible():
     cosine = np.einsum("ij,ij->i", normals, -positions) / np.linalg.norm(positions, axis=1)
     assert visible[cosine > 0.21].all()
     assert not visible[cosine < 0.19].any()
-    assert not visible_vertices(ball.flipped(), POSE)[cosine > 0].any()
+    assert not visible_vertices(ball.flip(), POSE)[cosine > 0].any()
 
 
 @pytest.mark.parametrize(
@@ -263,9 +263,9 @@ def test_the_matched_share_counts_measured_pixels_only():
     origin = np.array([[Origin.MATCHED, Origin.FILLED_BORDER], [Origin.UNKNOWN, Origin.MATCHED]])
     empty = np.zeros((2, 2), dtype=np.float32)
     disparity = DisparityMap(empty, empty, origin.astype(np.uint8), 3, 4)
-    assert disparity.matched_share == 0.5
+    assert disparity.matched_fraction == 0.5
     nothing = np.empty((0, 0))
-    assert dataclasses.replace(disparity, origin=nothing.astype(np.uint8)).matched_share == 0.0
+    assert dataclasses.replace(disparity, origin=nothing.astype(np.uint8)).matched_fraction == 0.0
 
 
 def test_a_map_knows_its_place_in_the_picture():
@@ -282,8 +282,8 @@ def test_a_part_of_a_cloud_keeps_its_columns_together():
     )
     assert len(cloud) == 4
     for part in (
-        cloud.selected(np.array([0, 1, 0, 1], dtype=bool)),
-        cloud.selected(np.array([1, 3])),
+        cloud.select(np.array([0, 1, 0, 1], dtype=bool)),
+        cloud.select(np.array([1, 3])),
     ):
         assert len(part) == 2
         np.testing.assert_array_equal(part.points_mm, [[3, 4, 5], [9, 10, 11]])

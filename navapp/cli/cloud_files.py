@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from navapp.cli.surface_cleaning import estimate_normals, mend, thin, thin_evenly
 from navapp.errors import InputError
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.surface_files import SurfaceFile, merged_rows, read_surface_file
+from navapp.geometry.surface_files import SurfaceFile, merge_rows, read_surface_file
 from navapp.geometry.transform import FloatArray
 
 MOST_SCENE_POINTS = 20_000
@@ -65,7 +65,7 @@ def read_scene(path: str | Path) -> SceneFile:
     file = _read(path)
     notes = _make_dropped_notes(file)
     points = file.mesh.vertices_mm
-    first, _ = merged_rows(points)
+    first, _ = merge_rows(points)
     if len(first) < len(points):
         notes.append(f"{len(points) - len(first)} of {len(points)} points repeat others and count "
                      "once")  # fmt: skip
@@ -133,7 +133,7 @@ def _mesh(file: SurfaceFile, notes: list[str]) -> TriangleMesh:
 
 
 def _cloud(file: SurfaceFile, notes: list[str]) -> TriangleMesh:
-    first, _ = merged_rows(file.mesh.vertices_mm)
+    first, _ = merge_rows(file.mesh.vertices_mm)
     points, normals = file.mesh.vertices_mm[first], file.mesh.normals[first]
     if len(points) > MOST_MODEL_POINTS:
         kept = thin_evenly(points, _THINNED_MODEL_POINTS)

@@ -134,7 +134,7 @@ def _content(
     pose = work.pose(estimate.camera_from_bone)
     has_pose = answer.outcome is not Outcome.FAILED
     fixes_all = has_pose and bool(np.isfinite(estimate.covariance).all())
-    n_fit = estimate.inlier_share * estimate.n_points
+    n_fit = estimate.inlier_fraction * estimate.n_points
     return {
         "units": {"length": options.units, "angle": "deg"},
         "scene_from_model": pose.to_list() if has_pose else None,
@@ -200,7 +200,7 @@ def _write_aligned(
     """The model as its file holds it, in the scene's coordinates and unit."""
     from navapp.geometry.ply import write_ply
 
-    aligned = work.file.whole.transformed(work.pose(answer.estimate.camera_from_bone))
+    aligned = work.file.whole.transform(work.pose(answer.estimate.camera_from_bone))
     write_ply(options.aligned, aligned, space="scene", unit=options.units)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.surface_files import merged_rows
+from navapp.geometry.surface_files import merge_rows
 from navapp.geometry.transform import FloatArray
 
 # Pieces of fewer triangles than this share of the largest one's are strays.
@@ -32,12 +32,12 @@ def mend(mesh: TriangleMesh) -> MendedSurface:
     is turned outward. Normals follow from the faces.
     """
     notes: list[str] = []
-    first, kind = merged_rows(mesh.vertices_mm)
+    first, kind = merge_rows(mesh.vertices_mm)
     faces = kind[mesh.faces]
     vertices = mesh.vertices_mm[first]
     _, double_area = _areas(vertices, faces)
     faces = faces[double_area > 0.0]
-    faces = faces[merged_rows(np.sort(faces, axis=1))[0]]
+    faces = faces[merge_rows(np.sort(faces, axis=1))[0]]
     if len(faces) == 0:
         return MendedSurface(TriangleMesh(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32)), ())
     is_stray = _strays(len(vertices), faces)
@@ -47,7 +47,7 @@ def mend(mesh: TriangleMesh) -> MendedSurface:
     if whole.volume_mm3() < 0.0:
         vectors, double_area = _areas(whole.vertices_mm, whole.faces)
         if np.linalg.norm(vectors.sum(axis=0)) < _OPEN_FRACTION * double_area.sum():
-            whole = whole.flipped()
+            whole = whole.flip()
             notes.append("its normals pointed inwards and were turned")
         else:
             notes.append("it is open, and its normals may point inwards; they were not turned")
@@ -71,7 +71,7 @@ def thin(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh:
     faces = np.sort(cell[mesh.faces], axis=1)
     is_face = (faces[:, 0] < faces[:, 1]) & (faces[:, 1] < faces[:, 2])
     corners = cell[mesh.faces[is_face]]
-    first, kind = merged_rows(faces[is_face])
+    first, kind = merge_rows(faces[is_face])
     # Two triangles that fall onto each other are a fold that has closed: both go.
     used, index = np.unique(corners[first[np.bincount(kind) % 2 == 1]], return_inverse=True)
     kept = index.reshape(-1, 3).astype(np.int32)

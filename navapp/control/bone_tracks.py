@@ -153,7 +153,7 @@ class BoneTracks:
         tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
         track = self._tracks[stage.bone]
         if moved is not None:
-            track = track.carried(moved)
+            track = track.carry(moved)
         tracked, track = tracker.glance(frame.left, frame.right, frame.captured_ns, track, goal)
         self._tracks[stage.bone] = track
         return tracked

@@ -138,7 +138,7 @@ class ScriptedOperator:
             self._phase = "proposed"
             turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
             # About a point of the bone: where the model's origin is, in the camera.
-            return [Reject(snapshot.candidate_id), Propose(pose.moved(turn, pose.translation_mm))]
+            return [Reject(snapshot.candidate_id), Propose(pose.move(turn, pose.translation_mm))]
         if snapshot.verdict.status is not Status.OK:
             if self._phase == "proposed":
                 self._next_step()

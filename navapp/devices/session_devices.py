@@ -77,7 +77,7 @@ def _open_simulated(
     if configuration.camera.rig is not None:
         rig = read_configured_rig(configuration)
     else:
-        rig = world.rig if settings.scale == 1.0 else world.rig.scaled(settings.scale)
+        rig = world.rig if settings.scale == 1.0 else world.rig.scale(settings.scale)
     simulation = simulation_of(world, camera)
     return _open_devices(configuration, camera, pace.clock, rig, simulation)
 

@@ -72,14 +72,14 @@ class Job(Generic[_Answer]):
             self.drop()
 
 
-def beside(work: Callable[[], _Answer]) -> Job[_Answer]:
+def begin_beside(work: Callable[[], _Answer]) -> Job[_Answer]:
     """Begin a job on the helper, if it is free before the answer is asked for."""
     return Job(work)
 
 
 def run_both(first: Callable[[], _Answer], second: Callable[[], _Other]) -> tuple[_Answer, _Other]:
     """Run two jobs side by side and wait for both answers; the first one's error goes before."""
-    with beside(second) as other:
+    with begin_beside(second) as other:
         answer = first()
     return answer, other.result()
 

@@ -17,7 +17,7 @@ class Box:
     width: int
     height: int
 
-    def grown(self, margin_px: int) -> "Box":
+    def grow(self, margin_px: int) -> "Box":
         """Larger by a margin on every side."""
         return Box(
             self.x - margin_px,
@@ -26,7 +26,7 @@ class Box:
             self.height + 2 * margin_px,
         )
 
-    def clipped(self, width: int, height: int) -> "Box":
+    def clip(self, width: int, height: int) -> "Box":
         """The part inside a picture; its width or height may be 0."""
         x0, y0 = min(max(self.x, 0), width), min(max(self.y, 0), height)
         x1 = min(max(self.x + self.width, x0), width)

@@ -89,7 +89,7 @@ class Camera:
         flat = flat.reshape(-1, 2)
         return np.column_stack([flat, np.ones(len(flat))])
 
-    def scaled(self, factor: float) -> "Camera":
+    def scale(self, factor: float) -> "Camera":
         """The same camera with its picture resized: u' = s (u + 0.5) - 0.5."""
         matrix = np.array(self.matrix)
         matrix[:2, 2] += 0.5

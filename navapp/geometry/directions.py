@@ -57,7 +57,7 @@ def sphere_spiral(n: int) -> FloatArray:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
 
 
-def seen_from(direction: FloatArray) -> FloatArray:
+def make_view_rotation(direction: FloatArray) -> FloatArray:
     """(3, 3) rotation into a camera that a body's direction points at; its roll is arbitrary."""
     forward = -np.asarray(direction) / np.linalg.norm(direction)
     right = np.cross(np.eye(3)[np.abs(forward).argmin()], forward)
@@ -73,5 +73,5 @@ def turn_between(source: FloatArray, target: FloatArray) -> FloatArray:
     if sine < 1e-9:
         if a @ b > 0.0:
             return np.eye(3)
-        return rotation_from_vector(np.pi * np.cross(a, seen_from(a)[0]))
+        return rotation_from_vector(np.pi * np.cross(a, make_view_rotation(a)[0]))
     return rotation_from_vector(across * (np.arctan2(sine, float(a @ b)) / sine))

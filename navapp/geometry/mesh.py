@@ -77,7 +77,7 @@ class TriangleMesh:
         areas: FloatArray = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         return areas
 
-    def transformed(self, target_from_source: RigidTransform) -> "TriangleMesh":
+    def transform(self, target_from_source: RigidTransform) -> "TriangleMesh":
         """The mesh in the target frame."""
         return TriangleMesh(
             target_from_source.apply(self.vertices_mm),
@@ -85,7 +85,7 @@ class TriangleMesh:
             target_from_source.rotate(self.normals),
         )
 
-    def flipped(self) -> "TriangleMesh":
+    def flip(self) -> "TriangleMesh":
         """The same surface with the other side outside."""
         return TriangleMesh(self.vertices_mm, self.faces[:, ::-1], -self.normals)
 

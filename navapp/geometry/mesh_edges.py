@@ -35,7 +35,7 @@ def ridge_edges(mesh: TriangleMesh) -> RidgeEdges:
     """Edges of a mesh that two triangles share and that are not grooves."""
     corners = np.array(mesh.vertices_mm)
     normals, offsets = _planes(corners, mesh.faces)
-    halves = paired_half_edges(mesh.faces)
+    halves = pair_half_edges(mesh.faces)
     one, other = halves[halves[:, 1] >= 0].T
     third = np.concatenate([mesh.faces[:, 2], mesh.faces[:, 0], mesh.faces[:, 1]])
     face = np.tile(np.arange(len(mesh.faces), dtype=np.int32), 3)
@@ -57,7 +57,7 @@ def half_edges(faces: IntArray) -> IntArray:
     return ends
 
 
-def paired_half_edges(faces: IntArray) -> NDArray[np.int64]:
+def pair_half_edges(faces: IntArray) -> NDArray[np.int64]:
     """(E, 2) the two `half_edges` of every edge, of triangles h % F; -1 where there is one only.
 
     Edges of more than two triangles keep the first two.
@@ -74,7 +74,7 @@ def paired_half_edges(faces: IntArray) -> NDArray[np.int64]:
 
 def open_border(n_vertices: int, faces: IntArray) -> NDArray[np.bool_]:
     """(V,) vertices on an edge of one triangle only: there the model ends, not the bone."""
-    halves = paired_half_edges(faces)
+    halves = pair_half_edges(faces)
     is_border = np.zeros(n_vertices, dtype=bool)
     is_border[half_edges(faces)[halves[halves[:, 1] < 0, 0]].ravel()] = True
     return is_border
@@ -82,7 +82,7 @@ def open_border(n_vertices: int, faces: IntArray) -> NDArray[np.bool_]:
 
 def face_pairs(faces: IntArray) -> tuple[IntArray, NDArray[np.int64]]:
     """(E, 2) edges, and (E, 2) the triangles on both sides of each; -1 where there is none."""
-    halves = paired_half_edges(faces)
+    halves = pair_half_edges(faces)
     edges = np.sort(half_edges(faces)[halves[:, 0]], axis=1)
     return edges, np.where(halves >= 0, halves % max(len(faces), 1), -1)
 

@@ -178,7 +178,7 @@ class Rectifier:
         if left.shape != right.shape:
             raise ValueError("one picture of the pair is grey and the other coloured")
         whole = Box(0, 0, self.rig.width, self.rig.height)
-        inside = whole if box is None else box.clipped(whole.width, whole.height)
+        inside = whole if box is None else box.clip(whole.width, whole.height)
         in_left, in_right = whole, whole
         if band_px is not None:
             first = inside.x - math.ceil(band_px[1]) - TAPS_PX
@@ -204,7 +204,7 @@ class Rectifier:
     ) -> RectifiedPair:
         """As other programs interpolate."""
         left_x, left_y, right_x, right_y = self.maps
-        slices = [part.clipped(self.rig.width, self.rig.height).slices for part in parts]
+        slices = [part.clip(self.rig.width, self.rig.height).slices for part in parts]
         left = bilinear(pictures[0], left_x, left_y, slices[0])
         right = bilinear(pictures[1], right_x, right_y, slices[1])
         return RectifiedPair(left, right, self.geometry, inside)
@@ -271,7 +271,7 @@ def _luma_for(picture: Image, places: "Places", part: Box) -> Image:
 def _source_box(places: "Places", part: Box) -> Box:
     """What of the other picture a part of the rectified one is made of."""
     height, width = places.columns.shape
-    inside = part.clipped(width, height)
+    inside = part.clip(width, height)
     if inside.is_empty:
         return inside
     low, high = inside.y, inside.y + inside.height - 1
@@ -338,7 +338,7 @@ def resample(picture: Image, places: "Places", part: Box | None = None) -> Image
     picture = np.ascontiguousarray(picture)
     values = np.zeros(places.columns.shape, dtype=np.uint8)
     height, width = places.columns.shape
-    inside = Box(0, 0, width, height) if part is None else part.clipped(width, height)
+    inside = Box(0, 0, width, height) if part is None else part.clip(width, height)
     if inside.is_empty:
         return values
     span = (inside.x, inside.x + inside.width)

@@ -102,11 +102,11 @@ class StereoRig:
         digest.update((np.round(self.right_from_left.matrix, 9) + 0.0).tobytes())
         return digest.hexdigest()[:12]
 
-    def scaled(self, factor: float) -> "StereoRig":
+    def scale(self, factor: float) -> "StereoRig":
         """The same rig with smaller or larger pictures."""
         return StereoRig(
-            self.left.scaled(factor),
-            self.right.scaled(factor),
+            self.left.scale(factor),
+            self.right.scale(factor),
             self.right_from_left,
             self.serials,
             self.quality,

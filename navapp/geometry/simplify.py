@@ -18,7 +18,7 @@ def drawn(mesh: TriangleMesh) -> TriangleMesh:
 
     Drawing takes as long as there are triangles, and a camera cannot tell the difference.
     """
-    return simplified(mesh, _DRAWN_VERTICES, _DRAWN_WITHIN_MM)
+    return simplify(mesh, _DRAWN_VERTICES, _DRAWN_WITHIN_MM)
 
 
 @lru_cache(maxsize=16)
@@ -35,7 +35,7 @@ def is_closed(mesh: TriangleMesh) -> bool:
     return bool(has_pairs and mesh.volume_mm3() > 0.0)
 
 
-def simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
+def simplify(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
     """A mesh of about so many vertices, or of as many as the distance asks for.
 
     Args:
@@ -46,7 +46,7 @@ def simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> Triangl
     Source: Garland and Heckbert 1997, quadric error metrics.
     """
     while 0 < n_vertices < len(mesh.vertices_mm):
-        candidate = _collapsed(mesh, n_vertices)
+        candidate = _collapse(mesh, n_vertices)
         if candidate is not None and is_within(mesh, candidate, within_mm):
             return candidate
         n_vertices *= 2
@@ -78,7 +78,7 @@ def is_within(mesh: TriangleMesh, surface: TriangleMesh, distance_mm: float) -> 
     return True
 
 
-def _collapsed(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh | None:
+def _collapse(mesh: TriangleMesh, n_vertices: int) -> TriangleMesh | None:
     """The mesh after edge collapses; None when the library makes nothing sensible of it."""
     import fast_simplification
 

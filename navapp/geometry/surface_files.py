@@ -148,16 +148,16 @@ def _parse_stl(content: bytes) -> RawSurface:
         corners = _stl_text_corners(content)
     else:
         raise UnusableContentError("it is cut short, or no STL at all")
-    return _welded(corners.astype(np.float64))
+    return _weld(corners.astype(np.float64))
 
 
-def _welded(corners: FloatArray) -> RawSurface:
+def _weld(corners: FloatArray) -> RawSurface:
     """A mesh of (3F, 3) corners in which those that are exactly equal are one point."""
-    first, index = merged_rows(corners)
+    first, index = merge_rows(corners)
     return RawSurface(corners[first], index.reshape(-1, 3))
 
 
-def merged_rows(points: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def merge_rows(points: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Which of (N, 3) points, or other rows, are exactly equal.
 
     Returns:

@@ -84,6 +84,11 @@ class RigidTransform:
             self.source, self.target, rotation, -rotation @ self.translation_mm
         )
 
+    def inverse_parts(self) -> tuple[FloatArray, FloatArray]:
+        """(3, 3) rotation and (3,) translation in mm of the inverse, contiguous for kernels."""
+        inverse = self.inverse()
+        return np.array(inverse.rotation), np.array(inverse.translation_mm)
+
     def __matmul__(self, other: "RigidTransform") -> "RigidTransform":
         """Compose: `a_from_b @ b_from_c` is `a_from_c`; neighbours must be the same frame."""
         if not isinstance(other, RigidTransform):
@@ -100,7 +105,7 @@ class RigidTransform:
         """Turn directions (N, 3) or (3,) from source to target."""
         return np.asarray(directions, dtype=np.float64) @ self.rotation.T
 
-    def moved(self, twist: ArrayLike, centre_mm: ArrayLike) -> "RigidTransform":
+    def move(self, twist: ArrayLike, centre_mm: ArrayLike) -> "RigidTransform":
         """This pose after a small motion, left-multiplied, about a point of the target frame.
 
         Args:
@@ -133,7 +138,7 @@ class RigidTransform:
         moved = points_mm @ turned.T + shifted_mm
         return float(np.sqrt(np.einsum("ij,ij->i", moved, moved)).mean())
 
-    def renamed(self, target: str, source: str) -> "RigidTransform":
+    def rename(self, target: str, source: str) -> "RigidTransform":
         """The same motion under other frame names (a border between naming schemes)."""
         return RigidTransform(target, source, self.matrix)
 

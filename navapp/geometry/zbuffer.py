@@ -74,7 +74,7 @@ def render(
     box = Box(0, 0, camera.width, camera.height)
     if not is_whole:
         around = Box.around(pixels)
-        box = Box(0, 0, 0, 0) if around is None else around.clipped(camera.width, camera.height)
+        box = Box(0, 0, 0, 0) if around is None else around.clip(camera.width, camera.height)
     pixels -= (box.x, box.y)
     return _raster(pixels, points_mm[:, 2].copy(), mesh.faces, box, is_closed)
 
@@ -106,7 +106,7 @@ def render_rectified(
     return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
-def projected_box(
+def project_box(
     mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry
 ) -> Box | None:
     """Box around the mesh in the rectified left view, clipped; None when it is out of view."""
@@ -128,7 +128,7 @@ def bounds_of(
         return None, (near_mm, far_mm)
     x, y = math.floor(u0), math.floor(v0)
     around = Box(x, y, math.ceil(u1) - x + 1, math.ceil(v1) - y + 1)
-    clipped = around.clipped(geometry.width, geometry.height)
+    clipped = around.clip(geometry.width, geometry.height)
     return None if clipped.is_empty else clipped, (near_mm, far_mm)
 
 

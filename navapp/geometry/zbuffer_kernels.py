@@ -75,7 +75,7 @@ def bounds_of_points(
 
 
 @njit(cache=True, nogil=True)
-def known_range(values: NDArray[np.float32]) -> tuple[float, float]:
+def find_known_range(values: NDArray[np.float32]) -> tuple[float, float]:
     """Least and largest of (h, w) numbers that are known; of none, infinity and its negative."""
     flat, ends = values.ravel(), np.empty(2 * LANES, dtype=np.float32)
     least, largest = spread(np.float32(np.inf)), spread(np.float32(-np.inf))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from navapp.errors import PlanError
 from navapp.geometry.bands import run_both
 from navapp.geometry.camera import Camera
-from navapp.geometry.directions import ViewCone, seen_from
+from navapp.geometry.directions import ViewCone, make_view_rotation
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render
 from navapp.preop.aspects_kernels import find_contour_segments, select_spread
@@ -99,7 +99,7 @@ class _AspectView:
     """One bone, looked at from anywhere."""
 
     def __init__(self, bone: BoneModel, settings: AspectSettings) -> None:
-        self._mesh = bone.seen_surface()
+        self._mesh = bone.make_seen_surface()
         surface_mm = self._mesh.vertices_mm
         self._settings = settings
         self._middle_mm = 0.5 * (surface_mm.min(axis=0) + surface_mm.max(axis=0))
@@ -117,7 +117,7 @@ class _AspectView:
 
     def at(self, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(n, 3) points of the edges seen from a direction, and their tangents."""
-        rotation = seen_from(direction)
+        rotation = make_view_rotation(direction)
         shift = np.array([0.0, 0.0, self._settings.distance_mm]) - rotation @ self._middle_mm
         pose = RigidTransform.from_parts("view", "bone", rotation, shift)
         camera_mm = pose.inverse().translation_mm

@@ -99,7 +99,7 @@ def import_cartilage(bone: BoneModel, path: str | Path) -> ImportedSurface:
         )
     mesh = convert_to_lps(mesh, header, path, warnings)
     if not open_border(len(mesh.vertices_mm), mesh.faces).any() and mesh.volume_mm3() < 0.0:
-        mesh = mesh.flipped()
+        mesh = mesh.flip()
         warnings.append(f"{bone.name}: normals of the cartilage pointed inwards and were turned")
     _check_place(bone, mesh, path)
     distance = measure_distance_above(bone.mesh, mesh, _REACH_MM)

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import half_edges, open_border, paired_half_edges
+from navapp.geometry.mesh_edges import half_edges, open_border, pair_half_edges
 from navapp.geometry.transform import FloatArray
 from navapp.values import BoneModel
 
@@ -75,7 +75,7 @@ def on_cut_borders(mesh: TriangleMesh) -> NDArray[np.bool_]:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    halves = paired_half_edges(mesh.faces)
+    halves = pair_half_edges(mesh.faces)
     edges = half_edges(mesh.faces)[halves[halves[:, 1] < 0, 0]]
     n = len(mesh.vertices_mm)
     graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))

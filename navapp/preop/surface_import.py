@@ -55,7 +55,7 @@ def import_surface(name: str, path: str | Path, side: Side | None = None) -> Imp
         n_lost = len(mesh.faces) - len(whole.faces)
         warnings.append(f"{name}: {n_lost} triangles of separate pieces were left out")
     if whole.volume_mm3() < 0.0:
-        whole = whole.flipped()
+        whole = whole.flip()
         warnings.append(f"{name}: normals pointed inwards and were turned")
     if not is_closed(whole):
         warnings.append(

@@ -3,16 +3,15 @@
 from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc, fit_pose
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import InitialSettings, find_initial
-from navapp.registration.landmarks import Landmarks, register_landmarks
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     Candidate,
+    compute_explained_fraction,
     distinct,
-    explained_share,
     find_candidates,
     is_same_pose,
-    scattered_starts,
-    tilted_starts,
+    make_scattered_starts,
+    make_tilted_starts,
 )
 from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
 from navapp.registration.pose_sampler import PoseSampler
@@ -24,15 +23,14 @@ __all__ = [
     "Candidate",
     "DepthMap",
     "InitialSettings",
-    "Landmarks",
     "Outcome",
     "PoseSampler",
     "Registration",
     "RegistrationModel",
     "Scene",
+    "compute_explained_fraction",
     "distinct",
     "estimate_at",
-    "explained_share",
     "find_candidates",
     "find_initial",
     "fit_bimcc",
@@ -40,8 +38,7 @@ __all__ = [
     "fit_icp",
     "fit_pose",
     "is_same_pose",
+    "make_scattered_starts",
+    "make_tilted_starts",
     "register",
-    "register_landmarks",
-    "scattered_starts",
-    "tilted_starts",
 ]

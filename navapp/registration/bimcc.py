@@ -1,7 +1,7 @@
 """Production BiMCC-ICP: bidirectional maximum correntropy against what one camera can see.
 
-Two loops (docs/registration.md has the equations): from far, thinned points pair both ways and the
-kernel narrows; at rest, all points pair forward under a kernel as narrow as the noise.
+From far, thinned points pair both ways and the kernel narrows; at rest, all points pair forward
+under a kernel as narrow as the noise (equations in docs/registration.md).
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,7 @@ from navapp.values import PoseEstimate, Reason
 
 MIN_POINTS = 60
 # Pairs that are longer than so many widths of the kernel take no part in the figures.
-_REACH_SIGMAS = 4.0
-_NOISE_ROUNDS = 20
+_REACH_SIGMAS, _NOISE_ROUNDS = 4.0, 20
 # A first kernel of this width means a start some millimetres off.
 _NEAR_SIGMA_MM = 5.0
 
@@ -43,8 +42,8 @@ class BimccSettings:
         n_sigmas: the kernel's width in standard deviations of the noise; at 2.5 it keeps 97 % of
             the efficiency that least squares has on pure noise, at 1.6 it keeps 88 %.
         largest_noise_mm: points noisier than this are not expected.
-        backward_share: what all backward pairs weigh beside all forward pairs.
-        point_share: what the whole distance of a pair weighs beside its plane's, from far.
+        backward_weight: what all backward pairs weigh beside all forward pairs.
+        point_weight: what the whole distance of a pair weighs beside its plane's, from far.
         model_points: so many model points ask backward, about.
         max_iterations: of each loop.
         settled_mm, settled_rad: a smaller step ends the fit.
@@ -54,8 +53,8 @@ class BimccSettings:
     narrowest_mm: float = 0.3
     n_sigmas: float = 2.5
     largest_noise_mm: float = 1.0
-    backward_share: float = 1.5
-    point_share: float = 0.1
+    backward_weight: float = 1.5
+    point_weight: float = 0.1
     model_points: int = 1500
     max_iterations: int = 60
     settled_mm: float = 2e-3
@@ -100,8 +99,7 @@ def fit_bimcc(
         settings: of the estimator.
 
     Returns:
-        The pose with covariance and reasons; never the start in disguise: when too few points
-        pair, the reasons say so.
+        The pose with covariance; when too few points pair, the reasons say so.
 
     Source: the paper, proposed equations 4 to 9 (corrected), Algorithm 2; Chen and Medioni 1992.
     """
@@ -174,12 +172,6 @@ def solution_at(
     return fit.solution(iterations, is_converged=is_converged)
 
 
-def bone_from_scene(pose: RigidTransform) -> tuple[FloatArray, FloatArray]:
-    """(3, 3) rotation and (3,) translation in mm of the inverse, as the kernels take them."""
-    inverse = pose.inverse()
-    return np.array(inverse.rotation), np.array(inverse.translation_mm)
-
-
 class _Reach(NamedTuple):
     """Pairs within reach of the kernel.
 
@@ -188,8 +180,7 @@ class _Reach(NamedTuple):
         noise_mm2: variance that the points do not know of themselves.
         distance: (n,) of each pair, mm.
         deviation: (n,) its standard deviation, mm.
-        is_near: (n,) within reach.
-        n_near: how many are.
+        is_near, n_near: (n,) within reach, and how many are.
     """
 
     sigma_mm: float
@@ -201,7 +192,7 @@ class _Reach(NamedTuple):
 
 
 class _Fit:
-    """Buffers and pose of one fit; the loops work in the bone's frame, where the model rests."""
+    """Buffers and pose of one fit."""
 
     def __init__(
         self,
@@ -212,7 +203,8 @@ class _Fit:
     ) -> None:
         self._scene, self._model, self._start = scene, model, scene_from_bone
         self._settings = settings
-        self._rotation, self._shift = bone_from_scene(scene_from_bone)
+        # The loops work in the bone's frame, where the model rests.
+        self._rotation, self._shift = scene_from_bone.inverse_parts()
         self._has_moved = False
         self._model_every = max(1, len(model.points_mm) // settings.model_points)
         n_backward = len(model.points_mm) // self._model_every + 1
@@ -348,8 +340,8 @@ class _Fit:
             n_sigmas=settings.n_sigmas,
             widest_at_rest_mm=settings.widest_at_rest_mm,
             knows_noise=self._scene.knows_noise,
-            backward_share=settings.backward_share,
-            point_share=settings.point_share,
+            backward_weight=settings.backward_weight,
+            point_weight=settings.point_weight,
             scene_every=self._scene.every,
             model_every=self._model_every,
             max_iterations=settings.max_iterations,

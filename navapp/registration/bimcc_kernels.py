@@ -46,8 +46,8 @@ class LoopSettings(NamedTuple):
     n_sigmas: float
     widest_at_rest_mm: float
     knows_noise: bool
-    backward_share: float
-    point_share: float
+    backward_weight: float
+    point_weight: float
     scene_every: int
     model_every: int
     max_iterations: int
@@ -134,12 +134,12 @@ def loop_from_far(
         if sums.kernels < _FEWEST_PAIRS:
             return LoopState(iteration, False, 0.0, 0, 0.0)
         objective = sums.kernels / n
-        balance = settings.backward_share * n_forward / max(n - n_forward, 1)
+        balance = settings.backward_weight * n_forward / max(n - n_forward, 1)
         for k in range(n_forward, n):
             pairs.weight[k] *= balance
         lever_mm = weighted_centre(pairs, n, centre)
         plane_system(pairs, n, centre, lever_mm, H, g)
-        add_point_system(pairs, n, model, settings.point_share, centre, lever_mm, H, g)
+        add_point_system(pairs, n, model, settings.point_weight, centre, lever_mm, H, g)
         plane_step(H, g, lever_mm, twist)
         apply_twist(twist, centre, rotation, translation)
         turn_rad, shift_mm = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])

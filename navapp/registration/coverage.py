@@ -3,7 +3,6 @@
 import numpy as np
 
 from navapp.geometry.transform import RigidTransform
-from navapp.registration.bimcc import bone_from_scene
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import (
     count_visible,
@@ -42,7 +41,7 @@ def coverage(
     """
     if scene.camera_mm is None:
         raise ValueError("coverage needs a place that the scene was seen from")
-    rotation, shift = bone_from_scene(scene_from_bone)
+    rotation, shift = scene_from_bone.inverse_parts()
     camera = rotation @ scene.camera_mm + shift
     every = max(1, len(model.points_mm) // (2 * _ASKED))
     n_asked = count_visible(model.arrays, camera, every, _LEAST_COSINE)

@@ -17,7 +17,7 @@ from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.registration.initial_kernels import (
     N_BINS,
     Optics,
-    quantised_gradients,
+    quantise_gradients,
     spread_responses,
 )
 
@@ -59,11 +59,11 @@ def edge_tables(pair: RectifiedPair, scale: int, reach: int, largest_px: float) 
     return EdgeTables(
         _responses(pair.left, box, scale, reach),
         _responses(pair.right, seen_right, scale, reach),
-        scaled_optics(pair, scale),
+        scale_optics(pair, scale),
     )
 
 
-def scaled_optics(pair: RectifiedPair, scale: int) -> Optics:
+def scale_optics(pair: RectifiedPair, scale: int) -> Optics:
     """Optics of the pictures when they are made smaller: u' = (u + 0.5) / scale - 0.5."""
     geometry = pair.geometry
     return Optics(
@@ -98,7 +98,7 @@ def _responses(picture: Image, inside: Box, scale: int, reach: int) -> NDArray[n
     least = _NOISE_SIGMAS * _BLURRED_NOISE * _noise(picture, inside) / scale
     least = max(least, float(np.quantile(part, _FLAT_SHARE)) if part.size else 0.0)
     bins = np.zeros(small.shape, dtype=np.uint8)
-    in_row_bands(height, partial(quantised_gradients, small, least, bins=bins))
+    in_row_bands(height, partial(quantise_gradients, small, least, bins=bins))
     response = np.zeros((height, width, N_BINS), dtype=np.uint8)
     answers = answer_table()
     in_row_bands(height, lambda rows: spread_responses(bins, reach, answers, rows, response))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.directions import ViewCone, seen_from, turn_between
+from navapp.geometry.directions import ViewCone, make_view_rotation, turn_between
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 from navapp.registration.initial_kernels import Hypotheses
@@ -116,13 +116,15 @@ def places_of(
     return depth, np.column_stack([x, y, z])
 
 
-def everywhere(
+def spread_hypotheses(
     views: Views, chosen: NDArray[np.intp], roll_step_deg: float, positions_mm: FloatArray
 ) -> Hypotheses:
     """Chosen views x anchors x rolls all around x places."""
     rolls = np.radians(np.arange(0.0, 360.0, roll_step_deg))
     turns = np.array([rotation_from_vector((0.0, 0.0, roll)) for roll in rolls])
-    upright = np.array([seen_from(views.directions[view]) for view in chosen]).reshape(-1, 3, 3)
+    upright = np.array([make_view_rotation(views.directions[view]) for view in chosen]).reshape(
+        -1, 3, 3
+    )
     rotations = np.einsum("rij,vjk->vrik", turns, upright)
     n_anchors = views.anchors_mm.shape[1]
     shape = (len(chosen), n_anchors, len(rolls))
@@ -140,12 +142,12 @@ def everywhere(
     )
 
 
-def taken(some: Hypotheses, which: NDArray[np.intp]) -> Hypotheses:
+def select_hypotheses(some: Hypotheses, which: NDArray[np.intp]) -> Hypotheses:
     """Some of the hypotheses, in that order."""
     return some._replace(orientation=some.orientation[which], place=some.place[which])
 
 
-def around(
+def vary_hypotheses(
     some: Hypotheses, views: Views, step_deg: float, roll_deg: float, shift_mm: float
 ) -> Hypotheses:
     """Each hypothesis with its neighbours: views within a step, rolls and places beside it."""
@@ -190,7 +192,7 @@ def poses_of(some: Hypotheses, target: str, bone: str) -> list[RigidTransform]:
     ]
 
 
-def apart(
+def find_distinct(
     some: Hypotheses, centre_mm: FloatArray, least_mm: float, least_deg: float
 ) -> NDArray[np.intp]:
     """Indices of hypotheses that repeat none before them, in their order.
@@ -222,7 +224,7 @@ def _parts(some: Hypotheses) -> tuple[FloatArray, FloatArray]:
     return rotations, some.position[some.place] - anchored
 
 
-def thinned_views(views: Views, step_deg: float) -> NDArray[np.intp]:
+def thin_views(views: Views, step_deg: float) -> NDArray[np.intp]:
     """Indices of views about that far apart."""
     nearest = np.cos(np.radians(0.75 * step_deg))
     kept: list[int] = []

@@ -34,7 +34,7 @@ _CLAIM_COUNT = 6.0
 _MOST_FAR, _BY_CHANCE = 0.5, 1.0
 _FEWEST = 6.0
 # Residuals that show nothing at all (drawn data) still leave a scale.
-_LEAST_RATIO2 = 1e-4
+_LEAST_SQUARED_RATIO = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,7 +178,7 @@ def join(
     kernel_sigmas: float,
     block: ResidualBlock,
     centre_mm: FloatArray,
-    noise2: float = 1.0,
+    noise_variance_ratio: float = 1.0,
 ) -> PoseEstimate:
     """A pose that was fitted to a surface, moved to what it and a further block say together.
 
@@ -187,7 +187,7 @@ def join(
         kernel_sigmas: width of the kernel it was fitted with, in sigma.
         block: linearised at that pose.
         centre_mm: (3,) the model's centre at that pose, in the camera's frame.
-        noise2: variance that the surface's noise has, over the one that it claims.
+        noise_variance_ratio: variance that the surface's noise has, over the one that it claims.
 
     Returns:
         The surface's pose when the block says too little or pulls too far away; with the reason
@@ -200,19 +200,32 @@ def join(
     Source: Gauss-Newton on the sum of squares, kernel weights as in `step_kernels.weigh`; variance
     components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
     """
-    alone = replace(estimate, covariance=noise2 * estimate.covariance)
+    alone = replace(estimate, covariance=noise_variance_ratio * estimate.covariance)
     is_near = near(block, estimate.covariance)
     count_all, count_near = (float((1.0 / block.n_sharing[kept]).sum()) for kept in (..., is_near))
     if count_all < _FEWEST:
         return alone
     if count_all - count_near > _MOST_FAR * count_all + _BY_CHANCE:
-        return alone.doubted(Reason.CUES_DISAGREE)
+        return alone.with_reason(Reason.CUES_DISAGREE)
     if count_near < _FEWEST:
         return alone
-    block = block.only(is_near)
+    joined = _solve_joined(
+        estimate, kernel_sigmas, block.only(is_near), centre_mm, noise_variance_ratio
+    )
+    return alone if joined is None else joined
+
+
+def _solve_joined(
+    estimate: PoseEstimate,
+    kernel_sigmas: float,
+    block: ResidualBlock,
+    centre_mm: FloatArray,
+    noise_variance_ratio: float,
+) -> PoseEstimate | None:
+    """What a surface and residuals that agree with it say together; None when they pull apart."""
     surface = np.zeros((7, 7))
     surface[:6, :6] = np.linalg.inv(estimate.covariance)
-    surface_scale = min(_shown(_rms_ratio2(estimate), kernel_sigmas), 1.0)
+    surface_scale = min(_ratio_without_kernel(_squared_rms_ratio(estimate), kernel_sigmas), 1.0)
     offset = np.zeros((7, 7))
     offset[6, 6] = 1.0 / block.common_sd**2
     rows = np.column_stack([block.jacobian, np.ones(len(block.residual))])
@@ -230,27 +243,29 @@ def join(
             np.linalg.solve(normal, weighted @ block.residual / scale), dtype=np.float64
         )
     if step @ surface @ step > _APART:
-        return alone
+        return None
     inverse = np.linalg.inv(normal)
     # A block that shows more noise than it claims is believed.
-    by_surface = noise2 * surface / surface_scale**2
+    by_surface = noise_variance_ratio * surface / surface_scale**2
     by_block = information * max(scale, 1.0) / scale**2
     covariance = (inverse @ (by_surface + offset + by_block) @ inverse)[:6, :6]
-    pose = estimate.camera_from_bone.moved(step[:6], centre_mm)
+    pose = estimate.camera_from_bone.move(step[:6], centre_mm)
     return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
 
 
 def _scale(rest: FloatArray, count: FloatArray, variance: FloatArray) -> float:
     """Variance that residuals show over the one they claim, drawn to 1 when they are few."""
     n = float(count.sum())
-    shown = _shown(float((count * rest**2 / variance).sum()) / max(n, 1e-12), _KERNEL_SIGMAS)
+    shown = _ratio_without_kernel(
+        float((count * rest**2 / variance).sum()) / max(n, 1e-12), _KERNEL_SIGMAS
+    )
     return (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
 
 
-def _shown(ratio2: float, kernel_sigmas: float) -> float:
+def _ratio_without_kernel(ratio2: float, kernel_sigmas: float) -> float:
     """The same of residuals without a kernel, from those under one."""
     return float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas))
 
 
-def _rms_ratio2(estimate: PoseEstimate) -> float:
-    return max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_RATIO2)
+def _squared_rms_ratio(estimate: PoseEstimate) -> float:
+    return max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)

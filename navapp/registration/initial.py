@@ -18,21 +18,21 @@ from navapp.geometry.directions import ViewCone
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.registration.bimcc import MIN_POINTS, fit_coarsely
-from navapp.registration.edge_tables import EdgeTables, edge_tables, scaled_optics
+from navapp.registration.edge_tables import EdgeTables, edge_tables, scale_optics
 from navapp.registration.hypotheses import (
     Views,
-    apart,
-    around,
-    everywhere,
+    find_distinct,
     places_of,
     poses_of,
-    taken,
-    thinned_views,
+    select_hypotheses,
+    spread_hypotheses,
+    thin_views,
+    vary_hypotheses,
     views_of,
 )
 from navapp.registration.initial_kernels import Hypotheses, score_edges, score_surface
 from navapp.registration.model import RegistrationModel
-from navapp.registration.multi_start import ANYWHERE, Candidate, explained_share
+from navapp.registration.multi_start import ANYWHERE, Candidate, compute_explained_fraction
 from navapp.registration.scene import Scene
 from navapp.values import AspectGraph
 
@@ -106,10 +106,12 @@ def find_initial(
     views = views_of(model, cone, settings.fine_step_deg, aspects, settings.n_surface_points)
     best = _best_hypotheses(pair, scene, views, settings, on_progress)
     target = pair.geometry.rectified_from_left.target
-    best = taken(best, apart(best, model.centre_mm, _ALIKE_MM, _ALIKE_DEG)[: settings.n_verified])
+    best = select_hypotheses(
+        best, find_distinct(best, model.centre_mm, _ALIKE_MM, _ALIKE_DEG)[: settings.n_verified]
+    )
     starts = poses_of(best, target, model.bone.name)
     told = lambda share: on_progress(_REFINED + (1.0 - _REFINED) * share)  # noqa: E731
-    return _verified(pair, scene, model, starts, told)
+    return _verify(pair, scene, model, starts, told)
 
 
 def score_views(
@@ -144,23 +146,18 @@ def _best_hypotheses(
     on_progress: Callable[[float], None],
 ) -> Hypotheses:
     """Hypotheses, best first, coarse to fine."""
-    chosen = thinned_views(views, settings.coarse_step_deg)
+    chosen = thin_views(views, settings.coarse_step_deg)
     n_orientations = len(chosen) * views.anchors_mm.shape[1] * 360.0 / settings.roll_step_deg
     n_places = min(settings.n_places, int(settings.n_hypotheses / n_orientations))
     depth_mm, positions_mm = places_of(scene, pair.geometry, _CELL_PX, n_places)
-    some = everywhere(views, chosen, settings.roll_step_deg, positions_mm)
-    optics = scaled_optics(pair, _CELL_PX)
+    some = spread_hypotheses(views, chosen, settings.roll_step_deg, positions_mm)
+    optics = scale_optics(pair, _CELL_PX)
     largest_px = pair.geometry.disparity_px(float(scene.points_mm[:, 2].min()))
 
-    def by_surface(these: Hypotheses, reach_mm: float) -> NDArray[np.float32]:
+    def by_surface(these: Hypotheses) -> NDArray[np.float32]:
         score = np.zeros(len(these.orientation), dtype=np.float32)
-        _in_halves(
-            len(score),
-            lambda first, last: score_surface(
-                these, views.surface_mm, views.starts, depth_mm, optics, reach_mm, (first, last),
-                score,
-            ),
-        )  # fmt: skip
+        fixed = (these, views.surface_mm, views.starts, depth_mm, optics, settings.reach_mm)
+        _in_halves(len(score), lambda a, b: score_surface(*fixed, (a, b), score))
         return score
 
     def by_both(these: Hypotheses, score: NDArray[np.float32], level: int) -> NDArray[np.float32]:
@@ -170,24 +167,19 @@ def _best_hypotheses(
         n_first = settings.n_edge_points[level]
         return score + score_views(these, views.edges, tables, n_first)
 
-    score = by_surface(some, settings.reach_mm)
+    score = by_surface(some)
     passed = _largest(score, settings.n_passed)
     on_progress(_SCORED)
-    some = taken(some, passed)
-    some = taken(some, _largest(by_both(some, score[passed], 0), settings.n_refined))
-    some = around(
-        some,
-        views,
-        0.75 * settings.coarse_step_deg,
-        settings.roll_step_deg / 3.0,
-        0.3 * settings.reach_mm,
-    )
-    score = by_both(some, by_surface(some, settings.reach_mm), 1)
+    some = select_hypotheses(some, passed)
+    some = select_hypotheses(some, _largest(by_both(some, score[passed], 0), settings.n_refined))
+    steps = 0.75 * settings.coarse_step_deg, settings.roll_step_deg / 3.0, 0.3 * settings.reach_mm
+    some = vary_hypotheses(some, views, *steps)
+    score = by_both(some, by_surface(some), 1)
     on_progress(_REFINED)
-    return taken(some, _largest(score, len(score)))
+    return select_hypotheses(some, _largest(score, len(score)))
 
 
-def _verified(
+def _verify(
     pair: RectifiedPair,
     scene: Scene,
     model: RegistrationModel,
@@ -210,7 +202,9 @@ def _verified(
             pose = fit_coarsely(replace(near, thinned_to=_COARSE_POINTS), model, start, ANYWHERE)
             if pose is not None:
                 # In shares of the whole scene, so that candidates compare.
-                share = explained_share(replace(near, thinned_to=_JUDGED_POINTS), model, pose)
+                share = compute_explained_fraction(
+                    replace(near, thinned_to=_JUDGED_POINTS), model, pose
+                )
                 found[number] = Candidate(pose, share * len(near) / len(scene))
 
     run_both(lambda: run(0), lambda: run(1))
@@ -242,7 +236,7 @@ def _near(
     around_model = Box.around(pair.geometry.project(points_mm))
     if around_model is None:
         return replace(scene, points_mm=np.empty((0, 3)), sigma_ray_mm=None)
-    box = around_model.grown(_SPARE_PX)
+    box = around_model.grow(_SPARE_PX)
     z_mm = scene.points_mm[:, 2]
     inside = (z_mm > points_mm[:, 2].min() - _SPARE_MM) & (z_mm < points_mm[:, 2].max() + _SPARE_MM)
     inside &= (pixels[:, 0] >= box.x) & (pixels[:, 0] < box.x + box.width)

@@ -41,7 +41,7 @@ class Optics(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def quantised_gradients(
+def quantise_gradients(
     picture: NDArray[np.float32],
     least: float,
     rows: tuple[int, int],
@@ -77,7 +77,7 @@ def spread_responses(
     """What an edge of each direction finds around each pixel.
 
     Args:
-        bins: (h, w) of `quantised_gradients`.
+        bins: (h, w) of `quantise_gradients`.
         reach: px in both directions within which the best gradient counts.
         answers: (256, 8) response of a byte of bins to each direction.
         rows: first and last (exclusive) to be done.

@@ -37,7 +37,7 @@ class RegistrationModel:
 
     def __init__(self, bone: BoneModel) -> None:
         self.bone = bone
-        self.seen_mesh = bone.seen_surface()
+        self.seen_mesh = bone.make_seen_surface()
         self.points_mm: FloatArray = np.array(self.seen_mesh.vertices_mm)
         self.normals: FloatArray = np.array(self.seen_mesh.normals)
         self.sigma_mm: FloatArray = np.hypot(self.SURFACE_SIGMA_MM, bone.cartilage_sd_mm)

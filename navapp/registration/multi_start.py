@@ -8,7 +8,7 @@ import numpy as np
 from navapp.geometry.bands import run_both
 from navapp.geometry.directions import sphere_spiral
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
-from navapp.registration.bimcc import BimccSettings, bone_from_scene, fit_coarsely
+from navapp.registration.bimcc import BimccSettings, fit_coarsely
 from navapp.registration.coverage import coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
@@ -32,7 +32,7 @@ class Candidate:
     score: float
 
 
-def tilted_starts(
+def make_tilted_starts(
     pose: RigidTransform, centre_mm: FloatArray, tilt_deg: float = 35.0, n_tilts: int = 14
 ) -> list[RigidTransform]:
     """The pose and tilts of it, axes spread over the sphere.
@@ -46,11 +46,11 @@ def tilted_starts(
     starts = [pose]
     for axis in sphere_spiral(n_tilts):
         twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
-        starts.append(pose.moved(twist, centre_mm))
+        starts.append(pose.move(twist, centre_mm))
     return starts
 
 
-def scattered_starts(
+def make_scattered_starts(
     pose: RigidTransform,
     centre_mm: FloatArray,
     step_mm: float,
@@ -70,10 +70,10 @@ def scattered_starts(
     axes = np.vstack([np.zeros((1, 3)) if has_middle else np.empty((0, 3)), np.eye(3), -np.eye(3)])
     starts = []
     for shift in step_mm * axes:
-        moved = pose.moved(np.concatenate([shift, np.zeros(3)]), centre_mm)
+        moved = pose.move(np.concatenate([shift, np.zeros(3)]), centre_mm)
         starts.append(moved)
         for tilt_deg, n_tilts in tilts:
-            starts += tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
+            starts += make_tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
     return starts
 
 
@@ -91,7 +91,7 @@ def find_candidates(
         scene: what was measured.
         model: prepared bone.
         starts: `scene_from_bone` each.
-        score: of a pose, larger is better; by default `explained_share`.
+        score: of a pose, larger is better; by default `compute_explained_fraction`.
         on_progress: told the share done; may raise to cancel.
         settings: of the approach.
     """
@@ -108,12 +108,12 @@ def find_candidates(
     run_both(lambda: run(0), lambda: run(1))
     on_progress(1.0)
     poses = distinct([pose for pose in found if pose is not None], model.centre_mm)
-    judged = score or (lambda pose: explained_share(thinned, model, pose))
+    judged = score or (lambda pose: compute_explained_fraction(thinned, model, pose))
     candidates = [Candidate(pose, judged(pose)) for pose in poses]
     return sorted(candidates, key=lambda candidate: candidate.score, reverse=True)
 
 
-def explained_share(
+def compute_explained_fraction(
     scene: Scene,
     model: RegistrationModel,
     scene_from_bone: RigidTransform,
@@ -126,7 +126,7 @@ def explained_share(
     """
     settings = settings or BimccSettings()
     sigma_mm = 0.5 * settings.widest_at_rest_mm
-    rotation, shift = bone_from_scene(scene_from_bone)
+    rotation, shift = scene_from_bone.inverse_parts()
     arrays = scene.arrays
     n_asked = len(range(0, len(scene), scene.every))
     pairs = make_pairs(n_asked)

@@ -98,12 +98,12 @@ class PoseSampler:
         poses = [rough]
         for k, (sigma_mm, draw) in enumerate(_ROUNDS):
             on_progress(k / (len(_ROUNDS) + 1))
-            poses = self._drawn(depth, poses, draw, sigma_mm, random)
+            poses = self._draw(depth, poses, draw, sigma_mm, random)
         on_progress(len(_ROUNDS) / (len(_ROUNDS) + 1))
         found: list[Candidate] = []
         for n_climbing, draw, sigmas_mm in _CLIMBS:
             starts = distinct(poses, self._centre_mm, n_climbing)
-            found = [self._climbed(depth, pose, draw, sigmas_mm) for pose in starts]
+            found = [self._climb(depth, pose, draw, sigmas_mm) for pose in starts]
             found.sort(key=lambda one: one.score, reverse=True)
             poses = [one.scene_from_bone for one in found]
         kept = distinct(poses, self._centre_mm, n)
@@ -144,7 +144,7 @@ class PoseSampler:
         run_both(lambda: run(0, middle), lambda: run(middle, len(scores)))
         return scores
 
-    def _drawn(
+    def _draw(
         self,
         depth: DepthMap,
         poses: list[RigidTransform],
@@ -156,13 +156,13 @@ class PoseSampler:
         parents = random.integers(0, len(poses), draw.n_poses)
         twists = random.standard_normal((draw.n_poses, 6)) * draw.deviations
         parents[: len(poses)], twists[: len(poses)] = np.arange(len(poses)), 0.0
-        rotations, shifts = self._moved(poses, twists, parents)
+        rotations, shifts = self._move_poses(poses, twists, parents)
         scores = self.scores(depth, rotations, shifts, sigma_mm, draw.n_points)
         names = poses[0].target, poses[0].source
         best = np.argsort(-scores, kind="stable")[: draw.n_kept]
         return [RigidTransform.from_parts(*names, rotations[k], shifts[k]) for k in best]
 
-    def _climbed(
+    def _climb(
         self, depth: DepthMap, start: RigidTransform, draw: Draw, sigmas_mm: tuple[float, ...]
     ) -> Candidate:
         """The best pose about a start by cross-entropy: draw, keep the best, draw as they spread.
@@ -176,13 +176,13 @@ class PoseSampler:
         for sigma_mm in sigmas_mm:
             twists = random.multivariate_normal(mean, covariance, draw.n_poses, method="cholesky")
             twists[0] = mean
-            scores = self.scores(depth, *self._moved([start], twists), sigma_mm, draw.n_points)
+            scores = self.scores(depth, *self._move_poses([start], twists), sigma_mm, draw.n_points)
             best = np.argsort(-scores, kind="stable")[: draw.n_kept]
             mean, score = twists[best].mean(axis=0), float(scores[best[0]])
             covariance = _WIDENING**2 * np.cov(twists[best].T) + floor
-        return Candidate(start.moved(mean, start.apply(self._centre_mm)), score)
+        return Candidate(start.move(mean, start.apply(self._centre_mm)), score)
 
-    def _moved(
+    def _move_poses(
         self,
         poses: list[RigidTransform],
         twists: FloatArray,

@@ -20,10 +20,10 @@ from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     ANYWHERE,
     NEAR,
-    explained_share,
+    compute_explained_fraction,
     find_candidates,
     is_same_pose,
-    tilted_starts,
+    make_tilted_starts,
 )
 from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.scene import Scene
@@ -115,13 +115,13 @@ def register(
     if len(scene) < MIN_POINTS or not (is_global or _is_doubtful(alone)):
         return alone
     middle_mm = np.median(scene.points_mm, axis=0)  # a stray point far away must not move it
-    near = tilted_starts(start, middle_mm)
+    near = make_tilted_starts(start, middle_mm)
     first_part = 0.2 if is_global else 1.0
     best = _from_many(scene, model, near, alone, lambda share: on_progress(first_part * share))
     if is_global and _is_doubtful(best):
         shift = middle_mm - start.apply(np.median(model.points_mm, axis=0))
-        centred = start.moved(np.concatenate([shift, np.zeros(3)]), np.zeros(3))
-        rings = [tilted_starts(centred, middle_mm, tilt_deg)[1:] for tilt_deg in _RINGS_DEG]
+        centred = start.move(np.concatenate([shift, np.zeros(3)]), np.zeros(3))
+        rings = [make_tilted_starts(centred, middle_mm, tilt_deg)[1:] for tilt_deg in _RINGS_DEG]
         far = [centred, *chain.from_iterable(rings)]
         best = _from_many(
             scene, model, far, best, lambda share: on_progress(first_part + 0.8 * share), ANYWHERE
@@ -147,7 +147,9 @@ def _from_many(
         if candidate.score >= least:
             solution = solve_bimcc(scene, model, candidate.scene_from_bone)
             tried.append(_verdict(scene, model, solution, n_starts))
-    scores = [explained_share(scene, model, one.estimate.camera_from_bone) for one in tried]
+    scores = [
+        compute_explained_fraction(scene, model, one.estimate.camera_from_bone) for one in tried
+    ]
     best = int(np.argmax(scores))
     rivals = [
         score
@@ -191,7 +193,7 @@ def _verdict(
     faults = _faults(scene, model, solution, seen)
     free = [f"not fixed: {words}" for words in information.free_in_words()]
     free = [Reason.DEGENERATE.value] * bool(free) + free
-    tre_mm = _predicted_tre_mm(scene, model, estimate)
+    tre_mm = _predict_tre_mm(scene, model, estimate)
     if tre_mm is None or tre_mm > _LARGEST_TRE_MM:
         free.append(Reason.POSE_UNCERTAIN.value)
     outcome = Outcome.FAILED if faults else Outcome.DEGENERATE if free else Outcome.CONVERGED
@@ -247,14 +249,12 @@ def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
     return float(max(float(shared.mean()), 0.0) ** 0.5) if len(shared) else 0.0
 
 
-def _predicted_tre_mm(
-    scene: Scene, model: RegistrationModel, estimate: PoseEstimate
-) -> float | None:
+def _predict_tre_mm(scene: Scene, model: RegistrationModel, estimate: PoseEstimate) -> float | None:
     points = _facing(model, estimate.camera_from_bone, scene)
     if len(points) == 0 or not np.isfinite(estimate.covariance).all():
         return None
     some = points[:: max(1, len(points) // _N_TRE_POINTS)]
-    return estimate.predicted_tre_mm(model.centre_mm, some)
+    return estimate.predict_tre_mm(model.centre_mm, some)
 
 
 def _facing(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:

@@ -11,7 +11,7 @@ from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.coarse import LEAST_AGREEMENT, Evidence, clip_box, coarse_surface
 from navapp.stereo.matching.census_sgm import CensusSettings, match_census
 from navapp.stereo.matching.gradient import GradientSettings, match_gradient, smooth_known
-from navapp.stereo.occlusion.classify import classify, seen_from_right
+from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface
@@ -116,7 +116,7 @@ def match_on_support(
     if not fills:
         return StereoAnswer(left, left, (), FrameTimings(stereo_ms=_ms(started)))
     # What the right camera sees of the support is all that is known of its view.
-    right_px = seen_from_right(support_px, left.x, pair.geometry.width)
+    right_px = project_to_right(support_px, left.x, pair.geometry.width)
     evidence = Evidence(right_px, 0, _by_sigma(left))
     fill = FillSettings(max_gap_px=max_gap_px)
     return _answer(pair, left, evidence, fill, started, np.isfinite(support_px))
@@ -128,10 +128,10 @@ def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoA
     pair = clip_box(pair)
     matched = match_gradient(pair, band_px)
     # Matches of chance stand alone.
-    in_patches = without_specks(matched).matched_share
-    if matched.matched_share == 0.0:
+    in_patches = without_specks(matched).matched_fraction
+    if matched.matched_fraction == 0.0:
         return _nothing(pair, _NO_CONTRAST, started)
-    if in_patches < _LEAST_IN_PATCHES * matched.matched_share:
+    if in_patches < _LEAST_IN_PATCHES * matched.matched_fraction:
         return _nothing(pair, _DISAGREEMENT, started)
     return StereoAnswer(matched, matched, (), FrameTimings(stereo_ms=_ms(started)))
 

@@ -126,7 +126,7 @@ def are_swapped(
 def clip_box(pair: RectifiedPair) -> RectifiedPair:
     """The pair with the part of its box that lies in the pictures."""
     height, width = pair.left.shape[:2]
-    return replace(pair, box=pair.box.clipped(width, height))
+    return replace(pair, box=pair.box.clip(width, height))
 
 
 def smooth_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -177,14 +177,14 @@ def halve(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> Re
     half, whole = half_box(pair.box), Box(0, 0, width, height)
     in_left = in_right = whole
     if band_px is not None:
-        in_left = half.grown(_WINDOW_PX)
+        in_left = half.grow(_WINDOW_PX)
         # From the farthest partner of the first column to the nearest of the last.
         farthest, nearest = math.ceil(band_px[1] / 2.0), math.floor(band_px[0] / 2.0)
         first, after = in_left.x - farthest, in_left.x + in_left.width - nearest
         in_right = replace(in_left, x=first, width=max(after - first, 0))
     return RectifiedPair(
-        _halve(pair.left, in_left.clipped(width, height), whole),
-        _halve(pair.right, in_right.clipped(width, height), whole),
+        _halve(pair.left, in_left.clip(width, height), whole),
+        _halve(pair.right, in_right.clip(width, height), whole),
         replace(
             geometry,
             focal_px=geometry.focal_px / 2.0,

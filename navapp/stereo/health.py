@@ -36,13 +36,13 @@ class PictureHealth:
     """Light and sharpness of one picture around the bone.
 
     Attributes:
-        dark_share: of pixels too dark to show a bone's texture.
-        saturated_share: of pixels that the sensor clipped.
+        dark_fraction: of pixels too dark to show a bone's texture.
+        saturated_fraction: of pixels that the sensor clipped.
         detail: rms difference of pixels two rows apart over the mean grey level.
     """
 
-    dark_share: float
-    saturated_share: float
+    dark_fraction: float
+    saturated_fraction: float
     detail: float
 
 
@@ -125,7 +125,7 @@ def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, 
 
 def _picture_health(picture: Image, box: Box) -> PictureHealth:
     """Of the part of the box that lies in the picture; of nothing, all dark."""
-    inside = box.clipped(picture.shape[1], picture.shape[0])
+    inside = box.clip(picture.shape[1], picture.shape[0])
     part = picture[
         inside.y : inside.y + inside.height : _ROWS_APART,
         inside.x : inside.x + inside.width : _COLUMNS_APART,

@@ -88,14 +88,14 @@ def measure_rows(
                     for a in range(5):
                         for b in range(a, 5):
                             sums[a, b] += term[a] * term[b]
-            if sums[0, 0] >= least and _solved(sums, found[n]):
+            if sums[0, 0] >= least and _solve(sums, found[n]):
                 found[n, 0] += row_shift_px
                 n += 1
     return n
 
 
 @njit(cache=True, nogil=True)
-def _solved(sums: NDArray[np.float64], answer: NDArray[np.float64]) -> bool:
+def _solve(sums: NDArray[np.float64], answer: NDArray[np.float64]) -> bool:
     """dy, its standard deviation and the correlation, of the sums of one window."""
     n = sums[0, 0]
     # Means removed: unknowns b, dx, dy.

@@ -45,29 +45,29 @@ class Agreement:
     Attributes:
         n_visible: model pixels in the box.
         coverage: share of them that was measured and agrees.
-        hidden_share: share of them that something nearer hides.
-        behind_share: share of them through which the scene is seen.
-        inlier_share: share of the measured ones that agrees; hidden ones do not count.
+        hidden_fraction: share of them that something nearer hides.
+        behind_fraction: share of them through which the scene is seen.
+        inlier_fraction: share of the measured ones that agrees; hidden ones do not count.
         spread_ratio: spread of the differences over the sigma that they claim; 0 when none is
             measured.
     """
 
     n_visible: int
     coverage: float
-    hidden_share: float
-    behind_share: float
-    inlier_share: float
+    hidden_fraction: float
+    behind_fraction: float
+    inlier_fraction: float
     spread_ratio: float
 
     @property
     def open_coverage(self) -> float:
         """Share of what nothing hides that was measured and agrees."""
-        return self.coverage / max(1.0 - self.hidden_share, 1e-9)
+        return self.coverage / max(1.0 - self.hidden_fraction, 1e-9)
 
     @property
     def lies_open(self) -> bool:
         """More of the bone is seen where it should be than something hides."""
-        return self.coverage > self.hidden_share
+        return self.coverage > self.hidden_fraction
 
 
 NO_AGREEMENT = Agreement(0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -84,7 +84,7 @@ class BimccTracker(TrackerBase):
         """Follow the bone into the next frame (the paper's section 3.2, intra-operative)."""
         watch = Stopwatch()
         # Predict where the bone will be.
-        left_from_bone = state.predicted(captured_ns, self.centre_mm)
+        left_from_bone = state.predict(captured_ns, self.centre_mm)
         best = None
         if state.n_lost == 0:
             # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
@@ -116,7 +116,7 @@ class BimccTracker(TrackerBase):
         Only the model itself is matched: that is soon done, and sees no more than some millimetres.
         """
         watch = Stopwatch()
-        left_from_bone = state.predicted(captured_ns, self.centre_mm)
+        left_from_bone = state.predict(captured_ns, self.centre_mm)
         frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
         with self.check_beside(frame) as checks:
             fits = self.near.find_rests(frame)

@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import Job, beside
+from navapp.geometry.bands import Job, begin_beside
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.stereo import StereoHealth, measure_health
@@ -62,7 +62,7 @@ class PairChecks:
         if self._begun is None or self._begun[0] is not measured:
             self._drop()
             run = partial(_run_check, self._meter, self._pair, self._coarse, measured, pose)
-            self._begun = measured, beside(run)
+            self._begun = measured, begin_beside(run)
         return self._begun[1]
 
     def __enter__(self) -> Self:

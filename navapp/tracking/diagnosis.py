@@ -11,7 +11,7 @@ import numpy as np
 
 from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import fit_bimcc, tilted_starts
+from navapp.registration import fit_bimcc, make_tilted_starts
 from navapp.stereo import are_swapped
 from navapp.tracking.frame import FREE_FIT, Fit, ignore
 from navapp.tracking.scoring import AMBIGUOUS_FRACTION, FitScorer
@@ -102,7 +102,7 @@ class Diagnosis:
         on_progress: Callable[[float], None],
     ) -> Fit | None:
         """Of the fits that a start and tilts of it lead to, the one that explains most."""
-        starts = tilted_starts(start, start.apply(self._meter.model.centre_mm), *_TILTS)
+        starts = make_tilted_starts(start, start.apply(self._meter.model.centre_mm), *_TILTS)
         found = self._scorer.find_candidates(measured, starts, lambda _: on_progress(1.0))
         model = self._meter.model
         poses = [one.scene_from_bone for one in found[:_N_REFINED]]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import distinct, scattered_starts, tilted_starts
+from navapp.registration import distinct, make_scattered_starts, make_tilted_starts
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer, select_poses
@@ -154,9 +154,9 @@ def _is_ok(answers: list[TrackedFrame]) -> bool:
 
 def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
     """A rough pose, and tilts of it about a place in the camera's frame."""
-    return tilted_starts(rough, centre_mm, *_NEAR_TILTS)
+    return make_tilted_starts(rough, centre_mm, *_NEAR_TILTS)
 
 
 def far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
     """Tilts of a rough pose and of what it becomes when shifted along each axis."""
-    return scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)
+    return make_scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)

@@ -93,6 +93,10 @@ class Follower:
             elif is_near:
                 break
             is_near |= moved_mm < settings.near_mm or n_rounds >= settings.max_sampled
-        if fit is not None and fit.moved_mm >= settings.near_mm:
-            fit = replace(fit, estimate=fit.estimate.doubted(Reason.NOT_CONVERGED))
-        return fit
+        return None if fit is None else self._doubt_motion(fit)
+
+    def _doubt_motion(self, fit: Fit) -> Fit:
+        """The fit; with a reason against it when its last step still moved the bone."""
+        if fit.moved_mm < self._settings.near_mm:
+            return fit
+        return replace(fit, estimate=fit.estimate.with_reason(Reason.NOT_CONVERGED))

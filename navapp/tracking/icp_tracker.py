@@ -44,7 +44,7 @@ class IcpTracker(TrackerBase):
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone's box into the next frame, match in it, and fit."""
         watch, margins = Stopwatch(), self.settings.near
-        expected = state.predicted(captured_ns, self.centre_mm)
+        expected = state.predict(captured_ns, self.centre_mm)
         predicted = self.rectify_pose(expected)
         # The box comes from the pictures, and the start from the box.
         box = self.boxes.follow(state.box, left, state.left_from_bone)
@@ -69,7 +69,7 @@ class IcpTracker(TrackerBase):
     ) -> tuple[TrackedFrame, TrackState]:
         """Match and fit once where the bone is expected."""
         watch = Stopwatch()
-        expected = state.predicted(captured_ns, self.centre_mm)
+        expected = state.predict(captured_ns, self.centre_mm)
         frame = self.begin(left, right, expected, watch, NEAR_VIEW)
         with self.check_beside(frame) as checks:
             fits = self._find(frame, self.settings.near.tracking)

@@ -104,8 +104,8 @@ class PoseJudge:
     def _evidence_of_pair(self, health: StereoHealth, depth_mm: float) -> Evidence:
         """What the pictures themselves say against any pose at a depth."""
         both = (health.left, health.right)
-        dark = max(one.dark_share for one in both)
-        saturated = max(one.saturated_share for one in both)
+        dark = max(one.dark_fraction for one in both)
+        saturated = max(one.saturated_fraction for one in both)
         detail_ratio = 0.0
         if max(dark, saturated) <= _UNUSABLE_FRACTION:
             least, most = sorted(one.detail for one in both)
@@ -138,7 +138,7 @@ class PoseJudge:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
         if not np.isfinite(estimate.covariance).all():
-            free = estimate if estimate.reasons else estimate.doubted(Reason.DEGENERATE)
+            free = estimate if estimate.reasons else estimate.with_reason(Reason.DEGENERATE)
             return replace(known, estimate=free, is_rig_accepted=True)
         if agreement is None or agreement.n_visible == 0:
             return replace(known, missing=Reason.OUT_OF_VIEW, is_rig_accepted=True)
@@ -149,11 +149,9 @@ class PoseJudge:
         bound_mm = math.hypot(view_mm, plan_mm, self._error_of_rig_mm(estimate))
         # Errors of a cartilage's thickness that go together look like another size.
         size_sigma_mm = math.hypot(estimate.size_sigma_mm, plan_mm)
-        jump_mm, jump_deg = 0.0, 0.0
+        twist = np.zeros(6)
         if predicted is not None:
             twist = predicted.twist_to(estimate.camera_from_bone, model.centre_mm)
-            jump_mm = float(np.linalg.norm(twist[:3]))
-            jump_deg = math.degrees(np.linalg.norm(twist[3:]))
         return replace(
             known,
             estimate=estimate,
@@ -165,8 +163,8 @@ class PoseJudge:
             plan_mm=plan_mm,
             bound_mm=math.hypot(bound_mm, known.rows_mm),
             cartilage_sd_mm=cartilage_mm,
-            jump_mm=jump_mm,
-            jump_deg=jump_deg,
+            jump_mm=float(np.linalg.norm(twist[:3])),
+            jump_deg=math.degrees(np.linalg.norm(twist[3:])),
             goal=goal,
         )
 
@@ -187,7 +185,7 @@ class PoseJudge:
         if len(index) == 0:
             return float("inf")
         step = max(1, len(index) // _MOST_TARGETS)
-        return estimate.predicted_tre_mm(model.centre_mm, points_mm[index[::step]])
+        return estimate.predict_tre_mm(model.centre_mm, points_mm[index[::step]])
 
     def _unrectify(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""

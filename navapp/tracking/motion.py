@@ -54,16 +54,16 @@ class TrackState:
         n = self.n_doubted
         return n % _MOST_BETWEEN_SEARCHES == 0 or (n < _MOST_BETWEEN_SEARCHES and n & (n - 1) == 0)
 
-    def predicted(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
+    def predict(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
         """The pose expected at a moment; where it was last seen after a long gap."""
         elapsed_ns = captured_ns - self.captured_ns
         if elapsed_ns > _MAX_GAP_NS:
             return self.left_from_bone
         seconds = elapsed_ns / 1e9
         twist = _DAMPING * seconds * self.velocity
-        return self.left_from_bone.moved(twist, self.left_from_bone.apply(centre_mm))
+        return self.left_from_bone.move(twist, self.left_from_bone.apply(centre_mm))
 
-    def carried(self, moved: RigidTransform) -> "TrackState":
+    def carry(self, moved: RigidTransform) -> "TrackState":
         """As if it had moved with something else; what it does besides is not foreseen.
 
         Args:
@@ -71,7 +71,7 @@ class TrackState:
         """
         return replace(self, left_from_bone=moved @ self.left_from_bone, velocity=np.zeros(6))
 
-    def updated(
+    def update(
         self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
     ) -> "TrackState":
         """After a frame: a lost one, or one that found something else, keeps the pose.

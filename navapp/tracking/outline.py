@@ -17,7 +17,7 @@ from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
-from navapp.geometry.zbuffer_kernels import known_range
+from navapp.geometry.zbuffer_kernels import find_known_range
 from navapp.registration.information import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.edge_kernels import find_steps
@@ -74,7 +74,7 @@ class OutlineMeter:
         pair: RectifiedPair,
         fit: Fit,
         coarse_px: NDArray[np.float32] | None,
-        noise2: float = 1.0,
+        noise_variance_ratio: float = 1.0,
     ) -> Fit:
         """A fit to the model's surface, moved to what surface and outline say together.
 
@@ -84,14 +84,14 @@ class OutlineMeter:
             pair: that it was fitted in.
             fit: of the bone.
             coarse_px: (h, w) coarse disparity of whatever lies in its box.
-            noise2: variance that the surface's noise has, over the one that it claims.
+            noise_variance_ratio: of the surface's noise to what it claims.
         """
         estimate, view = fit.estimate, fit.measured.view
         if view is None or not np.isfinite(estimate.covariance).all():
             return fit
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
-        joined = join(estimate, MODEL_FIT.n_sigmas, block, centre_mm, noise2)
+        joined = join(estimate, MODEL_FIT.n_sigmas, block, centre_mm, noise_variance_ratio)
         moved_mm = fit.pose.mean_motion_mm(joined.camera_from_bone, self._model.hull_mm)
         return replace(fit, estimate=joined, moved_mm=fit.moved_mm + moved_mm)
 
@@ -122,7 +122,7 @@ class OutlineMeter:
 
         blocks = run_both(
             lambda: residuals_in(pair.left, left, view.depth_mm, view.box),
-            lambda: residuals_in(pair.right, right, *self._seen_from_right(view, right)),
+            lambda: residuals_in(pair.right, right, *self._project_to_right(view, right)),
         )
         return ResidualBlock(
             np.concatenate([block.jacobian for block in blocks]),
@@ -136,9 +136,9 @@ class OutlineMeter:
         geometry = self._geometry
         return Eye(x_mm, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
 
-    def _seen_from_right(self, view: RenderedView, right: Eye) -> tuple[NDArray[np.float32], Box]:
+    def _project_to_right(self, view: RenderedView, right: Eye) -> tuple[NDArray[np.float32], Box]:
         depth, box = view.depth_mm, view.box
-        nearest_mm, farthest_mm = known_range(depth)
+        nearest_mm, farthest_mm = find_known_range(depth)
         if nearest_mm > farthest_mm:
             return depth, box
         near, far = (self._geometry.disparity_px(z) for z in (nearest_mm, farthest_mm))

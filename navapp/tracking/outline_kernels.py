@@ -59,7 +59,7 @@ class Eye(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def turned_edges(
+def find_turned_edges(
     faces: NDArray[np.int32], planes: NDArray[np.float32], eye: NDArray[np.float64]
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """Edges of which one triangle looks at an eye and one away, and which triangles look at it.
@@ -121,7 +121,7 @@ def find_rim(
     """
     vertices, edges, faces = ridges.vertices, ridges.edges, ridges.faces
     seat = rotation.T @ (np.array([eye.x_mm, 0.0, 0.0]) - translation)
-    found, looks = turned_edges(faces, ridges.planes, seat)
+    found, looks = find_turned_edges(faces, ridges.planes, seat)
     n = len(found)
     rim = Rim(
         np.empty((n, 3)), np.empty((n, 2)), np.empty((n, 2)), np.empty(n),

@@ -32,7 +32,7 @@ class FitScorer:
         """How much of the model, at a pose in the rectified left camera, a measurement explains."""
         model, geometry = self._meter.model, self._meter.geometry
         found = compare_at(pose, model, measured.disparity, geometry)
-        return found.coverage * found.inlier_share
+        return found.coverage * found.inlier_fraction
 
     def is_there(self, fit: Fit) -> bool:
         """Whether so much of the model agrees with what it was fitted to that it may be there."""
@@ -79,7 +79,7 @@ def rank_fits(fits: list[Fit], scores: list[float], model: RegistrationModel) ->
     )
     if not is_guess:
         return ranked
-    return [replace(best, estimate=best.estimate.doubted(Reason.AMBIGUOUS)), *ranked[1:]]
+    return [replace(best, estimate=best.estimate.with_reason(Reason.AMBIGUOUS)), *ranked[1:]]
 
 
 def select_poses(

@@ -183,7 +183,7 @@ class SurfaceMeter:
             return None
         box, band_px = region
         found = match(replace(pair, box=box), band_px)
-        return Measurement(found, self._cloud(found), found.matched_share, FREE_CORRELATION_PX)
+        return Measurement(found, self._cloud(found), found.matched_fraction, FREE_CORRELATION_PX)
 
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
@@ -224,7 +224,9 @@ class SurfaceMeter:
         found = refine_on_model(expected.pair, expected.support_px)
         is_expected = np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
-        share = found.matched_share * found.origin.size / max(int(np.count_nonzero(is_expected)), 1)
+        share = (
+            found.matched_fraction * found.origin.size / max(int(np.count_nonzero(is_expected)), 1)
+        )
         return Measurement(found, cloud, share, MODEL_CORRELATION_PX, expected.view)
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
@@ -243,7 +245,7 @@ class SurfaceMeter:
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About as many points as the line wants."""
-        n_matched = found.matched_share * found.origin.size
+        n_matched = found.matched_fraction * found.origin.size
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
         return found.reproject(self.geometry, stride_px)
 
@@ -262,7 +264,7 @@ class SurfaceMeter:
         far = min(farthest_mm + margins.band_mm, self.depth_mm[1])
         if near >= far:
             return None
-        grown = box.grown(margins.box_px).clipped(self.geometry.width, self.geometry.height)
+        grown = box.grow(margins.box_px).clip(self.geometry.width, self.geometry.height)
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
-from navapp.geometry.bands import beside
+from navapp.geometry.bands import begin_beside
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -157,7 +157,7 @@ class TrackerBase:
     def check_beside(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""
         # What may hide the bone does not depend on where exactly it is.
-        coarse = beside(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
+        coarse = begin_beside(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
         return PairChecks(self.meter, frame.pair, coarse)
 
     def judge_fits(
@@ -199,7 +199,7 @@ class TrackerBase:
         watch: Stopwatch,
     ) -> tuple[TrackedFrame, TrackState]:
         """The answer with its times, and the state after it."""
-        after = state.updated(tracked, captured_ns, self.centre_mm)
+        after = state.update(tracked, captured_ns, self.centre_mm)
         # What is not followed does not place the box either.
         box = self.boxes.place(state.box, left, tracked) if after.n_lost == 0 else state.box
         return replace(tracked, timings=watch.timings), replace(after, box=box)

@@ -161,7 +161,7 @@ def _compute_seen_percent(snapshot: Snapshot) -> float | None:
 
 
 def _compute_occluded_percent(snapshot: Snapshot) -> float | None:
-    return None if snapshot.verdict is None else 100.0 * snapshot.verdict.occluded_share
+    return None if snapshot.verdict is None else 100.0 * snapshot.verdict.occluded_fraction
 
 
 def _error(view: View, width: int) -> list[Content]:

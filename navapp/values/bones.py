@@ -68,7 +68,7 @@ class BoneModel:
         """(V,) vertices that face the left camera; see the function `visible_vertices`."""
         return visible_vertices(self.mesh, left_from_bone)
 
-    def seen_surface(self) -> TriangleMesh:
+    def make_seen_surface(self) -> TriangleMesh:
         """What a camera sees: moved out by the mean cartilage, without what a stage removed.
 
         Its normals lean where the cartilage grows thicker.

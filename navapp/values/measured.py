@@ -45,7 +45,7 @@ class DisparityMap:
         return Box(self.x, self.y, width, height)
 
     @property
-    def matched_share(self) -> float:
+    def matched_fraction(self) -> float:
         """Share of pixels with a measured disparity."""
         n_matched = np.count_nonzero(self.origin == Origin.MATCHED)
         return float(n_matched / self.origin.size) if self.origin.size else 0.0
@@ -128,7 +128,7 @@ class SurfaceCloud:
     def __len__(self) -> int:
         return len(self.points_mm)
 
-    def selected(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> "SurfaceCloud":
+    def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> "SurfaceCloud":
         """A part of the cloud; points are taken to be spread evenly over it."""
         n_kept = int(mask.sum()) if mask.dtype == np.bool_ else len(mask)
         thinning = (len(self) / n_kept) ** 0.5 if n_kept else 1.0

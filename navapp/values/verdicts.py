@@ -109,7 +109,7 @@ class PoseEstimate:
         covariance: (6, 6) of the twist (translation mm first, rotation rad second), applied from
             the left about the mean of the model's vertices.
         n_points: points that entered.
-        inlier_share: their share within three sigma of the surface.
+        inlier_fraction: their share within three sigma of the surface.
         rms_mm: weighted rms of the point-to-plane residual of those.
         expected_rms_mm: what the measurement's own sigma predicts for it.
         iterations: of the solver.
@@ -123,7 +123,7 @@ class PoseEstimate:
     camera_from_bone: RigidTransform
     covariance: FloatArray
     n_points: int
-    inlier_share: float
+    inlier_fraction: float
     rms_mm: float
     expected_rms_mm: float
     iterations: int
@@ -132,11 +132,11 @@ class PoseEstimate:
     size_mm: float = 0.0
     size_sigma_mm: float = math.inf
 
-    def doubted(self, reason: Reason) -> "PoseEstimate":
+    def with_reason(self, reason: Reason) -> "PoseEstimate":
         """The same estimate with one more reason against it."""
         return replace(self, reasons=(*self.reasons, reason))
 
-    def predicted_tre_mm(self, centre_mm: FloatArray, targets_mm: FloatArray) -> float:
+    def predict_tre_mm(self, centre_mm: FloatArray, targets_mm: FloatArray) -> float:
         """95 % bound of the mean error over target points of a bone.
 
         Args:
@@ -188,8 +188,8 @@ class Verdict:
             vertices when the plan names no targets; None without a pose.
         reasons: why it is not OK.
         coverage: share of the visible model that was measured and fits.
-        occluded_share: share of the visible model that something nearer hides.
-        inlier_share: share of the measured, not hidden model pixels that fit.
+        occluded_fraction: share of the visible model that something nearer hides.
+        inlier_fraction: share of the measured, not hidden model pixels that fit.
         rms_mm, expected_rms_mm: of the residual.
     """
 
@@ -197,8 +197,8 @@ class Verdict:
     predicted_tre_mm: float | None = None
     reasons: tuple[Reason, ...] = ()
     coverage: float = 0.0
-    occluded_share: float = 0.0
-    inlier_share: float = 0.0
+    occluded_fraction: float = 0.0
+    inlier_fraction: float = 0.0
     rms_mm: float | None = None
     expected_rms_mm: float | None = None
 

@@ -40,7 +40,7 @@ def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
     bone = BoneModel("femur", case.mesh)
     turn = np.radians(1.0) * np.array([0.6, -0.64, 0.48])
     twist = np.concatenate([[0.5, -0.5, 0.7], turn])
-    start = case.poses[0].moved(twist, case.poses[0].apply(tracker.centre_mm))
+    start = case.poses[0].move(twist, case.poses[0].apply(tracker.centre_mm))
     state = TrackState.at_rest(start, case.frames[0].captured_ns)
     found = []
     for frame, true in zip(case.frames, case.poses, strict=True):

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.zbuffer import projected_box
+from navapp.geometry.zbuffer import project_box
 from navapp.values import DisparityMap, visible_vertices
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -112,8 +112,8 @@ def _scene(
     left, right, mask = pictures
     geometry = rectifier.geometry
     pose = geometry.rectified_from_left @ left_from_bone
-    box = projected_box(mesh, pose, geometry).grown(_MARGIN_PX)
-    box = box.clipped(geometry.width, geometry.height)
+    box = project_box(mesh, pose, geometry).grow(_MARGIN_PX)
+    box = box.clip(geometry.width, geometry.height)
     x, y, *_ = rectifier.maps
     warped = cv2.remap(mask, x, y, cv2.INTER_NEAREST)
     size = 2 * _ERODED_PX + 1
@@ -138,7 +138,7 @@ def fit_error_mm(scene: Scene, found: DisparityMap, mesh: TriangleMesh) -> float
         residual = np.einsum("ij,ij->i", normals, near - mesh.vertices_mm[index])
         jacobian = np.hstack([normals, np.cross(near - centre, normals)])
         step = -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-        pose = pose.inverse().moved(step, centre).inverse()
+        pose = pose.inverse().move(step, centre).inverse()
         if np.linalg.norm(step[:3]) < 1e-4:
             break
     return tre_mm(pose, scene.pose, mesh)
@@ -148,7 +148,7 @@ def on_bone(scene: Scene, found: DisparityMap) -> DisparityMap:
     """Only what was matched on the bone, over the scene's box."""
     box = scene.pair.box
     inside = replace(found.box, x=found.x - box.x, y=found.y - box.y)
-    part = inside.clipped(box.width, box.height)
+    part = inside.clip(box.width, box.height)
     here = np.s_[part.y : part.y + part.height, part.x : part.x + part.width]
     x, y = part.x - inside.x, part.y - inside.y
     there = np.s_[y : y + part.height, x : x + part.width]
@@ -173,4 +173,4 @@ def disturbed(
     axis, direction = np.random.default_rng(seed).normal(size=(2, 3))
     shift = length_mm * direction / np.linalg.norm(direction)
     turn = np.radians(angle_deg) * axis / np.linalg.norm(axis)
-    return pose.moved(np.concatenate([shift, turn]), pose.apply(centre_mm))
+    return pose.move(np.concatenate([shift, turn]), pose.apply(centre_mm))

@@ -72,7 +72,7 @@ class LeavingWorld(World):
         up = smooth_step((time_s - 0.7) / 0.5) * smooth_step((5.8 - time_s) / 0.5)
         out = smooth_step((time_s - 1.2) / 1.5) * smooth_step((5.3 - time_s) / 1.5)
         shift = (-340.0 * out, 0.0, -60.0 * up, 0.0, 0.0, 0.0)
-        return super().left_from_body(body, time_ns).moved(shift, np.zeros(3))
+        return super().left_from_body(body, time_ns).move(shift, np.zeros(3))
 
 
 @dataclass
@@ -116,10 +116,10 @@ class Scene:
         width, height = self.knee.rig.width, self.knee.rig.height
         true_box = self.boxes.project(truth)
         assert true_box is not None
-        seen = true_box.seen_share(width, height)
+        seen = true_box.seen_fraction(width, height)
         if box is None:
             return -1.0, seen
-        return box.clipped(width, height).overlap(true_box.clipped(width, height)), seen
+        return box.clip(width, height).overlap(true_box.clip(width, height)), seen
 
 
 @dataclass
@@ -141,7 +141,7 @@ def follow_pictures(scene: Scene, n_frames: int, tally: Tally) -> None:
         if state is None:
             start = scene.registered(frame)
             assert start is not None
-            state = place_box(None, frame.left, scene.boxes.project(start), hidden_share=0.0)
+            state = place_box(None, frame.left, scene.boxes.project(start), hidden_fraction=0.0)
             continue
         times = tally.searching_ms if state.box is None else tally.ms
         started = time.perf_counter()

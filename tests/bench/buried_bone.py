@@ -65,7 +65,7 @@ def off(true: RigidTransform, tracker: Tracker, seed: int) -> RigidTransform:
     rng = np.random.default_rng([seed, 9])
     axis, shift = (one / np.linalg.norm(one) for one in rng.normal(size=(2, 3)))
     twist = np.concatenate([_OFF_MM * shift, np.radians(_OFF_DEG) * axis])
-    return true.moved(twist, true.apply(tracker.centre_mm))
+    return true.move(twist, true.apply(tracker.centre_mm))
 
 
 if __name__ == "__main__":

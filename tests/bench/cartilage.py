@@ -63,7 +63,7 @@ class Row:
     bound_mm: float
     rms_ratio: float
     coverage: float
-    inlier_share: float
+    inlier_fraction: float
     thirds_mm: float
     free_rms_ratio: float
     free_coverage: float
@@ -162,11 +162,11 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
         verdict.predicted_tre_mm or float("nan"),
         _ratio(verdict.rms_mm, verdict.expected_rms_mm),
         verdict.coverage,
-        verdict.inlier_share,
+        verdict.inlier_fraction,
         thirds_mm(tracker, frame, pose),
         _ratio(free.rms_mm, free.expected_rms_mm),
         free.coverage,
-        free.inlier_share,
+        free.inlier_fraction,
     )
 
 
@@ -272,7 +272,7 @@ def print_each(rows: dict[str, list[Row]]) -> None:
             print(
                 f"| {name} | {row.seed} | {row.frame} | {row.status.value} | {row.tre_mm:.2f} | "
                 f"{row.bound_mm:.2f} | {row.rms_ratio:.2f} | {row.coverage:.2f} | "
-                f"{row.inlier_share:.2f} | {row.thirds_mm:.3f} | {row.free_rms_ratio:.2f} | "
+                f"{row.inlier_fraction:.2f} | {row.thirds_mm:.3f} | {row.free_rms_ratio:.2f} | "
                 f"{row.free_coverage:.2f} | {row.free_inlier_share:.2f} | {row.reasons} |"
             )
 

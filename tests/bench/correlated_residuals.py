@@ -71,16 +71,18 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
     for _ in range(_STARTS):
         off = rng.normal(0.0, np.repeat([_START_OFF_MM, np.radians(_START_OFF_DEG)], 3))
         # One pair of pictures, rectified around the truth, for every start.
-        frame = replace(near, start=true.moved(off, true.apply(parts.centre_mm)))
+        frame = replace(near, start=true.move(off, true.apply(parts.centre_mm)))
         fit = parts.find(frame)
         if fit is None or fit.measured.view is None:
             continue
-        noise2 = NOISE_RATIO**2 if parts.lies_open(frame, fit) else 1.0
-        shown = parts.with_outline(frame, fit, noise2).with_correlated_residuals(noise2)
+        noise_variance_ratio = NOISE_RATIO**2 if parts.lies_open(frame, fit) else 1.0
+        shown = parts.with_outline(frame, fit, noise_variance_ratio).with_correlated_residuals(
+            noise_variance_ratio
+        )
         fit = parts.with_outline(frame, fit)
         targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
         bounds_mm = (
-            one.estimate.predicted_tre_mm(parts.centre_mm, targets[:: max(1, len(targets) // 200)])
+            one.estimate.predict_tre_mm(parts.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit, shown)
         )
         error_mm = compute_mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)

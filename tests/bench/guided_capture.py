@@ -66,7 +66,7 @@ def reached(
     """The hand goes there until both cameras see enough."""
     for _ in range(100):
         off = rng.normal(0.0, 1.0, 6) * np.repeat((OFF_MM, OFF_RAD), 3)
-        held = wanted.moved(off, wanted.apply(BOARD.points_mm.mean(axis=0)))
+        held = wanted.move(off, wanted.apply(BOARD.points_mm.mean(axis=0)))
         pair = seen_pair(index, true, held, rng, noise_px=noise_px)
         if len(pair.common()[0]) >= FEWEST_COMMON:
             return pair

@@ -29,7 +29,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.geometry.zbuffer import projected_box
+from navapp.geometry.zbuffer import project_box
 from navapp.overlay.layers import Scene, draw_bone
 from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, TrackState, make_tracker
@@ -114,11 +114,11 @@ def peers(recording: Recording) -> Way:
         frame = recording.frames[number]
         started = time.perf_counter()
         start = geometry.rectified_from_left @ last
-        box = projected_box(model.seen_mesh, start, geometry)
+        box = project_box(model.seen_mesh, start, geometry)
         assert box is not None
         nearest = geometry.disparity_px(float(start.apply(model.hull_mm)[:, 2].min())) + 8.0
         lowest = int(nearest) - _DISPARITIES
-        pair = _remapped(rectifier, frame, box.grown(_SPARE_PX), (lowest, int(nearest)))
+        pair = _remapped(rectifier, frame, box.grow(_SPARE_PX), (lowest, int(nearest)))
         rectified = time.perf_counter()
         found = np.asarray(peer_chain(pair, lowest, _DISPARITIES)(), dtype=np.float32) / 16.0
         matched = time.perf_counter()
@@ -138,7 +138,7 @@ def _remapped(
     """OpenCV's linear remap of the box, and of what its disparities reach."""
     geometry = rectifier.geometry
     left_x, left_y, right_x, right_y = rectifier.maps
-    box = box.clipped(geometry.width, geometry.height)
+    box = box.clip(geometry.width, geometry.height)
     rows = slice(box.y, box.y + box.height)
     grown = slice(max(box.x - band_px[1] - _DISPARITIES, 0), box.x + box.width)
     pictures = []

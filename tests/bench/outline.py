@@ -128,7 +128,7 @@ def joined(
     for one in (fit, parts.with_outline(frame, fit)):
         mesh = parts.model.bone.mesh
         targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
-        bound_mm = one.estimate.predicted_tre_mm(parts.centre_mm, targets[:: len(targets) // 200])
+        bound_mm = one.estimate.predict_tre_mm(parts.centre_mm, targets[:: len(targets) // 200])
         answer += [compute_mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
     yield answer[0], answer[1], answer[2], answer[3]
 
@@ -140,7 +140,7 @@ def located(case: Case, parts: TrackerParts, seed: int) -> tuple[Frame, Fit | No
     off = np.concatenate(
         [rng.normal(0.0, START_OFF_MM, 3), np.radians(rng.normal(0.0, START_OFF_DEG, 3))]
     )
-    start = true.moved(off, true.apply(parts.centre_mm))
+    start = true.move(off, true.apply(parts.centre_mm))
     frame = parts.frame(taken.left, taken.right, start)
     fit = parts.find(frame)
     return frame, None if fit is None or fit.measured.view is None else fit

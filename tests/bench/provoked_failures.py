@@ -107,8 +107,8 @@ def print_each(frames: list[Shown]) -> None:
             print(
                 f"    {one.time_s:.2f} s {verdict.status.value} {one.tre_mm:.2f} mm "
                 f"bound {bound_mm:.2f} "
-                f"cov {verdict.coverage:.2f} hid {verdict.occluded_share:.2f} "
-                f"in {verdict.inlier_share:.2f} {one.took_ms:.0f} ms {said}"
+                f"cov {verdict.coverage:.2f} hid {verdict.occluded_fraction:.2f} "
+                f"in {verdict.inlier_fraction:.2f} {one.took_ms:.0f} ms {said}"
             )
 
 

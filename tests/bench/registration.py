@@ -28,8 +28,8 @@ from navapp.registration import (
     fit_bimcc,
     fit_bimcc_literal,
     fit_icp,
+    make_tilted_starts,
     register,
-    tilted_starts,
 )
 from tests.bench.registration_peers import RADII_MM, Peer, open3d_plane, peers
 from tests.bench.registration_scenes import (
@@ -242,7 +242,7 @@ def _lists(
     peer = settings[name]
 
     def fit(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
-        starts = tilted_starts(scene.start, scene.points_mm.mean(axis=0))
+        starts = make_tilted_starts(scene.start, scene.points_mm.mean(axis=0))
         poses = [peer(scene.points_mm, model, start) for start in starts]
         return max(poses, key=lambda pose: _on_model(pose, scene, model)), None
 

@@ -48,7 +48,7 @@ class Clouded:
 def load_bone(folder: Path, name: str, n_vertices: int) -> Bone:
     """A bone of `bones/pymskt` and a decimated model of about so many vertices."""
     mesh = read_ply(folder / f"{name}.ply")[0].largest_component()
-    mesh = mesh.flipped() if mesh.volume_mm3() < 0.0 else mesh
+    mesh = mesh.flip() if mesh.volume_mm3() < 0.0 else mesh
     axis = np.array([0.0, 0.0, -1.0 if name.startswith("femur") else 1.0])
     normals, _ = _faces_of(mesh)
     height = mesh.vertices_mm @ axis
@@ -74,7 +74,7 @@ def clouded(bone: Bone, turn_deg: float, shift_mm: float, seed: int) -> Clouded:
     true = RigidTransform.from_parts("scene", bone.name, rotation, rng.uniform(-200.0, 200.0, 3))
     points = true.apply(points)
     twist = np.concatenate([shift_mm * _unit(rng), np.radians(turn_deg) * _unit(rng)])
-    start = true.moved(twist, points[:N_ON_BONE].mean(axis=0))
+    start = true.move(twist, points[:N_ON_BONE].mean(axis=0))
     return Clouded(points, true.apply(camera), true, start)
 
 
@@ -112,7 +112,7 @@ def information_limit_mm(bone: Bone, scene: Clouded) -> float:
         residual = (normals * offset).sum(axis=1) + 0.5 * (curved * offset).sum(axis=1)
         jacobian = np.hstack([normals, np.cross(moved, normals)])
         step = np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-        pose = pose.inverse().moved(-step, np.zeros(3)).inverse()
+        pose = pose.inverse().move(-step, np.zeros(3)).inverse()
     return error_mm(bone, pose, scene)
 
 

@@ -106,7 +106,7 @@ def disparity_window(band_px: tuple[float, float]) -> tuple[int, int]:
 def _crop(image: NDArray[np.uint8], x0: int, width: int, box: Box) -> NDArray[np.uint8]:
     """Columns x0 .. x0 + width - 1 of the box's rows; black outside the picture."""
     out = np.zeros((box.height, width, *image.shape[2:]), dtype=np.uint8)
-    inside = Box(x0, box.y, width, box.height).clipped(image.shape[1], image.shape[0])
+    inside = Box(x0, box.y, width, box.height).clip(image.shape[1], image.shape[0])
     if not inside.is_empty:
         x, y = inside.x - x0, inside.y - box.y
         out[y : y + inside.height, x : x + inside.width] = image[

@@ -62,7 +62,7 @@ def main() -> int:
         rig = read_rig(phantom / "rig.yml")
         for sequence in sorted(path.parent for path in phantom.glob("*/prior.json")):
             for turn_px in OFFSETS_PX:
-                rows = list(_followed(turned(rig, turn_px), bone, sequence))
+                rows = list(_follow_points(turned(rig, turn_px), bone, sequence))
                 print(_table_row(f"{phantom.name}/{sequence.name}", turn_px, rows), flush=True)
     return 0
 
@@ -77,7 +77,7 @@ def turned(rig: StereoRig, row_offset_px: float) -> StereoRig:
     return replace(rig, right_from_left=moved)
 
 
-def _followed(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[Row]:
+def _follow_points(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[Row]:
     """Every frame from its own truth."""
     tracker = TrackerParts(rig, bone)
     for entry in json.loads((sequence / "truth.json").read_text(encoding="utf-8"))["frames"]:

@@ -43,9 +43,9 @@ class TrackerParts(BimccTracker):
         """(h, w) coarse disparity of whatever lies in a fit's box; None out of view or depth."""
         return self._checks(frame).check(fit.measured, fit.pose).result().coarse_px
 
-    def with_outline(self, frame: Frame, fit: Fit, noise2: float = 1.0) -> Fit:
+    def with_outline(self, frame: Frame, fit: Fit, noise_variance_ratio: float = 1.0) -> Fit:
         """A fit of the surface, joined with the outline."""
-        return self.outline.join(frame.pair, fit, self.coarse_px(frame, fit), noise2)
+        return self.outline.join(frame.pair, fit, self.coarse_px(frame, fit), noise_variance_ratio)
 
     def lies_open(self, frame: Frame, fit: Fit) -> bool:
         """More of the model is seen than something hides."""

@@ -68,7 +68,7 @@ def _wrong(own: TriangleMesh, folder: Path) -> Iterator[tuple[str, TriangleMesh]
 def read_other(folder: Path, name: str) -> TriangleMesh:
     """Another person's femur, outward."""
     mesh = read_ply(folder / "bones" / "pymskt" / f"{name}.ply")[0].largest_component()
-    return mesh if mesh.volume_mm3() > 0.0 else mesh.flipped()
+    return mesh if mesh.volume_mm3() > 0.0 else mesh.flip()
 
 
 def _moved_onto(own: TriangleMesh, other: TriangleMesh) -> TriangleMesh:

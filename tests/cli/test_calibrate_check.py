@@ -118,7 +118,7 @@ def test_a_rig_file_that_is_damaged_edited_or_gone(
 
 
 def test_pictures_of_other_cameras(command, rig_file, capsys) -> None:
-    write_rig(rig_file, RIG.scaled(2.0))
+    write_rig(rig_file, RIG.scale(2.0))
     refused(command, capsys, 3, "the pictures are 640x360", "1280x720")
 
 

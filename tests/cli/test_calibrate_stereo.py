@@ -132,7 +132,7 @@ def exchanged(good: Path, folder: Path) -> Path:
 def moved(good: Path, folder: Path) -> Path:
     """3 mm to the side before the right picture of pair 5 was taken."""
     pose = good_poses()[5]
-    pose = pose.moved((3.0, 1.0, 0.0, 0.0, 0.0, 0.0), pose.apply(BOARD.points_mm.mean(axis=0)))
+    pose = pose.move((3.0, 1.0, 0.0, 0.0, 0.0, 0.0), pose.apply(BOARD.points_mm.mean(axis=0)))
     late = photograph(folder.with_name("late"), [pose])
     copied(good, folder)
     shutil.copy(late / name("right", 0), folder / name("right", 5))

@@ -71,14 +71,14 @@ def test_triangles_given_from_both_sides_count_once():
 @pytest.mark.parametrize("opening_mm", [-30.0, -15.0])
 def test_a_surface_that_is_all_but_closed_is_turned_outward(opening_mm):
     mesh = shell(sphere(), opening_mm)
-    found = mend(mesh.flipped())
+    found = mend(mesh.flip())
     assert found.mesh.volume_mm3() > 0.0
     assert "turned" in found.notes[0]
     assert mend(mesh).notes == ()
 
 
 def test_an_open_bowl_is_not_turned_but_named():
-    found = mend(shell(sphere(), 8.0).flipped())
+    found = mend(shell(sphere(), 8.0).flip())
     assert found.mesh.volume_mm3() < 0.0
     assert "may point inwards" in found.notes[0]
 

@@ -128,11 +128,11 @@ class FakeTracker:
         self.script.calls.append(f"glance at {self.bone.name}")
         return self._followed(captured_ns, state, goal)
 
-    def _followed(self, captured_ns, state: TrackState, goal):
+    def _follow_points(self, captured_ns, state: TrackState, goal):
         self.script.tracks.append((self.bone.name, state, goal))
         self.script.on_track(self.bone.name)
         tracked = self.script.tracked_of.get(self.bone.name, self.script.tracked)
-        return tracked, state.updated(tracked, captured_ns, np.zeros(3))
+        return tracked, state.update(tracked, captured_ns, np.zeros(3))
 
     def assess(self, left, right, left_from_bone, goal):
         self.script.calls.append(f"assess {self.bone.name}")

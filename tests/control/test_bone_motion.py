@@ -50,7 +50,7 @@ def test_sideways_costs_no_rows(motion: BoneMotion) -> None:
 
 
 def test_a_bone_that_turns_moves_at_its_ends(motion: BoneMotion) -> None:
-    turned = answer(pose=a_pose().moved(np.array([0, 0, 0, 0.0, 0.0, 0.05]), np.zeros(3)))
+    turned = answer(pose=a_pose().move(np.array([0, 0, 0, 0.0, 0.0, 0.05]), np.zeros(3)))
     assert motion.row_px(frame(100), turned) > 0.3
 
 

@@ -48,7 +48,7 @@ class SimulatedRoom:
             sensor=SensorModel(seed=SEED), faults=faults, rate_hz=rate_hz,
         )  # fmt: skip
         self.camera.open()
-        rig = world.rig if scale == 1.0 else world.rig.scaled(scale)
+        rig = world.rig if scale == 1.0 else world.rig.scale(scale)
         self.display = SimulatedDisplay(self.clock, rig.width, rig.height)
         self.display.open()
         self.oracle = TruthOracle(world, self.camera.world_time_ns)

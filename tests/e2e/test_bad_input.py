@@ -304,7 +304,7 @@ def test_a_rig_with_its_cameras_swapped(pairs, rig, plan, prior, tmp_path, capsy
     swapped = StereoRig(
         good.right,
         good.left,
-        good.right_from_left.inverse().renamed("right", "left"),
+        good.right_from_left.inverse().rename("right", "left"),
         name="swapped",
     )
     write_rig(rig, swapped)

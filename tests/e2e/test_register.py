@@ -62,14 +62,14 @@ class Bone:
         axis, way = self.rng.normal(size=(2, 3))
         turn = np.radians(angle_deg) * axis / np.linalg.norm(axis)
         step = shift_mm * way / np.linalg.norm(way)
-        pose = self.true.moved(np.concatenate([step, turn]), self.points.mean(axis=0))
+        pose = self.true.move(np.concatenate([step, turn]), self.points.mean(axis=0))
         matrix = np.array(pose.matrix)
         matrix[:3, 3] *= scale
         path = self.folder / "start.json"
         path.write_text(json.dumps({"matrix": matrix.tolist()}), encoding="utf-8")
         return str(path)
 
-    def seen_from(self, scale: float = 1.0) -> list[str]:
+    def make_view_rotation(self, scale: float = 1.0) -> list[str]:
         return ["--camera", *(repr(float(value)) for value in scale * self.camera)]
 
     def tre(self, matrix: Any, scale: float = 1.0) -> float:
@@ -252,7 +252,7 @@ def test_a_cloud_without_normals_gets_them_and_says_so(bone: Bone) -> None:
 
 
 def test_inward_normals_are_turned(bone: Bone) -> None:
-    write_ply(bone.model, bone.mesh.flipped())
+    write_ply(bone.model, bone.mesh.flip())
     start = bone.start(10.0, 8.0)
     found = register(bone.scene, bone.model, "--initial", start, *bone.seen_from())
     assert "pointed inwards" in found["warnings"][0]

@@ -89,7 +89,7 @@ def test_a_pair_without_a_pose_gives_every_file(scene: Path, tmp_path: Path) -> 
 def test_a_pose_makes_it_finer_and_is_not_handed_back(scene: Path, tmp_path: Path) -> None:
     pose = json.loads((scene / "pose.json").read_text(encoding="utf-8"))["matrix"]
     true = RigidTransform("left", "model", pose)
-    nearer = true.moved((0.0, 0.0, -0.8, 0.0, 0.0, 0.0), true.translation_mm)
+    nearer = true.move((0.0, 0.0, -0.8, 0.0, 0.0, 0.0), true.translation_mm)
     (tmp_path / "pose.json").write_text(json.dumps({"matrix": nearer.to_list()}), encoding="utf-8")
     cloud = tmp_path / "c.ply"
     more = ["--model", str(scene / "femur.ply"), "--pose", str(tmp_path / "pose.json")]

@@ -31,10 +31,10 @@ def test_a_part_is_that_of_the_whole_and_the_rest_is_black() -> None:
     rows, columns = np.mgrid[:20, :30].astype(np.float32)
     everything = (slice(None), slice(None))
     whole = bilinear(picture, columns + 0.5, rows, everything)
-    part = bilinear(picture, columns + 0.5, rows, Box(4, 3, 9, 40).clipped(30, 20).slices)
+    part = bilinear(picture, columns + 0.5, rows, Box(4, 3, 9, 40).clip(30, 20).slices)
     np.testing.assert_array_equal(part[3:, 4:13], whole[3:, 4:13])
     assert part[:3].max() == part[:, :4].max() == part[:, 13:].max() == 0
-    nothing = bilinear(picture, columns, rows, Box(90, 3, 9, 4).clipped(30, 20).slices)
+    nothing = bilinear(picture, columns, rows, Box(90, 3, 9, 4).clip(30, 20).slices)
     assert nothing.max() == 0
 
 

@@ -5,8 +5,8 @@ from navapp.geometry.box import Box
 
 
 def test_a_box_grows_on_every_side():
-    assert Box(5, 6, 10, 20).grown(3) == Box(2, 3, 16, 26)
-    assert Box(5, 6, 10, 20).grown(-5).is_empty
+    assert Box(5, 6, 10, 20).grow(3) == Box(2, 3, 16, 26)
+    assert Box(5, 6, 10, 20).grow(-5).is_empty
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ def test_a_box_grows_on_every_side():
     ],
 )
 def test_a_box_is_clipped_to_the_picture(box, clipped):
-    assert box.clipped(640, 480) == clipped
+    assert box.clip(640, 480) == clipped
     assert clipped.is_empty == (clipped.width == 0 or clipped.height == 0)
 
 

@@ -60,7 +60,7 @@ def test_the_ray_through_the_centre_is_the_axis():
 @pytest.mark.parametrize("factor", [0.25, 0.5, 2.0])
 def test_a_resized_picture_sees_the_same_ray_through_the_same_corner(factor):
     lens = camera(STRONG[:5])
-    small = lens.scaled(factor)
+    small = lens.scale(factor)
     assert (small.width, small.height) == (round(640 * factor), round(480 * factor))
     # Corners of the picture lie at -0.5 and size - 0.5, at every size.
     corners = np.array([[-0.5, -0.5], [639.5, -0.5], [-0.5, 479.5], [639.5, 479.5], [99.5, 199.5]])

@@ -40,12 +40,12 @@ def test_the_volume_of_a_sphere_approaches_its_formula():
 
 
 def test_flipping_turns_normals_faces_and_volume():
-    mesh = sphere().flipped()
+    mesh = sphere().flip()
     assert mesh.volume_mm3() == pytest.approx(-sphere().volume_mm3())
     np.testing.assert_allclose(
         TriangleMesh(mesh.vertices_mm, mesh.faces).normals, mesh.normals, atol=1e-12
     )
-    np.testing.assert_array_equal(mesh.flipped().faces, sphere().faces)
+    np.testing.assert_array_equal(mesh.flip().faces, sphere().faces)
 
 
 def test_the_largest_piece_is_kept_without_unused_vertices():
@@ -68,7 +68,7 @@ def test_triangles_that_share_one_vertex_are_one_piece():
 
 def test_moving_a_mesh_turns_its_normals():
     pose = RigidTransform.from_parts("a", "b", rotation_from_vector([0.3, 1.2, -0.5]), [1, 2, 3])
-    moved = sphere().transformed(pose)
+    moved = sphere().transform(pose)
     np.testing.assert_allclose(
         moved.normals, TriangleMesh(moved.vertices_mm, moved.faces).normals, atol=1e-12
     )
@@ -85,7 +85,7 @@ def test_an_empty_mesh_has_nothing():
     assert EMPTY.normals.shape == (0, 3)
     assert EMPTY.volume_mm3() == 0.0
     assert len(EMPTY.largest_component().vertices_mm) == 0
-    assert len(EMPTY.flipped().faces) == 0
+    assert len(EMPTY.flip().faces) == 0
 
 
 def test_points_without_triangles_have_no_largest_piece():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_edges import half_edges, open_border, paired_half_edges, ridge_edges
+from navapp.geometry.mesh_edges import half_edges, open_border, pair_half_edges, ridge_edges
 from tests.registration.shapes import ball_mesh, grid_mesh, tube_mesh
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
@@ -37,14 +37,14 @@ def test_planes_go_through_their_triangles_and_look_outward() -> None:
 
 
 def test_grooves_and_open_borders_are_left_out() -> None:
-    assert len(ridge_edges(CUBE.flipped()).edges) == 0
+    assert len(ridge_edges(CUBE.flip()).edges) == 0
     without_a_side = TriangleMesh(CORNERS, CUBE.faces[2:])
     assert len(ridge_edges(without_a_side).edges) == 8
 
 
 def test_every_edge_has_its_half_edges_once() -> None:
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]], dtype=np.int32)
-    ends, halves = half_edges(faces), paired_half_edges(faces)
+    ends, halves = half_edges(faces), pair_half_edges(faces)
     edges = [tuple(sorted(ends[one])) for one in halves[:, 0]]
     assert sorted(edges) == [(0, 1), (0, 2), (1, 2), (1, 3), (1, 4), (2, 3), (3, 4)]
     shared = {edge for edge, other in zip(edges, halves[:, 1], strict=True) if other >= 0}
@@ -56,7 +56,7 @@ def test_every_edge_has_its_half_edges_once() -> None:
 
 def test_an_edge_of_three_triangles_keeps_two() -> None:
     faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]], dtype=np.int32)
-    halves = paired_half_edges(faces)
+    halves = pair_half_edges(faces)
     assert len(halves) == 7
     assert (halves[:, 1] >= 0).sum() == 1
 

@@ -165,7 +165,7 @@ def test_a_grey_and_a_coloured_picture_are_no_pair(rectifier):
 
 def test_swapped_cameras_are_refused():
     rig = toed_in_rig()
-    swapped = StereoRig(rig.right, rig.left, rig.right_from_left.inverse().renamed("right", "left"))
+    swapped = StereoRig(rig.right, rig.left, rig.right_from_left.inverse().rename("right", "left"))
     with pytest.raises(RigError, match="right of the left"):
         Rectifier(swapped)
 

@@ -279,9 +279,9 @@ def test_the_identity_changes_with_any_number():
         for place, amount in ((axis, 1e-6), (axis + 3, 1e-7)):
             twist[:] = 0.0
             twist[place] = amount
-            moved = rig.right_from_left.moved(twist, np.zeros(3))
+            moved = rig.right_from_left.move(twist, np.zeros(3))
             others.append(dataclasses.replace(rig, right_from_left=moved))
-    others.append(rig.scaled(0.5))
+    others.append(rig.scale(0.5))
     assert len({rig.rig_id, *(other.rig_id for other in others)}) == len(others) + 1
 
 
@@ -299,7 +299,7 @@ def test_the_identity_is_of_the_numbers_only():
 
 def test_a_scaled_rig_sees_the_same_rays():
     rig = dataclasses.replace(toed_in_rig(), quality=RigQuality(True))
-    half = rig.scaled(0.5)
+    half = rig.scale(0.5)
     points = np.random.default_rng(1).uniform((-50, -50, 300), (50, 50, 600), (20, 3))
     np.testing.assert_allclose(
         half.right.project(half.right_from_left.apply(points)),

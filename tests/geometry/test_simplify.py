@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from navapp.geometry import TriangleMesh
-from navapp.geometry.simplify import is_within, simplified
+from navapp.geometry.simplify import is_within, simplify
 from tests.geometry.shapes import sphere
 
 SPHERE = sphere(30.0, 40)
 
 
 def test_a_simpler_mesh_stays_within_the_distance_and_closed() -> None:
-    simple = simplified(SPHERE, 300, 0.5)
+    simple = simplify(SPHERE, 300, 0.5)
     assert len(simple.vertices_mm) < 0.4 * len(SPHERE.vertices_mm)
     radii = np.linalg.norm(simple.vertices_mm, axis=1)
     np.testing.assert_allclose(radii, 30.0, atol=0.5)
@@ -20,19 +20,19 @@ def test_a_simpler_mesh_stays_within_the_distance_and_closed() -> None:
 
 
 def test_a_narrow_distance_keeps_more_vertices() -> None:
-    loose, narrow = simplified(SPHERE, 100, 5.0), simplified(SPHERE, 100, 0.05)
+    loose, narrow = simplify(SPHERE, 100, 5.0), simplify(SPHERE, 100, 0.05)
     assert len(loose.vertices_mm) < len(narrow.vertices_mm) <= len(SPHERE.vertices_mm)
     assert is_within(SPHERE, narrow, 0.05)
     assert not is_within(SPHERE, loose, 0.05)
 
 
 def test_a_small_mesh_stays_as_it_is() -> None:
-    assert simplified(SPHERE, len(SPHERE.vertices_mm), 0.1) is SPHERE
+    assert simplify(SPHERE, len(SPHERE.vertices_mm), 0.1) is SPHERE
 
 
 def test_a_surface_far_from_the_origin_is_simplified_as_well() -> None:
     far = TriangleMesh(SPHERE.vertices_mm + np.array([4000.0, -3000.0, 5000.0]), SPHERE.faces)
-    simple = simplified(far, 300, 0.5)
+    simple = simplify(far, 300, 0.5)
     assert len(simple.vertices_mm) < 0.4 * len(far.vertices_mm)
     assert is_within(far, simple, 0.5)
 

@@ -78,7 +78,7 @@ def test_a_motion_about_the_origin_is_the_exponential_of_the_rotation(
 ):
     vector, translation = unit(direction) * angle, np.array(shift) * 30
     start = pose()
-    moved = start.moved(np.r_[translation, vector], np.zeros(3))
+    moved = start.move(np.r_[translation, vector], np.zeros(3))
     motion = np.eye(4)
     motion[:3, :3] = expm(skew(vector))
     motion[:3, 3] = translation
@@ -89,7 +89,7 @@ def test_a_motion_about_the_origin_is_the_exponential_of_the_rotation(
     there[:3, 3], back[:3, 3] = -centre, centre
     turn, shift_only = np.eye(4), np.eye(4)
     turn[:3, :3], shift_only[:3, 3] = motion[:3, :3], translation
-    moved = start.moved(np.r_[translation, vector], centre)
+    moved = start.move(np.r_[translation, vector], centre)
     expected = shift_only @ back @ turn @ there @ start.matrix
     np.testing.assert_allclose(moved.matrix, expected, rtol=0, atol=1e-9)
 
@@ -97,7 +97,7 @@ def test_a_motion_about_the_origin_is_the_exponential_of_the_rotation(
 def test_the_centre_of_a_motion_only_shifts():
     start = pose()
     centre = start.apply([5.0, 6.0, 7.0])
-    moved = start.moved([1.0, 2.0, 3.0, 0.4, -0.2, 0.1], centre)
+    moved = start.move([1.0, 2.0, 3.0, 0.4, -0.2, 0.1], centre)
     np.testing.assert_allclose(moved.apply([5.0, 6.0, 7.0]), np.add(centre, [1, 2, 3]), atol=1e-10)
 
 
@@ -105,7 +105,7 @@ def test_a_small_motion_is_the_first_order_jacobian():
     twist = np.array([1e-6, -2e-6, 3e-6, 4e-6, -5e-6, 6e-6])
     start, centre, point = pose(), np.array([1.0, 2.0, 300.0]), np.array([20.0, -10.0, 5.0])
     offset = start.apply(point) - centre
-    difference = start.moved(twist, centre).apply(point) - start.apply(point)
+    difference = start.move(twist, centre).apply(point) - start.apply(point)
     np.testing.assert_allclose(difference, twist[:3] - skew(offset) @ twist[3:], atol=5e-8)
 
 
@@ -221,14 +221,14 @@ def test_a_transform_cannot_be_changed_from_outside():
 
 
 def test_renaming_keeps_the_motion():
-    renamed = pose().renamed("left", "femur")
+    renamed = pose().rename("left", "femur")
     assert renamed.name == "left_from_femur"
     np.testing.assert_array_equal(renamed.matrix, pose().matrix)
 
 
 def test_the_angle_between_poses_is_that_of_the_turn_between_them():
     start = pose()
-    turned = start.moved([0, 0, 0, *np.radians(unit([1.0, 2.0, 3.0]) * 37.0)], np.zeros(3))
+    turned = start.move([0, 0, 0, *np.radians(unit([1.0, 2.0, 3.0]) * 37.0)], np.zeros(3))
     assert rotation_angle_deg(start, turned) == pytest.approx(37.0, abs=1e-9)
     assert rotation_angle_deg(start, start) == 0.0
 

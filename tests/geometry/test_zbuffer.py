@@ -7,14 +7,14 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.geometry.zbuffer import (
-    projected_box,
+    project_box,
     render,
     render_rectified,
     unhidden_vertices,
 )
 from navapp.geometry.zbuffer_kernels import (
     bounds_of_points,
-    known_range,
+    find_known_range,
     project_points,
     raster_nearest,
     tell_depth,
@@ -92,9 +92,7 @@ def test_a_closed_mesh_looks_the_same_without_its_far_side():
     np.testing.assert_array_equal(facing.face_index, whole.face_index)
     np.testing.assert_array_equal(facing.depth_mm, whole.depth_mm)
     # Turned inside out, only its far side is drawn.
-    inside = render_rectified(
-        mesh.flipped(), left_rect_from_bone, GEOMETRY, whole.box, is_closed=True
-    )
+    inside = render_rectified(mesh.flip(), left_rect_from_bone, GEOMETRY, whole.box, is_closed=True)
     middle = np.isfinite(whole.depth_mm)
     assert (inside.depth_mm[middle] > whole.depth_mm[middle] + 1.0).mean() > 0.9
 
@@ -104,7 +102,7 @@ def test_depth_agrees_with_ray_casting():
     mesh, left_rect_from_bone = sphere(30.0, 30), pose()
     view = seen(mesh, left_rect_from_bone)
     scene = open3d.t.geometry.RaycastingScene(nthreads=1)
-    moved = mesh.transformed(left_rect_from_bone)
+    moved = mesh.transform(left_rect_from_bone)
     scene.add_triangles(
         open3d.core.Tensor(moved.vertices_mm.astype(np.float32)),
         open3d.core.Tensor(moved.faces.astype(np.uint32)),
@@ -258,19 +256,19 @@ def test_vertices_close_before_the_camera_do_no_harm():
 
 def test_the_projected_box_holds_the_mesh_and_is_clipped():
     view = seen(sphere(30.0), pose())
-    box = projected_box(sphere(30.0), pose(), GEOMETRY)
+    box = project_box(sphere(30.0), pose(), GEOMETRY)
     rows, columns = np.nonzero(view.mask)
     assert 0 <= columns.min() - box.x <= 1
     assert 0 <= box.x + box.width - 1 - columns.max() <= 1
     assert 0 <= rows.min() - box.y <= 1
     assert 0 <= box.y + box.height - 1 - rows.max() <= 1
-    near = projected_box(sphere(30.0), pose(translation=(0, 0, 100.0)), GEOMETRY)
+    near = project_box(sphere(30.0), pose(translation=(0, 0, 100.0)), GEOMETRY)
     assert near == WHOLE
 
 
 @pytest.mark.parametrize("mesh", [EMPTY, square(-300.0), square(300.0, 5.0, (900.0, 0.0))])
 def test_there_is_no_projected_box_out_of_view(mesh):
-    assert projected_box(mesh, IDENTITY, GEOMETRY) is None
+    assert project_box(mesh, IDENTITY, GEOMETRY) is None
 
 
 def test_a_distorted_camera_sees_the_vertices_where_it_projects_them():
@@ -358,12 +356,12 @@ def test_where_a_lens_shows_nothing_nothing_is_drawn(away, turned, is_whole):
 
 def test_the_range_is_that_of_what_is_known():
     values = np.array([[np.nan, 3.0, -1.0], [7.0, np.nan, 2.0]], dtype=np.float32)
-    assert known_range(values) == (-1.0, 7.0)
-    assert known_range(np.full((2, 3), np.nan, np.float32)) == (np.inf, -np.inf)
+    assert find_known_range(values) == (-1.0, 7.0)
+    assert find_known_range(np.full((2, 3), np.nan, np.float32)) == (np.inf, -np.inf)
     rng = np.random.default_rng(1)
     for shape in ((5, 8), (7, 13), (40, 3), (0, 4)):
         values = rng.normal(size=shape).astype(np.float32)
         values[rng.random(shape) < 0.3] = np.nan
         known = values[np.isfinite(values)]
         ends = (known.min(), known.max()) if known.size else (np.inf, -np.inf)
-        assert known_range(values) == ends
+        assert find_known_range(values) == ends

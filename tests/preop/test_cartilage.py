@@ -73,7 +73,7 @@ def test_a_patch_covers_what_it_lies_over(covered):
 
 
 def test_a_closed_shell_is_measured_to_its_outer_side(covered):
-    inner, outer = sphere(40.0, 24, CENTRE).flipped(), sphere(42.0, 41, CENTRE)
+    inner, outer = sphere(40.0, 24, CENTRE).flip(), sphere(42.0, 41, CENTRE)
     shell = TriangleMesh(
         np.vstack([inner.vertices_mm, outer.vertices_mm]),
         np.vstack([inner.faces, outer.faces + len(inner.vertices_mm)]),
@@ -98,7 +98,7 @@ def test_shallow_dips_beneath_the_bone_are_no_cartilage(covered):
 
 
 def test_inward_normals_of_a_closed_surface_are_turned(covered):
-    found = covered(raised(CAP_MM).flipped())
+    found = covered(raised(CAP_MM).flip())
     np.testing.assert_allclose(found.bone.cartilage_mm, CAP_MM, atol=1e-3)
     assert "turned" in found.warnings[0]
 
@@ -119,7 +119,7 @@ def test_ras_becomes_lps(covered):
         (raised(np.full(len(HEIGHT), 8.0)), "lies 8 mm away from the femur"),
         (TriangleMesh(raised(CAP_MM).vertices_mm / 1000.0, BONE.mesh.faces), "mm away.*in mm"),
         (BONE.mesh, "lies nowhere outside the femur"),
-        (part(raised(CAP_MM), HEIGHT > 10.0).flipped(), "nowhere outside.*outward normals"),
+        (part(raised(CAP_MM), HEIGHT > 10.0).flip(), "nowhere outside.*outward normals"),
         (cube(80.0), "has only 12 triangles"),
     ],
 )

@@ -153,7 +153,7 @@ def test_a_patella_that_was_cut_has_no_centre() -> None:
 def test_what_is_no_knee_has_no_landmarks_of_one() -> None:
     ball = sphere(40.0, 40)
     assert estimate_femur_landmarks(ball, "right") == {}
-    assert estimate_patella_landmarks(ball.flipped()) == {}
+    assert estimate_patella_landmarks(ball.flip()) == {}
 
 
 def test_the_centre_of_a_ball_is_its_middle_however_its_vertices_lie() -> None:

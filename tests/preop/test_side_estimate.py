@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.ply import read_ply
-from navapp.geometry.simplify import simplified
+from navapp.geometry.simplify import simplify
 from navapp.preop.side_estimate import SideEstimate, estimate_side
 from navapp.values import BoneModel
 from tests.geometry.shapes import sphere
@@ -124,7 +124,7 @@ def test_slices_of_a_bone_and_coarse_ones_are_survived() -> None:
     for width_mm in (0.5, 1.0, 2.0, 4.0, 8.0):
         strip = BoneModel("femur", femur, is_removed=np.abs(x - np.median(x)) > width_mm)
         assert estimate_side({"femur": strip}).certainty != "certain"
-    coarse = simplified(femur, 300, 5.0)
+    coarse = simplify(femur, 300, 5.0)
     for level in np.linspace(0.2, 1.0, 30):
         height = femur.vertices_mm[:, 2].min() + level * np.ptp(femur.vertices_mm[:, 2])
         cut = BoneModel("femur", coarse, is_removed=coarse.vertices_mm[:, 2] > height)

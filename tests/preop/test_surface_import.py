@@ -73,7 +73,7 @@ def test_a_file_without_a_unit_is_taken_as_mm(imported):
 
 
 def test_inward_normals_are_turned(imported):
-    surface = imported(BONE.flipped())
+    surface = imported(BONE.flip())
     assert surface.bone.mesh.volume_mm3() > 0
     assert "inwards" in surface.warnings[0]
     outward = surface.bone.mesh.vertices_mm - [5.0, -20.0, 100.0]

@@ -183,11 +183,11 @@ def step_from_far(scene, grid, model, R, t, sigma_mm, settings):
     off_mm2 = (sigma_mm / settings.n_sigmas) ** 2
     kernels, weight = weigh(measured, sigma_mm, settings.n_sigmas, off_mm2)
     n, n_backward = len(forward[0]), max(len(backward[0]), 1)
-    weight[n:] *= settings.backward_share * n / n_backward
+    weight[n:] *= settings.backward_weight * n / n_backward
     centre, lever_mm = weighted_centre(measured.point, weight)
     H, g = plane_system(measured, weight, centre, lever_mm)
     H_point, g_point = point_system(measured, model, vertex, weight, centre, lever_mm)
-    H, g = H + settings.point_share * H_point, g + settings.point_share * g_point
+    H, g = H + settings.point_weight * H_point, g + settings.point_weight * g_point
     return *apply_twist(plane_step(H, g, lever_mm), centre, R, t), kernels.mean()
 
 
@@ -213,8 +213,8 @@ def twist_information(measured, weight, pose, centre_mm):
     scene_point = pose.apply(measured.point)
     for k in range(6):
         twist = np.eye(6)[k] * step
-        there = pose.moved(twist, pose.apply(centre_mm)).inverse().apply(scene_point)
-        back = pose.moved(-twist, pose.apply(centre_mm)).inverse().apply(scene_point)
+        there = pose.move(twist, pose.apply(centre_mm)).inverse().apply(scene_point)
+        back = pose.move(-twist, pose.apply(centre_mm)).inverse().apply(scene_point)
         rows[:, k] = ((there - back) * measured.direction).sum(axis=1) / (2.0 * step)
     return rows.T @ (weight[:, None] * rows)
 

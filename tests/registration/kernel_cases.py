@@ -7,7 +7,6 @@ import numpy as np
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel, Scene
-from navapp.registration.bimcc import bone_from_scene
 from navapp.registration.lookup_kernels import ModelArrays, SceneGrid
 from navapp.registration.pairing_kernels import Pairs, SceneArrays, make_pairs, measure_pairs
 from tests.reference import bimcc_reference as reference
@@ -51,8 +50,8 @@ def make_case(*, has_camera: bool = True, knows_noise: bool = True) -> Case:
         rng.uniform(0.1, 0.6, 500) if knows_noise else None,
         thinned_to=250,
     )
-    off = POSE.moved((0.5, -0.7, 0.6, 0.02, -0.015, 0.01), POSE.translation_mm)
-    R, t = bone_from_scene(off)
+    off = POSE.move((0.5, -0.7, 0.6, 0.02, -0.015, 0.01), POSE.translation_mm)
+    R, t = off.inverse_parts()
     return Case(scene.arrays, scene.grid, model.arrays, R, t)
 
 

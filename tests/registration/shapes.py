@@ -7,7 +7,7 @@ import numpy as np
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import projected_box, render_rectified, unhidden_vertices
+from navapp.geometry.zbuffer import project_box, render_rectified, unhidden_vertices
 from navapp.registration import RegistrationModel, Scene
 from navapp.values import BoneModel, Origin, SurfaceCloud, visible_vertices
 from sim_devices.anatomy import KneeSpec, make_knee
@@ -37,7 +37,7 @@ def femur_for_registration() -> RegistrationModel:
 @cache
 def seen_vertices(bone: BoneModel, pose: RigidTransform = TRUE) -> np.ndarray:
     """Indices of the vertices that the left camera sees."""
-    box = projected_box(bone.mesh, pose, GEOMETRY)
+    box = project_box(bone.mesh, pose, GEOMETRY)
     view = render_rectified(bone.mesh, pose, GEOMETRY, box)
     shown = unhidden_vertices(bone.mesh, pose, GEOMETRY, view)
     return np.flatnonzero(shown & visible_vertices(bone.mesh, pose))
@@ -68,7 +68,7 @@ def disturbed(model: RegistrationModel, deg: float, mm: float, seed: int) -> Rig
     turn, shift = np.random.default_rng(seed).standard_normal((2, 3))
     turn *= np.radians(deg) / np.linalg.norm(turn)
     shift *= mm / np.linalg.norm(shift)
-    return TRUE.moved(np.concatenate([shift, turn]), TRUE.apply(model.centre_mm))
+    return TRUE.move(np.concatenate([shift, turn]), TRUE.apply(model.centre_mm))
 
 
 def mean_error_mm(pose: RigidTransform, bone: BoneModel) -> float:

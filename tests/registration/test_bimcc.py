@@ -46,7 +46,7 @@ def test_noise_is_averaged_out(seed: int) -> None:
     found = fit_bimcc(scene, MODEL, disturbed(MODEL, 8.0, 6.0, seed + 10))
     assert found.is_converged
     assert mean_error_mm(found.camera_from_bone, BONE) < 0.15
-    assert found.inlier_share > 0.97
+    assert found.inlier_fraction > 0.97
     assert 0.7 < found.rms_mm / found.expected_rms_mm < 1.25
 
 
@@ -228,7 +228,7 @@ def test_the_covariance_predicts_the_scatter_of_known_noise() -> None:
     targets = BONE.mesh.vertices_mm[chosen[::20]]
     covered = [
         np.linalg.norm(e.camera_from_bone.apply(targets) - TRUE.apply(targets), axis=1).mean()
-        <= e.predicted_tre_mm(MODEL.centre_mm, targets)
+        <= e.predict_tre_mm(MODEL.centre_mm, targets)
         for e in estimates
     ]
     assert np.mean(covered) >= 0.9

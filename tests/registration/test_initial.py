@@ -5,27 +5,27 @@ import numpy as np
 import pytest
 
 from navapp.geometry import Box, RectifiedPair
-from navapp.geometry.directions import ViewCone, seen_from
+from navapp.geometry.directions import ViewCone, make_view_rotation
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotation_from_vector
 from navapp.geometry.zbuffer import render_rectified
 from navapp.preop import build_aspects
 from navapp.registration import InitialSettings, RegistrationModel, Scene, find_initial
-from navapp.registration.edge_tables import answer_table, edge_tables, scaled_optics
+from navapp.registration.edge_tables import answer_table, edge_tables, scale_optics
 from navapp.registration.hypotheses import (
-    apart,
     around,
-    everywhere,
+    find_distinct,
     places_of,
     poses_of,
-    taken,
-    thinned_views,
+    select_hypotheses,
+    spread_hypotheses,
+    thin_views,
     views_of,
 )
 from navapp.registration.initial import score_views
 from navapp.registration.initial_kernels import (
     Hypotheses,
     Optics,
-    quantised_gradients,
+    quantise_gradients,
     score_edges,
     score_surface,
     spread_responses,
@@ -40,7 +40,7 @@ CONE = ViewCone(AXIS, 30.0)
 TRUE = RigidTransform.from_parts(
     "left_rect",
     "femur",
-    rotation_from_vector((0.0, 0.0, 0.5)) @ seen_from(AXIS + np.array([0.2, 0.1, 0.0])),
+    rotation_from_vector((0.0, 0.0, 0.5)) @ make_view_rotation(AXIS + np.array([0.2, 0.1, 0.0])),
     (20.0, 5.0, 430.0),
 )
 
@@ -135,10 +135,10 @@ def test_pictures_decide_between_poses_that_the_surface_allows() -> None:
     tables = edge_tables(pair, 4, 2, 250.0)
     turns = [0.0, 20.0, 40.0]
     poses = [
-        TRUE.moved((0, 0, 0, 0, 0, np.radians(turn)), TRUE.apply(model().centre_mm))
+        TRUE.move((0, 0, 0, 0, 0, np.radians(turn)), TRUE.apply(model().centre_mm))
         for turn in turns
     ]
-    poses.append(TRUE.moved((70.0, 0, 0, 0, 0, 0), (0, 0, 0)))
+    poses.append(TRUE.move((70.0, 0, 0, 0, 0, 0), (0, 0, 0)))
     some = Hypotheses(
         np.arange(4, dtype=np.int32), np.arange(4, dtype=np.int32), np.full(4, near, np.int32),
         np.array([pose.rotation for pose in poses]), np.array([np.eye(3)] * 4),
@@ -165,7 +165,7 @@ def test_places_lie_on_the_surface_and_the_map_holds_its_depth() -> None:
 def test_hypotheses_put_their_anchor_at_their_place_and_face_the_camera() -> None:
     views = views_of(model(), CONE, 12.0, None, 20)
     places = np.array([(10.0, -20.0, 400.0), (-60.0, 30.0, 500.0)])
-    some = everywhere(views, thinned_views(views, 16.0), 90.0, places)
+    some = spread_hypotheses(views, thin_views(views, 16.0), 90.0, places)
     assert len(some.orientation) == 2 * len(some.rotation)
     for h, pose in enumerate(poses_of(some, "left_rect", "femur")):
         o, place = some.orientation[h], places[some.place[h]]
@@ -176,8 +176,8 @@ def test_hypotheses_put_their_anchor_at_their_place_and_face_the_camera() -> Non
 
 def test_neighbours_keep_the_anchor_near_and_hold_the_hypothesis_itself() -> None:
     views = views_of(model(), CONE, 8.0, None, 20)
-    some = everywhere(views, thinned_views(views, 16.0), 90.0, np.array([(10.0, -20.0, 400.0)]))
-    one = taken(some, np.array([5]))
+    some = spread_hypotheses(views, thin_views(views, 16.0), 90.0, np.array([(10.0, -20.0, 400.0)]))
+    one = select_hypotheses(some, np.array([5]))
     (pose,) = poses_of(one, "left_rect", "femur")
     beside = poses_of(around(one, views, 12.0, 6.0, 2.0), "left_rect", "femur")
     angles = np.array([rotation_angle_deg(pose, other) for other in beside])
@@ -191,9 +191,9 @@ def test_neighbours_keep_the_anchor_near_and_hold_the_hypothesis_itself() -> Non
 def test_hypotheses_that_repeat_an_earlier_one_are_left_out() -> None:
     views = views_of(model(), CONE, 8.0, None, 20)
     places = np.array([(0.0, 0.0, 400.0), (0.5, 0.0, 400.0), (90.0, 0.0, 400.0)])
-    some = everywhere(views, np.array([0]), 360.0, places)
+    some = spread_hypotheses(views, np.array([0]), 360.0, places)
     assert len(some.orientation) == 6
-    kept = apart(some, model().centre_mm, 12.0, 15.0)
+    kept = find_distinct(some, model().centre_mm, 12.0, 15.0)
     assert kept[0] == 0
     assert 1 not in kept
     assert 2 in kept
@@ -216,7 +216,7 @@ def test_gradients_and_responses_are_those_of_the_reference() -> None:
     picture = np.random.default_rng(2).normal(0.0, 20.0, (40, 50)).astype(np.float32)
     bins = np.zeros(picture.shape, dtype=np.uint8)
     for rows in ((0, 17), (17, 40)):
-        quantised_gradients(picture, 12.0, rows, bins)
+        quantise_gradients(picture, 12.0, rows, bins)
     np.testing.assert_array_equal(bins, reference.quantised(picture.astype(np.float64), 12.0))
     assert 0.1 < (bins > 0).mean() < 0.9
     for reach in (0, 2):
@@ -229,8 +229,8 @@ def random_hypotheses(n: int) -> Hypotheses:
     rng = np.random.default_rng(4)
     views = views_of(model(), CONE, 12.0, None, 30)
     places = rng.uniform((-40, -30, 380), (40, 30, 480), (5, 3))
-    some = everywhere(views, thinned_views(views, 16.0), 45.0, places)
-    return taken(some, rng.choice(len(some.orientation), n, replace=False))
+    some = spread_hypotheses(views, thin_views(views, 16.0), 45.0, places)
+    return select_hypotheses(some, rng.choice(len(some.orientation), n, replace=False))
 
 
 def test_scores_are_those_of_the_reference() -> None:
@@ -267,7 +267,7 @@ def test_scores_are_those_of_the_reference() -> None:
 
 def test_smaller_pictures_keep_their_places() -> None:
     pair, _ = seen()
-    optics = scaled_optics(pair, 8)
+    optics = scale_optics(pair, 8)
     point = np.array([[30.0, -20.0, 450.0]])
     u, v = GEOMETRY.project(point)[0]
     assert optics.focal * 30.0 / 450.0 + optics.centre_x == pytest.approx((u + 0.5) / 8 - 0.5)
@@ -278,7 +278,7 @@ def test_fewer_hypotheses_still_find_a_bone_in_its_box() -> None:
     pair, scene = seen()
     pixels = GEOMETRY.project(scene.points_mm)
     around_bone = Box.around(GEOMETRY.project(TRUE.apply(model().points_mm)))
-    box = around_bone.grown(20).clipped(GEOMETRY.width, GEOMETRY.height)
+    box = around_bone.grow(20).clip(GEOMETRY.width, GEOMETRY.height)
     inside = ((pixels >= (box.x, box.y)) & (pixels < (box.x + box.width, box.y + box.height))).all(
         axis=1
     )

@@ -4,11 +4,11 @@ import pytest
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.registration import (
     Scene,
+    compute_explained_fraction,
     distinct,
-    explained_share,
     find_candidates,
     is_same_pose,
-    tilted_starts,
+    make_tilted_starts,
 )
 from tests.registration.shapes import (
     TRUE,
@@ -26,7 +26,7 @@ SCENE = seen_scene(900, 0.2)
 
 def test_the_starts_are_the_pose_and_tilts_about_the_centre() -> None:
     centre = TRUE.apply(MODEL.centre_mm)
-    starts = tilted_starts(TRUE, centre, 15.0, 12)
+    starts = make_tilted_starts(TRUE, centre, 15.0, 12)
     assert len(starts) == 13
     assert starts[0] is TRUE
     for start in starts[1:]:
@@ -35,7 +35,7 @@ def test_the_starts_are_the_pose_and_tilts_about_the_centre() -> None:
 
 
 def test_the_tilts_go_in_all_directions() -> None:
-    starts = tilted_starts(TRUE, TRUE.apply(MODEL.centre_mm), 15.0, 12)[1:]
+    starts = make_tilted_starts(TRUE, TRUE.apply(MODEL.centre_mm), 15.0, 12)[1:]
     angles = [rotation_angle_deg(a, b) for i, a in enumerate(starts) for b in starts[:i]]
     assert min(angles) > 8.0
     turns = np.array([(s.rotation @ TRUE.rotation.T)[[2, 0, 1], [1, 2, 0]] for s in starts])
@@ -62,7 +62,7 @@ def minus_error(pose: RigidTransform) -> float:
 
 def test_candidates_are_distinct_and_the_best_comes_first() -> None:
     centre = TRUE.apply(MODEL.centre_mm)
-    starts = [disturbed(MODEL, 60.0, 5.0, 3), *tilted_starts(TRUE, centre, 10.0, 5)]
+    starts = [disturbed(MODEL, 60.0, 5.0, 3), *make_tilted_starts(TRUE, centre, 10.0, 5)]
     found = find_candidates(SCENE, MODEL, starts, minus_error)
     scores = [candidate.score for candidate in found]
     assert scores == sorted(scores, reverse=True)
@@ -74,20 +74,20 @@ def test_candidates_are_distinct_and_the_best_comes_first() -> None:
 
 def test_what_a_pose_explains_finds_the_right_one_among_the_candidates() -> None:
     centre = SCENE.points_mm.mean(axis=0)
-    starts = tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre)
+    starts = make_tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre)
     found = find_candidates(seen_scene(900, 0.3, 1, 600), MODEL, starts)
     assert mean_error_mm(found[0].scene_from_bone, BONE) < 1.0
     assert all(0.0 <= candidate.score <= 1.0 for candidate in found)
 
 
 def test_a_start_that_pairs_with_nothing_gives_no_candidate() -> None:
-    far = TRUE.moved([300.0, 0, 0, 0, 0, 0], TRUE.translation_mm)
+    far = TRUE.move([300.0, 0, 0, 0, 0, 0], TRUE.translation_mm)
     assert find_candidates(SCENE, MODEL, [far]) == []
     assert find_candidates(SCENE, MODEL, []) == []
 
 
 def test_two_runs_on_two_threads_are_equal_to_the_last_bit() -> None:
-    starts = tilted_starts(disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0))
+    starts = make_tilted_starts(disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0))
     runs = [find_candidates(seen_scene(900, 0.3, 2, 600), MODEL, starts) for _ in range(2)]
     assert len(runs[0]) == len(runs[1]) > 0
     for a, b in zip(*runs, strict=True):
@@ -97,17 +97,19 @@ def test_two_runs_on_two_threads_are_equal_to_the_last_bit() -> None:
 
 def test_a_pose_explains_the_share_of_the_scene_that_lies_on_it() -> None:
     clean = Scene(SCENE.points_mm)
-    all_of_it = explained_share(clean, MODEL, TRUE)
+    all_of_it = compute_explained_fraction(clean, MODEL, TRUE)
     assert all_of_it > 0.95
     cluttered = seen_scene(900, 0.2, 0, 900)
-    half = explained_share(Scene(cluttered.points_mm), MODEL, TRUE)
+    half = compute_explained_fraction(Scene(cluttered.points_mm), MODEL, TRUE)
     assert 0.45 < half < 0.65
     # With a camera the share of the model that was seen counts as well.
     points = SCENE.points_mm
     part = points[points[:, 0] < np.median(points[:, 0])]
-    assert explained_share(Scene(part), MODEL, TRUE) > 0.95
-    assert explained_share(Scene(part, np.zeros(3)), MODEL, TRUE) < 0.7
-    assert explained_share(SCENE, MODEL, disturbed(MODEL, 20.0, 10.0, 1)) < 0.5 * all_of_it
+    assert compute_explained_fraction(Scene(part), MODEL, TRUE) > 0.95
+    assert compute_explained_fraction(Scene(part, np.zeros(3)), MODEL, TRUE) < 0.7
+    assert (
+        compute_explained_fraction(SCENE, MODEL, disturbed(MODEL, 20.0, 10.0, 1)) < 0.5 * all_of_it
+    )
 
 
 def test_progress_grows_to_one() -> None:

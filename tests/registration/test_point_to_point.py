@@ -77,7 +77,7 @@ def test_mirrored_points_give_the_best_rotation_and_no_reflection(seed: int) -> 
     least = ((found.apply(model) - scene) ** 2).sum()
     for _ in range(20):
         twist = np.append(np.zeros(3), rng.normal(0.0, 0.3, 3))
-        other = found.moved(twist, scene.mean(axis=0))
+        other = found.move(twist, scene.mean(axis=0))
         assert ((other.apply(model) - scene) ** 2).sum() >= least - 1e-6
 
 
@@ -93,7 +93,7 @@ def test_no_small_motion_is_better_than_the_weighted_answer(seed: int) -> None:
         return float(weight @ ((pose.apply(model) - scene) ** 2).sum(axis=1))
 
     for twist in np.concatenate([1e-3 * np.eye(6), -1e-3 * np.eye(6)]):
-        assert cost(found.moved(twist, scene.mean(axis=0))) >= cost(found)
+        assert cost(found.move(twist, scene.mean(axis=0))) >= cost(found)
 
 
 @given(seeds)
@@ -163,7 +163,7 @@ def test_forward_and_inverse_runs_agree(fit) -> None:
     """Model and scene change places."""
     truth = a_pose(7)
     placed = TriangleMesh(truth.apply(BLOB.points_mm), blob(700).mesh.faces)
-    start = truth.moved((0.4, -0.3, 0.5, 0.02, -0.02, 0.01), truth.translation_mm)
+    start = truth.move((0.4, -0.3, 0.5, 0.02, -0.02, 0.01), truth.translation_mm)
     forward = fit(Scene(placed.vertices_mm), BLOB, start)
     other = RegistrationModel(BoneModel("scene", placed))
     backward = fit(Scene(BLOB.points_mm), other, start.inverse())
@@ -178,7 +178,7 @@ def test_forward_and_inverse_runs_agree(fit) -> None:
 @pytest.mark.parametrize("fit", [fit_icp, fit_bimcc_literal])
 def test_any_place_and_orientation_of_the_world_gives_the_same_pose(fit) -> None:
     scene = SAMPLES + np.random.default_rng(1).normal(0.0, 0.2, SAMPLES.shape)
-    start, world = a_pose(8, 0.1, 2.0), a_pose(9).renamed("world", "scene")
+    start, world = a_pose(8, 0.1, 2.0), a_pose(9).rename("world", "scene")
     here = fit(Scene(scene), BLOB, start)
     there = fit(Scene(world.apply(scene)), BLOB, world @ start)
     back = world.inverse() @ there.camera_from_bone

@@ -3,7 +3,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.registration import DepthMap, PoseSampler, is_same_pose
 from navapp.registration.initial_kernels import Optics
 from navapp.registration.pose_sampler import spread_order
@@ -22,7 +22,7 @@ def sampler() -> PoseSampler:
 
 def seen_map(noise_mm: float = 0.1) -> DisparityMap:
     """What stereo would measure of the bone at `TRUE`."""
-    box = projected_box(femur().mesh, TRUE, GEOMETRY)
+    box = project_box(femur().mesh, TRUE, GEOMETRY)
     depth = render_rectified(femur().mesh, TRUE, GEOMETRY, box).depth_mm
     noise = noise_mm * np.random.default_rng(3).standard_normal(depth.shape)
     is_there = np.isfinite(depth)
@@ -58,7 +58,7 @@ def test_scores_as_the_reference() -> None:
 
 def test_a_rough_pose_leads_to_the_true_one() -> None:
     depth = DepthMap.of(GEOMETRY, seen_map())
-    rough = TRUE.moved((12.0, -9.0, 5.0, 0.12, -0.1, 0.08), TRUE.apply(CENTRE_MM))
+    rough = TRUE.move((12.0, -9.0, 5.0, 0.12, -0.1, 0.08), TRUE.apply(CENTRE_MM))
     best = sampler().search(depth, rough, 4)[0]
     assert is_same_pose(best.scene_from_bone, TRUE, femur_for_registration().centre_mm)
     assert best.score > sampler().score(depth, rough, 0.3, 3000) + 0.2
@@ -68,7 +68,7 @@ def test_what_is_seen_through_costs() -> None:
     depth = DepthMap.of(GEOMETRY, seen_map())
     ray = TRUE.apply(CENTRE_MM) / TRUE.apply(CENTRE_MM)[2]
     nearer, further = (
-        TRUE.moved((*(shift_mm * ray), 0.0, 0.0, 0.0), np.zeros(3)) for shift_mm in (-20.0, 20.0)
+        TRUE.move((*(shift_mm * ray), 0.0, 0.0, 0.0), np.zeros(3)) for shift_mm in (-20.0, 20.0)
     )
     true, before, behind = (
         sampler().score(depth, pose, 0.3, 3000) for pose in (TRUE, nearer, further)

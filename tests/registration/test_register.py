@@ -95,7 +95,7 @@ def test_a_search_that_leads_elsewhere_takes_nothing_away(monkeypatch: pytest.Mo
 
 
 def test_the_search_everywhere_brings_a_distant_model_to_the_scene() -> None:
-    start = TRUE.moved((500.0, -300.0, 200.0, 0.0, 0.0, 0.1), TRUE.translation_mm)
+    start = TRUE.move((500.0, -300.0, 200.0, 0.0, 0.0, 0.1), TRUE.translation_mm)
     scene = seen_scene(900, 0.3)
     assert register(scene, MODEL, start).outcome is Outcome.FAILED
     found = register(scene, MODEL, start, is_global=True)
@@ -128,13 +128,13 @@ def test_the_papers_methods_are_judged_in_the_same_way(method) -> None:
     model = RegistrationModel(blob())
     points = facing_points(blob(3000), pose)
     scene = Scene(points, EYE)
-    found = register(scene, model, pose.moved((0.5, 0.3, 0.2, 0, 0.01, 0), (0, 0, 400)), method)
+    found = register(scene, model, pose.move((0.5, 0.3, 0.2, 0, 0.01, 0), (0, 0, 400)), method)
     assert found.outcome is Outcome.CONVERGED
     assert found.n_starts == 1
     assert found.coverage is not None
     assert found.coverage > 0.85
     # Far off they fail, and say so: nobody helps them with other starts.
-    lost = register(scene, model, pose.moved((0, 0, 0, 0, 0, 2.5), (0, 0, 400)), method)
+    lost = register(scene, model, pose.move((0, 0, 0, 0, 0, 2.5), (0, 0, 400)), method)
     assert lost.outcome is Outcome.FAILED
     assert lost.reasons
 
@@ -378,9 +378,9 @@ def test_the_error_is_predicted_over_what_faces_the_camera() -> None:
     cosine = -(placed * normals).sum(axis=1) / np.linalg.norm(placed, axis=1)
     seen = MODEL.points_mm[cosine > 0.2]
     assert 0.1 * len(placed) < len(seen) < 0.6 * len(placed)
-    expected_mm = found.estimate.predicted_tre_mm(MODEL.centre_mm, seen)
+    expected_mm = found.estimate.predict_tre_mm(MODEL.centre_mm, seen)
     assert found.predicted_tre_mm == pytest.approx(expected_mm, rel=0.01)
-    everywhere_mm = found.estimate.predicted_tre_mm(MODEL.centre_mm, MODEL.points_mm)
+    everywhere_mm = found.estimate.predict_tre_mm(MODEL.centre_mm, MODEL.points_mm)
     assert found.predicted_tre_mm != pytest.approx(everywhere_mm, rel=0.015)
 
 
@@ -425,7 +425,7 @@ def test_a_rough_ball_is_as_degenerate_as_a_smooth_one(rough_mm: float) -> None:
     pose = RigidTransform.from_parts("left_rect", "ball", np.eye(3), (0.0, 0.0, 400.0))
     seen = ball.vertices_mm[ball.vertices_mm[:, 2] < -10.0]
     scene = Scene(pose.apply(seen) + rng.normal(0.0, 0.3, seen.shape), EYE)
-    start = pose.moved((1.0, -1.0, 2.0, 0.1, 0.05, -0.1), pose.translation_mm)
+    start = pose.move((1.0, -1.0, 2.0, 0.1, 0.05, -0.1), pose.translation_mm)
     assert register(scene, model, start).outcome is Outcome.DEGENERATE
 
 

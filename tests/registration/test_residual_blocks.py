@@ -120,13 +120,13 @@ def test_a_surface_without_residuals_is_survived() -> None:
 
 
 @pytest.mark.parametrize("noise2", [1.0, 0.4])
-def test_a_block_that_says_too_little_changes_nothing(noise2: float) -> None:
+def test_a_block_that_says_too_little_changes_nothing(noise_variance_ratio: float) -> None:
     few = block_of(drawn(1), n=5)
     sharing = replace(block_of(drawn(1), n=400), n_sharing=np.full(400, 100.0))
     for block in (few, sharing):
-        joined = join(SURFACE, WIDE, block, CENTRE_MM, noise2)
+        joined = join(SURFACE, WIDE, block, CENTRE_MM, noise_variance_ratio)
         assert joined.camera_from_bone is SURFACE.camera_from_bone
-        np.testing.assert_allclose(joined.covariance, noise2 * SURFACE.covariance)
+        np.testing.assert_allclose(joined.covariance, noise_variance_ratio * SURFACE.covariance)
 
 
 def test_the_surfaces_noise_is_the_surfaces_alone() -> None:
@@ -135,7 +135,10 @@ def test_the_surfaces_noise_is_the_surfaces_alone() -> None:
     rows = np.column_stack([block.jacobian, np.ones(len(block.residual))]) / SIGMA
     normal = rows.T @ rows + np.diag([0.0] * 6 + [COMMON_SD**-2])
     alike = estimate_of(np.linalg.inv(normal)[:6, :6])
-    whole, quiet = (join(alike, WIDE, block, CENTRE_MM, noise2) for noise2 in (1.0, 0.4))
+    whole, quiet = (
+        join(alike, WIDE, block, CENTRE_MM, noise_variance_ratio)
+        for noise_variance_ratio in (1.0, 0.4)
+    )
     assert quiet.camera_from_bone.matrix == pytest.approx(whole.camera_from_bone.matrix)
     ratio = np.trace(quiet.covariance[:3, :3]) / np.trace(whole.covariance[:3, :3])
     assert ratio == pytest.approx(0.7, abs=0.05)

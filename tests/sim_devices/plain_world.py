@@ -35,7 +35,7 @@ class PlainWorld:
     ) -> NDArray[np.float32]:
         self.rendered.append((eye, time_ns))
         self.turns_rad.append(turn_rad)
-        rig = self.rig.scaled(scale)
+        rig = self.rig.scale(scale)
         level = 0.1 + 0.2 * (time_ns * 1e-9 % 4.0)
         ramp = np.linspace(0.0, 0.1, rig.width, dtype=np.float32) + np.float32(level)
         return np.broadcast_to(ramp[None, :, None], (rig.height, rig.width, 3)).astype(np.float32)

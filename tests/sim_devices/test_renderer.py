@@ -88,7 +88,7 @@ def test_a_pattern_of_dots_lands_where_the_distorted_camera_projects_it():
     poses = {part.body: RigidTransform.identity("camera", part.body) for part in parts}
     for native in (rig.left, rig.right):
         # Twice as many pixels: counting them finds the middle of a dot twice as well.
-        camera = native.scaled(2.0)
+        camera = native.scale(2.0)
         picture = Renderer(camera, parts, surfaces()).depth(poses, NO_LAMPS)
         expected = np.array([projected_centroid(camera, p, 14.0) for p in places])
         pinhole = Camera(camera.matrix, np.zeros(5), camera.width, camera.height)
@@ -104,11 +104,11 @@ def test_texture_sticks_to_the_body_in_both_views(femur, monkeypatch):
     rig = make_default_rig()
     plain = surfaces(lamps=LAMPS * (1, 1, 1, 0), ambient=1.0, vignetting=0.0)
     parts = [Part("femur", femur, MaterialId.BONE)]
-    moved = POSE.moved((3.0, -2.0, 8.0, 0.05, -0.08, 0.1), POSE.translation_mm)
+    moved = POSE.move((3.0, -2.0, 8.0, 0.05, -0.08, 0.1), POSE.translation_mm)
     views = []
     for camera, pose in (
         (rig.left, POSE),
-        (rig.right, rig.right_from_left.renamed("camera", "camera") @ POSE),
+        (rig.right, rig.right_from_left.rename("camera", "camera") @ POSE),
         (rig.left, moved),
     ):
         renderer = Renderer(camera, parts, plain)
@@ -183,7 +183,7 @@ def test_what_is_kept_gives_the_same_picture(femur, pinhole):
     poses = {"femur": POSE, "drape": RigidTransform.identity("camera", "drape")}
     kept = Renderer(pinhole, parts, surfaces(), frozenset({"drape"}))
     fresh = Renderer(pinhole, parts, surfaces())
-    aside = poses | {"femur": POSE.moved((60.0, 20.0, 0, 0, 0, 0), POSE.translation_mm)}
+    aside = poses | {"femur": POSE.move((60.0, 20.0, 0, 0, 0, 0), POSE.translation_mm)}
     kept.render(aside, NO_LAMPS)
     bone = fresh.depth(poses, NO_LAMPS).body == 0
     picture = kept.render(poses, NO_LAMPS)

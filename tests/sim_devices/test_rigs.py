@@ -38,7 +38,7 @@ def test_the_rig_can_be_rectified_and_sees_the_working_distance_inside_the_pictu
 
 def test_another_size_is_the_same_rig_scaled():
     half = make_default_rig(640, 360)
-    np.testing.assert_allclose(half.left.matrix, make_default_rig().scaled(0.5).left.matrix)
+    np.testing.assert_allclose(half.left.matrix, make_default_rig().scale(0.5).left.matrix)
     assert (half.width, half.height) == (640, 360)
 
 

@@ -85,7 +85,7 @@ def test_what_is_seen_of_the_femur_is_the_anatomy_at_the_true_pose():
         pose = world().left_from_body("femur", 0)
         if eye == "right":
             pose = world().rig.right_from_left @ pose
-        bone = world().anatomy.bones["femur"].transformed(pose)
+        bone = world().anatomy.bones["femur"].transform(pose)
         scene = o3d.t.geometry.RaycastingScene(nthreads=1)
         scene.add_triangles(
             o3d.core.Tensor(np.array(bone.vertices_mm, dtype=np.float32)),

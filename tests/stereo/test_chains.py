@@ -363,4 +363,4 @@ def test_of_a_box_that_leaves_the_picture_the_inside_is_matched(chain, fills: bo
     assert found.disparity_px.shape == (180, WIDTH - 200)
     error = found.disparity_px - TRUTH[:180, 200:]
     assert np.nanmedian(np.abs(error)) < 0.1
-    assert found.matched_share > 0.7
+    assert found.matched_fraction > 0.7

@@ -96,10 +96,10 @@ def test_a_dark_or_bright_picture_is_seen(
     bad = replace(good, **{side: np.full_like(good.left, level)})
     health = measure_health(bad, matched(), DISPARITY_PX)
     one = getattr(health, side)
-    assert (one.dark_share, one.saturated_share, one.detail) == (dark, saturated, 0.0)
+    assert (one.dark_fraction, one.saturated_fraction, one.detail) == (dark, saturated, 0.0)
     other = health.right if side == "left" else health.left
-    assert other.dark_share < 0.02
-    assert other.saturated_share < 0.02
+    assert other.dark_fraction < 0.02
+    assert other.saturated_fraction < 0.02
 
 
 def test_the_right_picture_is_looked_at_where_it_shows_the_box() -> None:
@@ -108,7 +108,7 @@ def test_the_right_picture_is_looked_at_where_it_shows_the_box() -> None:
     first = BOX.x - round(DISPARITY_PX)
     right[:, first : first + BOX.width] = good.right[:, first : first + BOX.width]
     health = measure_health(replace(good, right=right), matched(), DISPARITY_PX)
-    assert health.right.dark_share < 0.02
+    assert health.right.dark_fraction < 0.02
 
 
 def test_a_blurred_picture_has_less_detail() -> None:
@@ -131,4 +131,4 @@ def test_light_and_gain_do_not_change_the_detail() -> None:
 def test_a_box_beside_the_pictures_is_dark() -> None:
     away = replace(pair(), box=Box(WIDTH + 5, 0, 50, 50))
     health = measure_health(away, None, DISPARITY_PX)
-    assert health.left.dark_share == 1.0
+    assert health.left.dark_fraction == 1.0

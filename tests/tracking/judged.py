@@ -54,8 +54,8 @@ class SurfaceAlone:
     def __init__(self, moved_mm: float | None = None) -> None:
         self._moved_mm = moved_mm
 
-    def join(self, pair, fit: Fit, coarse_px, noise2: float = 1.0) -> Fit:
-        covariance = noise2 * fit.estimate.covariance
+    def join(self, pair, fit: Fit, coarse_px, noise_variance_ratio: float = 1.0) -> Fit:
+        covariance = noise_variance_ratio * fit.estimate.covariance
         moved_mm = fit.moved_mm if self._moved_mm is None else self._moved_mm
         return replace(
             fit, estimate=replace(fit.estimate, covariance=covariance), moved_mm=moved_mm

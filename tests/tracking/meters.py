@@ -23,7 +23,7 @@ MODEL = RegistrationModel(BoneModel("femur", grid_mesh(height_mm), "right"))
 
 def moved(mm: tuple[float, float, float], deg: tuple[float, float, float]) -> RigidTransform:
     """`TRUE`, moved about the bone's centre."""
-    return TRUE.moved((*mm, *np.radians(deg)), TRUE.apply(MODEL.centre_mm))
+    return TRUE.move((*mm, *np.radians(deg)), TRUE.apply(MODEL.centre_mm))
 
 
 def error_mm(pose: RigidTransform, true: RigidTransform = TRUE) -> float:

@@ -10,7 +10,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.tracking import Goal
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, DisparityMap, Origin, Prior, visible_vertices
@@ -26,7 +26,7 @@ GOAL = Goal(np.empty((0, 3)), 2.0)
 
 def measured_map(bone: BoneModel, pose: RigidTransform = TRUE, margin_px: int = 16) -> DisparityMap:
     """What a good matcher finds of a bone alone: exact up to noise of 0.25 px."""
-    box = projected_box(bone.mesh, pose, GEOMETRY).grown(margin_px).clipped(1280, 720)
+    box = project_box(bone.mesh, pose, GEOMETRY).grow(margin_px).clip(1280, 720)
     view = render_rectified(bone.mesh, pose, GEOMETRY, box)
     noise = np.random.default_rng(1).normal(0.0, 0.25, view.mask.shape)
     disparity = GEOMETRY.focal_px * GEOMETRY.baseline_mm / view.depth_mm + noise

@@ -59,18 +59,18 @@ def test_the_truth_agrees_everywhere() -> None:
     found = agreement(MAP)
     assert found.coverage > 0.9
     assert found.open_coverage == found.coverage
-    assert found.hidden_share == found.behind_share == 0.0
+    assert found.hidden_fraction == found.behind_fraction == 0.0
     assert 0.3 < found.spread_ratio < 1.1
 
 
 def test_what_something_nearer_hides_is_not_held_against_a_pose() -> None:
     part = half()
     without, aware = agreement(silent_in(part)), agreement(silent_in(part), coarse(-20.0, part))
-    assert without.hidden_share == 0.0
+    assert without.hidden_fraction == 0.0
     assert without.open_coverage == without.coverage == aware.coverage
-    assert aware.hidden_share == pytest.approx(part.sum() / SEEN.sum(), abs=0.02)
+    assert aware.hidden_fraction == pytest.approx(part.sum() / SEEN.sum(), abs=0.02)
     assert aware.open_coverage > 0.9
-    assert aware.behind_share == 0.0
+    assert aware.behind_fraction == 0.0
 
 
 def test_a_bone_lies_open_while_more_of_it_is_seen_than_hidden() -> None:
@@ -83,9 +83,9 @@ def test_a_bone_lies_open_while_more_of_it_is_seen_than_hidden() -> None:
 def test_what_is_seen_through_the_model_is_told() -> None:
     part = half()
     found = agreement(silent_in(part), coarse(20.0, part))
-    assert found.hidden_share == 0.0
+    assert found.hidden_fraction == 0.0
     # Its rim does not count: depth is blurred there.
-    assert 0.35 < found.behind_share < part.sum() / SEEN.sum()
+    assert 0.35 < found.behind_fraction < part.sum() / SEEN.sum()
     assert found.open_coverage == found.coverage
 
 
@@ -93,12 +93,12 @@ def test_what_is_seen_through_the_model_is_told() -> None:
 def test_a_coarse_map_says_nothing_about_a_millimetre(change_mm: float) -> None:
     part = half()
     found = agreement(silent_in(part), coarse(change_mm, part))
-    assert found.hidden_share == found.behind_share == 0.0
+    assert found.hidden_fraction == found.behind_fraction == 0.0
 
 
 def test_what_was_measured_outweighs_a_coarse_map() -> None:
     found = agreement(MAP, coarse(-20.0, SEEN))
-    assert found.hidden_share < 0.1
+    assert found.hidden_fraction < 0.1
     assert found.coverage > 0.9
 
 
@@ -109,13 +109,13 @@ def test_specks_are_neither_occluder_nor_gap() -> None:
         part[rows[k], columns[k]] = True
     for change_mm in (-20.0, 20.0):
         found = agreement(silent_in(part), coarse(change_mm, part))
-        assert found.hidden_share == found.behind_share == 0.0
+        assert found.hidden_fraction == found.behind_fraction == 0.0
 
 
 def test_a_measured_surface_behind_the_model_is_seen_through_it() -> None:
     further = replace(MAP, disparity_px=MAP.disparity_px - np.float32(12.0))
     found = agreement(further)
-    assert found.behind_share > 0.7
+    assert found.behind_fraction > 0.7
     assert found.coverage < 0.05
 
 

@@ -17,7 +17,7 @@ from tests.tracking.rooms import GOAL, Room, room
 def follow(a: Room, tracker: BimccTracker, start_off=(0.0,) * 6):
     """Track through the room's frames, from a pose a little beside the first truth."""
     truth = a.truth(a.frames[0])
-    start = truth.moved(start_off, truth.apply(tracker.centre_mm))
+    start = truth.move(start_off, truth.apply(tracker.centre_mm))
     state = TrackState.at_rest(start, a.frames[0].captured_ns)
     answers = []
     for frame in a.frames:
@@ -84,7 +84,7 @@ def test_one_dark_eye_is_lost(eye: str) -> None:
 def test_a_bone_out_of_view_is_lost_and_said_so(shift) -> None:
     a = room()
     frame = a.frames[0]
-    away = a.truth(frame).moved((*shift, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    away = a.truth(frame).move((*shift, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     state = TrackState.at_rest(away, frame.captured_ns)
     tracked, after = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
     assert tracked.verdict.status is Status.LOST
@@ -103,7 +103,7 @@ def test_a_pose_is_assessed_where_it_stands() -> None:
     right = a.tracker.assess(frame.left, frame.right, truth, GOAL)
     assert right.verdict.status is not Status.LOST
     np.testing.assert_allclose(right.left_from_bone.matrix, truth.matrix, atol=1e-9)
-    turned = truth.moved((0, 0, 0, 0, np.radians(15.0), 0), truth.apply(a.tracker.centre_mm))
+    turned = truth.move((0, 0, 0, 0, np.radians(15.0), 0), truth.apply(a.tracker.centre_mm))
     wrong = a.tracker.assess(frame.left, frame.right, turned, GOAL)
     assert wrong.verdict.status is Status.LOST
 
@@ -122,7 +122,7 @@ def lost_far_away(a: Room, n_seen: int = 2) -> TrackState:
     state = TrackState.at_rest(truth, a.frames[0].captured_ns)
     for frame in a.frames[:n_seen]:
         _, state = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
-    away = truth.moved((70.0, 0, 0, 0, 0, 0), truth.apply(a.tracker.centre_mm))
+    away = truth.move((70.0, 0, 0, 0, 0, 0), truth.apply(a.tracker.centre_mm))
     return replace(state, left_from_bone=away, n_lost=5)
 
 
@@ -193,7 +193,7 @@ def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
 def test_a_glance_finds_a_bone_near_where_it_is_expected(n_lost: int) -> None:
     a = room()
     truth = a.truth(a.frames[2])
-    expected = truth.moved((2.0, -1.5, 2.0, 0.01, -0.01, 0.01), truth.apply(a.tracker.centre_mm))
+    expected = truth.move((2.0, -1.5, 2.0, 0.01, -0.01, 0.01), truth.apply(a.tracker.centre_mm))
     found, after = glance(a, replace(TrackState.at_rest(expected, 0), n_lost=n_lost))
     assert found.verdict.status is Status.OK
     assert a.error_mm(found.left_from_bone, a.frames[2]) < 0.4
@@ -216,7 +216,7 @@ def test_a_doubt_at_a_glance_puts_off_no_search() -> None:
     found, after = glance(a, state, tracker)
     assert found.verdict.reasons == (Reason.SURFACE_MISFIT,)
     assert after.is_search_due
-    assert not state.updated(found, 0, tracker.centre_mm).is_search_due
+    assert not state.update(found, 0, tracker.centre_mm).is_search_due
 
 
 def test_the_box_of_a_pose_is_its_projection() -> None:

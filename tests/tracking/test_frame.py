@@ -38,22 +38,22 @@ def test_noise_counts_as_right_poses_show_it() -> None:
 
 @pytest.mark.parametrize("noise2", [0.65**2, 1.0])
 @pytest.mark.parametrize("ratio", [0.3, 0.55])
-def test_noise_alone_changes_nothing(ratio: float, noise2: float) -> None:
+def test_noise_alone_changes_nothing(ratio: float, noise_variance_ratio: float) -> None:
     """Few residuals may show less by chance: that promises nothing."""
     quiet = fit_of(ratio)
-    told = quiet.with_correlated_residuals(noise2)
+    told = quiet.with_correlated_residuals(noise_variance_ratio)
     assert told.estimate.covariance == pytest.approx(quiet.estimate.covariance)
     assert told.estimate.reasons == ()
 
 
 @pytest.mark.parametrize("noise2", [0.65**2, 1.0])
-def test_what_goes_together_over_40_px_counts_so_often(noise2: float) -> None:
+def test_what_goes_together_over_40_px_counts_so_often(noise_variance_ratio: float) -> None:
     """A window of 11 px says it (40 / 11)^2 times, and each time the same."""
     loose = fit_of(0.8)
-    covariance = noise2 * loose.estimate.covariance
+    covariance = noise_variance_ratio * loose.estimate.covariance
     made_with = replace(loose, estimate=replace(loose.estimate, covariance=covariance))
-    variance = noise2 + (0.8**2 - 0.65**2) * (40.0 / 11.0) ** 2
-    told = made_with.with_correlated_residuals(noise2)
+    variance = noise_variance_ratio + (0.8**2 - 0.65**2) * (40.0 / 11.0) ** 2
+    told = made_with.with_correlated_residuals(noise_variance_ratio)
     assert np.trace(told.estimate.covariance) == pytest.approx(6.0 * variance, rel=0.05)
     assert (told.measured, told.pose) == (loose.measured, loose.pose)
 

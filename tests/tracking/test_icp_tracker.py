@@ -34,7 +34,7 @@ def test_one_matching_and_one_fit_make_an_answer() -> None:
     """At a glance around the pose, at a first registration with more room."""
     a = room()
     frame, truth = a.frames[0], a.truth(a.frames[0])
-    start = truth.moved((0.5, -0.5, 1.0, 0.01, 0.0, 0.0), truth.apply(a.tracker.centre_mm))
+    start = truth.move((0.5, -0.5, 1.0, 0.01, 0.0, 0.0), truth.apply(a.tracker.centre_mm))
     for name, view in (("tracking", NEAR_VIEW), ("search", WIDE_VIEW)):
         icp = tracker()
         icp.meter = meter = Listening(icp.meter)
@@ -74,7 +74,7 @@ def test_pictures_without_content_are_lost() -> None:
 def test_out_of_view_it_is_lost_and_said_so(n_lost: int) -> None:
     a, icp = room(), tracker()
     frame = a.frames[0]
-    away = a.truth(frame).moved((900.0, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0))
+    away = a.truth(frame).move((900.0, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0))
     state = replace(TrackState.at_rest(away, frame.captured_ns), n_lost=n_lost)
     tracked, after = icp.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
     assert tracked.verdict.reasons == (Reason.OUT_OF_VIEW,)

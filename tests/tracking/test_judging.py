@@ -47,8 +47,8 @@ def test_the_truth_is_ok() -> None:
     assert verdict.status is Status.OK
     assert verdict.reasons == ()
     assert verdict.coverage > 0.9
-    assert verdict.inlier_share > 0.9
-    assert verdict.occluded_share < 0.01
+    assert verdict.inlier_fraction > 0.9
+    assert verdict.occluded_fraction < 0.01
     assert 0.0 < verdict.predicted_tre_mm < 3.0
 
 
@@ -57,7 +57,7 @@ def test_the_truth_is_ok() -> None:
 def test_a_pose_turned_by_fifteen_degrees_is_lost(axis: int, sign: float) -> None:
     twist = np.zeros(6)
     twist[3 + axis] = sign * np.radians(15.0)
-    wrong = TRUE.moved(twist, TRUE.apply(MODEL.centre_mm))
+    wrong = TRUE.move(twist, TRUE.apply(MODEL.centre_mm))
     assert verdict_on(wrong).status is Status.LOST
 
 
@@ -95,8 +95,8 @@ def with_blob(share: float) -> DisparityMap:
 def test_a_small_occluder_is_named_and_does_not_count_as_a_misfit() -> None:
     verdict = verdict_on(measured=with_blob(0.2))
     assert verdict.status is Status.OK
-    assert verdict.occluded_share > 0.1
-    assert verdict.inlier_share > 0.9
+    assert verdict.occluded_fraction > 0.1
+    assert verdict.inlier_fraction > 0.9
     assert verdict.coverage < verdict_on().coverage
 
 
@@ -104,7 +104,7 @@ def test_a_large_occluder_leaves_too_little_of_the_bone() -> None:
     verdict = verdict_on(measured=with_blob(0.68))
     assert verdict.status is not Status.OK
     assert Reason.COVERAGE_LOW in verdict.reasons
-    assert verdict.occluded_share > 0.5
+    assert verdict.occluded_fraction > 0.5
 
 
 def test_filled_pixels_do_not_count_as_seen() -> None:
@@ -120,7 +120,7 @@ def test_a_rig_that_was_not_accepted_is_degraded_at_best() -> None:
 
 
 def test_a_rig_that_was_not_accepted_is_told_of_lost_poses_too() -> None:
-    wrong = TRUE.moved((0.0, 0.0, 0.0, 0.0, 0.0, np.radians(15.0)), TRUE.apply(MODEL.centre_mm))
+    wrong = TRUE.move((0.0, 0.0, 0.0, 0.0, 0.0, np.radians(15.0)), TRUE.apply(MODEL.centre_mm))
     lost, given = verdict_on(wrong), verdict_on(wrong, is_accepted=False)
     assert lost.status is given.status is Status.LOST
     assert set(given.reasons) == {*lost.reasons, Reason.RIG_NOT_ACCEPTED}
@@ -167,7 +167,7 @@ def test_of_many_targets_some_stand_for_all() -> None:
     assert bound_mm(targets_mm) == bound_mm(targets_mm[::step])
     # Of fewer than twice as many every one counts.
     few_mm, centre_mm = targets_mm[:250], MODEL.centre_mm
-    assert bound_mm(few_mm) == pytest.approx(estimate_on().predicted_tre_mm(centre_mm, few_mm))
+    assert bound_mm(few_mm) == pytest.approx(estimate_on().predict_tre_mm(centre_mm, few_mm))
 
 
 def test_what_the_calibration_leaves_widens_the_bound_and_nothing_else() -> None:
@@ -251,7 +251,7 @@ def test_a_turn_in_place_is_a_jump_as_well() -> None:
 
 
 def test_a_bone_that_is_nowhere_in_the_box_is_out_of_view() -> None:
-    away = TRUE.moved((400.0, 0.0, 0.0, 0.0, 0.0, 0.0), np.zeros(3))
+    away = TRUE.move((400.0, 0.0, 0.0, 0.0, 0.0, 0.0), np.zeros(3))
     verdict = judged(replace(estimate_on(), camera_from_bone=away)).verdict
     assert (verdict.status, verdict.reasons) == (Status.LOST, (Reason.OUT_OF_VIEW,))
     assert verdict.predicted_tre_mm is None

@@ -65,15 +65,15 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
 
 @pytest.mark.parametrize(("hidden_share", "noise"), [(0.0, 0.65), (0.9, 1.0)])
 def test_a_claim_is_believed_less_while_the_bone_lies_open(
-    hidden_share: float, noise: float
+    hidden_fraction: float, noise: float
 ) -> None:
     a = room()
     frame, checks, fit = found_at_the_truth(a)
     targets_mm = a.tracker.centre_mm + 30.0 * np.eye(3)
     told = judge_with(SurfaceAlone()).judge(
-        frame, altered(checks, fit, hidden_share=hidden_share), fit, Goal(targets_mm, 2.0)
+        frame, altered(checks, fit, hidden_fraction=hidden_fraction), fit, Goal(targets_mm, 2.0)
     )
-    claimed_mm = fit.estimate.predicted_tre_mm(a.tracker.centre_mm, targets_mm)
+    claimed_mm = fit.estimate.predict_tre_mm(a.tracker.centre_mm, targets_mm)
     assert told.verdict.predicted_tre_mm == pytest.approx(noise * claimed_mm, rel=1e-6)
 
 

@@ -33,7 +33,7 @@ def frame(pose: RigidTransform | None, status: Status = Status.OK) -> TrackedFra
 
 
 def moved(pose: RigidTransform, twist) -> RigidTransform:
-    return pose.moved(twist, pose.apply(CENTRE))
+    return pose.move(twist, pose.apply(CENTRE))
 
 
 STEP = np.array([1.5, -0.5, 0.8, 0.01, -0.02, 0.005])
@@ -41,30 +41,30 @@ STEP = np.array([1.5, -0.5, 0.8, 0.01, -0.02, 0.005])
 
 def test_a_bone_at_rest_is_expected_where_it_is() -> None:
     state = TrackState.at_rest(START, 1000)
-    np.testing.assert_array_equal(state.predicted(1000 + PERIOD_NS, CENTRE).matrix, START.matrix)
+    np.testing.assert_array_equal(state.predict(1000 + PERIOD_NS, CENTRE).matrix, START.matrix)
 
 
 def test_a_steady_motion_goes_on_damped() -> None:
-    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
-    predicted = state.predicted(2 * PERIOD_NS, CENTRE)
+    state = TrackState.at_rest(START, 0).update(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    predicted = state.predict(2 * PERIOD_NS, CENTRE)
     expected = moved(moved(START, STEP), 0.7 * STEP)
     np.testing.assert_allclose(predicted.matrix, expected.matrix, atol=1e-9)
     np.testing.assert_allclose(state.velocity * PERIOD_NS / 1e9, STEP, atol=1e-9)
 
 
 def test_what_is_carried_is_expected_where_it_was_carried_to() -> None:
-    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    state = TrackState.at_rest(START, 0).update(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
     turn = rotation_from_vector((0.0, 0.1, -0.2))
     motion = RigidTransform.from_parts("left", "left", turn, (4.0, -3.0, 2.0))
-    carried = state.carried(motion)
-    predicted = carried.predicted(2 * PERIOD_NS, CENTRE)
+    carried = state.carry(motion)
+    predicted = carried.predict(2 * PERIOD_NS, CENTRE)
     np.testing.assert_array_equal(predicted.matrix, (motion @ state.left_from_bone).matrix)
     assert (carried.captured_ns, carried.n_lost) == (state.captured_ns, state.n_lost)
 
 
 def test_half_the_time_is_half_the_motion() -> None:
-    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
-    half = state.predicted(PERIOD_NS + PERIOD_NS // 2, CENTRE)
+    state = TrackState.at_rest(START, 0).update(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    half = state.predict(PERIOD_NS + PERIOD_NS // 2, CENTRE)
     expected = moved(moved(START, STEP), 0.35 * STEP)
     np.testing.assert_allclose(half.matrix, expected.matrix, atol=1e-9)
 
@@ -73,8 +73,8 @@ def test_half_the_time_is_half_the_motion() -> None:
     "lost", [frame(None, Status.LOST), frame(moved(START, 9 * STEP), Status.LOST)]
 )
 def test_a_loss_keeps_the_pose_and_forgets_the_velocity(lost: TrackedFrame) -> None:
-    moving = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
-    state = moving.updated(lost, 2 * PERIOD_NS, CENTRE).updated(lost, 3 * PERIOD_NS, CENTRE)
+    moving = TrackState.at_rest(START, 0).update(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    state = moving.update(lost, 2 * PERIOD_NS, CENTRE).update(lost, 3 * PERIOD_NS, CENTRE)
     assert state.n_lost == 2
     assert state.left_from_bone is moving.left_from_bone
     assert not state.velocity.any()
@@ -83,13 +83,13 @@ def test_a_loss_keeps_the_pose_and_forgets_the_velocity(lost: TrackedFrame) -> N
 def test_the_box_stays_through_poses_and_losses() -> None:
     box = BoxState(np.zeros((2, 2), np.uint8), PictureBox(0.0, 0.0, 1.0, 1.0))
     state = replace(TrackState.at_rest(START, 0), box=box)
-    assert state.updated(frame(None, Status.LOST), PERIOD_NS, CENTRE).box is box
-    assert state.updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE).box is box
+    assert state.update(frame(None, Status.LOST), PERIOD_NS, CENTRE).box is box
+    assert state.update(frame(moved(START, STEP)), PERIOD_NS, CENTRE).box is box
 
 
 def test_the_first_pose_after_a_loss_gives_no_velocity() -> None:
-    state = TrackState.at_rest(START, 0).updated(frame(None, Status.LOST), PERIOD_NS, CENTRE)
-    state = state.updated(frame(moved(START, STEP)), 2 * PERIOD_NS, CENTRE)
+    state = TrackState.at_rest(START, 0).update(frame(None, Status.LOST), PERIOD_NS, CENTRE)
+    state = state.update(frame(moved(START, STEP)), 2 * PERIOD_NS, CENTRE)
     assert state.n_lost == 0
     assert not state.velocity.any()
     assert state.captured_ns == 2 * PERIOD_NS
@@ -98,23 +98,23 @@ def test_the_first_pose_after_a_loss_gives_no_velocity() -> None:
 @pytest.mark.parametrize("elapsed_ns", [0, -PERIOD_NS, 500_000_000])
 def test_a_gap_that_is_too_long_or_none_gives_no_velocity(elapsed_ns: int) -> None:
     state = TrackState.at_rest(START, 10**9)
-    state = state.updated(frame(moved(START, STEP)), 10**9 + elapsed_ns, CENTRE)
+    state = state.update(frame(moved(START, STEP)), 10**9 + elapsed_ns, CENTRE)
     assert not state.velocity.any()
 
 
 def test_an_old_velocity_says_nothing_after_a_long_silence() -> None:
     """A camera that was away for seconds: the bone is looked for where it was last seen."""
-    state = TrackState.at_rest(START, 0).updated(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
-    predicted = state.predicted(PERIOD_NS + 3_000_000_000, CENTRE)
+    state = TrackState.at_rest(START, 0).update(frame(moved(START, STEP)), PERIOD_NS, CENTRE)
+    predicted = state.predict(PERIOD_NS + 3_000_000_000, CENTRE)
     np.testing.assert_array_equal(predicted.matrix, state.left_from_bone.matrix)
 
 
 def test_rotations_do_not_drift_over_a_thousand_updates() -> None:
     state = TrackState.at_rest(START, 0)
     for number in range(1, 1001):
-        pose = state.predicted(number * PERIOD_NS, CENTRE)
+        pose = state.predict(number * PERIOD_NS, CENTRE)
         nudge = STEP * np.sin(number / 7.0)
-        state = state.updated(frame(moved(pose, nudge)), number * PERIOD_NS, CENTRE)
+        state = state.update(frame(moved(pose, nudge)), number * PERIOD_NS, CENTRE)
     rotation = state.left_from_bone.rotation
     np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=1e-11)
     assert np.linalg.det(rotation) == pytest.approx(1.0)
@@ -142,7 +142,7 @@ def test_something_else_far_away_is_not_followed(
     far = moved(START, (20.0, 0.0, 0.0, 0.0, 0.2, 0.0))
     found = frame(far, Status.DEGRADED)
     found = replace(found, verdict=Verdict(Status.DEGRADED, 0.2, reasons))
-    state = TrackState.at_rest(START, 0).updated(found, PERIOD_NS, CENTRE)
+    state = TrackState.at_rest(START, 0).update(found, PERIOD_NS, CENTRE)
     assert state.left_from_bone is (far if is_taken else START)
     assert state.n_lost == (0 if is_taken else 1)
 
@@ -152,9 +152,9 @@ def test_what_is_wrong_for_good_is_remembered_until_a_frame_is_ok() -> None:
     for number, status in enumerate((Status.DEGRADED, Status.LOST), start=1):
         found = frame(START, status)
         found = replace(found, verdict=Verdict(status, 0.2, (Reason.SURFACE_MISFIT,)))
-        state = state.updated(with_cause(found, state.cause), number * PERIOD_NS, CENTRE)
+        state = state.update(with_cause(found, state.cause), number * PERIOD_NS, CENTRE)
         assert state.cause is Reason.OTHER_SIDE
-    assert state.updated(frame(START), 3 * PERIOD_NS, CENTRE).cause is None
+    assert state.update(frame(START), 3 * PERIOD_NS, CENTRE).cause is None
 
 
 def doubtful(pose: RigidTransform) -> TrackedFrame:
@@ -166,16 +166,16 @@ def test_a_search_that_finds_nothing_is_made_ever_more_rarely() -> None:
     for number in range(33):
         if state.is_search_due:
             due.append(number)
-        state = state.updated(doubtful(START), PERIOD_NS * number, CENTRE)
+        state = state.update(doubtful(START), PERIOD_NS * number, CENTRE)
     assert due == [0, 1, 2, 4, 8, 16, 24, 32]
 
 
 def test_after_a_sure_frame_the_next_doubt_is_searched_at_once() -> None:
     state = TrackState.at_rest(START, 0)
     for _ in range(3):
-        state = state.updated(doubtful(START), PERIOD_NS, CENTRE)
+        state = state.update(doubtful(START), PERIOD_NS, CENTRE)
     assert not state.is_search_due
-    assert state.updated(frame(START), PERIOD_NS, CENTRE).is_search_due
+    assert state.update(frame(START), PERIOD_NS, CENTRE).is_search_due
 
 
 @pytest.mark.parametrize(
@@ -198,16 +198,16 @@ def test_a_doubt_under_rows_that_disagree_puts_off_no_search() -> None:
     state, rows_off = TrackState.at_rest(START, 0), RowCheck(0.5, True)
     for number in range(3):
         found = replace(doubtful(START), rows=rows_off)
-        state = state.updated(found, number * PERIOD_NS, CENTRE)
+        state = state.update(found, number * PERIOD_NS, CENTRE)
     assert state.is_search_due
-    state = state.updated(doubtful(START), 3 * PERIOD_NS, CENTRE)
+    state = state.update(doubtful(START), 3 * PERIOD_NS, CENTRE)
     assert state.n_doubted == 1
 
 
 def test_a_lost_frame_neither_counts_as_a_doubt_nor_ends_a_row_of_them() -> None:
     state = TrackState.at_rest(START, 0)
     for number in range(3):
-        state = state.updated(doubtful(START), number * PERIOD_NS, CENTRE)
-    lost = state.updated(frame(START, Status.LOST), 3 * PERIOD_NS, CENTRE)
+        state = state.update(doubtful(START), number * PERIOD_NS, CENTRE)
+    lost = state.update(frame(START, Status.LOST), 3 * PERIOD_NS, CENTRE)
     assert (lost.n_doubted, lost.n_lost) == (3, 1)
-    assert lost.updated(doubtful(START), 4 * PERIOD_NS, CENTRE).n_doubted == 4
+    assert lost.update(doubtful(START), 4 * PERIOD_NS, CENTRE).n_doubted == 4

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.tracking.frame import Fit
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import Measurement
@@ -42,8 +42,8 @@ def picture(pose: RigidTransform) -> np.ndarray:
 def pair() -> RectifiedPair:
     """Of the bone at `TRUE`; what the right camera sees is the bone further left."""
     shift = np.array([-GEOMETRY.baseline_mm, 0.0, 0.0, 0.0, 0.0, 0.0])
-    box = projected_box(femur().mesh, TRUE, GEOMETRY)
-    return RectifiedPair(picture(TRUE), picture(TRUE.moved(shift, np.zeros(3))), GEOMETRY, box)
+    box = project_box(femur().mesh, TRUE, GEOMETRY)
+    return RectifiedPair(picture(TRUE), picture(TRUE.move(shift, np.zeros(3))), GEOMETRY, box)
 
 
 @cache
@@ -57,7 +57,7 @@ def centre_mm(pose: RigidTransform) -> np.ndarray:
 
 def fit_at(pose: RigidTransform, is_measured: bool = True) -> Fit:
     """The bone matched on the model at a pose, everywhere or nowhere."""
-    box = projected_box(femur().mesh, pose, GEOMETRY).grown(16)
+    box = project_box(femur().mesh, pose, GEOMETRY).grow(16)
     view = render_rectified(femur().mesh, pose, GEOMETRY, box)
     origin = np.where(view.mask & is_measured, Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8)
     disparity = GEOMETRY.disparity_map_px(view.depth_mm)
@@ -78,7 +78,7 @@ def error_mm(pose: RigidTransform) -> float:
 
 
 TWIST = np.array([0.12, -0.1, 0.05, 0.0015, -0.002, 0.002])
-OFF = TRUE.moved(TWIST, centre_mm(TRUE))
+OFF = TRUE.move(TWIST, centre_mm(TRUE))
 
 
 def test_at_the_true_pose_edges_are_where_the_model_has_them() -> None:

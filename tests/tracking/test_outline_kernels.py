@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh_edges import ridge_edges
-from navapp.geometry.zbuffer import projected_box, render_rectified
+from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.tracking.outline_kernels import (
     Eye,
     Ridges,
@@ -38,7 +38,7 @@ def rim_of(eye: Eye) -> Rim:
 
 @cache
 def left_view():
-    box = projected_box(femur().mesh, TRUE, GEOMETRY).grown(16)
+    box = project_box(femur().mesh, TRUE, GEOMETRY).grow(16)
     return render_rectified(femur().mesh, TRUE, GEOMETRY, box)
 
 

@@ -24,7 +24,7 @@ def found_at_the_truth() -> Fit:
 
 
 def turned(fit: Fit, turn_rad: float) -> Fit:
-    pose = fit.pose.moved((0, 0, 0, 0, 0, turn_rad), fit.pose.apply(room().tracker.centre_mm))
+    pose = fit.pose.move((0, 0, 0, 0, 0, turn_rad), fit.pose.apply(room().tracker.centre_mm))
     return replace(fit, estimate=replace(fit.estimate, camera_from_bone=pose))
 
 

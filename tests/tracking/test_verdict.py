@@ -50,14 +50,14 @@ def missing(reason: Reason) -> Callable[[float], Evidence]:
 
 
 def said(reason: Reason) -> Callable[[float], Evidence]:
-    return lambda yes: known(estimate=ESTIMATE.doubted(reason)) if yes > 0 else FINE
+    return lambda yes: known(estimate=ESTIMATE.with_reason(reason)) if yes > 0 else FINE
 
 
 def degenerate(value: float) -> Evidence:
     """Nothing is free, a direction is, all are."""
     if value <= 0:
         return FINE
-    free = ESTIMATE.doubted(Reason.DEGENERATE)
+    free = ESTIMATE.with_reason(Reason.DEGENERATE)
     return known(estimate=free) if value <= 1 else Evidence(estimate=free)
 
 
@@ -92,9 +92,9 @@ ROWS = (
     Row(Reason.CUES_DISAGREE, said(Reason.CUES_DISAGREE), 0, None, 1),
     Row(Reason.SURFACE_MISFIT, lambda x: known(correlated_ratio=x), 2.0, None),
     Row(Reason.COVERAGE_LOW, lambda x: seen(coverage=x), 0.4, 0.25, -1e-6),
-    Row(Reason.COVERAGE_LOW, lambda x: seen(coverage=x, hidden_share=0.84), 0.15, 0.1, -1e-6),
-    Row(Reason.SEEN_THROUGH, lambda x: seen(behind_share=x), 0.05, 0.15),
-    Row(Reason.OUTLIERS, lambda x: seen(inlier_share=x), 0.8, 0.5, -1e-6),
+    Row(Reason.COVERAGE_LOW, lambda x: seen(coverage=x, hidden_fraction=0.84), 0.15, 0.1, -1e-6),
+    Row(Reason.SEEN_THROUGH, lambda x: seen(behind_fraction=x), 0.05, 0.15),
+    Row(Reason.OUTLIERS, lambda x: seen(inlier_fraction=x), 0.8, 0.5, -1e-6),
     Row(Reason.SURFACE_MISFIT, lambda x: known(estimate=replace(ESTIMATE, rms_mm=0.1 * x)),
         1.25, 2.0),
     Row(Reason.SURFACE_MISFIT, lambda x: seen(spread_ratio=x), 1.1, None),
@@ -170,7 +170,7 @@ def test_what_the_judge_may_say_is_all_in_the_table() -> None:
 def test_reasons_are_told_in_the_order_of_the_table_and_once() -> None:
     evidence = known(
         jump_deg=20.0, jump_mm=20.0, correlated_ratio=3.0, dark_fraction=0.9, is_rig_accepted=False,
-        agreement=replace(AGREEMENT, spread_ratio=2.0, behind_share=0.1),
+        agreement=replace(AGREEMENT, spread_ratio=2.0, behind_fraction=0.1),
     )  # fmt: skip
     assert told(evidence) == (
         Status.DEGRADED,
@@ -186,7 +186,7 @@ def test_reasons_are_told_in_the_order_of_the_table_and_once() -> None:
 
 def test_the_worst_rule_decides_and_a_lost_pose_keeps_its_figures() -> None:
     lost = known(
-        dark_fraction=0.9, agreement=replace(AGREEMENT, inlier_share=0.4), is_rig_accepted=False
+        dark_fraction=0.9, agreement=replace(AGREEMENT, inlier_fraction=0.4), is_rig_accepted=False
     )
     verdict = decide(lost)
     assert verdict.status is Status.LOST
@@ -195,7 +195,7 @@ def test_the_worst_rule_decides_and_a_lost_pose_keeps_its_figures() -> None:
         Reason.OUTLIERS,
         Reason.RIG_NOT_ACCEPTED,
     )
-    assert (verdict.predicted_tre_mm, verdict.inlier_share) == (0.4, 0.4)
+    assert (verdict.predicted_tre_mm, verdict.inlier_fraction) == (0.4, 0.4)
 
 
 def test_without_a_pose_the_pair_is_told_first() -> None:

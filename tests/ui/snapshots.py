@@ -73,8 +73,8 @@ GOOD = Verdict(
     status=Status.OK,
     predicted_tre_mm=0.21,
     coverage=0.71,
-    occluded_share=0.12,
-    inlier_share=0.93,
+    occluded_fraction=0.12,
+    inlier_fraction=0.93,
     rms_mm=0.18,
     expected_rms_mm=0.17,
 )

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.simplify import simplified
+from navapp.geometry.simplify import simplify
 from navapp.geometry.transform import FloatArray
 from navapp.preop.ct_surface.blur import compute_axial_fractions
 from navapp.preop.ct_surface.cortex_model import Scan, sample_positions_mm
@@ -103,7 +103,7 @@ def _working(surface: BoneSurface, volume: CtVolume | LabelVolume) -> BoneSurfac
     """In as few triangles as keep every vertex within a tenth of a millimetre."""
     from scipy.spatial import cKDTree
 
-    mesh = simplified(surface.mesh, _WORKING_VERTICES, _WORKING_WITHIN_MM)
+    mesh = simplify(surface.mesh, _WORKING_VERTICES, _WORKING_WITHIN_MM)
     _, nearest = cKDTree(surface.mesh.vertices_mm).query(mesh.vertices_mm)
     return BoneSurface(mesh, _is_cut(mesh, volume), surface.is_measured[nearest])
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.simplify import simplified
+from navapp.geometry.simplify import simplify
 from navapp.preop.segmentation.masks import find_bounds
 from navapp.preop.volume import CtVolume, LabelVolume
 
@@ -43,9 +43,9 @@ def make_isosurface(
     pieces = TriangleMesh(volume.points_lps_mm(indices), faces)
     mesh = pieces.largest_component()
     if mesh.volume_mm3() < 0.0:
-        pieces, mesh = pieces.flipped(), mesh.flipped()
+        pieces, mesh = pieces.flip(), mesh.flip()
     wanted = int(_VERTICES_PER_MM2 * mesh.face_areas_mm2().sum())
-    return simplified(mesh, wanted, _WITHIN_MM), _left_out(pieces)
+    return simplify(mesh, wanted, _WITHIN_MM), _left_out(pieces)
 
 
 def _left_out(pieces: TriangleMesh) -> float:

@@ -54,7 +54,7 @@ def _place(context: Any, builder: Any, array: tuple[Any, Any], index: Any) -> An
     return builder.bitcast(builder.gep(data, [index]), lanes.as_pointer())
 
 
-def _called(builder: Any, name: str, result: Any, arguments: list[Any]) -> Any:
+def _call(builder: Any, name: str, result: Any, arguments: list[Any]) -> Any:
     """Result of an intrinsic function of LLVM on lanes."""
     lanes = arguments[0].type
     function = cgutils.get_or_insert_function(
@@ -129,19 +129,19 @@ def _of_two(operate: Callable[[Any, Any, Any], Any], doc: str) -> Any:
 added = _of_two(lambda builder, a, b: builder.add(a, b), "a + b, which must not overflow.")
 less = _of_two(lambda builder, a, b: builder.sub(a, b), "a - b, modulo the range.")
 capped_sum = _of_two(
-    lambda builder, a, b: _called(builder, "uadd.sat", a.type, [a, b]),
+    lambda builder, a, b: _call(builder, "uadd.sat", a.type, [a, b]),
     "a + b, at most the largest number.",
 )
 what_exceeds = _of_two(
-    lambda builder, a, b: _called(builder, "usub.sat", a.type, [a, b]), "a - b, at least 0."
+    lambda builder, a, b: _call(builder, "usub.sat", a.type, [a, b]), "a - b, at least 0."
 )
 differing = _of_two(lambda builder, a, b: builder.xor(a, b), "Bits that differ.")
 both_bits = _of_two(lambda builder, a, b: builder.or_(a, b), "Bits of either.")
 smaller = _of_two(
-    lambda builder, a, b: _called(builder, "umin", a.type, [a, b]), "Minimum, lane by lane."
+    lambda builder, a, b: _call(builder, "umin", a.type, [a, b]), "Minimum, lane by lane."
 )
 larger = _of_two(
-    lambda builder, a, b: _called(builder, "umax", a.type, [a, b]), "Maximum, lane by lane."
+    lambda builder, a, b: _call(builder, "umax", a.type, [a, b]), "Maximum, lane by lane."
 )
 
 
@@ -162,12 +162,12 @@ def ones(_: Any, lanes: Any) -> Any:
     """Number of ones in each lane's bits."""
 
     def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
-        return _called(builder, "ctpop", values[0].type, [values[0]])
+        return _call(builder, "ctpop", values[0].type, [values[0]])
 
     return lanes(lanes), generate
 
 
-def _shifted_left(bits: Callable[[int], int], doc: str) -> Any:
+def _shift_left(bits: Callable[[int], int], doc: str) -> Any:
     def declare(_: Any, lanes: Any) -> Any:
         def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
             vector = values[0].type
@@ -179,8 +179,8 @@ def _shifted_left(bits: Callable[[int], int], doc: str) -> Any:
     return intrinsic(declare)
 
 
-eightfold = _shifted_left(lambda _: 3, "8 * a, which must not overflow.")
-in_upper_half = _shifted_left(lambda width: width // 2, "Moved into the upper half of the bits.")
+eightfold = _shift_left(lambda _: 3, "8 * a, which must not overflow.")
+in_upper_half = _shift_left(lambda width: width // 2, "Moved into the upper half of the bits.")
 
 
 @intrinsic
@@ -188,6 +188,6 @@ def smallest(_: Any, lanes: Any) -> Any:
     """The smallest of the lanes."""
 
     def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
-        return _called(builder, "vector.reduce.umin", values[0].type.element, [values[0]])
+        return _call(builder, "vector.reduce.umin", values[0].type.element, [values[0]])
 
     return lanes.dtype(lanes), generate

@@ -24,7 +24,7 @@ from navapp.stereo.matching.sgm_kernels import (
     Views,
     jump_penalties,
     keep_rows,
-    mirrored_codes,
+    mirror_codes,
     new_paths,
     surplus_dtype,
 )
@@ -228,7 +228,7 @@ def _views(left: _View, right: _View, search: Search, settings: CensusSettings) 
     n = lanes_for(search.count)
     return Views(
         left.codes,
-        mirrored_codes(right.codes, n),
+        mirror_codes(right.codes, n),
         left.grey,
         search.shift - search.lowest,
         np.uint8(settings.p1),
@@ -259,7 +259,7 @@ def _result(
     top = inside.y - box.y
     right_rows[top : top + inside.height] = right_px
     return TwoViewDisparity(
-        matched_map(search, left_px, settings.sigma_px),
+        make_matched_map(search, left_px, settings.sigma_px),
         right_rows,
         search.right.x,
         search.over_box(confidence, np.float32(0.0)),
@@ -267,7 +267,9 @@ def _result(
     )
 
 
-def matched_map(search: Search, disparity_px: NDArray[np.float32], sigma_px: float) -> DisparityMap:
+def make_matched_map(
+    search: Search, disparity_px: NDArray[np.float32], sigma_px: float
+) -> DisparityMap:
     """The map over the whole box; (h, w) of its inside part, NaN where unmatched."""
     whole = search.over_box(disparity_px.astype(np.float32, copy=False), np.float32(np.nan))
     is_matched = np.isfinite(whole)

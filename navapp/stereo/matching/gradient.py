@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.stereo.matching.census_sgm import matched_map
+from navapp.stereo.matching.census_sgm import make_matched_map
 from navapp.stereo.matching.consistency import at_partner, view_difference_px
 from navapp.stereo.matching.gradient_kernels import match_rows
 from navapp.stereo.matching.search import Crop, Search
@@ -69,7 +69,7 @@ def match_gradient(
     search = Search.plan(pair, band_px)
     if search.is_empty:
         shape = (search.inside.height, search.inside.width)
-        return matched_map(search, np.full(shape, np.nan, dtype=np.float32), settings.sigma_px)
+        return make_matched_map(search, np.full(shape, np.nan, dtype=np.float32), settings.sigma_px)
     left_px, right_px, shift = _winners(pair, search, settings)
     # Left-right consistency check: the right view's winners come from the same cost.
     difference = view_difference_px(left_px, right_px, shift)
@@ -83,7 +83,7 @@ def match_gradient(
     is_matched &= np.minimum(left_spread, partner_spread) >= settings.contrast_grey
     matched_px = np.where(is_matched, left_px, np.float32(np.nan))
     smooth = smooth_known(matched_px, settings.gaussian_sigma_px)
-    return matched_map(search, smooth, settings.sigma_px)
+    return make_matched_map(search, smooth, settings.sigma_px)
 
 
 def smooth_known(values: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:

@@ -58,11 +58,11 @@ class Search:
             )
         height, width = pair.left.shape
         box = Box(pair.box.x, pair.box.y, max(pair.box.width, 0), max(pair.box.height, 0))
-        inside = box.clipped(width, height)
+        inside = box.clip(width, height)
         reached = Box(
             inside.x - (lowest + count - 1), inside.y, inside.width + count - 1, inside.height
         )
-        right = Box(0, 0, 0, 0) if inside.is_empty else reached.clipped(width, height)
+        right = Box(0, 0, 0, 0) if inside.is_empty else reached.clip(width, height)
         return cls(box, inside, lowest, count, right)
 
     @property

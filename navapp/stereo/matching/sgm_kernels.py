@@ -93,7 +93,7 @@ def new_paths(width: int, n: int) -> Paths:
     return Paths(costs, np.zeros(n_slots, dtype=np.uint8), np.empty(n, dtype=np.uint8))
 
 
-def mirrored_codes(codes: NDArray[np.uint8], n: int) -> NDArray[np.uint8]:
+def mirror_codes(codes: NDArray[np.uint8], n: int) -> NDArray[np.uint8]:
     """`Views.mirrored` of (h, bytes, W) codes."""
     height, n_bytes, width = codes.shape
     out = np.zeros((height, n_bytes, width + 2 * n), dtype=np.uint8)

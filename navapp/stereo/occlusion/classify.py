@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import run_both
 from navapp.stereo.occlusion.classify_kernels import (
-    agreed_ends,
     class_rows,
     edge_splits,
+    find_agreed_ends,
     mark_seen,
     project_rows,
     strip_ends,
@@ -60,7 +60,7 @@ def classify(
     in_two_shares(lambda *rows: mark_seen(right_px, right_x0 - left.x, *rows, seen))
     strip_ends(disparity, origin, left.x, ends)
     begins = np.empty(shape[0], dtype=np.int64)
-    agreed_ends(ends, begins)
+    find_agreed_ends(ends, begins)
     splits = np.empty((0, 0), dtype=np.int8)
     if picture is not None:
         channels = with_channels(picture, left)
@@ -73,7 +73,7 @@ def classify(
     return classes
 
 
-def seen_from_right(
+def project_to_right(
     left_px: NDArray[np.float32], left_x: int, picture_width: int
 ) -> NDArray[np.float32]:
     """(h, W) disparity of the right view of a surface known in the left one; NaN where unseen.

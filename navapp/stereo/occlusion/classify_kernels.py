@@ -86,7 +86,7 @@ def strip_ends(
 
 
 @njit(cache=True, nogil=True)
-def agreed_ends(ends: NDArray[np.float64], agreed: NDArray[np.int64]) -> None:
+def find_agreed_ends(ends: NDArray[np.float64], agreed: NDArray[np.int64]) -> None:
     """Whole column below the median of the known ends around each row; 0 without any."""
     height = len(ends)
     near = np.empty(2 * _STRIP_ROWS + 1)
@@ -202,13 +202,13 @@ def class_rows(
                 row[x] = _MISMATCH if seen[y, x] else _INTERIOR
         for x in range(begins[y], splits.shape[1]):
             if splits[y, x] >= 0:
-                for u in range(x, min(x + _agreed_split(splits, y, x), width)):
+                for u in range(x, min(x + _find_agreed_split(splits, y, x), width)):
                     row[u] = _INTERIOR if row[u] == 0 else row[u]
         _keep_possible(disparity[y], row)
 
 
 @njit(cache=True, nogil=True)
-def _agreed_split(splits: NDArray[np.int8], y: int, x: int) -> int:
+def _find_agreed_split(splits: NDArray[np.int8], y: int, x: int) -> int:
     """Median of the splits beside one (two columns, two rows to every side), rounded down.
 
     One row alone is moved by noise: without another nearby nothing is split off.

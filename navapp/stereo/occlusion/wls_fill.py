@@ -95,7 +95,7 @@ def fill_wls(
         picture=with_channels(picture, left),
         confidence=np.ascontiguousarray(confidence, dtype=np.float32),
     )
-    told = _fitted(scene, settings)
+    told = _fit_all(scene, settings)
     disparity, origin = np.empty_like(told), np.empty_like(scene.origin)
     in_two_shares(lambda *rows: calm_rows(scene, told, *rows, disparity, origin))
     sigma = np.where(classes == 0, left.sigma_px, np.float32(_FILLED_SIGMA_PX))
@@ -112,7 +112,7 @@ def support_radius_px(matched_px: NDArray[np.float32]) -> int:
     return round(float(np.clip(radius, *_RADIUS_LIMITS_PX)))
 
 
-def _fitted(scene: Scene, settings: FillSettings) -> NDArray[np.float32]:
+def _fit_all(scene: Scene, settings: FillSettings) -> NDArray[np.float32]:
     """What the fits tell of the classified pixels; the matches elsewhere."""
     height, width = scene.disparity.shape
     rules = _rules(scene, settings)

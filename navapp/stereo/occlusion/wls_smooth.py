@@ -70,7 +70,7 @@ def smooth_wls(
         np.ascontiguousarray(confidence, dtype=np.float32),
     )
     centre = _centre(measured.disparity)
-    columns, rows = _weighed(measured, centre, channels, colour_sigma)
+    columns, rows = _weigh_lines(measured, centre, channels, colour_sigma)
     height, width = values.shape
     for k in range(1, n_rounds + 1):
         step = np.float32(pass_strength(strength, k, n_rounds))
@@ -92,7 +92,7 @@ def pass_strength(strength: float, k: int, n_rounds: int) -> float:
     return 1.5 * 4.0 ** (n_rounds - k) / (4.0**n_rounds - 1.0) * strength
 
 
-def _weighed(
+def _weigh_lines(
     measured: Measured, centre: np.float32, picture: NDArray[np.uint8], colour_sigma: float
 ) -> tuple[Lines, Lines]:
     """What is solved along the columns, and along the rows (turned; its values come later)."""

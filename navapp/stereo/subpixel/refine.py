@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.masks import large_smooth_regions
 from navapp.geometry.rectification import RectifiedPair
-from navapp.geometry.zbuffer_kernels import known_range
+from navapp.geometry.zbuffer_kernels import find_known_range
 from navapp.stereo.subpixel.refine_kernels import (
     CORRELATION,
     N_QUALITIES,
@@ -109,7 +109,7 @@ def refine_on_model(pair: RectifiedPair, support_px: NDArray[np.float32]) -> Dis
     """
     found = without_specks(refine(pair, support_px, MODEL_REFINEMENT))
     n_expected = np.count_nonzero(np.isfinite(support_px))
-    if found.matched_share * support_px.size < _LEAST_CONFIRMED * n_expected:
+    if found.matched_fraction * support_px.size < _LEAST_CONFIRMED * n_expected:
         return found.only(np.zeros(support_px.shape, dtype=np.bool_))
     return found
 
@@ -130,7 +130,7 @@ def _accept(
     if pair.left.ndim != 2 or support_px.shape != (box.height, box.width):
         raise ValueError("refine needs grey pictures and a support of the box's size")
     height, width = pair.left.shape
-    if box.clipped(width, height) != box:
+    if box.clip(width, height) != box:
         raise ValueError(f"the box {box} reaches beyond the picture of {width}x{height}")
     support = np.ascontiguousarray(support_px, dtype=np.float32)
     offset, quality = _steps(pair, support, settings, stride_px)
@@ -160,7 +160,7 @@ def _steps(
     """(h, w) offset px from the support, and (h, w, 4) / stride what the last step says of it."""
     box = pair.box
     rows = slice(box.y, box.y + box.height)
-    columns = _reached_columns(support, box.x, pair.right.shape[1])
+    columns = _find_reached_columns(support, box.x, pair.right.shape[1])
     seen = pair.left[rows, box.x : box.x + box.width]
     # About a middle value, the products of float32 keep their digits.
     centre = np.float32(seen[::_SAMPLE_PX, ::_SAMPLE_PX].mean() if seen.size else 0.0)
@@ -199,9 +199,11 @@ def _is_at_rest(quality: NDArray[np.float32], settings: RefineSettings) -> bool:
     return bool(2 * np.count_nonzero(is_small) >= len(step))
 
 
-def _reached_columns(support: NDArray[np.float32], first_column: int, picture_width: int) -> slice:
+def _find_reached_columns(
+    support: NDArray[np.float32], first_column: int, picture_width: int
+) -> slice:
     """Columns of the right picture that some pixel's window can ask for."""
-    farthest, nearest = known_range(support)
+    farthest, nearest = find_known_range(support)
     if farthest > nearest:
         return slice(0, 0)
     first = int(first_column - nearest) - _SPARE_COLUMNS

@@ -67,7 +67,7 @@ def tell_row(
 
 
 @njit(cache=True, nogil=True)
-def supported_spans(
+def find_supported_spans(
     support: NDArray[np.float32], stride: int, rows: tuple[int, int]
 ) -> NDArray[np.int32]:
     """Columns of the windows of some rows that stand for a supported pixel.
@@ -106,7 +106,7 @@ def joint_span(
     """The columns that the windows of some rows reach, in whole lanes; of no rows, none.
 
     Args:
-        spans: as `supported_spans` makes them.
+        spans: as `find_supported_spans` makes them.
         rows: first, and after the last, of the spans.
         radius: px of the windows.
         pitch: no column lies beyond.
@@ -160,7 +160,7 @@ def refine_rows(
     first, after = rows
     size = 2 * radius + 1
     planes = make_planes(width, radius)
-    spans = supported_spans(support, stride, rows)
+    spans = find_supported_spans(support, stride, rows)
     entered_low, entered_high = planes.pitch, 0
     for y in range(first - radius, after + radius):
         place = (y - first + radius) % size

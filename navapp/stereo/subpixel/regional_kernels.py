@@ -145,17 +145,17 @@ def _solve(
         for k in range(j, _N_TERMS + 1):
             left = load(state, _below(k, j))
             for m in range(j):
-                left = left - load(state, _below(k, m)) * load(state, _scaled(j, m))
+                left = left - load(state, _below(k, m)) * load(state, _scale(j, m))
             store(state, _below(k, j), left)
         pivot = load(state, _below(j, j))
         inverse = where_positive(pivot, one / pivot, one)
         for k in range(j + 1, _N_TERMS + 1):
-            store(state, _scaled(k, j), load(state, _below(k, j)) * inverse)
+            store(state, _scale(k, j), load(state, _below(k, j)) * inverse)
     for j in range(_N_TERMS - 1, -1, -1):
-        change = load(state, _scaled(_N_TERMS, j))
+        change = load(state, _scale(_N_TERMS, j))
         for k in range(j + 1, _N_TERMS):
-            change = change - load(state, _scaled(k, j)) * load(state, _scaled(_N_TERMS, k))
-        store(state, _scaled(_N_TERMS, j), change)
+            change = change - load(state, _scale(k, j)) * load(state, _scale(_N_TERMS, k))
+        store(state, _scale(_N_TERMS, j), change)
         store(state, j * LANES, load(state, j * LANES) + change)
 
 
@@ -166,7 +166,7 @@ def _below(k: int, j: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _scaled(k: int, j: int) -> int:
+def _scale(k: int, j: int) -> int:
     """Where L is; its last row is the answer."""
     return (_SCALED + k * _N_TERMS + j) * LANES
 

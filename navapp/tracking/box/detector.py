@@ -84,7 +84,7 @@ class Detection:
     likeness: Likeness
 
 
-def taught(memory: BoxMemory | None, picture: Grey, box: PictureBox) -> BoxMemory:
+def learn(memory: BoxMemory | None, picture: Grey, box: PictureBox) -> BoxMemory:
     """The memory after an accepted frame.
 
     Args:
@@ -98,18 +98,18 @@ def taught(memory: BoxMemory | None, picture: Grey, box: PictureBox) -> BoxMemor
         memory = BoxMemory(window, around, box.width, box.height)
     elif memory.examples.similarity(window) < _KNOWN:
         # The first one, of the registration, stays.
-        first, newer = memory.examples.selected(slice(1)), memory.examples.selected(slice(1, None))
-        examples = joined([first, newer.selected(slice(2 - MOST_EXAMPLES, None)), window])
+        first, newer = memory.examples.select(slice(1)), memory.examples.select(slice(1, None))
+        examples = joined([first, newer.select(slice(2 - MOST_EXAMPLES, None)), window])
         memory = replace(memory, examples=examples, width_px=box.width, height_px=box.height)
     else:
         return replace(memory, width_px=box.width, height_px=box.height)
     mistaken = [
         seen(picture, found.box)
-        for found in detected(memory, picture)
+        for found in detect(memory, picture)
         if found.box.overlap(box) < _APART
     ]
     counterexamples = joined([memory.counterexamples, *mistaken])
-    newest = counterexamples.selected(slice(-MOST_COUNTEREXAMPLES, None))
+    newest = counterexamples.select(slice(-MOST_COUNTEREXAMPLES, None))
     return replace(memory, counterexamples=newest)
 
 
@@ -122,7 +122,7 @@ def likeness(memory: BoxMemory, picture: Grey, box: PictureBox) -> Likeness:
     return Likeness(similarity, similarity / total if total > 0.0 else 0.0)
 
 
-def detected(memory: BoxMemory, picture: Grey) -> list[Detection]:
+def detect(memory: BoxMemory, picture: Grey) -> list[Detection]:
     """A few places that look most like the box, the most alike first.
 
     Other scales are looked at when the last one shows nothing that is surely the box.
@@ -134,7 +134,7 @@ def detected(memory: BoxMemory, picture: Grey) -> list[Detection]:
     found: list[tuple[float, PictureBox]] = []
     detections: list[Detection] = []
     for scale in _SCALES:
-        found = sorted(found + _scanned(memory, picture, scale), key=lambda one: -one[0])
+        found = sorted(found + _scan(memory, picture, scale), key=lambda one: -one[0])
         boxes: list[PictureBox] = []
         for _, box in found:
             if len(boxes) < _N_BEST and all(box.overlap(other) < _APART for other in boxes):
@@ -146,20 +146,20 @@ def detected(memory: BoxMemory, picture: Grey) -> list[Detection]:
     return detections
 
 
-def polished(memory: BoxMemory, picture: Grey, box: PictureBox) -> Detection:
+def polish(memory: BoxMemory, picture: Grey, box: PictureBox) -> Detection:
     """The box moved and scaled a little to where it looks most like what was accepted."""
     best = Detection(box, likeness(memory, picture, box))
     for step in _POLISHING_STEPS:
         tried = []
         for column, row, grown in _NEIGHBOURS:
             shift = step * np.array([column * best.box.width, row * best.box.height])
-            near = best.box.moved(shift, 1.0 + step * grown)
+            near = best.box.move(shift, 1.0 + step * grown)
             tried.append(Detection(near, likeness(memory, picture, near)))
         best = max([best, *tried], key=lambda one: one.likeness.similarity)
     return best
 
 
-def _scanned(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float, PictureBox]]:
+def _scan(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float, PictureBox]]:
     """Best places at one scale, with their score."""
     import cv2
 
@@ -171,7 +171,7 @@ def _scanned(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float
     # A box may lie half outside the picture.
     margin = SIZE_PX // 2
     view = cv2.copyMakeBorder(view, margin, margin, margin, margin, cv2.BORDER_REPLICATE)
-    maps = _correlated(view.astype(np.float32), memory.examples.parts[-1])
+    maps = _correlate(view.astype(np.float32), memory.examples.parts[-1])
     loose = np.ones((2 * _LOOSE_PX + 1,) * 2, np.uint8)
     score = np.mean([np.asarray(cv2.dilate(one, loose)) for one in maps], axis=0)
     found = []
@@ -179,16 +179,16 @@ def _scanned(memory: BoxMemory, picture: Grey, scale: float) -> list[tuple[float
         _, best, _, (x, y) = cv2.minMaxLoc(score)
         if best < _LEAST_SCORE:
             break
-        shift, rescale = _settled(maps, x, y)
+        shift, rescale = _settle(maps, x, y)
         middle = (np.array([x, y]) + shift - margin + 0.5 * SIZE_PX) * shape / size - 0.5
         box = PictureBox(0.0, 0.0, width, height)
-        found.append((best, box.moved(middle - box.centre, rescale)))
+        found.append((best, box.move(middle - box.centre, rescale)))
         reach = SIZE_PX // 3
         score[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1] = 0.0
     return found
 
 
-def _correlated(view: FloatPicture, example: FloatPicture) -> FloatPicture:
+def _correlate(view: FloatPicture, example: FloatPicture) -> FloatPicture:
     """(parts, h, w) correlation of every part, by the corner of the box; 0 where it is flat."""
     import cv2
 
@@ -211,7 +211,7 @@ def _correlated(view: FloatPicture, example: FloatPicture) -> FloatPicture:
     return maps
 
 
-def _settled(maps: FloatPicture, x: int, y: int) -> tuple[FloatArray, float]:
+def _settle(maps: FloatPicture, x: int, y: int) -> tuple[FloatArray, float]:
     """Shift (2,) in px of the view, and scale, by where the parts agree best near a place."""
     reach = _LOOSE_PX + 1
     y0, x0 = max(0, y - reach), max(0, x - reach)
@@ -234,5 +234,5 @@ def _around(box: PictureBox) -> Sequence[PictureBox]:
     """Boxes beside a box, half a box away, and of twice and half its size."""
     places = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if (i, j) != (0, 0)]
     half = 0.5 * np.array([box.width, box.height])
-    beside = [box.moved(half * place) for place in places]
-    return [*beside, box.moved(np.zeros(2), 2.0), box.moved(np.zeros(2), 0.5)]
+    beside = [box.move(half * place) for place in places]
+    return [*beside, box.move(np.zeros(2), 2.0), box.move(np.zeros(2), 0.5)]

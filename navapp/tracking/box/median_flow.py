@@ -40,19 +40,19 @@ def median_flow(before: Grey, after: Grey, box: PictureBox) -> PictureBox | None
         box: in the first one.
     """
     around = _around(box, before.shape)
-    after = _lit_as(after, before)[around]
+    after = _match_light(after, before)[around]
     before = before[around]
     corner = np.array([around[1].start, around[0].start])
-    near = _flow(before, after, box.moved(-corner))
-    return None if near is None else near.moved(corner)
+    near = _flow(before, after, box.move(-corner))
+    return None if near is None else near.move(corner)
 
 
 def _flow(before: Grey, after: Grey, box: PictureBox) -> PictureBox | None:
     start = _grid(box, before.shape)
     if len(start) < _LEAST_POINTS:
         return None
-    end, is_there = _followed(before, after, start)
-    back, is_back = _followed(after, before, end)
+    end, is_there = _follow_points(before, after, start)
+    back, is_back = _follow_points(after, before, end)
     error_px = np.linalg.norm(back - start, axis=1)
     ncc = _ncc(before, after, start, end)
     is_good = is_there & is_back & (error_px <= _BACK_PX) & (ncc >= _LEAST_NCC)
@@ -62,10 +62,10 @@ def _flow(before: Grey, after: Grey, box: PictureBox) -> PictureBox | None:
     is_good &= (error_px <= np.median(error_px[is_good])) & (ncc >= np.median(ncc[is_good]))
     if is_good.sum() < _LEAST_POINTS // 2:
         return None
-    return _moved(box, start[is_good], end[is_good])
+    return _move_box(box, start[is_good], end[is_good])
 
 
-def _moved(box: PictureBox, start: FloatArray, end: FloatArray) -> PictureBox | None:
+def _move_box(box: PictureBox, start: FloatArray, end: FloatArray) -> PictureBox | None:
     """The box moved and scaled by medians; None when the points disagree."""
     first, second = np.triu_indices(len(start), 1)
     length, length_after = (
@@ -79,12 +79,12 @@ def _moved(box: PictureBox, start: FloatArray, end: FloatArray) -> PictureBox | 
     scatter_px = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
     if scatter_px > _LARGEST_SCATTER * max(box.width, box.height):
         return None
-    return box.moved(shift, scale)
+    return box.move(shift, scale)
 
 
 def _grid(box: PictureBox, shape: tuple[int, ...]) -> FloatArray:
     """(N, 2) points of the part of the box that lies inside the picture."""
-    inside = box.clipped(shape[1], shape[0])
+    inside = box.clip(shape[1], shape[0])
     share = np.linspace(_INSET_SHARE, 1.0 - _INSET_SHARE, _GRID)
     if inside.width < _GRID or inside.height < _GRID:
         return np.empty((0, 2))
@@ -105,7 +105,7 @@ def _around(box: PictureBox, shape: tuple[int, ...]) -> tuple[slice, slice]:
     return rows, columns
 
 
-def _lit_as(picture: Grey, other: Grey) -> Grey:
+def _match_light(picture: Grey, other: Grey) -> Grey:
     """A picture as bright as another one: points are followed by their brightness.
 
     By the median over pixels, which a hand that comes does not change.
@@ -119,7 +119,7 @@ def _lit_as(picture: Grey, other: Grey) -> Grey:
     return np.asarray(cv2.convertScaleAbs(picture, alpha=gain), dtype=np.uint8)
 
 
-def _followed(
+def _follow_points(
     before: Grey, after: Grey, points: FloatArray
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     import cv2

@@ -31,26 +31,26 @@ class PictureBox:
         """(2,) column and row of its middle."""
         return np.array([self.x + 0.5 * self.width, self.y + 0.5 * self.height])
 
-    def resized(self, factor: float) -> "PictureBox":
+    def resize(self, factor: float) -> "PictureBox":
         """The same box after its picture was resized: u' = s (u + 0.5) - 0.5."""
         x, y = (factor * (place + 0.5) - 0.5 for place in (self.x, self.y))
         return PictureBox(x, y, factor * self.width, factor * self.height)
 
-    def moved(self, shift: FloatArray, scale: float = 1.0) -> "PictureBox":
+    def move(self, shift: FloatArray, scale: float = 1.0) -> "PictureBox":
         """Its middle shifted (2,), its sides scaled about the middle."""
         x, y = self.centre + shift
         width, height = scale * self.width, scale * self.height
         return PictureBox(float(x) - 0.5 * width, float(y) - 0.5 * height, width, height)
 
-    def clipped(self, width: int, height: int) -> "PictureBox":
+    def clip(self, width: int, height: int) -> "PictureBox":
         """The part inside a picture; its sides may be 0."""
         x0, x1 = np.clip([self.x, self.x + self.width], 0.0, width - 1.0)
         y0, y1 = np.clip([self.y, self.y + self.height], 0.0, height - 1.0)
         return PictureBox(float(x0), float(y0), float(x1 - x0), float(y1 - y0))
 
-    def seen_share(self, width: int, height: int) -> float:
+    def seen_fraction(self, width: int, height: int) -> float:
         """Which part of its area lies inside a picture."""
-        inside = self.clipped(width, height)
+        inside = self.clip(width, height)
         return inside.width * inside.height / (self.width * self.height)
 
     def overlap(self, other: "PictureBox") -> float:

@@ -13,7 +13,7 @@ from navapp.geometry.rectification import Image, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel
-from navapp.tracking.box.detector import SURE, BoxMemory, Detection, detected, polished, taught
+from navapp.tracking.box.detector import SURE, BoxMemory, Detection, detect, learn, polish
 from navapp.tracking.box.median_flow import Grey, median_flow
 from navapp.tracking.box.picture_box import PictureBox
 from navapp.values import Status, TrackedFrame
@@ -57,16 +57,16 @@ class BoxState:
     @property
     def picture(self) -> Grey:
         """The newest one, grey and reduced: a bone that is followed seldom asks for it."""
-        return reduced(self.newest)
+        return reduce_picture(self.newest)
 
     @property
     def picture_box(self) -> PictureBox | None:
         """The box in the picture's own size; None when it is not known."""
-        return None if self.box is None else self.box.resized(_REDUCTION)
+        return None if self.box is None else self.box.resize(_REDUCTION)
 
 
 def place_box(
-    state: BoxState | None, left: Image, box: PictureBox | None, hidden_share: float | None
+    state: BoxState | None, left: Image, box: PictureBox | None, hidden_fraction: float | None
 ) -> BoxState:
     """After a frame with a pose: its projection is the box.
 
@@ -74,19 +74,19 @@ def place_box(
         state: before; None at first.
         left: (H, W) or (H, W, 3) picture of the left camera.
         box: of the pose, in that picture.
-        hidden_share: of the bone, when the judge accepted the pose; None otherwise.
+        hidden_fraction: of the bone, when the judge accepted the pose; None otherwise.
     """
     state = BoxState(left, None) if state is None else state
-    small = None if box is None else box.resized(1.0 / _REDUCTION)
+    small = None if box is None else box.resize(1.0 / _REDUCTION)
     state = replace(state, newest=left, box=small)
-    if small is None or hidden_share is None:
+    if small is None or hidden_fraction is None:
         return state
-    least_hidden = min(state.least_hidden, hidden_share)
-    if hidden_share > least_hidden + _HAND_SHARE:
+    least_hidden = min(state.least_hidden, hidden_fraction)
+    if hidden_fraction > least_hidden + _HAND_SHARE:
         return state
     memory = state.memory
     if memory is None or state.n_accepted % _LEARN_EVERY == 0:
-        memory = taught(memory, state.picture, small)
+        memory = learn(memory, state.picture, small)
     return BoxState(left, small, memory, state.n_accepted + 1, least_hidden)
 
 
@@ -95,15 +95,15 @@ def follow_box(state: BoxState, left: Image) -> BoxState:
     memory = state.memory
     if memory is None:
         return replace(state, newest=left, box=None)
-    picture = reduced(left)
-    carried = _carried(state, memory, picture)
+    picture = reduce_picture(left)
+    carried = _carry(state, memory, picture)
     if carried is None or carried.likeness.similarity < SURE:
-        found = [one for one in detected(memory, picture) if _is_enough(one, _FOUND)]
-        carried = _likelier(carried, polished(memory, picture, found[0].box) if found else None)
+        found = [one for one in detect(memory, picture) if _is_enough(one, _FOUND)]
+        carried = _likelier(carried, polish(memory, picture, found[0].box) if found else None)
     return replace(state, newest=left, box=None if carried is None else carried.box)
 
 
-def reduced(left: Image) -> Grey:
+def reduce_picture(left: Image) -> Grey:
     """A picture as the box is looked for in it: grey, a quarter of its size."""
     import cv2
 
@@ -112,7 +112,7 @@ def reduced(left: Image) -> Grey:
     return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def _carried(state: BoxState, memory: BoxMemory, picture: Grey) -> Detection | None:
+def _carry(state: BoxState, memory: BoxMemory, picture: Grey) -> Detection | None:
     """What the flow says, if it still looks like the bone."""
     if state.box is None:
         return None
@@ -122,7 +122,7 @@ def _carried(state: BoxState, memory: BoxMemory, picture: Grey) -> Detection | N
     box = median_flow(before, picture, state.box)
     if box is None:
         return None
-    carried = polished(memory, picture, box)
+    carried = polish(memory, picture, box)
     return carried if _is_enough(carried, _CARRIED) else None
 
 
@@ -161,15 +161,15 @@ class BoxTracker:
             return follow_box(state, left)
         if start is None:
             return None
-        return place_box(None, left, self.project(start), hidden_share=0.0)
+        return place_box(None, left, self.project(start), hidden_fraction=0.0)
 
     def place(self, state: BoxState | None, left: Image, tracked: TrackedFrame) -> BoxState | None:
         """The box after a frame: the pose's projection, if there is a pose."""
         pose, verdict = tracked.left_from_bone, tracked.verdict
         if pose is None or verdict.status is Status.LOST:
             return state
-        hidden_share = verdict.occluded_share if verdict.status is Status.OK else None
-        return place_box(state, left, self.project(pose), hidden_share)
+        hidden_fraction = verdict.occluded_fraction if verdict.status is Status.OK else None
+        return place_box(state, left, self.project(pose), hidden_fraction)
 
     def starts(self, expected: RigidTransform, state: BoxState | None) -> list[RigidTransform]:
         """Poses from which a bone is searched: where its box lies, and where it was expected."""

@@ -37,7 +37,7 @@ class Windows:
     def __len__(self) -> int:
         return len(self.parts)
 
-    def selected(self, which: slice) -> "Windows":
+    def select(self, which: slice) -> "Windows":
         """Some of them."""
         return Windows(self.parts[which], self.light[which])
 

@@ -6,7 +6,7 @@ part that is spread over all directions, until every start had its turn.
 """
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import scattered_starts
+from navapp.registration import make_scattered_starts
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer, select_poses
 from navapp.tracking.search.near import NearSearch
@@ -63,5 +63,5 @@ def _all_starts(last: RigidTransform, place_mm: FloatArray) -> list[RigidTransfo
     """Tilts of the last pose where it was, and a step away along each axis."""
     starts: list[RigidTransform] = []
     for step_mm, tilts in _RINGS:
-        starts += scattered_starts(last, place_mm, step_mm, tilts, has_middle=not starts)
+        starts += make_scattered_starts(last, place_mm, step_mm, tilts, has_middle=not starts)
     return starts

@@ -95,7 +95,7 @@ class BuriedSearch:
         random = np.random.default_rng(_SEED)
         twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations
         centre_mm = frame.start.apply(self._meter.model.centre_mm)
-        places = self._step_from(frame, [frame.start.moved(twist, centre_mm) for twist in twists])
+        places = self._step_from(frame, [frame.start.move(twist, centre_mm) for twist in twists])
         places = _select_best(places, _N_FRAME_PLACES)
         for one in _FRAME_ROUNDS:
             places = self._improve(frame, places, one, random)
@@ -151,7 +151,7 @@ class BuriedSearch:
         twists = random.standard_normal((one.n_starts, 6))
         twists[0::2] *= one.deviations
         twists[1::2] @= loose.T
-        return [fit.pose.moved(twist, centre_mm) for twist in twists]
+        return [fit.pose.move(twist, centre_mm) for twist in twists]
 
     def _select_rest(self, frame: Frame, places: list[Place]) -> Fit | None:
         """Of all that come to rest, what leaves least; a guess when another leaves as little."""

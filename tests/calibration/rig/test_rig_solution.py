@@ -178,7 +178,7 @@ def test_a_board_that_moved_between_the_pictures_is_refused(world):
     rng = np.random.default_rng(4)
     pairs = list(world[1])
     pose = drawn_pose(rng)
-    moved = pose.moved((3.0, 1.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 450.0))
+    moved = pose.move((3.0, 1.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 450.0))
     pairs.append(seen_pair(99, world[0], pose, rng, moved_right=moved))
     found, reasons = reasons_of(pairs)
     assert [(one.index, one.fault) for one in found.dropped] == [(99, Fault.MOVED)]

@@ -64,7 +64,7 @@ class Room:
 
     def move_to(self, left_from_body: RigidTransform) -> None:
         off = self.rng.normal(0.0, 1.0, 6) * np.repeat((self.off_mm, 0.02), 3)
-        self.pose = left_from_body.moved(off, left_from_body.apply(BOARD.points_mm.mean(axis=0)))
+        self.pose = left_from_body.move(off, left_from_body.apply(BOARD.points_mm.mean(axis=0)))
 
     def nudge(self, shift_mm: tuple[float, ...], turn_rad: tuple[float, ...]) -> None:
         self.nudges.append((shift_mm, turn_rad))

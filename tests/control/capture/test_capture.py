@@ -116,7 +116,7 @@ def test_a_pair_that_does_not_fit_is_named_and_left_out(room):
 
     def torn(frame, board):
         found = look(frame, board)
-        room.pose = room.pose.moved((6.0, 2.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 450.0))
+        room.pose = room.pose.move((6.0, 2.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 450.0))
         other = look(frame, board)
         return type(found)(frame, found.left, other.right)
 

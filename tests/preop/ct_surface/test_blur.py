@@ -79,7 +79,7 @@ def test_the_shift_is_that_of_the_half_maximum_of_a_blurred_body():
 
 
 def test_a_hollow_lies_further_in():
-    np.testing.assert_allclose(shifts_mm(sphere_mesh(12.0).flipped()), -0.36 / 12.0, rtol=0.05)
+    np.testing.assert_allclose(shifts_mm(sphere_mesh(12.0).flip()), -0.36 / 12.0, rtol=0.05)
 
 
 def test_across_the_slices_their_blur_counts():

@@ -48,7 +48,7 @@ def test_a_constant_shift_is_found(disparity) -> None:
     found = match_census(shifted_pair(constant(disparity), INNER), BAND)
     assert found.left.disparity_px.shape == (INNER.height, INNER.width)
     assert (found.left.x, found.left.y) == (INNER.x, INNER.y)
-    assert found.left.matched_share > 0.98
+    assert found.left.matched_fraction > 0.98
     assert found.agreement > 0.98
     error = np.abs(found.left.disparity_px - disparity)[matched(found)]
     # The parabola leans towards whole pixels.
@@ -60,7 +60,7 @@ def test_a_slant_is_followed_within_its_claimed_sigma() -> None:
     truth = np.broadcast_to(25.0 + 0.06 * np.arange(WIDTH), (HEIGHT, WIDTH)).copy()
     found = match_census(shifted_pair(truth, INNER), (15.0, 60.0))
     error = (found.left.disparity_px - in_box(truth))[matched(found)]
-    assert found.left.matched_share > 0.97
+    assert found.left.matched_fraction > 0.97
     assert abs(np.median(error)) < 0.05
     assert np.sqrt(np.mean(error**2)) < CensusSettings().sigma_px
     assert (found.left.sigma_px[matched(found)] == np.float32(0.2)).all()
@@ -69,20 +69,20 @@ def test_a_slant_is_followed_within_its_claimed_sigma() -> None:
 @pytest.mark.parametrize("band", [(28.0, 32.0), (0.0, 31.0), (29.5, 90.0), (-20.0, 40.0)])
 def test_the_answer_does_not_depend_on_where_the_band_begins(band) -> None:
     found = match_census(shifted_pair(constant(30.0), INNER), band)
-    assert found.left.matched_share > 0.97
+    assert found.left.matched_fraction > 0.97
     assert np.percentile(np.abs(found.left.disparity_px[matched(found)] - 30.0), 98) < 0.3
 
 
 def test_a_negative_disparity_is_found_too() -> None:
     found = match_census(shifted_pair(constant(-12.0), INNER), (-30.0, -2.0))
-    assert found.left.matched_share > 0.97
+    assert found.left.matched_fraction > 0.97
     assert np.nanmedian(found.left.disparity_px) == pytest.approx(-12.0, abs=0.05)
 
 
 def test_a_surface_outside_the_band_is_not_claimed() -> None:
     found = match_census(shifted_pair(constant(70.0), INNER), (10.0, 30.0))
     # What chance finds are patches far apart.
-    assert found.left.matched_share < 0.15
+    assert found.left.matched_fraction < 0.15
     assert found.agreement < 0.15
 
 
@@ -136,11 +136,11 @@ def test_a_difference_in_gain_changes_nothing() -> None:
     uneven = RectifiedPair(dim.left, dim.right * 2, pair.geometry, INNER)
     a, b = match_census(dim, BAND), match_census(uneven, BAND)
     assert np.array_equal(a.left.disparity_px, b.left.disparity_px, equal_nan=True)
-    assert a.left.matched_share > 0.97
+    assert a.left.matched_fraction > 0.97
     rounded = np.round(0.7 * pair.right + 20.0).astype(np.uint8)
     c = match_census(RectifiedPair(pair.left, rounded, pair.geometry, INNER), BAND)
     assert np.percentile(np.abs(c.left.disparity_px[matched(c)] - 24.0), 99) < 0.3
-    assert c.left.matched_share > 0.97
+    assert c.left.matched_fraction > 0.97
 
 
 @pytest.mark.parametrize("dark", ["both", "left", "right"])
@@ -151,7 +151,7 @@ def test_a_picture_without_contrast_answers_nothing(grey, dark) -> None:
         if dark in (name, "both"):
             getattr(pair, name)[:] = grey
     found = match_census(pair, BAND)
-    assert found.left.matched_share == 0.0
+    assert found.left.matched_fraction == 0.0
     assert not found.confidence.any()
     assert np.isnan(found.left.disparity_px).all()
     assert not found.agreement > 0.0
@@ -177,13 +177,13 @@ def test_a_pattern_that_repeats_within_the_band_is_not_matched() -> None:
     period = texture(12, HEIGHT)
     stripes = np.clip(np.tile(period, (1, WIDTH // 12 + 1))[:, :WIDTH], 0, 255).astype(np.uint8)
     found = match_census(RectifiedPair(stripes, stripes, pair.geometry, INNER), BAND)
-    assert found.left.matched_share < 0.02
+    assert found.left.matched_fraction < 0.02
     ambiguous = match_census(
         RectifiedPair(stripes, stripes, pair.geometry, INNER),
         BAND,
         CensusSettings(min_uniqueness=0),
     )
-    assert ambiguous.left.matched_share > 0.5
+    assert ambiguous.left.matched_fraction > 0.5
     assert np.median(ambiguous.confidence) < 0.05
 
 
@@ -227,7 +227,7 @@ def test_pixels_of_a_box_beyond_the_picture_stay_unknown(box) -> None:
 
 def test_the_picture_around_the_box_does_not_move_its_inside() -> None:
     pair = shifted_pair(constant(24.0), INNER)
-    larger = RectifiedPair(pair.left, pair.right, pair.geometry, INNER.grown(10))
+    larger = RectifiedPair(pair.left, pair.right, pair.geometry, INNER.grow(10))
     a = match_census(pair, BAND).left.disparity_px[5:-5, 5:-5]
     b = match_census(larger, BAND).left.disparity_px[15:-15, 15:-15]
     assert np.nanpercentile(np.abs(a - b), 99) < 0.1
@@ -246,7 +246,7 @@ def test_no_pixel_with_a_partner_gives_an_unknown_map(box, band) -> None:
     found = match_census(shifted_pair(constant(20.0), box), band)
     assert found.left.disparity_px.shape == (box.height, box.width)
     assert found.right_px.shape == (box.height, 0)
-    assert found.left.matched_share == 0.0
+    assert found.left.matched_fraction == 0.0
     assert np.isnan(found.agreement)
 
 
@@ -290,7 +290,7 @@ def test_the_largest_penalties_do_not_overflow() -> None:
     settings = CensusSettings(radius_x=4, radius_y=3, p1=190, p2=191)
     found = match_census(shifted_pair(constant(20.0), INNER), BAND, settings)
     assert np.percentile(np.abs(found.left.disparity_px[matched(found)] - 20.0), 98) < 0.6
-    assert found.left.matched_share > 0.9
+    assert found.left.matched_fraction > 0.9
 
 
 def test_the_same_pictures_give_the_same_answer() -> None:

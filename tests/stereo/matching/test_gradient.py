@@ -47,7 +47,7 @@ def test_the_magnitude_is_that_of_the_slope() -> None:
 @pytest.mark.parametrize("band", [(10.0, 30.0), (19.0, 21.0), (-8.0, 25.0), (19.6, 60.0)])
 def test_a_constant_shift_is_found_wherever_the_band_begins(band) -> None:
     found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER), band)
-    assert found.matched_share > 0.98
+    assert found.matched_fraction > 0.98
     matched = found.disparity_px[found.origin == Origin.MATCHED]
     assert np.percentile(np.abs(matched - 20.0), 99) < 0.05
     assert (found.sigma_px[found.origin == Origin.MATCHED] == np.float32(0.5)).all()
@@ -86,7 +86,7 @@ def test_a_picture_without_contrast_matches_nowhere(grey, dark) -> None:
     for name in ("left", "right"):
         if dark in (name, "both"):
             getattr(pair, name)[:] = grey
-    assert match_gradient(pair, (10.0, 40.0)).matched_share == 0.0
+    assert match_gradient(pair, (10.0, 40.0)).matched_fraction == 0.0
 
 
 def test_the_filter_keeps_unknown_pixels_unknown_and_gives_them_no_weight() -> None:
@@ -103,7 +103,7 @@ def test_the_filter_keeps_unknown_pixels_unknown_and_gives_them_no_weight() -> N
 def test_a_box_without_pixels_gives_an_unknown_map(box) -> None:
     found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), box), (10.0, 40.0))
     assert found.disparity_px.shape == (box.height, box.width)
-    assert found.matched_share == 0.0
+    assert found.matched_fraction == 0.0
 
 
 def test_bad_input_is_refused() -> None:

@@ -12,7 +12,7 @@ from navapp.stereo.matching.sgm_kernels import (
     Views,
     jump_penalties,
     keep_rows,
-    mirrored_codes,
+    mirror_codes,
     new_paths,
     surplus_dtype,
 )
@@ -39,7 +39,7 @@ def views_of(first_partner: int, count: int, p1: int, p2: int) -> Views:
         census_rows(np.pad(image, 2, mode="edge"), 2, 2, (0, HEIGHT), codes[-1])
     return Views(
         codes[0],
-        mirrored_codes(codes[1], n),
+        mirror_codes(codes[1], n),
         pictures()[0],
         first_partner,
         np.uint8(p1),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.stereo.occlusion.classify import classify, mirrored, seen_from_right, with_channels
+from navapp.stereo.occlusion.classify import classify, mirrored, project_to_right, with_channels
 from navapp.stereo.occlusion.classify_kernels import class_rows
 from navapp.values import DisparityMap, Origin
 from tests.reference.occlusion_reference import seen_from_right_reference
@@ -237,7 +237,7 @@ def test_what_the_right_camera_sees_is_what_the_reference_says(left_x: int) -> N
     whole = rng.integers(5, 25, (9, 70)).astype(float)
     for surface in (rough, smooth, whole, 0.5 + whole):
         left = np.where(rng.random(surface.shape) < 0.2, np.nan, surface).astype(np.float32)
-        found = seen_from_right(left, left_x, 130)
+        found = project_to_right(left, left_x, 130)
         assert found.shape == (9, 130)
         assert found.dtype == np.float32
         np.testing.assert_array_equal(found, seen_from_right_reference(left, left_x, 130))
@@ -245,7 +245,7 @@ def test_what_the_right_camera_sees_is_what_the_reference_says(left_x: int) -> N
 
 def test_the_right_camera_sees_the_square_where_it_stands_and_the_wall_beside_it() -> None:
     left, right = true_views()
-    found = seen_from_right(left.astype(np.float32), 0, WIDTH)
+    found = project_to_right(left.astype(np.float32), 0, WIDTH)
     assert (found[ROWS, RIGHT_COLUMNS] == NEAR).all()
     is_square = np.zeros(found.shape, dtype=bool)
     is_square[ROWS, RIGHT_COLUMNS] = True
@@ -263,14 +263,14 @@ def test_the_right_camera_sees_the_square_where_it_stands_and_the_wall_beside_it
 def test_where_two_surfaces_fall_on_one_place_the_nearer_is_seen() -> None:
     line = np.full((1, 40), np.nan, dtype=np.float32)
     line[0, [8, 10, 25]] = (3.0, 5.0, 20.0)
-    found = seen_from_right(line, 0, 40)
+    found = project_to_right(line, 0, 40)
     assert found[0, 5] == 20.0
     assert np.isfinite(found).sum() == 1
 
 
 def test_a_box_of_the_surface_falls_where_its_columns_say() -> None:
     left = true_views()[0].astype(np.float32)
-    whole, box = seen_from_right(left, 0, WIDTH), seen_from_right(left[:, 60:], 60, WIDTH)
+    whole, box = project_to_right(left, 0, WIDTH), project_to_right(left[:, 60:], 60, WIDTH)
     known = np.isfinite(box)
     assert known.sum() > 0.5 * box.size
     # Without the pixels left of the box something farther may be seen, never something nearer.
@@ -280,7 +280,7 @@ def test_a_box_of_the_surface_falls_where_its_columns_say() -> None:
 
 def test_without_a_surface_the_right_camera_sees_nothing() -> None:
     nothing = np.full((6, 30), np.nan, dtype=np.float32)
-    assert np.isnan(seen_from_right(nothing, 0, 40)).all()
+    assert np.isnan(project_to_right(nothing, 0, 40)).all()
     # Everything falls left of the right picture.
-    assert np.isnan(seen_from_right(np.full((6, 30), 99.0, dtype=np.float32), 0, 40)).all()
-    assert seen_from_right(np.empty((6, 0), dtype=np.float32), 0, 40).shape == (6, 40)
+    assert np.isnan(project_to_right(np.full((6, 30), 99.0, dtype=np.float32), 0, 40)).all()
+    assert project_to_right(np.empty((6, 0), dtype=np.float32), 0, 40).shape == (6, 40)

@@ -89,7 +89,7 @@ def test_noise_alone_does_not_hand_the_support_back() -> None:
         for _ in range(2)
     )
     found = refine(RectifiedPair(left, right, geometry(), BOX), in_box(SLANT))
-    assert found.matched_share < 0.01
+    assert found.matched_fraction < 0.01
 
 
 def test_a_support_far_from_the_truth_is_not_confirmed() -> None:
@@ -205,7 +205,7 @@ def test_two_threads_share_the_support_not_the_rows(monkeypatch: pytest.MonkeyPa
     assert sorted(bands) == [(0, 24), (24, 44)]
     bands.clear()
     nothing = refine(pair_with(SLANT), np.full_like(support, np.nan), RefineSettings(n_steps=1))
-    assert nothing.matched_share == 0.0
+    assert nothing.matched_fraction == 0.0
 
 
 def test_a_window_over_two_surfaces_is_rough() -> None:

@@ -19,7 +19,7 @@ def scene(
     shift=(0.0, 0.0),
     scale: float = 1.0,
     gain: float = 1.0,
-    hidden_share: float = 0.0,
+    hidden_fraction: float = 0.0,
     seed: int = 0,
 ) -> np.ndarray:
     """A patterned box on a duller ground; a bright hand may lie over its lower part."""
@@ -31,8 +31,8 @@ def scene(
     matrix[:, 2] = box.x, box.y
     mask = cv2.warpAffine(np.ones(size), matrix, SHAPE[::-1])
     picture += mask * (cv2.warpAffine(thing, matrix, SHAPE[::-1], borderMode=1) - picture)
-    top = int(box.y + (1.0 - hidden_share) * box.height)
-    if hidden_share > 0.0:
+    top = int(box.y + (1.0 - hidden_fraction) * box.height)
+    if hidden_fraction > 0.0:
         hand = 190.0 + texture(SHAPE, 4.0, 18.0, 5)
         columns = slice(max(0, int(box.x) - 20), int(box.x + box.width) + 20)
         picture[top : top + 70, columns] = hand[top : top + 70, columns]
@@ -41,7 +41,7 @@ def scene(
 
 
 def box_at(shift=(0.0, 0.0), scale: float = 1.0) -> PictureBox:
-    return BOX.moved(np.array(shift), scale)
+    return BOX.move(np.array(shift), scale)
 
 
 def empty(seed: int = 0) -> np.ndarray:

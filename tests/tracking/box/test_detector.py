@@ -4,17 +4,17 @@ import pytest
 from navapp.tracking.box.detector import (
     MOST_COUNTEREXAMPLES,
     MOST_EXAMPLES,
-    detected,
+    detect,
+    learn,
     likeness,
-    polished,
-    taught,
+    polish,
 )
 from tests.tracking.box.pictures import BOX, box_at, empty, scene, texture
 
 
 @pytest.fixture(scope="module")
 def memory():
-    return taught(None, scene(), BOX)
+    return learn(None, scene(), BOX)
 
 
 @pytest.mark.parametrize(
@@ -27,16 +27,16 @@ def memory():
     ],
 )
 def test_a_thing_is_found_anywhere_in_any_light(memory, shift, scale, gain) -> None:
-    best = detected(memory, scene(shift, scale, gain, seed=7))[0]
+    best = detect(memory, scene(shift, scale, gain, seed=7))[0]
     assert best.box.overlap(box_at(shift, scale)) > 0.8
     assert best.likeness.similarity > 0.7
     assert best.likeness.relative > 0.54
 
 
 @pytest.mark.parametrize("hidden_share", [0.2, 0.4])
-def test_the_whole_box_of_a_thing_that_is_hidden_in_part(memory, hidden_share: float) -> None:
+def test_the_whole_box_of_a_thing_that_is_hidden_in_part(memory, hidden_fraction: float) -> None:
     shift = (-40.0, 12.0)
-    best = detected(memory, scene(shift, hidden_share=hidden_share, seed=7))[0]
+    best = detect(memory, scene(shift, hidden_fraction=hidden_fraction, seed=7))[0]
     assert best.box.overlap(box_at(shift)) > 0.7
     assert best.likeness.similarity > 0.5
 
@@ -46,9 +46,9 @@ def test_nothing_else_is_like_it(memory, seed: int) -> None:
     clutter = 110.0 + texture((180, 320), 4.0, 25.0, 50 + seed)
     clutter = np.clip(clutter, 0.0, 255.0).astype(np.uint8)
     for picture in (clutter, empty(seed)):
-        for one in detected(memory, picture):
+        for one in detect(memory, picture):
             assert one.likeness.similarity < 0.5
-    assert detected(memory, np.full((180, 320), 90, np.uint8)) == []
+    assert detect(memory, np.full((180, 320), 90, np.uint8)) == []
 
 
 def test_a_part_that_is_lit_otherwise_does_not_count(memory) -> None:
@@ -63,7 +63,7 @@ def test_a_part_that_is_lit_otherwise_does_not_count(memory) -> None:
 def test_a_box_a_little_off_is_put_right(memory) -> None:
     picture = scene((3.0, 5.0), seed=7)
     off = box_at((6.0, 2.0))
-    found = polished(memory, picture, off)
+    found = polish(memory, picture, off)
     assert found.box.overlap(box_at((3.0, 5.0))) > 0.92 > off.overlap(box_at((3.0, 5.0)))
 
 
@@ -77,7 +77,7 @@ def test_a_look_alike_becomes_a_counterexample(memory) -> None:
     other = box_at((10.0 - BOX.x, 20.0))
     before = likeness(memory, double, other)
     # The thing as it is seen now is new to the memory: half of it is hidden.
-    after = likeness(taught(memory, _half_hidden(double), BOX), double, other)
+    after = likeness(learn(memory, _half_hidden(double), BOX), double, other)
     assert before.relative > 0.54
     assert after.relative < before.relative - 0.05
 
@@ -93,7 +93,7 @@ def test_the_memory_is_bounded_and_keeps_the_first(memory) -> None:
     for seed in range(2 * MOST_EXAMPLES):
         clutter = 110.0 + texture((180, 320), 3.0, 30.0, 100 + seed)
         picture = np.clip(clutter, 0.0, 255.0).astype(np.uint8)
-        grown = taught(grown, picture, box_at((5.0 * (seed % 7), 0.0)))
+        grown = learn(grown, picture, box_at((5.0 * (seed % 7), 0.0)))
         assert len(grown.examples) <= MOST_EXAMPLES
         assert len(grown.counterexamples) <= MOST_COUNTEREXAMPLES
     assert len(grown.examples) == MOST_EXAMPLES
@@ -102,5 +102,5 @@ def test_the_memory_is_bounded_and_keeps_the_first(memory) -> None:
 
 
 def test_what_is_known_is_not_kept_twice(memory) -> None:
-    again = taught(memory, scene((2.0, 1.0), seed=9), box_at((2.0, 1.0)))
+    again = learn(memory, scene((2.0, 1.0), seed=9), box_at((2.0, 1.0)))
     assert len(again.examples) == 1

@@ -21,7 +21,7 @@ def test_brighter_light_moves_nothing() -> None:
 
 
 def test_a_third_that_is_hidden_does_not_carry_the_box_away() -> None:
-    found = median_flow(scene(), scene((4.0, -3.0), hidden_share=0.3, seed=1), BOX)
+    found = median_flow(scene(), scene((4.0, -3.0), hidden_fraction=0.3, seed=1), BOX)
     np.testing.assert_allclose(found.centre, box_at((4.0, -3.0)).centre, atol=0.6)
 
 

@@ -15,17 +15,17 @@ def test_a_box_around_points() -> None:
 
 
 def test_moving_scales_about_the_middle() -> None:
-    moved = A.moved(np.array([5.0, -2.0]), 2.0)
+    moved = A.move(np.array([5.0, -2.0]), 2.0)
     np.testing.assert_allclose(moved.centre, A.centre + np.array([5.0, -2.0]))
     assert (moved.width, moved.height) == (80.0, 60.0)
 
 
 def test_resizing_there_and_back() -> None:
-    small = A.resized(0.25)
+    small = A.resize(0.25)
     assert small.width == 10.0
     # The first pixel's centre stays half a pixel inside the picture.
     assert small.x == pytest.approx(0.25 * 10.5 - 0.5)
-    assert small.resized(4.0).x == pytest.approx(A.x)
+    assert small.resize(4.0).x == pytest.approx(A.x)
 
 
 @pytest.mark.parametrize(
@@ -43,8 +43,8 @@ def test_overlap(other: PictureBox, expected: float) -> None:
 
 
 def test_what_lies_in_a_picture() -> None:
-    assert A.seen_share(320, 180) == 1.0
+    assert A.seen_fraction(320, 180) == 1.0
     out = PictureBox(-20.0, 10.0, 40.0, 30.0)
-    assert out.clipped(320, 180) == PictureBox(0.0, 10.0, 20.0, 30.0)
-    assert out.seen_share(320, 180) == 0.5
-    assert PictureBox(-60.0, 10.0, 40.0, 30.0).seen_share(320, 180) == 0.0
+    assert out.clip(320, 180) == PictureBox(0.0, 10.0, 20.0, 30.0)
+    assert out.seen_fraction(320, 180) == 0.5
+    assert PictureBox(-60.0, 10.0, 40.0, 30.0).seen_fraction(320, 180) == 0.0

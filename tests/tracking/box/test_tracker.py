@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from navapp.tracking.box.picture_box import PictureBox
-from navapp.tracking.box.tracker import BoxState, BoxTracker, follow_box, place_box, reduced
+from navapp.tracking.box.tracker import BoxState, BoxTracker, follow_box, place_box, reduce_picture
 from navapp.values import FrameTimings, PoseEstimate, Status, TrackedFrame, Verdict
 from tests.tracking.box.pictures import BOX, box_at, empty, enlarged, scene
 from tests.tracking.rooms import room
 
-LARGE = BOX.resized(4.0)
+LARGE = BOX.resize(4.0)
 
 
 def start() -> BoxState:
-    return place_box(None, enlarged(scene()), LARGE, hidden_share=0.4)
+    return place_box(None, enlarged(scene()), LARGE, hidden_fraction=0.4)
 
 
 def right(state: BoxState, shift, scale: float = 1.0) -> bool:
-    return state.picture_box.overlap(box_at(shift, scale).resized(4.0)) > 0.8
+    return state.picture_box.overlap(box_at(shift, scale).resize(4.0)) > 0.8
 
 
 def test_a_pose_places_the_box() -> None:
@@ -30,7 +30,7 @@ def test_a_pose_places_the_box() -> None:
 def test_colour_and_grey_give_the_same() -> None:
     picture = enlarged(scene())
     colour = np.repeat(picture[..., None], 3, axis=2)
-    np.testing.assert_array_equal(reduced(colour), reduced(picture))
+    np.testing.assert_array_equal(reduce_picture(colour), reduce_picture(picture))
 
 
 def test_a_box_is_followed_behind_a_hand_that_comes_and_goes() -> None:
@@ -76,7 +76,7 @@ def test_following_teaches_nothing() -> None:
 def test_every_so_many_accepted_frames_one_is_learned_from() -> None:
     state, learned_in = start(), []
     for number in range(1, 46):
-        after = place_box(state, enlarged(scene(seed=number)), LARGE, hidden_share=0.4)
+        after = place_box(state, enlarged(scene(seed=number)), LARGE, hidden_fraction=0.4)
         if after.memory is not state.memory:
             learned_in.append(number)
         state = after
@@ -86,9 +86,9 @@ def test_every_so_many_accepted_frames_one_is_learned_from() -> None:
 
 def test_a_hand_over_the_bone_is_not_learned() -> None:
     state = replace(start(), n_accepted=15)
-    hidden = enlarged(scene(hidden_share=0.4, seed=2))
-    assert place_box(state, hidden, LARGE, hidden_share=0.6).memory is state.memory
-    assert place_box(state, hidden, LARGE, hidden_share=0.45).memory is not state.memory
+    hidden = enlarged(scene(hidden_fraction=0.4, seed=2))
+    assert place_box(state, hidden, LARGE, hidden_fraction=0.6).memory is state.memory
+    assert place_box(state, hidden, LARGE, hidden_fraction=0.45).memory is not state.memory
 
 
 def test_other_pictures_than_before_are_searched_anew() -> None:
@@ -112,7 +112,7 @@ def test_a_box_moves_the_pose_to_where_it_was_made(shift) -> None:
     a = room()
     truth = a.truth(a.frames[0])
     centre_mm = truth.apply(a.tracker.centre_mm)
-    elsewhere = truth.moved((*shift, 0, 0, 0), centre_mm)
+    elsewhere = truth.move((*shift, 0, 0, 0), centre_mm)
     found = boxes().move(truth, boxes().project(elsewhere))
     off_mm = found.apply(a.tracker.centre_mm) - elsewhere.apply(a.tracker.centre_mm)
     np.testing.assert_allclose(off_mm[:2], 0.0, atol=4.0)
@@ -124,7 +124,7 @@ def test_a_box_moves_the_pose_to_where_it_was_made(shift) -> None:
 def test_a_box_a_few_percent_larger_leaves_the_depth() -> None:
     a = room()
     truth = a.truth(a.frames[0])
-    box = boxes().project(truth).moved(np.array([40.0, 0.0]), 1.06)
+    box = boxes().project(truth).move(np.array([40.0, 0.0]), 1.06)
     found = boxes().move(truth, box)
     assert found.translation_mm[2] == pytest.approx(truth.translation_mm[2], abs=2.0)
     assert found.translation_mm[0] - truth.translation_mm[0] == pytest.approx(13.0, abs=2.0)
@@ -136,9 +136,9 @@ def test_a_search_starts_from_the_box_and_from_where_it_was() -> None:
     picture = np.zeros((180, 320), np.uint8)
     assert boxes().starts(truth, None) == [truth]
     assert boxes().starts(truth, BoxState(picture, None)) == [truth]
-    assert boxes().starts(truth, BoxState(picture, box.resized(0.25))) == [truth]
-    far = box.moved(np.array([200.0, 0.0]))
-    first, second = boxes().starts(truth, BoxState(picture, far.resized(0.25)))
+    assert boxes().starts(truth, BoxState(picture, box.resize(0.25))) == [truth]
+    far = box.move(np.array([200.0, 0.0]))
+    first, second = boxes().starts(truth, BoxState(picture, far.resize(0.25)))
     assert second is truth
     assert boxes().project(first).overlap(far) > 0.9
 
@@ -159,5 +159,5 @@ def test_only_an_ok_frame_teaches() -> None:
 
 def test_a_pose_behind_the_camera_has_no_box() -> None:
     truth = room().truth(room().frames[0])
-    behind = truth.moved((0, 0, -2000.0, 0, 0, 0), np.zeros(3))
+    behind = truth.move((0, 0, -2000.0, 0, 0, 0), np.zeros(3))
     assert boxes().project(behind) is None

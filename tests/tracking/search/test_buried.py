@@ -14,7 +14,7 @@ def off(a: Room, twist: tuple[float, ...]) -> Frame:
     """The first frame, expected beside the truth."""
     taken = a.frames[0]
     true = a.truth(taken)
-    rough = true.moved(twist, true.apply(a.tracker.centre_mm))
+    rough = true.move(twist, true.apply(a.tracker.centre_mm))
     return a.tracker.begin(taken.left, taken.right, rough, Stopwatch())
 
 
@@ -64,7 +64,7 @@ def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search() -> None:
     assert answers[0].verdict.status is Status.OK
     assert not asked.frames
     true = a.truth(frame)
-    far_off = true.moved((0.0, 60.0, 0.0, 1.5, 0.0, 0.0), true.apply(tracker.centre_mm))
+    far_off = true.move((0.0, 60.0, 0.0, 1.5, 0.0, 0.0), true.apply(tracker.centre_mm))
     answers = tracker.register(frame.left, frame.right, Prior({"femur": far_off}), GOAL)
     assert asked.frames
     orders = [one.verdict.order for one in answers]

@@ -219,7 +219,7 @@ def test_in_pictures_a_pose_5_mm_and_5_deg_off_is_found(sign: float) -> None:
     frame, search, asked = seen_knee()
     shift, turn = np.array([3.0, -2.0, 3.5]), np.array([0.6, -0.5, 0.62])
     twist = sign * np.concatenate([shift, np.radians(5.0) * turn / np.linalg.norm(turn)])
-    off = frame.start.moved(twist, frame.start.apply(room().tracker.centre_mm))
+    off = frame.start.move(twist, frame.start.apply(room().tracker.centre_mm))
     fit = find(search, replace(frame, start=off))
     assert asked.count("measure_freely") == 1
     assert surface_error_mm(off, frame.start) > 3.0
@@ -228,7 +228,7 @@ def test_in_pictures_a_pose_5_mm_and_5_deg_off_is_found(sign: float) -> None:
 
 def test_in_pictures_a_bone_out_of_view_gives_none() -> None:
     frame, search, _ = seen_knee()
-    away = frame.start.moved((900.0, 0, 0, 0, 0, 0), (0.0,) * 3)
+    away = frame.start.move((900.0, 0, 0, 0, 0, 0), (0.0,) * 3)
     assert find(search, replace(frame, start=away)) is None
 
 
