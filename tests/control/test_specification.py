@@ -28,7 +28,7 @@ def test_what_is_configured_counts_in_live_sessions_and_replays(is_live: bool) -
     specification = specified(is_live=is_live)
     assert specification.stage is STAGES[1]
     assert specification.method == "icp"
-    assert specification.tracker_settings.locator.method == "icp"
+    assert specification.tracker_settings.method == "icp"
     assert specification.tracker_settings.depth_mm == (350.0, 600.0)
     assert specification.mirror_deg == 44.0
 

@@ -1,6 +1,7 @@
 """Two halves of a job."""
 
 import threading
+import time
 from contextlib import ExitStack
 
 import pytest
@@ -31,12 +32,27 @@ def test_halves_of_halves_do_not_wait_for_each_other():
     assert sorted(done) == ["left lower", "left upper", "right lower", "right upper"]
 
 
-def test_the_first_error_is_raised_after_both_have_ended():
-    ended = []
+def test_the_first_error_is_raised_after_both_have_ended() -> None:
+    begun, ended = threading.Event(), []
+
+    def lower() -> None:
+        begun.set()
+        time.sleep(0.05)
+        ended.append("lower")
+
+    def upper() -> None:
+        assert begun.wait(10.0)
+        raise ValueError("upper")
 
     with pytest.raises(ValueError, match="upper"):
-        run_both(fails_as("upper"), lambda: ended.append("lower"))
+        run_both(upper, lower)
     assert ended == ["lower"]
+    with pytest.raises(ValueError, match="lower"):
+        run_both(lambda: None, fails_as("lower"))
+
+
+def test_both_answers_are_given() -> None:
+    assert run_both(lambda: 1, lambda: "two") == (1, "two")
 
 
 @pytest.mark.parametrize("height", [0, 1, 7, 16, 40, 41])
