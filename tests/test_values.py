@@ -18,7 +18,6 @@ from navapp.values import (
     SurfaceCloud,
     TrackedFrame,
     Verdict,
-    visible_vertices,
 )
 from navapp.values import Status as PoseStatus
 from tests.geometry.shapes import cube, sphere
@@ -96,13 +95,13 @@ def test_no_targets_have_no_predicted_error():
 
 def test_vertices_that_face_the_camera_are_visible():
     ball = sphere(30.0, 24)
-    visible = visible_vertices(ball, POSE)
+    visible = ball.visible_vertices(POSE)
     positions = POSE.apply(ball.vertices_mm)
     normals = (positions - POSE.translation_mm) / 30.0
     cosine = np.einsum("ij,ij->i", normals, -positions) / np.linalg.norm(positions, axis=1)
     assert visible[cosine > 0.21].all()
     assert not visible[cosine < 0.19].any()
-    assert not visible_vertices(ball.flip(), POSE)[cosine > 0].any()
+    assert not ball.flip().visible_vertices(POSE)[cosine > 0].any()
 
 
 @pytest.mark.parametrize(
@@ -115,7 +114,7 @@ def test_what_is_visible_follows_the_definition(mesh) -> None:
     )
     view, normals = beyond.apply(mesh.vertices_mm), beyond.rotate(mesh.normals)
     expected = np.einsum("ij,ij->i", normals, view) < -0.2 * np.linalg.norm(view, axis=1)
-    np.testing.assert_array_equal(visible_vertices(mesh, beyond), expected)
+    np.testing.assert_array_equal(mesh.visible_vertices(beyond), expected)
     assert 0.1 < expected.mean() < 0.9
 
 

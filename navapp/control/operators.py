@@ -219,7 +219,7 @@ def read_events(path: str | Path) -> RecordedEvents:
             commands.append((sequence, command_from_json(value)))
         elif value.get("type") == "take_over":
             take_overs.append(sequence)
-        elif value.get("kind") == "refused" and commands:
+        elif value.get("kind") == "refused" and commands and commands[-1][0] == sequence:
             # The refusal follows its command at once. What refused it may be missing in a replay,
             # a lost camera for example, and the command would be carried out.
             commands.pop()

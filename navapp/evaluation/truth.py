@@ -3,7 +3,7 @@
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.values import BoneModel, visible_vertices
+from navapp.values import BoneModel
 
 
 def compute_mean_tre_mm(
@@ -23,7 +23,7 @@ def compute_mean_tre_mm(
     """
     points = targets_mm
     if len(points) == 0:
-        points = bone.mesh.vertices_mm[visible_vertices(bone.mesh, true)]
+        points = bone.mesh.vertices_mm[bone.mesh.visible_vertices(true)]
     if len(points) == 0:
         return None
     return float(np.linalg.norm(estimated.apply(points) - true.apply(points), axis=1).mean())

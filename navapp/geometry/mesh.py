@@ -9,6 +9,9 @@ from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 IntArray = NDArray[np.int32]
 
+# Of the angle between a vertex's normal and the way to the camera.
+_LEAST_COSINE = 0.2
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TriangleMesh:
@@ -76,6 +79,17 @@ class TriangleMesh:
         a, b, c = (self.vertices_mm[self.faces[:, corner]] for corner in range(3))
         areas: FloatArray = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         return areas
+
+    def visible_vertices(self, camera_from_mesh: RigidTransform) -> NDArray[np.bool_]:
+        """(V,) vertices that face a camera: n . v < -0.2 |v| (occlusion is not tested)."""
+        # What is compiled is not loaded by those who only read meshes.
+        from navapp.geometry.facing_kernels import find_facing
+
+        # In the mesh's frame, nothing but the camera has to be moved.
+        camera_mm = camera_from_mesh.inverse().translation_mm
+        is_facing = np.empty(len(self.vertices_mm), dtype=np.bool_)
+        find_facing(camera_mm, self.vertices_mm, self.normals, _LEAST_COSINE, is_facing)
+        return is_facing
 
     def transform(self, target_from_source: RigidTransform) -> "TriangleMesh":
         """The mesh in the target frame."""

@@ -16,7 +16,6 @@ from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
-from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.after_loss import SearchAfterLoss
 from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.near import NearSearch
@@ -33,9 +32,6 @@ from navapp.values import (
     Stopwatch,
     TrackedFrame,
 )
-
-# It is asked so often, counted in lost frames, whether the pictures are swapped; chosen.
-_LOST_BETWEEN = 10
 
 
 class BimccTracker(TrackerBase):
@@ -68,15 +64,12 @@ class BimccTracker(TrackerBase):
         after_loss: SearchAfterLoss | None = None,
         diagnosis: Diagnosis | None = None,
     ) -> None:
-        super().__init__(rig, bone, settings or TrackerSettings(), judge)
-        meter, scorer = self.meter, FitScorer(self.meter)
+        super().__init__(rig, bone, settings or TrackerSettings(), judge, diagnosis)
+        meter, scorer = self.meter, self.scorer
         self.near = near or NearSearch(meter, scorer.score, self.settings.near)
         self.buried = buried or BuriedSearch(meter, self.settings.near)
         self.after_loss = after_loss or SearchAfterLoss(meter, self.near, scorer)
-        self.diagnosis = diagnosis or Diagnosis(meter, scorer)
-        self.first = FirstRegistration(
-            self, WholeViewSearch(meter, aspects), scorer, self.settings.n_refined
-        )
+        self.whole_view = WholeViewSearch(meter, aspects)
 
     def track(
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
@@ -99,12 +92,14 @@ class BimccTracker(TrackerBase):
                     searches = state.is_search_due and is_worth_a_search(best)
                     frame = replace(frame, searches=searches)
                     more = self.buried.find(frame)
-                    best = self.judge_fits(frame, checks, more, goal, frame.start, best)
+                    best = self.judge_fits(
+                        frame, checks, more, goal, frame.start, best, keeps_first=True
+                    )
         if best is None or best.verdict.status is Status.LOST:
             state = replace(state, box=self.boxes.follow(state.box, left))
             best = self._search_again(left, right, left_from_bone, state, goal, watch, best)
         if best.verdict.status is not Status.OK:
-            best = with_cause(best, self._find_cause(left, right, left_from_bone, state, best))
+            best = with_cause(best, self.find_cause(left, right, left_from_bone, state, best))
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
 
@@ -138,7 +133,7 @@ class BimccTracker(TrackerBase):
         on_progress: Callable[[float], None] = ignore,
     ) -> list[TrackedFrame]:
         """Find the bone from a rough pose, a box or a cone: distinct candidates, best first."""
-        return self.first.register(left, right, prior, goal, on_progress)
+        return FirstRegistration(self).register(left, right, prior, goal, on_progress)
 
     def _search_again(
         self,
@@ -164,21 +159,3 @@ class BimccTracker(TrackerBase):
             if best.verdict.status is Status.OK:
                 break
         return best
-
-    def _find_cause(
-        self,
-        left: Image,
-        right: Image,
-        left_from_bone: RigidTransform,
-        state: TrackState,
-        tracked: TrackedFrame,
-    ) -> Reason | None:
-        """What is wrong for good: as known, or looked for anew in some of the lost frames."""
-        is_lost = tracked.verdict.status is Status.LOST
-        if not is_lost and state.cause is Reason.PICTURES_SWAPPED:
-            # Swapped pictures show no bone: they are no longer.
-            return None
-        is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
-        if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
-            return state.cause
-        return self.diagnosis.explain_loss(left, right, self.rectify_pose(left_from_bone))

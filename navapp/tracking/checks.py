@@ -68,10 +68,10 @@ class PairChecks:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         self._drop()
         if self._coarse is not None and not self._coarse.is_over:
-            self._coarse.drop()
+            self._coarse.__exit__(kind, *rest)
 
     def _drop(self) -> None:
         if self._begun is not None and not self._begun[1].is_over:

@@ -9,8 +9,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import distinct, make_scattered_starts, make_tilted_starts
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.scoring import FitScorer, select_poses
-from navapp.tracking.search.whole_view import WholeViewSearch
+from navapp.tracking.scoring import select_poses
 from navapp.tracking.surface_meter import Measurement
 from navapp.tracking.verdict import Goal, with_cause
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
@@ -34,20 +33,11 @@ class FirstRegistration:
 
     Args:
         tracker: whose pictures, searches and judge it uses.
-        whole_view: tells where the bone may be without a pose.
-        scorer: of fits.
-        n_refined: so many answers of a search are refined.
     """
 
-    def __init__(
-        self,
-        tracker: "BimccTracker",
-        whole_view: WholeViewSearch,
-        scorer: FitScorer,
-        n_refined: int,
-    ) -> None:
-        self._tracker, self._whole_view = tracker, whole_view
-        self._scorer, self._n_refined = scorer, n_refined
+    def __init__(self, tracker: "BimccTracker") -> None:
+        self._tracker, self._scorer = tracker, tracker.scorer
+        self._n_refined = tracker.settings.n_refined
 
     def register(
         self,
@@ -119,9 +109,9 @@ class FirstRegistration:
         watch: Stopwatch,
     ) -> list[TrackedFrame]:
         """In a box, or in the whole view, without a pose to start from."""
-        pair = self._whole_view.rectify(left, right, prior)
+        pair = self._tracker.whole_view.rectify(left, right, prior)
         watch.lap("rectify")
-        candidates = self._whole_view.find_candidates(pair, prior, on_progress)
+        candidates = self._tracker.whole_view.find_candidates(pair, prior, on_progress)
         watch.lap("estimate")
         poses = select_poses(candidates, self._n_refined, _REFINED_FRACTION)
         found = [self._fit_candidate(Frame(pair, pose, watch)) for pose in poses]
@@ -144,8 +134,13 @@ class FirstRegistration:
         """Distinct answers, best first; a guess is called one."""
         fits = self._scorer.rank(fits)
         kept = distinct([fit.pose for fit in fits], self._tracker.centre_mm)
-        judge, checks = self._tracker.judge, PairChecks(self._tracker.meter, frame.pair)
-        return [judge.judge(frame, checks, fit, goal) for fit in fits if fit.pose in kept]
+        judge, meter = self._tracker.judge, self._tracker.meter
+        # Checks of its own for each: several may have been fitted to one free measurement.
+        return [
+            judge.judge(frame, PairChecks(meter, frame.pair), fit, goal)
+            for fit in fits
+            if fit.pose in kept
+        ]
 
 
 def _is_ok(answers: list[TrackedFrame]) -> bool:

@@ -75,7 +75,7 @@ class Fit:
     def variance_ratio(self) -> float:
         """Variance of the residuals over the one they claim, of a fit on the model.
 
-        It is that of all residuals, told from those that the kernel lets through.
+        Estimated for all residuals from those inside the kernel.
         """
         claimed_mm = max(self.estimate.expected_rms_mm, 1e-9)
         kernel_mm = max(MODEL_FIT.narrowest_mm, MODEL_FIT.n_sigmas * claimed_mm)

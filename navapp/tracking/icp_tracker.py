@@ -16,7 +16,7 @@ from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import NEAR_VIEW, Margins
 from navapp.tracking.tracker import TrackerBase, TrackerSettings
-from navapp.tracking.verdict import Goal
+from navapp.tracking.verdict import Goal, with_cause
 from navapp.values import BoneModel, DisparityMap, Prior, Reason, Status, Stopwatch, TrackedFrame
 
 
@@ -44,11 +44,11 @@ class IcpTracker(TrackerBase):
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone's box into the next frame, match in it, and fit."""
         watch, margins = Stopwatch(), self.settings.near
-        expected = state.predict(captured_ns, self.centre_mm)
-        predicted = self.rectify_pose(expected)
+        left_from_bone = state.predict(captured_ns, self.centre_mm)
+        predicted = self.rectify_pose(left_from_bone)
         # The box comes from the pictures, and the start from the box.
         box = self.boxes.follow(state.box, left, state.left_from_bone)
-        expected = self.boxes.starts(expected, box)[0]
+        expected = self.boxes.starts(left_from_bone, box)[0]
         best = self.judge.lost(Reason.BONE_LOST, watch)
         if state.n_lost == 0:
             frame = self.begin(left, right, expected, watch, NEAR_VIEW)
@@ -62,7 +62,9 @@ class IcpTracker(TrackerBase):
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
                 if best.verdict.status is Status.OK:
                     break
-        return self.update(best, replace(state, box=box), left, captured_ns, watch)
+        state = replace(state, box=box)
+        best = with_cause(best, self.find_cause(left, right, left_from_bone, state, best))
+        return self.update(best, state, left, captured_ns, watch)
 
     def glance(
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
@@ -74,7 +76,9 @@ class IcpTracker(TrackerBase):
         with self.check_beside(frame) as checks:
             fits = self._find(frame, self.settings.near.tracking)
             best = self.judge_fits(frame, checks, fits, goal, frame.start)
-        return self.update(best, state, left, captured_ns, watch)
+        best = with_cause(best, state.cause)
+        tracked, after = self.update(best, state, left, captured_ns, watch)
+        return tracked, replace(after, n_doubted=0)
 
     def register(
         self,

@@ -52,6 +52,7 @@ class PoseJudge:
         outline: OutlineMeter | None = None,
     ) -> None:
         self._meter, self._quality = meter, quality
+        self._is_rig_accepted = quality is None or quality.is_accepted
         self._outline = outline or OutlineMeter(meter.model, meter.geometry)
 
     def judge(
@@ -98,7 +99,7 @@ class PoseJudge:
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
         """The answer when there is no fit to judge."""
-        verdict = decide(Evidence(missing=reason))
+        verdict = decide(Evidence(missing=reason, is_rig_accepted=self._is_rig_accepted))
         return TrackedFrame(self._meter.model.bone.name, None, verdict, watch.timings)
 
     def _evidence_of_pair(self, health: StereoHealth, depth_mm: float) -> Evidence:
@@ -123,7 +124,7 @@ class PoseJudge:
             detail_ratio=detail_ratio,
             has_lost_rows=health.has_lost_rows,
             rows_mm=rows_mm if is_sure else 0.0,
-            is_rig_accepted=self._quality is None or self._quality.is_accepted,
+            is_rig_accepted=self._is_rig_accepted,
         )
 
     def _evidence_of_pose(
@@ -137,12 +138,12 @@ class PoseJudge:
     ) -> Evidence:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
+        correlated_ratio = fit.variance_ratio / NOISE_RATIO**2 if is_on_model else math.nan
         if not np.isfinite(estimate.covariance).all():
-            free = estimate if estimate.reasons else estimate.with_reason(Reason.DEGENERATE)
-            return replace(known, estimate=free, is_rig_accepted=True)
+            return replace(known, estimate=estimate, correlated_ratio=correlated_ratio)
         if agreement is None or agreement.n_visible == 0:
-            return replace(known, missing=Reason.OUT_OF_VIEW, is_rig_accepted=True)
-        is_seen = model.bone.visible_vertices(estimate.camera_from_bone)
+            return replace(known, missing=Reason.OUT_OF_VIEW)
+        is_seen = model.bone.mesh.visible_vertices(estimate.camera_from_bone)
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
         plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_mm, model.bone.surface_sd_mm)
         view_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
@@ -157,7 +158,7 @@ class PoseJudge:
             estimate=estimate,
             is_fixed=True,
             agreement=agreement,
-            correlated_ratio=fit.variance_ratio / NOISE_RATIO**2 if is_on_model else math.nan,
+            correlated_ratio=correlated_ratio,
             size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),
             view_mm=view_mm,
             plan_mm=plan_mm,

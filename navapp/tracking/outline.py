@@ -31,6 +31,7 @@ from navapp.tracking.outline_kernels import (
     thin_rim,
     warp_depth,
 )
+from navapp.tracking.surface_meter import MODEL_CORRELATION_PX
 from navapp.values import DisparityMap, Origin
 
 # Where behind the outline it is less dark than this, the edge is as often that of tissue on the
@@ -45,8 +46,6 @@ _EDGE_SIGMA_PX = 0.15
 # The tone curve of video cameras moves all edges towards the dark by about so much, a linear one
 # does not.
 _COMMON_SD_PX = 0.3
-# Errors go together over a matching window as well as along a rim.
-_CORRELATION_PX = 11.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,7 +197,7 @@ class OutlineMeter:
             np.column_stack([slope, np.cross(arm, slope)]),
             steps.offset_px,
             _EDGE_SIGMA_PX**2 + surface_px**2,
-            (apart <= 0.5 * _CORRELATION_PX).sum(axis=1).astype(np.float64),
+            (apart <= 0.5 * MODEL_CORRELATION_PX).sum(axis=1).astype(np.float64),
             _COMMON_SD_PX,
         )
 

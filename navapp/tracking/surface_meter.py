@@ -6,14 +6,14 @@ coarsely, to tell what lies where.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.masks import large_regions
-from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
+from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
@@ -40,6 +40,7 @@ _MIXED_PX = 3
 _LEAST_UNMIXED = 0.5
 
 
+# Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
 # Matches a pair's box within a band of disparities (px).
@@ -148,7 +149,7 @@ class SurfaceMeter:
         self._max_points = max_points
         self.geometry = self.rectifier.geometry
         # Several steps ask for the same few poses.
-        self._bounds = lru_cache(_KEPT_BOUNDS)(self._find_bounds)
+        self._bounds = lru_cache(_KEPT_BOUNDS)(partial(_find_bounds, model, self.geometry))
 
     def rectify(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins
@@ -249,10 +250,6 @@ class SurfaceMeter:
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
         return found.reproject(self.geometry, stride_px)
 
-    def _find_bounds(self, pose: RigidTransform) -> tuple[Box | None, tuple[float, float]]:
-        """What bounds the model at a pose: its box, and nearest and farthest depth, mm."""
-        return bounds_of(self.model.hull_mm, pose, self.geometry)
-
     def _region(
         self, pose: RigidTransform, margins: Margins
     ) -> tuple[Box, tuple[float, float]] | None:
@@ -266,6 +263,14 @@ class SurfaceMeter:
             return None
         grown = box.grow(margins.box_px).clip(self.geometry.width, self.geometry.height)
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
+
+
+# Not a method: the cache of a meter must not keep that meter alive.
+def _find_bounds(
+    model: RegistrationModel, geometry: RectifiedGeometry, pose: RigidTransform
+) -> tuple[Box | None, tuple[float, float]]:
+    """What bounds the model at a pose: its box, and nearest and farthest depth, mm."""
+    return bounds_of(model.hull_mm, pose, geometry)
 
 
 def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:

@@ -12,15 +12,20 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, estimate_at
 from navapp.tracking.box.tracker import BoxTracker
 from navapp.tracking.checks import PairChecks
+from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.frame import FREE_FIT, Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
+from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import NearSettings
 from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
 from navapp.tracking.verdict import Goal
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 
 Method = Literal["bimcc", "icp"]
+
+# It is asked so often, counted in lost frames, whether the pictures are swapped; chosen.
+_LOST_BETWEEN = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +103,8 @@ class TrackerBase:
         meter: of its surface.
         judge: of its poses.
         boxes: its box in the left pictures.
+        scorer: tells how much of the model a fit explains.
+        diagnosis: why the bone is not found.
     """
 
     def __init__(
@@ -106,12 +113,15 @@ class TrackerBase:
         bone: BoneModel,
         settings: TrackerSettings,
         judge: PoseJudge | None = None,
+        diagnosis: Diagnosis | None = None,
     ) -> None:
         self.settings, self.rig = settings, rig
         self.model = RegistrationModel(bone)
         self.meter = SurfaceMeter(rig, self.model, settings.depth_mm, settings.max_points)
         self.judge = judge or PoseJudge(self.meter, rig.quality)
         self.boxes = BoxTracker(rig, self.model)
+        self.scorer = FitScorer(self.meter)
+        self.diagnosis = diagnosis or Diagnosis(self.meter, self.scorer)
 
     @property
     def centre_mm(self) -> FloatArray:
@@ -168,6 +178,7 @@ class TrackerBase:
         goal: Goal,
         predicted: RigidTransform,
         best: TrackedFrame | None = None,
+        keeps_first: bool = False,
         is_enough: Callable[[Verdict], bool] = lambda verdict: verdict.status is Status.OK,
     ) -> TrackedFrame:
         """The best of an answer and of fits, which are asked for until one is good enough.
@@ -179,16 +190,35 @@ class TrackerBase:
             goal: of the stage.
             predicted: pose in the rectified left camera that the motion lets expect.
             best: answer so far; without one, and without fits, the bone is lost.
+            keeps_first: of equal answers the first stands; by default the last, which knows more.
             is_enough: no further fit is asked for.
         """
         for fit in fits:
             answer = self.judge.judge(frame, checks, fit, goal, predicted)
-            # Of equals, what came later knows more.
-            if best is None or answer.verdict.order <= best.verdict.order:
+            orders = () if best is None else (answer.verdict.order, best.verdict.order)
+            if not orders or orders[0] < orders[1] or (orders[0] == orders[1] and not keeps_first):
                 best = answer
             if is_enough(answer.verdict):
                 break
         return best or self.judge.lost(Reason.BONE_LOST, frame.watch)
+
+    def find_cause(
+        self,
+        left: Image,
+        right: Image,
+        left_from_bone: RigidTransform,
+        state: TrackState,
+        tracked: TrackedFrame,
+    ) -> Reason | None:
+        """What is wrong for good: as known, or looked for anew in some of the lost frames."""
+        is_lost = tracked.verdict.status is Status.LOST
+        if not is_lost and state.cause is Reason.PICTURES_SWAPPED:
+            # Swapped pictures show no bone: they are no longer.
+            return None
+        is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
+        if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
+            return state.cause
+        return self.diagnosis.explain_loss(left, right, self.rectify_pose(left_from_bone))
 
     def update(
         self,

@@ -82,6 +82,14 @@ class Evidence:
         return self.estimate is not None and reason in self.estimate.reasons
 
     @property
+    def n_loose(self) -> int:
+        """1 when a direction is free, 2 when the points fix no pose at all."""
+        is_loose = self.estimate is not None and not self.is_fixed
+        if is_loose and not self.says(Reason.TOO_FEW_POINTS):
+            return 2
+        return int(self.says(Reason.DEGENERATE))
+
+    @property
     def seen(self) -> Agreement:
         """The agreement; NaN without one."""
         return _UNKNOWN if self.agreement is None else self.agreement
@@ -129,7 +137,7 @@ class Rule:
     measure: Callable[[Evidence], float]
     degraded: float | None
     lost: float | None
-    source: str = CHOSEN
+    source: str
     is_below: bool = False
     doubts_place: bool = False
 
@@ -145,7 +153,7 @@ class Rule:
 
 
 def _without_pose(reason: Reason, quantity: str) -> Rule:
-    return Rule(reason, quantity, lambda e: e.missing is reason, None, 0)
+    return Rule(reason, quantity, lambda e: e.missing is reason, None, 0, CHOSEN)
 
 
 _PARTLY_CHOSEN = "tests.bench.wrong_plans; LOST chosen"
@@ -154,27 +162,28 @@ _RESIDUALS = "chosen; noise by tests.bench.correlated_residuals"
 
 # In the order in which reasons are told: what is wrong with the pair first, as the cause.
 RULES = (
-    Rule(Reason.PICTURE_DARK, "pixels too dark for texture", lambda e: e.dark_fraction, 0.7, None),
+    Rule(Reason.PICTURE_DARK, "pixels too dark for texture",
+         lambda e: e.dark_fraction, 0.7, None, CHOSEN),
     Rule(Reason.PICTURE_OVEREXPOSED, "pixels that the sensor clipped",
-         lambda e: e.saturated_fraction, 0.7, None),
+         lambda e: e.saturated_fraction, 0.7, None, CHOSEN),
     Rule(Reason.PICTURES_UNLIKE, "detail of one picture over the other's",
-         lambda e: e.detail_ratio, 2.0, None),
+         lambda e: e.detail_ratio, 2.0, None, CHOSEN),
     Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",
          lambda e: e.has_lost_rows, 0, None, _HEALTH),
     Rule(Reason.ROWS_DISAGREE, "depth error that the rows' offset stands for, mm",
-         lambda e: e.rows_mm, OK_ERROR_MM, None, _HEALTH),
+         lambda e: e.rows_mm, OK_ERROR_MM, None, CHOSEN),
     _without_pose(Reason.BONE_LOST, "nothing was found where the bone was expected (yes 1)"),
     _without_pose(Reason.NO_SURFACE, "no surface was measured (yes 1)"),
     _without_pose(Reason.OUT_OF_VIEW, "no part of the model is in view (yes 1)"),
     Rule(Reason.TOO_FEW_POINTS, "fewer than 60 points pair (yes 1)",
-         lambda e: e.says(Reason.TOO_FEW_POINTS), None, 0),
+         lambda e: e.says(Reason.TOO_FEW_POINTS), None, 0, CHOSEN),
     Rule(Reason.NOT_CONVERGED, "the fit met its limit of steps (yes 1)",
-         lambda e: e.says(Reason.NOT_CONVERGED), 0, None, doubts_place=True),
+         lambda e: e.says(Reason.NOT_CONVERGED), 0, None, CHOSEN, doubts_place=True),
     Rule(Reason.DEGENERATE, "a direction is free (1), nothing is fixed (2)",
-         lambda e: 0 if not e.says(Reason.DEGENERATE) else 1 if e.is_fixed else 2, 0, 1,
+         lambda e: e.n_loose, 0, 1, CHOSEN,
          doubts_place=True),
     Rule(Reason.AMBIGUOUS, "a different pose explains 0.9 of as much (yes 1)",
-         lambda e: e.says(Reason.AMBIGUOUS), 0, None, doubts_place=True),
+         lambda e: e.says(Reason.AMBIGUOUS), 0, None, CHOSEN, doubts_place=True),
     Rule(Reason.CUES_DISAGREE, "half of the outline is off by 3 sigma (yes 1)",
          lambda e: e.says(Reason.CUES_DISAGREE), 0, None, "tests.bench.outline"),
     Rule(Reason.SURFACE_MISFIT, "correlated residuals' variance over the noise of right poses",
@@ -183,31 +192,32 @@ RULES = (
          lambda e: e.seen.open_coverage, 0.4, 0.25, _PARTLY_CHOSEN, is_below=True,
          doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "the whole visible model: measured and agreeing",
-         lambda e: e.seen.coverage, 0.15, 0.1, is_below=True, doubts_place=True),
+         lambda e: e.seen.coverage, 0.15, 0.1, CHOSEN, is_below=True, doubts_place=True),
     Rule(Reason.SEEN_THROUGH, "model through which the scene is seen",
-         lambda e: e.seen.behind_fraction, 0.05, 0.15, doubts_place=True),
+         lambda e: e.seen.behind_fraction, 0.05, 0.15, CHOSEN, doubts_place=True),
     Rule(Reason.OUTLIERS, "measured model pixels that agree",
-         lambda e: e.seen.inlier_fraction, 0.8, 0.5, is_below=True, doubts_place=True),
+         lambda e: e.seen.inlier_fraction, 0.8, 0.5, CHOSEN, is_below=True, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "rms of the fit's residual over the predicted one",
          lambda e: e.rms_ratio, 1.25, 2.0, _PARTLY_CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "spread of all differences over the claimed sigma",
-         lambda e: e.seen.spread_ratio, 1.1, None, doubts_place=True),
+         lambda e: e.seen.spread_ratio, 1.1, None, CHOSEN, doubts_place=True),
     Rule(Reason.RIG_NOT_ACCEPTED, "the calibration refused the rig (yes 1)",
-         lambda e: not e.is_rig_accepted, 0, None),
+         lambda e: not e.is_rig_accepted, 0, None, CHOSEN),
     Rule(Reason.SIZE_DIFFERS, "size beyond 3 sigma and 0.5 mm from the model's, mm",
-         lambda e: e.size_excess_mm, 0, None),
+         lambda e: e.size_excess_mm, 0, None, CHOSEN),
     Rule(Reason.POSE_UNCERTAIN, "95 % bound by what is seen, over 0.5 mm and the plan's, mm",
-         lambda e: e.view_excess_mm, 0, None),
+         lambda e: e.view_excess_mm, 0, None, CHOSEN),
     Rule(Reason.CARTILAGE_UNCERTAIN, "rms deviation of the cartilage, mm",
-         lambda e: e.cartilage_sd_mm, 0.45, None, "tests.bench.cartilage"),
+         lambda e: e.cartilage_sd_mm, 0.45, None,
+         "chosen; compared in tests.bench.cartilage"),
     Rule(Reason.TRE_TOO_LARGE, "95 % bound over the stage's tolerance, mm",
-         lambda e: e.tolerance_excess_mm, 0, None),
-    Rule(Reason.JUMPED, "centre from where it was expected, mm", lambda e: e.jump_mm, 12.0, None),
-    Rule(Reason.JUMPED, "turn from where it was expected, deg", lambda e: e.jump_deg, 10.0, None),
+         lambda e: e.tolerance_excess_mm, 0, None, CHOSEN),
+    Rule(Reason.JUMPED, "centre from where it was expected, mm",
+         lambda e: e.jump_mm, 12.0, None, CHOSEN),
+    Rule(Reason.JUMPED, "turn from where it was expected, deg",
+         lambda e: e.jump_deg, 10.0, None, CHOSEN),
 )  # fmt: skip
 
-# Told in front of the reasons of a bone that is not OK, once the diagnosis found them.
-CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 _AGAINST_PLACE = frozenset(rule.reason for rule in RULES if rule.doubts_place)
 _OF_AGREEMENT = tuple(
     rule
@@ -223,7 +233,8 @@ def decide(evidence: Evidence) -> Verdict:
     worst = max(said.values(), key=list(Status).index)
     agreement, estimate = evidence.agreement, evidence.estimate
     if agreement is None or estimate is None:
-        return Verdict(worst, None, reasons)
+        # Without a pose that was compared with a measurement nothing is there to be shown.
+        return Verdict(Status.LOST, None, reasons)
     return Verdict(
         worst,
         evidence.bound_mm,

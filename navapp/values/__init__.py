@@ -9,7 +9,6 @@ from navapp.values.bones import (
     BoneModel,
     FollowedBone,
     Side,
-    visible_vertices,
 )
 from navapp.values.contents import (
     ANKLE_CENTRE,
@@ -75,5 +74,4 @@ __all__ = [
     "SurgicalContent",
     "TrackedFrame",
     "Verdict",
-    "visible_vertices",
 ]

@@ -8,14 +8,12 @@ from numpy.typing import NDArray
 
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh, vertex_normals
-from navapp.geometry.transform import FloatArray, RigidTransform, read_only
+from navapp.geometry.transform import FloatArray, read_only
 
 Side = Literal["left", "right"]
 # Those that can be followed; the fibula only tells the side.
 FollowedBone = Literal["femur", "tibia", "patella"]
 FOLLOWED_BONES: tuple[str, ...] = get_args(FollowedBone)
-# Of the angle between a vertex's normal and the way to the camera.
-_LEAST_COSINE = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,10 +61,6 @@ class BoneModel:
             if kind is float and not (np.isfinite(values) & (values >= 0.0)).all():
                 raise ValueError(f"{self.name}: {name} must be finite and not negative")
             object.__setattr__(self, name, values)
-
-    def visible_vertices(self, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
-        """(V,) vertices that face the left camera; see the function `visible_vertices`."""
-        return visible_vertices(self.mesh, left_from_bone)
 
     def make_seen_surface(self) -> TriangleMesh:
         """What a camera sees: moved out by the mean cartilage, without what a stage removed.
@@ -141,15 +135,3 @@ class AspectGraph:
             self.points_mm[is_kept],
             self.tangents[is_kept],
         )
-
-
-def visible_vertices(mesh: TriangleMesh, left_from_bone: RigidTransform) -> NDArray[np.bool_]:
-    """(V,) vertices that face the left camera: n . v < -0.2 |v| (occlusion is not tested)."""
-    # What is compiled is not loaded by those who only read values.
-    from navapp.geometry.facing_kernels import find_facing
-
-    # In the bone's frame, nothing but the camera has to be moved.
-    camera_mm = left_from_bone.inverse().translation_mm
-    is_facing = np.empty(len(mesh.vertices_mm), dtype=np.bool_)
-    find_facing(camera_mm, mesh.vertices_mm, mesh.normals, _LEAST_COSINE, is_facing)
-    return is_facing

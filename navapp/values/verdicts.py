@@ -95,8 +95,8 @@ _REMEDIES = {
 }
 
 
-# What stays wrong until somebody mends it.
-_FOR_GOOD = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
+# What stays wrong until somebody mends it: told in front of the reasons of a bone that is not OK.
+CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,7 +113,7 @@ class PoseEstimate:
         rms_mm: weighted rms of the point-to-plane residual of those.
         expected_rms_mm: what the measurement's own sigma predicts for it.
         iterations: of the solver.
-        is_converged: the solver met its step limit.
+        is_converged: the last step was small enough.
         reasons: what the solver itself has against the result.
         size_mm: by how much the bone seems larger than the model, at the rms distance of what is
             seen from its middle; told by the surface alone.
@@ -205,7 +205,7 @@ class Verdict:
     @property
     def cause(self) -> Reason | None:
         """What is wrong for good, when that was found out."""
-        return next((reason for reason in self.reasons if reason in _FOR_GOOD), None)
+        return next((reason for reason in self.reasons if reason in CAUSES), None)
 
     @property
     def order(self) -> tuple[int, bool, float]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.tracking import Goal, TrackState, make_tracker
-from navapp.values import Side, Status, visible_vertices
+from navapp.values import Side, Status
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
 
@@ -45,7 +45,7 @@ def run(seed: int, side: Side) -> tuple[Judged, ...]:
     def judge(frame, tracked) -> None:
         assert tracked.left_from_bone is not None, f"no pose in frame {frame.sequence}"
         true = knee.truth(frame)
-        points = mesh.vertices_mm[visible_vertices(mesh, true)]
+        points = mesh.vertices_mm[mesh.visible_vertices(true)]
         error = np.linalg.norm(tracked.left_from_bone.apply(points) - true.apply(points), axis=1)
         verdict = tracked.verdict
         judged.append(

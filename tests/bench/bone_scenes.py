@@ -13,7 +13,7 @@ from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMe
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.zbuffer import project_box
-from navapp.values import DisparityMap, visible_vertices
+from navapp.values import DisparityMap
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
@@ -162,7 +162,7 @@ def on_bone(scene: Scene, found: DisparityMap) -> DisparityMap:
 
 def tre_mm(pose: RigidTransform, true: RigidTransform, mesh: TriangleMesh) -> float:
     """Mean over the vertices that face the camera at the true pose."""
-    seen = mesh.vertices_mm[visible_vertices(mesh, true)]
+    seen = mesh.vertices_mm[mesh.visible_vertices(true)]
     return float(np.linalg.norm(pose.apply(seen) - true.apply(seen), axis=1).mean())
 
 

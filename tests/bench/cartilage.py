@@ -246,7 +246,7 @@ def print_summary(rows: dict[str, list[Row]]) -> None:
 def print_separation(rows: dict[str, list[Row]]) -> None:
     """Least, median and largest value of what a judge can look at."""
     keys = {
-        "rms / expected": "rms_ratio", "coverage": "coverage", "inlier share": "inlier_share",
+        "rms / expected": "rms_ratio", "coverage": "coverage", "inlier share": "inlier_fraction",
         "thirds, mm": "thirds_mm", "free: rms / expected": "free_rms_ratio",
         "free: coverage": "free_coverage", "free: inlier share": "free_inlier_share",
     }  # fmt: skip

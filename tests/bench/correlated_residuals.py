@@ -17,7 +17,7 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking.frame import NOISE_RATIO
 from navapp.tracking.verdict import Evidence, decide
-from navapp.values import BoneModel, Reason, visible_vertices
+from navapp.values import BoneModel, Reason
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
@@ -80,7 +80,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             noise_variance_ratio
         )
         fit = parts.with_outline(frame, fit)
-        targets = bone.mesh.vertices_mm[visible_vertices(bone.mesh, fit.pose)]
+        targets = bone.mesh.vertices_mm[bone.mesh.visible_vertices(fit.pose)]
         bounds_mm = (
             one.estimate.predict_tre_mm(parts.centre_mm, targets[:: max(1, len(targets) // 200)])
             for one in (fit, shown)

@@ -44,6 +44,7 @@ _LOOP_FRAMES = 40
 # A pose further off than this at the plan's targets must not be OK.
 _WRONG_MM = 1.0
 _WORKERS = 2
+_TIMES = ("timing_ms", "register_ms")
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def print_differences(before: dict[str, Any], after: dict[str, Any]) -> int:
         print(_row(name, before[name], after[name]))
     if changed:
         print(_row("all", *([one for k in names for one in some[k]] for some in (before, after))))
-    return 1 if changed else 0
+    return 1 if changed or set(before) != set(after) else 0
 
 
 def _row(name: str, before: list[dict[str, Any]], after: list[dict[str, Any]]) -> str:
@@ -348,7 +349,7 @@ def _surface(case: Case, path: Path, folder: Path) -> Path:
 def _answers_of(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Each answer of a result without its times, bones apart."""
     if "frames" not in result:
-        yield {key: value for key, value in result.items() if "ms" not in key and "time" not in key}
+        yield {key: value for key, value in result.items() if key not in _TIMES}
     for frame in result.get("frames", ()):
         kept = {key: value for key, value in frame.items() if key not in ("timing_ms", "bodies")}
         yield kept

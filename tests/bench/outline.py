@@ -25,7 +25,7 @@ from navapp.registration.information import near
 from navapp.tracking.edge_kernels import missing_share, sample_across, strongest_edge
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
-from navapp.values import BoneModel, visible_vertices
+from navapp.values import BoneModel
 from tests.bench.first_registration import Case, simulated
 from tests.bench.tracker_parts import TrackerParts
 
@@ -127,7 +127,7 @@ def joined(
     answer: list[float] = []
     for one in (fit, parts.with_outline(frame, fit)):
         mesh = parts.model.bone.mesh
-        targets = mesh.vertices_mm[visible_vertices(mesh, one.pose)]
+        targets = mesh.vertices_mm[mesh.visible_vertices(one.pose)]
         bound_mm = one.estimate.predict_tre_mm(parts.centre_mm, targets[:: len(targets) // 200])
         answer += [compute_mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
     yield answer[0], answer[1], answer[2], answer[3]

@@ -11,7 +11,7 @@ import numpy as np
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking import Goal, Tracker, TrackState
-from navapp.values import BoneModel, Prior, Status, TrackedFrame, visible_vertices
+from navapp.values import BoneModel, Prior, Status, TrackedFrame
 from sim_devices.motion import LegMotion, smooth_step
 from sim_devices.rigs import NO_TURN, Turn
 from sim_devices.scenario import Scenario
@@ -136,7 +136,7 @@ class Theatre:
         """With a textured sheet in front of the bone, up to a line that leaves the rest open."""
         truth, event, time_s = self.truth(time_ns), self.event, time_ns / 1e9
         mesh = self.bone.mesh
-        seen_mm = truth.apply(mesh.vertices_mm[visible_vertices(mesh, truth)])
+        seen_mm = truth.apply(mesh.vertices_mm[mesh.visible_vertices(truth)])
         height_mm = float(seen_mm[:, 2].min()) - _COVER_ABOVE_MM
         slid_in = smooth_step((time_s - event.start_s) / _COVER_SLIDES_S)
         slid_in *= smooth_step((event.end_s - time_s) / _COVER_SLIDES_S)

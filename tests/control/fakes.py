@@ -122,13 +122,13 @@ class FakeTracker:
 
     def track(self, left, right, captured_ns, state: TrackState, goal):
         self.script.calls.append(f"track {self.bone.name}")
-        return self._followed(captured_ns, state, goal)
+        return self._follow(captured_ns, state, goal)
 
     def glance(self, left, right, captured_ns, state: TrackState, goal):
         self.script.calls.append(f"glance at {self.bone.name}")
-        return self._followed(captured_ns, state, goal)
+        return self._follow(captured_ns, state, goal)
 
-    def _follow_points(self, captured_ns, state: TrackState, goal):
+    def _follow(self, captured_ns, state: TrackState, goal):
         self.script.tracks.append((self.bone.name, state, goal))
         self.script.on_track(self.bone.name)
         tracked = self.script.tracked_of.get(self.bone.name, self.script.tracked)

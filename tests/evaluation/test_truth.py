@@ -3,7 +3,7 @@ import pytest
 
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.transform import RigidTransform
-from navapp.values import BoneModel, visible_vertices
+from navapp.values import BoneModel
 from tests.geometry.shapes import sphere
 
 BONE = BoneModel("femur", sphere(30.0))
@@ -31,7 +31,7 @@ def test_a_turn_is_an_error_that_grows_with_the_distance():
 
 def test_without_targets_the_vertices_visible_at_the_true_pose_count():
     turned = TRUE.move([0, 0, 0, 0, 0.6, 0], TRUE.translation_mm)
-    seen = BONE.mesh.vertices_mm[visible_vertices(BONE.mesh, TRUE)]
+    seen = BONE.mesh.vertices_mm[BONE.mesh.visible_vertices(TRUE)]
     assert 0.2 * len(BONE.mesh.vertices_mm) < len(seen) < 0.5 * len(BONE.mesh.vertices_mm)
     assert compute_mean_tre_mm(turned, TRUE, BONE, NONE) == pytest.approx(
         compute_mean_tre_mm(turned, TRUE, BONE, seen), abs=1e-12

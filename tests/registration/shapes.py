@@ -9,7 +9,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import project_box, render_rectified, unhidden_vertices
 from navapp.registration import RegistrationModel, Scene
-from navapp.values import BoneModel, Origin, SurfaceCloud, visible_vertices
+from navapp.values import BoneModel, Origin, SurfaceCloud
 from sim_devices.anatomy import KneeSpec, make_knee
 
 TRUE = RigidTransform.from_parts(
@@ -40,7 +40,7 @@ def seen_vertices(bone: BoneModel, pose: RigidTransform = TRUE) -> np.ndarray:
     box = project_box(bone.mesh, pose, GEOMETRY)
     view = render_rectified(bone.mesh, pose, GEOMETRY, box)
     shown = unhidden_vertices(bone.mesh, pose, GEOMETRY, view)
-    return np.flatnonzero(shown & visible_vertices(bone.mesh, pose))
+    return np.flatnonzero(shown & bone.mesh.visible_vertices(pose))
 
 
 def as_cloud(points_mm: np.ndarray, sigma_mm: float) -> SurfaceCloud:
@@ -73,7 +73,7 @@ def disturbed(model: RegistrationModel, deg: float, mm: float, seed: int) -> Rig
 
 def mean_error_mm(pose: RigidTransform, bone: BoneModel) -> float:
     """Mean error over the visible vertices."""
-    points = bone.mesh.vertices_mm[visible_vertices(bone.mesh, TRUE)]
+    points = bone.mesh.vertices_mm[bone.mesh.visible_vertices(TRUE)]
     return float(np.linalg.norm(pose.apply(points) - TRUE.apply(points), axis=1).mean())
 
 

@@ -12,13 +12,13 @@ from navapp.preop import build_aspects
 from navapp.registration import InitialSettings, RegistrationModel, Scene, find_initial
 from navapp.registration.edge_tables import answer_table, edge_tables, scale_optics
 from navapp.registration.hypotheses import (
-    around,
     find_distinct,
     places_of,
     poses_of,
     select_hypotheses,
     spread_hypotheses,
     thin_views,
+    vary_hypotheses,
     views_of,
 )
 from navapp.registration.initial import score_views
@@ -179,7 +179,7 @@ def test_neighbours_keep_the_anchor_near_and_hold_the_hypothesis_itself() -> Non
     some = spread_hypotheses(views, thin_views(views, 16.0), 90.0, np.array([(10.0, -20.0, 400.0)]))
     one = select_hypotheses(some, np.array([5]))
     (pose,) = poses_of(one, "left_rect", "femur")
-    beside = poses_of(around(one, views, 12.0, 6.0, 2.0), "left_rect", "femur")
+    beside = poses_of(vary_hypotheses(one, views, 12.0, 6.0, 2.0), "left_rect", "femur")
     angles = np.array([rotation_angle_deg(pose, other) for other in beside])
     assert angles.min() < 1e-3
     assert angles.max() < 20.0

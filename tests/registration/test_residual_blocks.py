@@ -119,7 +119,7 @@ def test_a_surface_without_residuals_is_survived() -> None:
     assert np.isfinite(joined.covariance).all()
 
 
-@pytest.mark.parametrize("noise2", [1.0, 0.4])
+@pytest.mark.parametrize("noise_variance_ratio", [1.0, 0.4])
 def test_a_block_that_says_too_little_changes_nothing(noise_variance_ratio: float) -> None:
     few = block_of(drawn(1), n=5)
     sharing = replace(block_of(drawn(1), n=400), n_sharing=np.full(400, 100.0))

@@ -13,7 +13,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.tracking import Goal
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.values import BoneModel, DisparityMap, Origin, Prior, visible_vertices
+from navapp.values import BoneModel, DisparityMap, Origin, Prior
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.truth import TruthOracle
@@ -61,7 +61,7 @@ class Room:
     def error_mm(self, pose: RigidTransform, frame: StereoFrame) -> float:
         """Mean over the visible vertices."""
         truth, mesh = self.truth(frame), self.tracker.model.bone.mesh
-        points = mesh.vertices_mm[visible_vertices(mesh, truth)]
+        points = mesh.vertices_mm[mesh.visible_vertices(truth)]
         return float(np.linalg.norm(pose.apply(points) - truth.apply(points), axis=1).mean())
 
 

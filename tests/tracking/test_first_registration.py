@@ -7,7 +7,7 @@ import pytest
 
 from navapp.preop import build_aspects
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.values import Prior, Status, visible_vertices
+from navapp.values import Prior, Status
 from tests.tracking.rooms import GOAL, Room, cone, room
 
 
@@ -23,7 +23,7 @@ def drawn_box(a: Room) -> tuple[int, int, int, int]:
     """Roughly what is seen of the bone, in the left picture."""
     truth = a.truth(a.frames[0])
     mesh = a.tracker.model.bone.mesh
-    seen = mesh.vertices_mm[visible_vertices(mesh, truth)]
+    seen = mesh.vertices_mm[mesh.visible_vertices(truth)]
     bare = seen[seen[:, 2] < mesh.vertices_mm[:, 2].min() + 60.0]
     pixels = a.rig.left.project(truth.apply(bare))
     x, y = pixels.min(axis=0) - np.array([12.0, -8.0])

@@ -19,7 +19,6 @@ from navapp.values import (
     Reason,
     Status,
     Verdict,
-    visible_vertices,
 )
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.registration.shapes import GEOMETRY, TRUE, disturbed
@@ -150,7 +149,7 @@ def bound_mm(targets_mm: np.ndarray) -> float:
 
 
 def test_without_targets_the_bound_is_that_of_what_is_seen() -> None:
-    is_seen = visible_vertices(MODEL.bone.mesh, TRUE)
+    is_seen = MODEL.bone.mesh.visible_vertices(TRUE)
     vertices_mm = MODEL.bone.mesh.vertices_mm
     bounds = [
         bound_mm(targets_mm)

@@ -11,7 +11,6 @@ from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Goal
 from navapp.tracking.agreement import Agreement
 from navapp.tracking.verdict import (
-    CAUSES,
     OK_ERROR_MM,
     RULES,
     Evidence,
@@ -22,6 +21,7 @@ from navapp.tracking.verdict import (
     with_cause,
 )
 from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
+from navapp.values.verdicts import CAUSES
 
 DOCS = Path(__file__).parents[2] / "docs" / "registration.md"
 POSE = RigidTransform.identity("left_rect", "femur")
@@ -153,8 +153,11 @@ def test_at_the_limit_itself_nothing_is_said_yet(row: Row, rule: Rule) -> None:
                 assert rule.status(evidence) is expected
 
 
-def test_what_is_not_known_is_no_reason() -> None:
-    assert told(Evidence()) == (Status.OK, ())
+def test_what_is_not_known_is_no_reason_and_no_pose_is_ok() -> None:
+    assert decide(Evidence()) == Verdict(Status.LOST)
+    fixed_by_nothing = replace(FINE, is_fixed=False, agreement=None)
+    assert decide(fixed_by_nothing).status is Status.LOST
+    assert Reason.DEGENERATE in decide(fixed_by_nothing).reasons
 
 
 def test_what_the_judge_may_say_is_all_in_the_table() -> None:
@@ -229,10 +232,10 @@ def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
         ({}, False),
         ({"coverage": 0.24}, True),
         ({"coverage": 0.26}, False),
-        ({"coverage": 0.09, "hidden_share": 0.9}, True),
-        ({"behind_share": 0.16}, True),
-        ({"behind_share": 0.14}, False),
-        ({"inlier_share": 0.49}, True),
+        ({"coverage": 0.09, "hidden_fraction": 0.9}, True),
+        ({"behind_fraction": 0.16}, True),
+        ({"behind_fraction": 0.14}, False),
+        ({"inlier_fraction": 0.49}, True),
         ({"spread_ratio": 9.0}, False),
     ],
 )

@@ -49,7 +49,7 @@ class NearSearch:
     ) -> None:
         self.settings = settings
         self._meter, self._score = meter, score
-        self.follower = Follower(meter, settings.rest, settings.tracking)
+        self._follower = Follower(meter, settings.rest, settings.tracking)
 
     def find(self, frame: Frame) -> list[Fit | None]:
         """The one fit that explains most; None out of view.
@@ -58,7 +58,7 @@ class NearSearch:
         that the bone is elsewhere, the surface is measured freely before it goes on. When the bone
         is half hidden, or moved, both are tried, and what explains more of the model stands.
         """
-        stayed = self.follower.follow(
+        stayed = self._follower.follow(
             frame, frame.start, self.settings.hidden_fraction, on_measured=frame.on_measured
         )
         if stayed is not None and self._is_here(stayed, frame.start):
@@ -70,7 +70,7 @@ class NearSearch:
     def find_rests(self, frame: Frame) -> Iterator[Fit]:
         """Where the model rests next to the start, from samples of it and from all of it."""
         for is_near in (False, True):
-            fit = self.follower.follow(
+            fit = self._follower.follow(
                 frame, frame.start, self.settings.hidden_fraction, is_near=is_near
             )
             if fit is not None:
@@ -105,7 +105,7 @@ class NearSearch:
 
     def _follow_on(self, frame: Frame, free: Fit) -> Fit:
         """A free fit followed onto the model; as it was when nothing answers there."""
-        followed = self.follower.follow(frame, free.pose)
+        followed = self._follower.follow(frame, free.pose)
         return free if followed is None else replace(followed, n_rounds=followed.n_rounds + 1)
 
     def _fit(

@@ -33,7 +33,7 @@ def test_a_thing_is_found_anywhere_in_any_light(memory, shift, scale, gain) -> N
     assert best.likeness.relative > 0.54
 
 
-@pytest.mark.parametrize("hidden_share", [0.2, 0.4])
+@pytest.mark.parametrize("hidden_fraction", [0.2, 0.4])
 def test_the_whole_box_of_a_thing_that_is_hidden_in_part(memory, hidden_fraction: float) -> None:
     shift = (-40.0, 12.0)
     best = detect(memory, scene(shift, hidden_fraction=hidden_fraction, seed=7))[0]
