@@ -69,7 +69,7 @@ class Bone:
         path.write_text(json.dumps({"matrix": matrix.tolist()}), encoding="utf-8")
         return str(path)
 
-    def make_view_rotation(self, scale: float = 1.0) -> list[str]:
+    def seen_from(self, scale: float = 1.0) -> list[str]:
         return ["--camera", *(repr(float(value)) for value in scale * self.camera)]
 
     def tre(self, matrix: Any, scale: float = 1.0) -> float:
