@@ -53,7 +53,7 @@ def opening_s(eye: mss.MSS, width: int, height: int) -> float:
     return taken_s
 
 
-def _ratio_without_kernel(
+def _shown(
     measure: Callable[[mss.MSS, WindowDisplay], float],
 ) -> Callable[..., float]:
     """A measurement on a window that shows white."""
@@ -150,16 +150,16 @@ def _white(display: WindowDisplay) -> np.ndarray:
 
 _MEASUREMENTS: dict[str, Callable[[mss.MSS, int, int], float]] = {
     "`open` to black window": opening_s,
-    "`show`, the call": _ratio_without_kernel(calling_s),
-    "`show` to seen": _ratio_without_kernel(showing_s),
-    "`blank` to dark": _ratio_without_kernel(blanking_s),
-    "expiry to dark": _ratio_without_kernel(expiring_s),
+    "`show`, the call": _shown(calling_s),
+    "`show` to seen": _shown(showing_s),
+    "`blank` to dark": _shown(blanking_s),
+    "expiry to dark": _shown(expiring_s),
     "application killed (SIGKILL) to dark": _application_struck(signal.SIGKILL),
     "application stopped (SIGSTOP) to dark, picture valid for a minute": _application_struck(
         signal.SIGSTOP
     ),
-    "window's process killed to dark": _ratio_without_kernel(window_killed_s),
-    "window's process stopped to dark": _ratio_without_kernel(window_stopped_s),
+    "window's process killed to dark": _shown(window_killed_s),
+    "window's process stopped to dark": _shown(window_stopped_s),
 }
 
 
