@@ -4,7 +4,7 @@ Source: the paper's proposed system, section 3.2 and figure 2: the steps of `Bim
 its intra-operative stage. How they differ from it, and why, is told in docs/registration.md.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from navapp.geometry.rectification import Image
@@ -13,7 +13,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
-from navapp.tracking.frame import ignore
+from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
 from navapp.tracking.search.after_loss import SearchAfterLoss
@@ -103,26 +103,9 @@ class BimccTracker(TrackerBase):
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
 
-    def glance(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
-    ) -> tuple[TrackedFrame, TrackState]:
-        """Follow the bone into the next frame, lost or not, if it is near where it is expected.
-
-        Only the model itself is matched: that is soon done, and sees no more than some millimetres.
-        """
-        watch = Stopwatch()
-        left_from_bone = state.predict(captured_ns, self.centre_mm)
-        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
-        with self.check_beside(frame) as checks:
-            fits = self.near.find_rests(frame)
-            best = self.judge_fits(
-                frame, checks, fits, goal, frame.start,
-                is_enough=lambda verdict: not is_place_doubted(verdict),
-            )  # fmt: skip
-        best = with_cause(best, state.cause)
-        tracked, after = self.update(best, state, left, captured_ns, watch)
-        # A doubt that nothing was searched for puts off no search.
-        return tracked, replace(after, n_doubted=0)
+    def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
+        """Where the model itself rests next to the start; nothing is measured around it."""
+        return self.near.find_rests(frame)
 
     def register(
         self,

@@ -87,7 +87,7 @@ class Follower:
                 break
             moved_mm, pose = pose.mean_motion_mm(rested, model.hull_mm), rested
             if is_near:
-                fit = Fit(estimate, measured, n_rounds, moved_mm)
+                fit = Fit(estimate, measured, moved_mm)
             if moved_mm >= settings.settled_mm:
                 expected = None
             elif is_near:

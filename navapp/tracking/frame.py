@@ -57,13 +57,11 @@ class Fit:
     Attributes:
         estimate: of the pose.
         measured: the surface.
-        n_rounds: measurements and fits in turns that led to it.
-        moved_mm: how far the last of them moved the bone's surface.
+        moved_mm: how far the last round of measuring and fitting moved the bone's surface.
     """
 
     estimate: PoseEstimate
     measured: Measurement
-    n_rounds: int = 1
     moved_mm: float = float("inf")
 
     @property

@@ -4,7 +4,7 @@ Source: section 3.1, figure 1, algorithm 1 of the paper. Here it has our judge, 
 any of its poses; it is there to be compared with.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from navapp.geometry.rectification import Image, RectifiedPair
@@ -53,12 +53,15 @@ class IcpTracker(TrackerBase):
         if state.n_lost == 0:
             frame = self.begin(left, right, expected, watch, NEAR_VIEW)
             with self.check_beside(frame) as checks:
-                fits = self._find(frame, margins.tracking)
+                fits = [self._fit(frame, margins.tracking)]
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
         if best.verdict.status is Status.LOST:
             for place in self.boxes.starts(expected, box):
                 frame = self.begin(left, right, place, watch)
-                checks, fits = PairChecks(self.meter, frame.pair), self._find(frame, margins.search)
+                checks, fits = (
+                    PairChecks(self.meter, frame.pair),
+                    [self._fit(frame, margins.search)],
+                )
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
                 if best.verdict.status is Status.OK:
                     break
@@ -66,19 +69,9 @@ class IcpTracker(TrackerBase):
         best = with_cause(best, self.find_cause(left, right, left_from_bone, state, best))
         return self.update(best, state, left, captured_ns, watch)
 
-    def glance(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
-    ) -> tuple[TrackedFrame, TrackState]:
-        """Match and fit once where the bone is expected."""
-        watch = Stopwatch()
-        expected = state.predict(captured_ns, self.centre_mm)
-        frame = self.begin(left, right, expected, watch, NEAR_VIEW)
-        with self.check_beside(frame) as checks:
-            fits = self._find(frame, self.settings.near.tracking)
-            best = self.judge_fits(frame, checks, fits, goal, frame.start)
-        best = with_cause(best, state.cause)
-        tracked, after = self.update(best, state, left, captured_ns, watch)
-        return tracked, replace(after, n_doubted=0)
+    def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
+        """The one fit around the start."""
+        return [self._fit(frame, self.settings.near.tracking)]
 
     def register(
         self,
@@ -93,18 +86,17 @@ class IcpTracker(TrackerBase):
         if start is None:
             return []
         frame = self.begin(left, right, start, Stopwatch())
-        fit = next(self._find(frame, self.settings.near.search))
+        fit = self._fit(frame, self.settings.near.search)
         if fit is None or len(fit.measured.cloud) == 0:
             return [self.judge.lost(Reason.NO_SURFACE, frame.watch)]
         return [self.judge.judge(frame, PairChecks(self.meter, frame.pair), fit, goal)]
 
-    def _find(self, frame: Frame, margins: Margins) -> Iterator[Fit | None]:
+    def _fit(self, frame: Frame, margins: Margins) -> Fit | None:
         """The fit to what is matched around the start (equation 1); None out of view."""
         measured = self.meter.measure_freely(frame.pair, frame.start, margins, match_gradients)
         frame.watch.lap("stereo")
         if measured is None:
-            yield None
-            return
+            return None
         estimate = fit_icp(measured.scene, self.model, frame.start)
         frame.watch.lap("estimate")
-        yield Fit(estimate, measured)
+        return Fit(estimate, measured)

@@ -14,7 +14,7 @@ from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import NOISE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
-from navapp.tracking.verdict import OK_ERROR_MM, Evidence, Goal, decide
+from navapp.tracking.verdict import OK_ERROR_MM, UNUSABLE_FRACTION, Evidence, Goal, decide
 from navapp.values import (
     PoseEstimate,
     Reason,
@@ -32,8 +32,6 @@ _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
 # About so many targets are used for the predicted error; for time alone.
 _MOST_TARGETS = 200
-# Light is told from pixels first: a dark or clipped picture has no detail either.
-_UNUSABLE_FRACTION = 0.7
 
 
 class PoseJudge:
@@ -107,8 +105,9 @@ class PoseJudge:
         both = (health.left, health.right)
         dark = max(one.dark_fraction for one in both)
         saturated = max(one.saturated_fraction for one in both)
+        # Light is told first: a dark or clipped picture has no detail either.
         detail_ratio = 0.0
-        if max(dark, saturated) <= _UNUSABLE_FRACTION:
+        if max(dark, saturated) <= UNUSABLE_FRACTION:
             least, most = sorted(one.detail for one in both)
             detail_ratio = most / least if least > 0.0 else math.inf if most > 0.0 else 0.0
         # Rows tell of turns about the line between the cameras, and those alone cost little. But

@@ -1,6 +1,8 @@
 """What every tracker does: find one bone in pairs of pictures, and follow it."""
 
 import math
+import operator
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
@@ -19,7 +21,7 @@ from navapp.tracking.motion import TrackState
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import NearSettings
 from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
-from navapp.tracking.verdict import Goal
+from navapp.tracking.verdict import Goal, is_place_doubted, with_cause
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 
 Method = Literal["bimcc", "icp"]
@@ -93,7 +95,7 @@ class Tracker(Protocol):
         ...
 
 
-class TrackerBase:
+class TrackerBase(ABC):
     """What trackers share: pictures around an expected bone, judged fits, and the bone's box.
 
     Attributes:
@@ -127,6 +129,31 @@ class TrackerBase:
     def centre_mm(self) -> FloatArray:
         """(3,) mean of the model's vertices, in bone coordinates."""
         return self.model.centre_mm
+
+    @abstractmethod
+    def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
+        """The fits that are soon found near the start of a frame."""
+
+    def glance(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame, lost or not, if it is near where it is expected.
+
+        It takes a frame's time or two, and sees no further than some millimetres.
+        """
+        watch = Stopwatch()
+        left_from_bone = state.predict(captured_ns, self.centre_mm)
+        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
+        with self.check_beside(frame) as checks:
+            fits = self.find_for_glance(frame)
+            best = self.judge_fits(
+                frame, checks, fits, goal, frame.start,
+                is_enough=lambda verdict: not is_place_doubted(verdict),
+            )  # fmt: skip
+        best = with_cause(best, state.cause)
+        tracked, after = self.update(best, state, left, captured_ns, watch)
+        # A doubt that nothing was searched for puts off no search.
+        return tracked, replace(after, n_doubted=0)
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
@@ -193,10 +220,10 @@ class TrackerBase:
             keeps_first: of equal answers the first stands; by default the last, which knows more.
             is_enough: no further fit is asked for.
         """
+        is_better = operator.lt if keeps_first else operator.le
         for fit in fits:
             answer = self.judge.judge(frame, checks, fit, goal, predicted)
-            orders = () if best is None else (answer.verdict.order, best.verdict.order)
-            if not orders or orders[0] < orders[1] or (orders[0] == orders[1] and not keeps_first):
+            if best is None or is_better(answer.verdict.order, best.verdict.order):
                 best = answer
             if is_enough(answer.verdict):
                 break

@@ -16,6 +16,8 @@ from navapp.values import PoseEstimate, Reason, Status, TrackedFrame, Verdict
 # What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
 OK_ERROR_MM = 0.5
 CHOSEN = "chosen"
+# A bone fills half of its box and more; what lies around it may be black.
+UNUSABLE_FRACTION = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,9 +165,9 @@ _RESIDUALS = "chosen; noise by tests.bench.correlated_residuals"
 # In the order in which reasons are told: what is wrong with the pair first, as the cause.
 RULES = (
     Rule(Reason.PICTURE_DARK, "pixels too dark for texture",
-         lambda e: e.dark_fraction, 0.7, None, CHOSEN),
+         lambda e: e.dark_fraction, UNUSABLE_FRACTION, None, CHOSEN),
     Rule(Reason.PICTURE_OVEREXPOSED, "pixels that the sensor clipped",
-         lambda e: e.saturated_fraction, 0.7, None, CHOSEN),
+         lambda e: e.saturated_fraction, UNUSABLE_FRACTION, None, CHOSEN),
     Rule(Reason.PICTURES_UNLIKE, "detail of one picture over the other's",
          lambda e: e.detail_ratio, 2.0, None, CHOSEN),
     Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",

@@ -24,7 +24,7 @@ def test_a_near_pose_comes_to_rest_where_the_bone_is(start: RigidTransform) -> N
     meter = FakeMeter()
     fit = follower(meter).follow(frame_at(start), start)
     assert error_mm(fit.pose) < 0.05
-    assert fit.n_rounds == len(meter.asked) <= RestSettings().max_rounds
+    assert len(meter.asked) <= RestSettings().max_rounds
     assert fit.moved_mm < RestSettings().settled_mm
     assert set(meter.margins) == {MARGINS}
 
@@ -43,7 +43,7 @@ def test_at_rest_the_model_is_rendered_once() -> None:
     fit = follower(meter).follow(frame_at(TRUE), TRUE)
     assert meter.asked == ["sampled", "on_model"]
     assert meter.n_rendered == 1
-    assert fit.n_rounds == 2
+    assert fit.moved_mm < RestSettings().settled_mm
 
 
 def test_after_a_move_the_model_is_rendered_again() -> None:
@@ -57,7 +57,8 @@ def test_it_never_takes_more_rounds_than_allowed(max_rounds: int) -> None:
     meter = FakeMeter()
     settings = RestSettings(max_sampled=1, max_rounds=max_rounds, settled_mm=0.0)
     fit = follower(meter, settings).follow(frame_at(TRUE), TRUE)
-    assert fit.n_rounds == len(meter.asked) == max_rounds
+    assert fit is not None
+    assert len(meter.asked) == max_rounds
     assert meter.n_rendered == max_rounds
 
 
@@ -107,7 +108,7 @@ def test_a_matching_without_points_does_not_replace_a_fit(
     if blind_after == "sampled":
         assert fit is None
         return
-    assert fit.n_rounds == 2
+    assert len(fit.measured.cloud) > 10
     assert not fit.estimate.reasons
     assert error_mm(fit.pose) < 0.1
 

@@ -1,6 +1,7 @@
 """What is said of poses of which the truth is known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from navapp.registration import RegistrationModel, estimate_at, fit_bimcc
 from navapp.tracking import Goal
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.frame import FREE_FIT
+from navapp.tracking.judging import PoseJudge
 from navapp.tracking.verdict import OK_ERROR_MM
 from navapp.values import (
     BoneModel,
@@ -18,11 +20,12 @@ from navapp.values import (
     PoseEstimate,
     Reason,
     Status,
+    Stopwatch,
     Verdict,
 )
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.registration.shapes import GEOMETRY, TRUE, disturbed
-from tests.tracking.judged import BONE, MAP, MODEL, NO_TARGETS, judged, scene_of
+from tests.tracking.judged import BONE, MAP, MODEL, NO_TARGETS, SurfaceAlone, judged, scene_of
 from tests.tracking.rooms import measured_map
 
 
@@ -123,6 +126,16 @@ def test_a_rig_that_was_not_accepted_is_told_of_lost_poses_too() -> None:
     lost, given = verdict_on(wrong), verdict_on(wrong, is_accepted=False)
     assert lost.status is given.status is Status.LOST
     assert set(given.reasons) == {*lost.reasons, Reason.RIG_NOT_ACCEPTED}
+    loose = replace(estimate_on(), covariance=np.full((6, 6), np.inf))
+    told = judged(loose, quality=RigQuality(False, ("too few pictures",))).verdict
+    assert told.reasons == (Reason.DEGENERATE, Reason.RIG_NOT_ACCEPTED)
+    judge = PoseJudge(
+        SimpleNamespace(model=MODEL, geometry=GEOMETRY),
+        RigQuality(False, ("too few pictures",)),
+        SurfaceAlone(),
+    )
+    nothing = judge.lost(Reason.OUT_OF_VIEW, Stopwatch()).verdict
+    assert nothing.reasons == (Reason.OUT_OF_VIEW, Reason.RIG_NOT_ACCEPTED)
 
 
 def test_the_bound_is_held_against_the_stages_tolerance() -> None:

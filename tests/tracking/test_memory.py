@@ -1,11 +1,13 @@
 """A bone that is followed for long; tests/bench/memory.py does it for longer."""
 
+import gc
 import tracemalloc
+import weakref
 
 import numpy as np
 import pytest
 
-from navapp.tracking import TrackState
+from navapp.tracking import TrackState, make_tracker
 from tests.bench.memory import growth_of
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -38,6 +40,22 @@ def test_nothing_is_kept_of_the_frames_that_have_passed() -> None:
     finally:
         tracemalloc.stop()
     assert after - before < LARGEST_GROWTH_BYTES_PER_FRAME * N_MORE
+
+
+def test_a_tracker_that_nobody_needs_is_gone_at_once() -> None:
+    """A model and the maps of a rectifier are large; a session makes its trackers anew."""
+    a = room()
+    frame = a.frames[0]
+    gc.collect()
+    gc.disable()
+    try:
+        tracker = make_tracker(a.rig, a.tracker.model.bone)
+        tracker.track(frame.left, frame.right, 0, TrackState.at_rest(a.truth(frame), 0), GOAL)
+        meter = weakref.ref(tracker.meter)
+        del tracker
+        assert meter() is None
+    finally:
+        gc.enable()
 
 
 def test_growth_is_the_slope_after_the_first_tenth() -> None:

@@ -83,7 +83,10 @@ class NearSearch:
         if measured is None:
             return None
         far = self._follow_on(frame, self._fit(frame, measured, frame.start, FREE_FIT))
-        if far.n_rounds > 1 and far.measured.answered_fraction >= self.settings.near_fraction:
+        if (
+            far.measured.view is not None
+            and far.measured.answered_fraction >= self.settings.near_fraction
+        ):
             return far
         return max(far, self.settle(frame, measured, frame.start), key=self._score)
 
@@ -105,8 +108,7 @@ class NearSearch:
 
     def _follow_on(self, frame: Frame, free: Fit) -> Fit:
         """A free fit followed onto the model; as it was when nothing answers there."""
-        followed = self._follower.follow(frame, free.pose)
-        return free if followed is None else replace(followed, n_rounds=followed.n_rounds + 1)
+        return self._follower.follow(frame, free.pose) or free
 
     def _fit(
         self, frame: Frame, measured: Measurement, start: RigidTransform, settings: BimccSettings
