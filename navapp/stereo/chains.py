@@ -1,6 +1,5 @@
 """The stereo chains: match, then fill what one camera cannot see."""
 
-import time
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,7 +16,7 @@ from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface
 from navapp.stereo.subpixel.refine import refine_on_model, without_specks
 from navapp.stereo.subpixel.refine_scene import refine_scene
-from navapp.values import DisparityMap, FrameTimings
+from navapp.values import DisparityMap, FrameTimings, Stopwatch
 
 Smoothing = Literal["none", "gaussian", "wls"]
 
@@ -61,15 +60,15 @@ def match_scene(
         fills: weighted least squares fill, in the paper's directions.
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
     """
-    started = time.perf_counter_ns()
+    watch = Stopwatch()
     pair = clip_box(pair)
     found = match_census(pair, band_px, _settings_for(band_px))
     if not found.agreement >= LEAST_AGREEMENT:
-        return _nothing(pair, _why(found.agreement), started)
+        return _nothing(pair, _why(found.agreement), watch)
     left = refine_scene(pair, found.left)
     evidence = Evidence(found.right_px, found.right_x0, found.confidence)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
-    return _answer(pair, left, evidence, fill, started)
+    return _answer(pair, left, evidence, fill, watch)
 
 
 def match_surface(
@@ -84,14 +83,14 @@ def match_surface(
     Census and semi-global matching, at half resolution where that leaves enough of the picture,
     tell where; `refine_surface` measures. Arguments as for `match_scene`.
     """
-    started = time.perf_counter_ns()
+    watch = Stopwatch()
     pair = clip_box(pair)
     coarse = coarse_surface(pair, band_px)
     if not coarse.agreement >= LEAST_AGREEMENT:
-        return _nothing(pair, _why(coarse.agreement), started)
+        return _nothing(pair, _why(coarse.agreement), watch)
     left = refine_surface(pair, coarse.surface_px)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
-    return _answer(pair, left, coarse.evidence, fill, started)
+    return _answer(pair, left, coarse.evidence, fill, watch)
 
 
 def match_on_support(
@@ -109,31 +108,33 @@ def match_on_support(
         fills: from what was measured, never from the support.
         max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
     """
-    started = time.perf_counter_ns()
+    watch = Stopwatch()
     left = refine_on_model(pair, support_px)
     if np.isfinite(support_px).any() and not (left.origin > 0).any():
-        return _nothing(pair, _NOT_CONFIRMED, started)
+        return _nothing(pair, _NOT_CONFIRMED, watch)
     if not fills:
-        return StereoAnswer(left, left, (), FrameTimings(stereo_ms=_ms(started)))
+        watch.lap("stereo")
+        return StereoAnswer(left, left, (), watch.timings)
     # What the right camera sees of the support is all that is known of its view.
     right_px = project_to_right(support_px, left.x, pair.geometry.width)
     evidence = Evidence(right_px, 0, _by_sigma(left))
     fill = FillSettings(max_gap_px=max_gap_px)
-    return _answer(pair, left, evidence, fill, started, np.isfinite(support_px))
+    return _answer(pair, left, evidence, fill, watch, np.isfinite(support_px))
 
 
 def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoAnswer:
     """The paper's state of the art: gradient magnitudes, winner takes all, Gaussian; no fill."""
-    started = time.perf_counter_ns()
+    watch = Stopwatch()
     pair = clip_box(pair)
     matched = match_gradient(pair, band_px)
     # Matches of chance stand alone.
     in_patches = without_specks(matched).matched_fraction
     if matched.matched_fraction == 0.0:
-        return _nothing(pair, _NO_CONTRAST, started)
+        return _nothing(pair, _NO_CONTRAST, watch)
     if in_patches < _LEAST_IN_PATCHES * matched.matched_fraction:
-        return _nothing(pair, _DISAGREEMENT, started)
-    return StereoAnswer(matched, matched, (), FrameTimings(stereo_ms=_ms(started)))
+        return _nothing(pair, _DISAGREEMENT, watch)
+    watch.lap("stereo")
+    return StereoAnswer(matched, matched, (), watch.timings)
 
 
 def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) -> StereoAnswer:
@@ -145,8 +146,7 @@ def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) ->
         smoothing: "gaussian" is the paper's noise filter and moves every pixel; "wls" keeps matched
             pixels within their sigma; "none" changes nothing.
     """
-    started = time.perf_counter_ns()
-    before = answer.disparity
+    before, watch = answer.disparity, Stopwatch()
     if smoothing == "none":
         return answer
     if smoothing == "wls":
@@ -154,9 +154,9 @@ def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) ->
     else:
         smooth_px = smooth_known(before.disparity_px, GradientSettings().gaussian_sigma_px)
         after = replace(before, disparity_px=smooth_px)
-    timings = answer.timings
-    timings = replace(timings, fill_ms=timings.fill_ms + _ms(started))
-    return replace(answer, disparity=after, timings=timings)
+    watch.lap("fill")
+    fill_ms = answer.timings.fill_ms + watch.timings.fill_ms
+    return replace(answer, disparity=after, timings=replace(answer.timings, fill_ms=fill_ms))
 
 
 def _answer(
@@ -164,20 +164,20 @@ def _answer(
     left: DisparityMap,
     evidence: Evidence,
     fill: FillSettings | None,
-    started_ns: int,
+    watch: Stopwatch,
     is_expected: NDArray[np.bool_] | None = None,
 ) -> StereoAnswer:
     """The answer, its occlusions filled where that is wanted and a surface is expected."""
-    timings = FrameTimings(stereo_ms=_ms(started_ns))
+    watch.lap("stereo")
     if fill is None:
-        return StereoAnswer(left, left, (), timings)
-    started_ns = time.perf_counter_ns()
+        return StereoAnswer(left, left, (), watch.timings)
     picture = _box_of(pair)
     classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width, picture)
     if is_expected is not None:
         classes[~is_expected] = 0
     filled = fill_wls(left, picture, evidence.confidence, classes, fill)
-    return StereoAnswer(filled, left, (), replace(timings, fill_ms=_ms(started_ns)))
+    watch.lap("fill")
+    return StereoAnswer(filled, left, (), watch.timings)
 
 
 def _by_sigma(left: DisparityMap) -> NDArray[np.float32]:
@@ -197,18 +197,15 @@ def _why(agreement: float) -> str:
     return _NO_CONTRAST if np.isnan(agreement) else _DISAGREEMENT
 
 
-def _nothing(pair: RectifiedPair, why: str, started_ns: int) -> StereoAnswer:
+def _nothing(pair: RectifiedPair, why: str, watch: Stopwatch) -> StereoAnswer:
     """An empty map, and the reason."""
     box = pair.box
     unknown = np.full((box.height, box.width), np.nan, dtype=np.float32)
     nothing = DisparityMap(unknown, unknown, np.zeros(unknown.shape, np.uint8), box.x, box.y)
-    return StereoAnswer(nothing, nothing, (why,), FrameTimings(stereo_ms=_ms(started_ns)))
+    watch.lap("stereo")
+    return StereoAnswer(nothing, nothing, (why,), watch.timings)
 
 
 def _box_of(pair: RectifiedPair) -> NDArray[np.uint8]:
     box = pair.box
     return pair.left[box.y : box.y + box.height, box.x : box.x + box.width]
-
-
-def _ms(started_ns: int) -> float:
-    return (time.perf_counter_ns() - started_ns) / 1e6
