@@ -5,8 +5,6 @@ instrument, tissue. Nothing that is opaque can be seen behind it. Where the scen
 the model, the pose is wrong, however well the rest fits.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +13,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.model import RegistrationModel
+from navapp.registration.verdict import NO_AGREEMENT, Agreement
 from navapp.tracking.agreement_kernels import (
     COARSELY_FURTHER,
     COARSELY_NEARER,
@@ -36,41 +35,6 @@ _FIT_SIGMAS = 3.0
 _MAD_TO_SIGMA = 1.4826
 # Errors of neighbours go together: the spread is as well known from every second pixel each way.
 _SPREAD_STRIDE_PX = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """Comparison of the rendered model with what was measured.
-
-    Attributes:
-        n_visible: model pixels in the box.
-        coverage: share of them that was measured and agrees.
-        hidden_fraction: share of them that something nearer hides.
-        behind_fraction: share of them through which the scene is seen.
-        inlier_fraction: share of the measured ones that agrees; hidden ones do not count.
-        spread_ratio: spread of the differences over the sigma that they claim; 0 when none is
-            measured.
-    """
-
-    n_visible: int
-    coverage: float
-    hidden_fraction: float
-    behind_fraction: float
-    inlier_fraction: float
-    spread_ratio: float
-
-    @property
-    def open_coverage(self) -> float:
-        """Share of what nothing hides that was measured and agrees."""
-        return self.coverage / max(1.0 - self.hidden_fraction, 1e-9)
-
-    @property
-    def lies_open(self) -> bool:
-        """More of the bone is seen where it should be than something hides."""
-        return self.coverage > self.hidden_fraction
-
-
-NO_AGREEMENT = Agreement(0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def compare(

@@ -10,6 +10,7 @@ from dataclasses import replace
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
+from navapp.registration.verdict import Goal, is_place_doubted, is_worth_a_search, with_cause
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
@@ -22,7 +23,6 @@ from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.surface_meter import NEAR_VIEW
 from navapp.tracking.tracker import TrackerBase, TrackerSettings
-from navapp.tracking.verdict import Goal, is_place_doubted, is_worth_a_search, with_cause
 from navapp.values import (
     AspectGraph,
     BoneModel,

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import Job, begin_beside
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
+from navapp.registration.verdict import Agreement
 from navapp.stereo import StereoHealth, measure_health
-from navapp.tracking.agreement import Agreement, compare
+from navapp.tracking.agreement import compare
 from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import distinct, make_scattered_starts, make_tilted_starts
+from navapp.registration.verdict import Goal, with_cause
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import select_poses
 from navapp.tracking.surface_meter import Measurement
-from navapp.tracking.verdict import Goal, with_cause
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
 
 if TYPE_CHECKING:

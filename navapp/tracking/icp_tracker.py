@@ -10,13 +10,13 @@ from dataclasses import replace
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.registration import fit_icp
+from navapp.registration.verdict import Goal, with_cause
 from navapp.stereo import match_baseline
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import NEAR_VIEW, Margins
 from navapp.tracking.tracker import TrackerBase, TrackerSettings
-from navapp.tracking.verdict import Goal, with_cause
 from navapp.values import BoneModel, DisparityMap, Prior, Reason, Status, Stopwatch, TrackedFrame
 
 

@@ -8,13 +8,20 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration.verdict import (
+    OK_ERROR_MM,
+    UNUSABLE_FRACTION,
+    Agreement,
+    Evidence,
+    Goal,
+    decide,
+)
 from navapp.stereo import StereoHealth
-from navapp.tracking.agreement import Agreement, compare_at
+from navapp.tracking.agreement import compare_at
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import NOISE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
-from navapp.tracking.verdict import OK_ERROR_MM, UNUSABLE_FRACTION, Evidence, Goal, decide
 from navapp.values import (
     PoseEstimate,
     Reason,

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.registration.verdict import is_place_doubted, is_worth_a_search
 from navapp.tracking.box.tracker import BoxState
-from navapp.tracking.verdict import is_place_doubted, is_worth_a_search
 from navapp.values import Reason, Status, TrackedFrame
 
 # A patient's limb slows down: the prediction takes this part of the last velocity.

@@ -7,10 +7,10 @@ import numpy as np
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Candidate, RegistrationModel, find_candidates, is_same_pose
+from navapp.registration.verdict import is_elsewhere
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.frame import Fit, ignore
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
-from navapp.tracking.verdict import is_elsewhere
 from navapp.values import Reason
 
 # A different pose that explains as much as this of the best one makes that one a guess; chosen.

@@ -12,6 +12,7 @@ from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, estimate_at
+from navapp.registration.verdict import Goal, is_place_doubted, with_cause
 from navapp.tracking.box.tracker import BoxTracker
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
@@ -21,7 +22,6 @@ from navapp.tracking.motion import TrackState
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import NearSettings
 from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
-from navapp.tracking.verdict import Goal, is_place_doubted, with_cause
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 
 Method = Literal["bimcc", "icp"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from navapp.evaluation import compute_mean_tre_mm
+from navapp.registration.verdict import OK_ERROR_MM
 from navapp.tracking import TrackState, make_tracker
-from navapp.tracking.verdict import OK_ERROR_MM
 from navapp.values import BoneModel, Prior, Reason, Status, TrackedFrame
 from tests.bench.cartilage import (
     GOAL,

@@ -15,8 +15,8 @@ import numpy as np
 
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
+from navapp.registration.verdict import Evidence, decide
 from navapp.tracking.frame import NOISE_RATIO
-from navapp.tracking.verdict import Evidence, decide
 from navapp.values import BoneModel, Reason
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel

@@ -8,9 +8,9 @@ import numpy as np
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel, Scene
+from navapp.registration.verdict import Agreement
 from navapp.stereo import PictureHealth, StereoHealth
 from navapp.tracking import Goal
-from navapp.tracking.agreement import Agreement
 from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.judging import PoseJudge

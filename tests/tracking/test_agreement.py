@@ -7,7 +7,8 @@ import pytest
 
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration import RegistrationModel
-from navapp.tracking.agreement import Agreement, compare
+from navapp.registration.verdict import Agreement
+from navapp.tracking.agreement import compare
 from navapp.tracking.agreement_kernels import (
     AGREES,
     COARSELY_FURTHER,

@@ -8,11 +8,11 @@ import pytest
 
 from navapp.geometry.rig import RigQuality
 from navapp.registration import RegistrationModel, estimate_at, fit_bimcc
+from navapp.registration.verdict import OK_ERROR_MM
 from navapp.tracking import Goal
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.frame import FREE_FIT
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.verdict import OK_ERROR_MM
 from navapp.values import (
     BoneModel,
     DisparityMap,

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.registration.verdict import is_worth_a_search, with_cause
 from navapp.tracking import TrackState
 from navapp.tracking.box.picture_box import PictureBox
 from navapp.tracking.box.tracker import BoxState
-from navapp.tracking.verdict import is_worth_a_search, with_cause
 from navapp.values import (
     FrameTimings,
     PoseEstimate,

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from navapp.geometry.transform import FloatArray
-from navapp.tracking.agreement import Agreement
 from navapp.values import PoseEstimate, Reason, Status, TrackedFrame, Verdict
 
 # What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
@@ -18,6 +17,41 @@ OK_ERROR_MM = 0.5
 CHOSEN = "chosen"
 # A bone fills half of its box and more; what lies around it may be black.
 UNUSABLE_FRACTION = 0.7
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Comparison of the rendered model with what was measured.
+
+    Attributes:
+        n_visible: model pixels in the box.
+        coverage: share of them that was measured and agrees.
+        hidden_fraction: share of them that something nearer hides.
+        behind_fraction: share of them through which the scene is seen.
+        inlier_fraction: share of the measured ones that agrees; hidden ones do not count.
+        spread_ratio: spread of the differences over the sigma that they claim; 0 when none is
+            measured.
+    """
+
+    n_visible: int
+    coverage: float
+    hidden_fraction: float
+    behind_fraction: float
+    inlier_fraction: float
+    spread_ratio: float
+
+    @property
+    def open_coverage(self) -> float:
+        """Share of what nothing hides that was measured and agrees."""
+        return self.coverage / max(1.0 - self.hidden_fraction, 1e-9)
+
+    @property
+    def lies_open(self) -> bool:
+        """More of the bone is seen where it should be than something hides."""
+        return self.coverage > self.hidden_fraction
+
+
+NO_AGREEMENT = Agreement(0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import Goal
-from navapp.tracking.agreement import Agreement
-from navapp.tracking.verdict import (
+from navapp.registration.verdict import (
     OK_ERROR_MM,
     RULES,
+    Agreement,
     Evidence,
     Rule,
     decide,
@@ -20,6 +19,7 @@ from navapp.tracking.verdict import (
     is_place_doubted,
     with_cause,
 )
+from navapp.tracking import Goal
 from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 from navapp.values.verdicts import CAUSES
 
