@@ -85,7 +85,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if content["status"] == "CONVERGED":
         return 0
     raise ResultError(
-        f"the registration is {content['status']}: {'; '.join(answer.reasons)}",
+        f"the registration is {content['status']}: {'; '.join(answer.explanations)}",
         remedy=_remedy(has_pose, options),
     )
 
@@ -139,7 +139,7 @@ def _content(
         "units": {"length": options.units, "angle": "deg"},
         "scene_from_model": pose.to_list() if has_pose else None,
         "status": answer.outcome.value,
-        "reasons": list(answer.reasons),
+        "reasons": list(answer.explanations),
         "iterations": estimate.iterations,
         "rms": work.length(estimate.rms_mm),
         "inlier_share": n_fit / len(work.scene),

@@ -10,8 +10,12 @@ from navapp.registration.multi_start import (
     distinct,
     find_candidates,
     is_same_pose,
+    make_far_starts,
+    make_near_starts,
     make_scattered_starts,
     make_tilted_starts,
+    rank_fits,
+    select_poses,
 )
 from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
 from navapp.registration.pose_sampler import PoseSampler
@@ -38,7 +42,11 @@ __all__ = [
     "fit_icp",
     "fit_pose",
     "is_same_pose",
+    "make_far_starts",
+    "make_near_starts",
     "make_scattered_starts",
     "make_tilted_starts",
+    "rank_fits",
     "register",
+    "select_poses",
 ]

@@ -4,7 +4,7 @@ From far, thinned points pair both ways and the kernel narrows; at rest, all poi
 under a kernel as narrow as the noise (equations in docs/registration.md).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -82,6 +82,10 @@ class Solution:
     sigma_mm: float
     points_mm: FloatArray
     residual_mm: FloatArray
+
+    def with_reason(self, reason: Reason) -> "Solution":
+        """The same solution with one more reason against its pose."""
+        return replace(self, estimate=self.estimate.with_reason(reason))
 
 
 def fit_bimcc(

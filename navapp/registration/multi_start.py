@@ -1,7 +1,8 @@
-"""Many starts, one answer: tilted starts, coarse approaches, distinct candidates, agreement."""
+"""Many starts, one answer: starts, coarse approaches, distinct candidates, their ranking."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -14,11 +15,19 @@ from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
 from navapp.registration.scene import Scene
 from navapp.registration.step_kernels import weigh
+from navapp.values import PoseEstimate, Reason
 
+# All chosen; the starts for rough poses 15 deg and 20 mm off (tests.bench.registration).
 # Poses nearer than this are the same answer.
-_SAME_MM = 2.0
-_SAME_DEG = 2.0
+_SAME_MM, _SAME_DEG = 2.0, 2.0
 _COARSE_POINTS = 400
+# Tilts (deg, how many) of a rough pose, nearby; then also of what it becomes when shifted.
+_NEAR_TILTS, _FAR_TILTS = (15.0, 12), ((15.0, 12), (28.0, 20))
+_FAR_SHIFT_MM = 8.0
+# So many candidates are refined, of those that explain so much of what the best does.
+_N_REFINED, _REFINED_FRACTION = 3, 0.5
+# A different pose that explains as much as this of the best one makes that one a guess.
+AMBIGUOUS_FRACTION = 0.9
 # For starts that are near, or may be anywhere.
 NEAR = BimccSettings(model_points=1000, max_iterations=35)
 ANYWHERE = BimccSettings(model_points=1000, max_iterations=60, widest_mm=30.0)
@@ -32,8 +41,34 @@ class Candidate:
     score: float
 
 
+class RankedFit(Protocol):
+    """A fit of a candidate."""
+
+    @property
+    def estimate(self) -> PoseEstimate:
+        """Of the pose."""
+        ...
+
+    def with_reason(self, reason: Reason) -> Self:
+        """The same fit with one more reason against it."""
+        ...
+
+
+AnyFit = TypeVar("AnyFit", bound=RankedFit)
+
+
+def make_near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """A rough pose, and tilts of it about a place (3,) in the scene's frame: tried first."""
+    return make_tilted_starts(rough, centre_mm, *_NEAR_TILTS)
+
+
+def make_far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+    """Tilts of a rough pose, and of what it becomes when shifted: tried when the near ones fail."""
+    return make_scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)
+
+
 def make_tilted_starts(
-    pose: RigidTransform, centre_mm: FloatArray, tilt_deg: float = 35.0, n_tilts: int = 14
+    pose: RigidTransform, centre_mm: FloatArray, tilt_deg: float, n_tilts: int
 ) -> list[RigidTransform]:
     """The pose and tilts of it, axes spread over the sphere.
 
@@ -117,14 +152,13 @@ def compute_explained_fraction(
     scene: Scene,
     model: RegistrationModel,
     scene_from_bone: RigidTransform,
-    settings: BimccSettings | None = None,
 ) -> float:
     """How much a pose explains: share of the scene on the model x share of the model in the scene.
 
     Both under a kernel as wide as the largest noise, so that poses compare. Without a camera the
     second is left out.
     """
-    settings = settings or BimccSettings()
+    settings = BimccSettings()
     sigma_mm = 0.5 * settings.widest_at_rest_mm
     rotation, shift = scene_from_bone.inverse_parts()
     arrays = scene.arrays
@@ -138,6 +172,38 @@ def compute_explained_fraction(
     if scene.camera_mm is None:
         return share
     return share * coverage(scene, model, scene_from_bone, sigma_mm)
+
+
+def select_poses(candidates: Sequence[Candidate], most: int = _N_REFINED) -> list[RigidTransform]:
+    """Of candidates, best first, the poses that are worth a fit on all points."""
+    least = _REFINED_FRACTION * max((one.score for one in candidates), default=0.0)
+    return [one.scene_from_bone for one in candidates[:most] if one.score >= least]
+
+
+def rank_fits(
+    fits: Sequence[AnyFit], scores: Sequence[float], centre_mm: FloatArray
+) -> list[AnyFit]:
+    """Fits of different candidates, best first; the best says so when it is a guess.
+
+    It is one when a different pose explains as much. Along a free direction every pose does: that
+    is said already.
+
+    Args:
+        fits: of the candidates.
+        scores: how much each explains.
+        centre_mm: (3,) of the model, in the bone's frame.
+    """
+    order = sorted(range(len(fits)), key=lambda k: -scores[k])
+    ranked = [fits[k] for k in order]
+    if not ranked or scores[order[0]] <= 0.0:
+        return ranked
+    best = ranked[0].estimate
+    is_guess = Reason.DEGENERATE not in best.reasons and any(
+        scores[k] >= AMBIGUOUS_FRACTION * scores[order[0]]
+        and not is_same_pose(best.camera_from_bone, fits[k].estimate.camera_from_bone, centre_mm)
+        for k in order[1:]
+    )
+    return [ranked[0].with_reason(Reason.AMBIGUOUS), *ranked[1:]] if is_guess else ranked
 
 
 def distinct(

@@ -8,13 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration.bimcc import (
-    MIN_POINTS,
-    BimccSettings,
-    Solution,
-    solve_bimcc,
-)
+from navapp.geometry.transform import RigidTransform
+from navapp.registration.bimcc import MIN_POINTS, BimccSettings, Solution, solve_bimcc
 from navapp.registration.coverage import coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
@@ -22,39 +17,31 @@ from navapp.registration.multi_start import (
     NEAR,
     compute_explained_fraction,
     find_candidates,
-    is_same_pose,
+    make_far_starts,
+    make_near_starts,
     make_tilted_starts,
+    rank_fits,
+    select_poses,
 )
 from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.scene import Scene
+from navapp.registration.verdict import Agreement, Evidence, Goal, find_reasons
 from navapp.values import PoseEstimate, Reason
 
 Method = Literal["bimcc", "bimcc-literal", "icp"]
 
-# With a camera; a bone that lies open is covered better than this.
+# All chosen. An answer of which less was seen is tried from other starts: with a camera a bone that
+# lies open is covered better.
 _DOUBTFUL_COVERAGE = 0.85
-_LEAST_COVERAGE = 0.25
-# A kernel this near to its upper bound never found the noise: residuals are something else.
-_MISFIT_SHARE = 0.95
 # What residuals have in common some millimetres apart is no noise but another shape; a coarse model
 # leaves some of that itself.
 _SMOOTH_MM, _SMOOTH_SPACINGS = 0.2, 0.05
-_CELL_MM = 3.0
-_APART_CELLS = (0.8, 1.6)
-# A pose that is no better known than this is not known.
-_LARGEST_TRE_MM = 2.0
-_N_TRE_POINTS = 200
-# No bone is smaller; below it everything lies under one kernel and fits.
-_SMALLEST_MM = 5.0
-# Residuals so much larger than the points' own sigma lets expect are no noise either.
-_MISFIT_RATIO = 1.5
-_N_REFINED = 3
-# Tilts that leave no orientation far from a start.
-_RINGS_DEG = (35.0, 70.0, 105.0, 140.0, 175.0)
-# Candidates that explain less than this share of the best are not refined ...
-_REFINED_SHARE = 0.6
-# ... and a different one that explains as much as this makes the best one a guess.
-_AMBIGUOUS_SHARE = 0.9
+_CELL_MM, _APART_CELLS = 3.0, (0.8, 1.6)
+# A pose that is no better known than this is not known; no stage asks for more.
+_GOAL = Goal(np.empty((0, 3)), tolerance_mm=np.inf, seen_mm=2.0)
+_LEAST_FACING_COSINE, _N_TRE_POINTS = 0.2, 200
+# Tilts that leave no orientation far from a start: angles, and how many of each.
+_RINGS_DEG, _N_RING_TILTS = (35.0, 70.0, 105.0, 140.0, 175.0), 14
 
 
 class Outcome(Enum):
@@ -71,9 +58,10 @@ class Registration:
 
     Attributes:
         outcome: only CONVERGED is a registration.
-        reasons: why it is not, in words for people.
+        reasons: why it is not.
+        details: which directions are not fixed, and what is too small, in words for people.
         estimate: the pose, `scene_from_bone`.
-        coverage: share of the model facing the camera that has the scene's surface on it; None
+        coverage: fraction of the model facing the camera that has the scene's surface on it; None
             without a camera.
         predicted_tre_mm: 95 % bound of the mean error over the points that face the camera; None
             when a direction is not fixed at all or no point faces the camera.
@@ -81,11 +69,22 @@ class Registration:
     """
 
     outcome: Outcome
-    reasons: tuple[str, ...]
+    reasons: tuple[Reason, ...]
+    details: tuple[str, ...]
     estimate: PoseEstimate
     coverage: float | None
     predicted_tre_mm: float | None
     n_starts: int
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether other starts are worth a try."""
+        return self.outcome is Outcome.FAILED or _is_little(self.coverage)
+
+    @property
+    def explanations(self) -> tuple[str, ...]:
+        """Why it is no registration, in words for people."""
+        return (*(reason.value for reason in self.reasons), *self.details)
 
 
 def register(
@@ -95,133 +94,143 @@ def register(
     method: Method = "bimcc",
     *,
     is_global: bool = False,
-    on_progress: Callable[[float], None] = lambda share: None,
+    on_progress: Callable[[float], None] = lambda fraction: None,
 ) -> Registration:
-    """Register a model to a scene, check the answer, and try tilted starts when it is doubtful.
+    """Register a model to a scene, check the answer, and try more starts when it is doubtful.
+
+    Near starts when the answer is in doubt; far ones when it still fails; as in the first
+    registration of a tracker.
 
     Args:
         scene: what was measured.
         model: prepared bone.
         start: rough `scene_from_bone`.
         method: production, or one of the paper's for comparison (from the start alone).
-        is_global: try the tilted starts in any case; when they leave doubt, centre the model on
-            the scene and tilt it all around.
-        on_progress: told the share done; may raise to cancel.
+        is_global: try the near starts in any case; when doubt remains, centre the model on the
+            scene and tilt it all around.
+        on_progress: told the fraction done; may raise to cancel.
     """
     if method != "bimcc":
         solve = solve_icp if method == "icp" else solve_bimcc_literal
-        return _verdict(scene, model, solve(scene, model, start), 1)
-    alone = _verdict(scene, model, solve_bimcc(scene, model, start), 1)
-    if len(scene) < MIN_POINTS or not (is_global or _is_doubtful(alone)):
-        return alone
-    middle_mm = np.median(scene.points_mm, axis=0)  # a stray point far away must not move it
-    near = make_tilted_starts(start, middle_mm)
-    first_part = 0.2 if is_global else 1.0
-    best = _from_many(scene, model, near, alone, lambda share: on_progress(first_part * share))
-    if is_global and _is_doubtful(best):
-        shift = middle_mm - start.apply(np.median(model.points_mm, axis=0))
-        centred = start.move(np.concatenate([shift, np.zeros(3)]), np.zeros(3))
-        rings = [make_tilted_starts(centred, middle_mm, tilt_deg)[1:] for tilt_deg in _RINGS_DEG]
-        far = [centred, *chain.from_iterable(rings)]
-        best = _from_many(
-            scene, model, far, best, lambda share: on_progress(first_part + 0.8 * share), ANYWHERE
-        )
+        return _judge(scene, model, solve(scene, model, start), 1)
+    search = _Search(scene, model, start)
+    if len(scene) < MIN_POINTS:
+        return search.best
+    place_mm = start.apply(model.centre_mm)
+    if is_global or search.best.is_doubtful:
+        search.try_starts(make_near_starts(start, place_mm), NEAR, on_progress, 0.0)
+    if search.best.outcome is Outcome.FAILED:
+        search.try_starts(make_far_starts(start, place_mm), NEAR, on_progress, 0.1)
+    if is_global and search.best.is_doubtful:
+        starts = _make_starts_all_around(scene, model, start)
+        search.try_starts(starts, ANYWHERE, on_progress, 0.5)
     on_progress(1.0)
-    return best
+    return search.best
 
 
-def _from_many(
-    scene: Scene,
-    model: RegistrationModel,
-    starts: list[RigidTransform],
-    known: Registration,
-    on_progress: Callable[[float], None],
-    settings: BimccSettings = NEAR,
-) -> Registration:
-    """The best of what is known and of what many starts lead to; a guess is called one."""
-    candidates = find_candidates(scene, model, starts, on_progress=on_progress, settings=settings)
-    least = _REFINED_SHARE * max((candidate.score for candidate in candidates), default=0.0)
-    n_starts = known.n_starts + len(starts)
-    tried = [known]
-    for candidate in candidates[:_N_REFINED]:
-        if candidate.score >= least:
-            solution = solve_bimcc(scene, model, candidate.scene_from_bone)
-            tried.append(_verdict(scene, model, solution, n_starts))
-    scores = [
-        compute_explained_fraction(scene, model, one.estimate.camera_from_bone) for one in tried
-    ]
-    best = int(np.argmax(scores))
-    rivals = [
-        score
-        for score, one in zip(scores, tried, strict=True)
-        if one.estimate.is_converged
-        and not is_same_pose(
-            one.estimate.camera_from_bone,
-            tried[best].estimate.camera_from_bone,
-            model.centre_mm,
-        )
-    ]
-    answer = replace(tried[best], n_starts=n_starts)
-    is_guess = 0.0 < _AMBIGUOUS_SHARE * scores[best] <= max(rivals, default=0.0)
-    # Along a free direction every pose fits as well: that is said already.
-    if not is_guess or answer.outcome is Outcome.DEGENERATE:
-        return answer
-    reasons = tuple(dict.fromkeys((*answer.reasons, Reason.AMBIGUOUS.value)))
-    return replace(answer, outcome=Outcome.FAILED, reasons=reasons)
+class _Search:
+    """The best of what one start and then others lead to.
+
+    Attributes:
+        best: answer so far.
+    """
+
+    def __init__(self, scene: Scene, model: RegistrationModel, start: RigidTransform) -> None:
+        self._scene, self._model = scene, model
+        self._solutions = [solve_bimcc(scene, model, start)]
+        self.best = _judge(scene, model, self._solutions[0], 1)
+
+    def try_starts(
+        self,
+        starts: list[RigidTransform],
+        settings: BimccSettings,
+        on_progress: Callable[[float], None],
+        done: float,
+    ) -> None:
+        """Refine what many starts lead to; progress goes on from the fraction done."""
+        scene, model = self._scene, self._model
+        told = lambda part: on_progress(done + 0.5 * part * (1.0 - done))  # noqa: E731
+        found = find_candidates(scene, model, starts, on_progress=told, settings=settings)
+        self._solutions += [solve_bimcc(scene, model, pose) for pose in select_poses(found)]
+        poses = [one.estimate.camera_from_bone for one in self._solutions]
+        scores = [compute_explained_fraction(scene, model, pose) for pose in poses]
+        solution = rank_fits(self._solutions, scores, model.centre_mm)[0]
+        self.best = _judge(scene, model, solution, self.best.n_starts + len(starts))
 
 
-def _is_doubtful(answer: Registration) -> bool:
-    return answer.outcome is Outcome.FAILED or _is_little(answer.coverage)
+def _make_starts_all_around(
+    scene: Scene, model: RegistrationModel, start: RigidTransform
+) -> list[RigidTransform]:
+    """The model's middle on the scene's, tilted all around."""
+    middle_mm = np.median(scene.points_mm, axis=0)  # a stray point far away must not move it
+    shift_mm = middle_mm - start.apply(np.median(model.points_mm, axis=0))
+    centred = start.move(np.concatenate([shift_mm, np.zeros(3)]), np.zeros(3))
+    rings = (make_tilted_starts(centred, middle_mm, tilt, _N_RING_TILTS) for tilt in _RINGS_DEG)
+    return [centred, *chain.from_iterable(ring[1:] for ring in rings)]
 
 
-def _is_little(seen: float | None) -> bool:
-    """Whether a coverage leaves doubt; where the camera stood unknown, it always does."""
-    return seen is None or seen < _DOUBTFUL_COVERAGE
-
-
-def _verdict(
+def _judge(
     scene: Scene, model: RegistrationModel, solution: Solution, n_starts: int
 ) -> Registration:
     """Outcome and reasons of a solution."""
     estimate, information = solution.estimate, solution.information
     if information is None:
-        why = tuple(reason.value for reason in estimate.reasons)
-        return Registration(Outcome.FAILED, why, estimate, None, None, n_starts)
+        return Registration(Outcome.FAILED, estimate.reasons, (), estimate, None, None, n_starts)
     seen = None
     if scene.camera_mm is not None:
         seen = coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
-    faults = _faults(scene, model, solution, seen)
-    free = [f"not fixed: {words}" for words in information.free_in_words()]
-    free = [Reason.DEGENERATE.value] * bool(free) + free
     tre_mm = _predict_tre_mm(scene, model, estimate)
-    if tre_mm is None or tre_mm > _LARGEST_TRE_MM:
-        free.append(Reason.POSE_UNCERTAIN.value)
-    outcome = Outcome.FAILED if faults else Outcome.DEGENERATE if free else Outcome.CONVERGED
-    return Registration(outcome, (*faults, *free), estimate, seen, tre_mm, n_starts)
+    reasons = find_reasons(_gather_evidence(scene, model, solution, seen, tre_mm))
+    outcome = Outcome.FAILED
+    if {Reason.DEGENERATE, Reason.POSE_UNCERTAIN}.issuperset(reasons):
+        outcome = Outcome.DEGENERATE if reasons else Outcome.CONVERGED
+    details = [f"not fixed: {words}" for words in information.free_in_words()]
+    if Reason.SIZE_DIFFERS in reasons:
+        name = "model" if _extent_mm(model) < _extent_mm(scene) else "scene"
+        details.append(f"the {name} is too small to fix a bone")
+    return Registration(outcome, reasons, tuple(details), estimate, seen, tre_mm, n_starts)
 
 
-def _faults(
-    scene: Scene, model: RegistrationModel, solution: Solution, seen: float | None
-) -> list[str]:
-    """What makes a solution no registration."""
+def _gather_evidence(
+    scene: Scene,
+    model: RegistrationModel,
+    solution: Solution,
+    seen: float | None,
+    tre_mm: float | None,
+) -> Evidence:
+    """What is known of a solution; nothing is known of pictures."""
     estimate = solution.estimate
-    faults = [] if estimate.is_converged else [Reason.NOT_CONVERGED.value]
-    for name, points_mm in (("scene", scene.points_mm), ("model", model.points_mm)):
-        if float(np.ptp(points_mm, axis=0).max()) < _SMALLEST_MM:
-            faults.append(f"the {name} is too small to fix a bone")
+    evidence = Evidence(
+        estimate=estimate,
+        is_fixed=bool(np.isfinite(estimate.covariance).all()),
+        extent_mm=min(_extent_mm(scene), _extent_mm(model)),
+        view_mm=np.inf if tre_mm is None else tre_mm,
+        plan_mm=0.0,
+        goal=_GOAL,
+    )
+    if seen is not None:
+        # Nothing tells what hides the rest.
+        evidence = replace(evidence, agreement=Agreement(1, seen, 0.0, np.nan, np.nan, np.nan))
     if scene.knows_noise:
-        is_misfit = estimate.rms_mm > _MISFIT_RATIO * estimate.expected_rms_mm
-    else:
-        is_misfit = solution.sigma_mm >= _MISFIT_SHARE * BimccSettings().widest_at_rest_mm
+        return evidence
+    kernel_fraction = solution.sigma_mm / BimccSettings().widest_at_rest_mm
+    evidence = replace(evidence, kernel_fraction=kernel_fraction)
+    if not _is_little(seen):
+        return evidence
     # Where little tells a right pose from a wrong one, residuals must look like noise as well.
-    if _is_little(seen) and not scene.knows_noise:
-        spacing_mm = float(np.median(model.arrays.spacing))
-        limit_mm = max(_SMOOTH_MM, _SMOOTH_SPACINGS * spacing_mm)
-        is_misfit |= smooth_part_mm(solution, max(_CELL_MM, spacing_mm)) > limit_mm
-    faults += [Reason.SURFACE_MISFIT.value] * is_misfit
-    if seen is not None and seen < _LEAST_COVERAGE:
-        faults.append(Reason.COVERAGE_LOW.value)
-    return faults
+    spacing_mm = float(np.median(model.arrays.spacing))
+    limit_mm = max(_SMOOTH_MM, _SMOOTH_SPACINGS * spacing_mm)
+    smooth_mm = smooth_part_mm(solution, max(_CELL_MM, spacing_mm))
+    return replace(evidence, smooth_excess_mm=smooth_mm - limit_mm)
+
+
+def _extent_mm(points: Scene | RegistrationModel) -> float:
+    return float(np.ptp(points.points_mm, axis=0).max())
+
+
+def _is_little(seen: float | None) -> bool:
+    """Whether a coverage leaves doubt; where the camera stood unknown, it always does."""
+    return seen is None or seen < _DOUBTFUL_COVERAGE
 
 
 def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
@@ -250,18 +259,14 @@ def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
 
 
 def _predict_tre_mm(scene: Scene, model: RegistrationModel, estimate: PoseEstimate) -> float | None:
-    points = _facing(model, estimate.camera_from_bone, scene)
-    if len(points) == 0 or not np.isfinite(estimate.covariance).all():
+    """95 % bound over the model's points that face the camera, or over all without one."""
+    points_mm = model.points_mm
+    if scene.camera_mm is not None:
+        camera_mm = estimate.camera_from_bone.inverse().apply(scene.camera_mm)
+        towards = camera_mm - points_mm
+        cosine = np.einsum("ij,ij->i", model.normals, towards) / np.linalg.norm(towards, axis=1)
+        points_mm = points_mm[cosine > _LEAST_FACING_COSINE]
+    if len(points_mm) == 0 or not np.isfinite(estimate.covariance).all():
         return None
-    some = points[:: max(1, len(points) // _N_TRE_POINTS)]
-    return estimate.predict_tre_mm(model.centre_mm, some)
-
-
-def _facing(model: RegistrationModel, pose: RigidTransform, scene: Scene) -> FloatArray:
-    """(N, 3) model points, bone coordinates, that face the scene's camera; all without one."""
-    if scene.camera_mm is None:
-        return model.points_mm
-    towards = pose.inverse().apply(scene.camera_mm) - model.points_mm
-    cosine = np.einsum("ij,ij->i", model.normals, towards) / np.linalg.norm(towards, axis=1)
-    facing: FloatArray = model.points_mm[cosine > 0.2]
-    return facing
+    some_mm = points_mm[:: max(1, len(points_mm) // _N_TRE_POINTS)]
+    return estimate.predict_tre_mm(model.centre_mm, some_mm)

@@ -84,6 +84,11 @@ class Evidence:
         has_lost_rows: the cameras' rows are too far apart to be compared.
         rows_mm: error in depth that rows which surely disagree stand for.
         correlated_ratio: variance of the residuals over what right poses show of the noise.
+        kernel_fraction: width of the fit's kernel over the widest at rest, of points that do not
+            know their noise.
+        smooth_excess_mm: what the residuals of such points share with those beside them, over what
+            a right pose leaves.
+        extent_mm: longest side of the scene or of the model, the smaller one's.
         is_rig_accepted: by its calibration.
         size_excess_mm: by which the bone surely has another size than the model, over what may be.
         view_mm, plan_mm: 95 % bounds of the error by what is seen, by the plan's own surface.
@@ -103,6 +108,9 @@ class Evidence:
     has_lost_rows: bool = False
     rows_mm: float = 0.0
     correlated_ratio: float = math.nan
+    kernel_fraction: float = math.nan
+    smooth_excess_mm: float = math.nan
+    extent_mm: float = math.nan
     is_rig_accepted: bool = True
     size_excess_mm: float = math.nan
     view_mm: float = math.nan
@@ -133,7 +141,7 @@ class Evidence:
     @property
     def rms_ratio(self) -> float:
         """Rms of the residual over what its sigma predicts."""
-        if self.agreement is None or self.estimate is None:
+        if self.estimate is None:
             return math.nan
         return self.estimate.rms_mm / self.estimate.expected_rms_mm
 
@@ -237,8 +245,14 @@ RULES = (
          lambda e: e.rms_ratio, 1.25, 2.0, _PARTLY_CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "spread of all differences over the claimed sigma",
          lambda e: e.seen.spread_ratio, 1.1, None, CHOSEN, doubts_place=True),
+    Rule(Reason.SURFACE_MISFIT, "kernel that found no noise, over the widest",
+         lambda e: e.kernel_fraction, None, 0.95, CHOSEN, doubts_place=True),
+    Rule(Reason.SURFACE_MISFIT, "what residuals share 3 mm apart, over 0.2 mm, mm",
+         lambda e: e.smooth_excess_mm, None, 0, CHOSEN, doubts_place=True),
     Rule(Reason.RIG_NOT_ACCEPTED, "the calibration refused the rig (yes 1)",
          lambda e: not e.is_rig_accepted, 0, None, CHOSEN),
+    Rule(Reason.SIZE_DIFFERS, "extent of the scene or the model, mm",
+         lambda e: e.extent_mm, None, 5.0, CHOSEN, is_below=True),
     Rule(Reason.SIZE_DIFFERS, "size beyond 3 sigma and 0.5 mm from the model's, mm",
          lambda e: e.size_excess_mm, 0, None, CHOSEN),
     Rule(Reason.POSE_UNCERTAIN, "95 % bound by what is seen, over 0.5 mm and the plan's, mm",
@@ -262,11 +276,16 @@ _OF_AGREEMENT = tuple(
 )
 
 
+def find_reasons(evidence: Evidence) -> tuple[Reason, ...]:
+    """All that speaks against a pose, in the table's order."""
+    against = (rule.reason for rule in RULES if rule.status(evidence) is not Status.OK)
+    return tuple(dict.fromkeys(against))
+
+
 def decide(evidence: Evidence) -> Verdict:
     """Status, reasons and bound of what is known."""
-    said = {rule: rule.status(evidence) for rule in RULES}
-    reasons = tuple(dict.fromkeys(rule.reason for rule in RULES if said[rule] is not Status.OK))
-    worst = max(said.values(), key=list(Status).index)
+    reasons = find_reasons(evidence)
+    worst = max((rule.status(evidence) for rule in RULES), key=list(Status).index)
     agreement, estimate = evidence.agreement, evidence.estimate
     if agreement is None or estimate is None:
         # Without a pose that was compared with a measurement nothing is there to be shown.

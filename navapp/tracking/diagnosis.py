@@ -11,17 +11,16 @@ import numpy as np
 
 from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import fit_bimcc, make_tilted_starts
+from navapp.registration import fit_bimcc, make_near_starts, select_poses
+from navapp.registration.multi_start import AMBIGUOUS_FRACTION
 from navapp.stereo import are_swapped
 from navapp.tracking.frame import FREE_FIT, Fit, ignore
-from navapp.tracking.scoring import AMBIGUOUS_FRACTION, FitScorer
+from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import WIDE_VIEW, Measurement, SurfaceMeter
 from navapp.values import DisparityMap, Reason, Status, TrackedFrame
 
 # What is said of a surface that was seen well enough, but is another one's.
 _UNFIT = frozenset({Reason.SURFACE_MISFIT, Reason.SEEN_THROUGH, Reason.OUTLIERS})
-# Tilts of the start (deg, how many), as far as a rough pose is off; so many ends are refined.
-_TILTS, _N_REFINED = (15.0, 12), 3
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
@@ -102,11 +101,13 @@ class Diagnosis:
         on_progress: Callable[[float], None],
     ) -> Fit | None:
         """Of the fits that a start and tilts of it lead to, the one that explains most."""
-        starts = make_tilted_starts(start, start.apply(self._meter.model.centre_mm), *_TILTS)
+        starts = make_near_starts(start, start.apply(self._meter.model.centre_mm))
         found = self._scorer.find_candidates(measured, starts, lambda _: on_progress(1.0))
         model = self._meter.model
-        poses = [one.scene_from_bone for one in found[:_N_REFINED]]
-        fits = [Fit(fit_bimcc(measured.scene, model, pose, FREE_FIT), measured) for pose in poses]
+        fits = [
+            Fit(fit_bimcc(measured.scene, model, pose, FREE_FIT), measured)
+            for pose in select_poses(found)
+        ]
         return max(fits, key=self._scorer.score, default=None)
 
 

@@ -5,12 +5,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from navapp.geometry.rectification import Image
-from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import distinct, make_scattered_starts, make_tilted_starts
+from navapp.geometry.transform import RigidTransform
+from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
 from navapp.registration.verdict import Goal, with_cause
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.scoring import select_poses
 from navapp.tracking.surface_meter import Measurement
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
 
@@ -20,12 +19,6 @@ if TYPE_CHECKING:
 # A first registration tries near starts first, which is so much of the work of all; then far ones;
 # then it looks for a bone that is partly buried.
 _NEAR_PART, _FAR_PART = 0.05, 0.45
-# Tilts and shifts of a rough pose: (deg, how many); chosen for poses 15 deg and 20 mm off.
-_NEAR_TILTS = (15.0, 12)
-_FAR_TILTS = ((15.0, 12), (28.0, 20))
-_FAR_SHIFT_MM = 8.0
-# Candidates of a search everywhere that explain less than this of the best are left out; chosen.
-_REFINED_FRACTION = 0.5
 
 
 class FirstRegistration:
@@ -37,7 +30,6 @@ class FirstRegistration:
 
     def __init__(self, tracker: "BimccTracker") -> None:
         self._tracker, self._scorer = tracker, tracker.scorer
-        self._n_refined = tracker.settings.n_refined
 
     def register(
         self,
@@ -76,14 +68,14 @@ class FirstRegistration:
 
         def fit_from(starts: list[RigidTransform], done: float, part: float) -> list[Fit]:
             told = lambda share: report(done + part * share)  # noqa: E731
-            found = self._scorer.find_candidates(measured, starts, told)[: self._n_refined]
-            return [tracker.near.settle(frame, measured, one.scene_from_bone) for one in found]
+            found = select_poses(self._scorer.find_candidates(measured, starts, told))
+            return [tracker.near.settle(frame, measured, pose) for pose in found]
 
         centre_mm = frame.start.apply(tracker.centre_mm)
-        fits = fit_from(near_starts(frame.start, centre_mm), 0.0, _NEAR_PART)
+        fits = fit_from(make_near_starts(frame.start, centre_mm), 0.0, _NEAR_PART)
         answers = self._judge_distinct(frame, fits, goal)
         if not _is_ok(answers):
-            fits += fit_from(far_starts(frame.start, centre_mm), _NEAR_PART, _FAR_PART)
+            fits += fit_from(make_far_starts(frame.start, centre_mm), _NEAR_PART, _FAR_PART)
             answers = self._judge_distinct(frame, fits, goal)
         if not _is_ok(answers):
             buried = self._judge_buried(frame, measured, goal)
@@ -113,7 +105,7 @@ class FirstRegistration:
         watch.lap("rectify")
         candidates = self._tracker.whole_view.find_candidates(pair, prior, on_progress)
         watch.lap("estimate")
-        poses = select_poses(candidates, self._n_refined, _REFINED_FRACTION)
+        poses = select_poses(candidates)
         found = [self._fit_candidate(Frame(pair, pose, watch)) for pose in poses]
         fits = [fit for fit in found if fit is not None]
         if not fits:
@@ -145,13 +137,3 @@ class FirstRegistration:
 
 def _is_ok(answers: list[TrackedFrame]) -> bool:
     return bool(answers) and answers[0].verdict.status is Status.OK
-
-
-def near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
-    """A rough pose, and tilts of it about a place in the camera's frame."""
-    return make_tilted_starts(rough, centre_mm, *_NEAR_TILTS)
-
-
-def far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
-    """Tilts of a rough pose and of what it becomes when shifted along each axis."""
-    return make_scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)

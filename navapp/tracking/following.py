@@ -1,6 +1,6 @@
 """Following a pose to rest on the model: measuring where it is expected, and fitting, in turns."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import fit_bimcc, fit_pose
@@ -99,4 +99,4 @@ class Follower:
         """The fit; with a reason against it when its last step still moved the bone."""
         if fit.moved_mm < self._settings.near_mm:
             return fit
-        return replace(fit, estimate=fit.estimate.with_reason(Reason.NOT_CONVERGED))
+        return fit.with_reason(Reason.NOT_CONVERGED)

@@ -8,7 +8,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, MODEL_CORRELATION_PX, Measurement
-from navapp.values import PoseEstimate, Stopwatch
+from navapp.values import PoseEstimate, Reason, Stopwatch
 
 # Kernels of the fits: points that were measured freely know their noise, but not all of their
 # errors; on the model a kernel as narrow as the noise costs little, and keeps out tissue that lies
@@ -79,6 +79,10 @@ class Fit:
         kernel_mm = max(MODEL_FIT.narrowest_mm, MODEL_FIT.n_sigmas * claimed_mm)
         squares_mm2 = self.estimate.rms_mm**2
         return float(noise_under_kernel_mm2(squares_mm2, 1.0, kernel_mm)) / claimed_mm**2
+
+    def with_reason(self, reason: Reason) -> "Fit":
+        """The same fit with one more reason against its pose."""
+        return replace(self, estimate=self.estimate.with_reason(reason))
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model with what its residuals show beyond noise in its covariance.

@@ -1,20 +1,15 @@
 """How much of the model a fit explains: what decides between two of them."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import Candidate, RegistrationModel, find_candidates, is_same_pose
+from navapp.registration import Candidate, find_candidates, rank_fits
 from navapp.registration.verdict import is_elsewhere
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.frame import Fit, ignore
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
-from navapp.values import Reason
-
-# A different pose that explains as much as this of the best one makes that one a guess; chosen.
-AMBIGUOUS_FRACTION = 0.9
 
 
 class FitScorer:
@@ -41,7 +36,7 @@ class FitScorer:
 
     def rank(self, fits: list[Fit]) -> list[Fit]:
         """Fits of different candidates, best first; see `rank_fits`."""
-        return rank_fits(fits, [self.score(fit) for fit in fits], self._meter.model)
+        return rank_fits(fits, [self.score(fit) for fit in fits], self._meter.model.centre_mm)
 
     def find_candidates(
         self,
@@ -57,34 +52,3 @@ class FitScorer:
             lambda pose: self.explain(pose, measured),
             on_progress,
         )
-
-
-def rank_fits(fits: list[Fit], scores: list[float], model: RegistrationModel) -> list[Fit]:
-    """The fits, best first; the best one says so when a different one explains as much.
-
-    Args:
-        fits: of different candidates.
-        scores: how much of the model each explains.
-        model: of the bone.
-    """
-    order = np.argsort([-score for score in scores], kind="stable")
-    ranked = [fits[k] for k in order]
-    if len(ranked) < 2 or scores[order[0]] <= 0.0:
-        return ranked
-    best = ranked[0]
-    is_guess = any(
-        scores[k] >= AMBIGUOUS_FRACTION * scores[order[0]]
-        and not is_same_pose(best.pose, fits[k].pose, model.centre_mm)
-        for k in order[1:]
-    )
-    if not is_guess:
-        return ranked
-    return [replace(best, estimate=best.estimate.with_reason(Reason.AMBIGUOUS)), *ranked[1:]]
-
-
-def select_poses(
-    candidates: list[Candidate], most: int, least_fraction: float
-) -> list[RigidTransform]:
-    """Of the candidates that explain enough beside the best, the first ones."""
-    least = least_fraction * max((one.score for one in candidates), default=0.0)
-    return [one.scene_from_bone for one in candidates[:most] if one.score >= least]

@@ -39,14 +39,12 @@ class TrackerSettings:
         near: how the bone is located around an expected pose.
         depth_mm: nearest and farthest surface that the rig is used for.
         max_points: about so many measured points enter an estimate.
-        n_refined: so many answers of a first registration's searches are refined.
     """
 
     method: Method = "bimcc"
     near: NearSettings = field(default_factory=NearSettings)
     depth_mm: tuple[float, float] = (300.0, 700.0)
     max_points: int = 2500
-    n_refined: int = 3
 
 
 class Tracker(Protocol):

@@ -28,7 +28,8 @@ from navapp.registration import (
     fit_bimcc,
     fit_bimcc_literal,
     fit_icp,
-    make_tilted_starts,
+    make_far_starts,
+    make_near_starts,
     register,
 )
 from tests.bench.registration_peers import RADII_MM, Peer, open3d_plane, peers
@@ -242,7 +243,8 @@ def _lists(
     peer = settings[name]
 
     def fit(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
-        starts = make_tilted_starts(scene.start, scene.points_mm.mean(axis=0))
+        place_mm = scene.start.apply(model.centre_mm)
+        starts = make_near_starts(scene.start, place_mm) + make_far_starts(scene.start, place_mm)
         poses = [peer(scene.points_mm, model, start) for start in starts]
         return max(poses, key=lambda pose: _on_model(pose, scene, model)), None
 

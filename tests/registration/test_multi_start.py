@@ -74,7 +74,7 @@ def test_candidates_are_distinct_and_the_best_comes_first() -> None:
 
 def test_what_a_pose_explains_finds_the_right_one_among_the_candidates() -> None:
     centre = SCENE.points_mm.mean(axis=0)
-    starts = make_tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre)
+    starts = make_tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre, 35.0, 14)
     found = find_candidates(seen_scene(900, 0.3, 1, 600), MODEL, starts)
     assert mean_error_mm(found[0].scene_from_bone, BONE) < 1.0
     assert all(0.0 <= candidate.score <= 1.0 for candidate in found)
@@ -87,7 +87,9 @@ def test_a_start_that_pairs_with_nothing_gives_no_candidate() -> None:
 
 
 def test_two_runs_on_two_threads_are_equal_to_the_last_bit() -> None:
-    starts = make_tilted_starts(disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0))
+    starts = make_tilted_starts(
+        disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0), 35.0, 14
+    )
     runs = [find_candidates(seen_scene(900, 0.3, 2, 600), MODEL, starts) for _ in range(2)]
     assert len(runs[0]) == len(runs[1]) > 0
     for a, b in zip(*runs, strict=True):

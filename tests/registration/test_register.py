@@ -41,7 +41,7 @@ def test_the_pose_is_found_from_far_through_clutter(seed: int) -> None:
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
     assert found.coverage is not None
     assert 0.85 < found.coverage <= 1.0
-    assert found.n_starts in (1, 16)
+    assert found.n_starts in (1, 14)
 
 
 def test_a_good_start_is_the_only_one() -> None:
@@ -50,7 +50,7 @@ def test_a_good_start_is_the_only_one() -> None:
     everywhere = register(
         seen_scene(900, 0.3), MODEL, disturbed(MODEL, 4.0, 3.0, 1), is_global=True
     )
-    assert everywhere.n_starts == 16
+    assert everywhere.n_starts == 14
     assert mean_error_mm(everywhere.estimate.camera_from_bone, BONE) < 0.2
 
 
@@ -60,8 +60,8 @@ def test_the_search_everywhere_finds_a_bone_that_is_turned_away(seed: int) -> No
     found = register(seen_scene(1200, 0.4, seed), MODEL, start, is_global=True)
     assert found.outcome is Outcome.CONVERGED
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
-    # Near the start, then about the scene's middle in five rings.
-    assert found.n_starts == 1 + 15 + 71
+    # Near the start, further off, then about the scene's middle in five rings.
+    assert found.n_starts == 1 + 13 + 231 + 71
 
 
 def only_candidates(monkeypatch: pytest.MonkeyPatch, *candidates: Candidate) -> None:
@@ -75,7 +75,7 @@ def elsewhere(seed: int) -> RigidTransform:
     return disturbed(MODEL, 150.0, 10.0, seed)
 
 
-@pytest.mark.parametrize(("score", "is_found"), [(0.7, True), (0.5, False)])
+@pytest.mark.parametrize(("score", "is_found"), [(0.55, True), (0.45, False)])
 def test_candidates_that_explain_nearly_as_much_get_their_chance(
     score: float, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,7 +110,7 @@ def test_what_is_seen_in_part_is_tried_from_other_starts_too() -> None:
     for scene in (Scene(half, EYE), Scene(points)):
         found = register(scene, MODEL, start)
         assert found.outcome is Outcome.CONVERGED
-        assert found.n_starts == 16
+        assert found.n_starts == 14
         assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.35
 
 
@@ -189,7 +189,7 @@ def test_a_slightly_larger_bone_betrays_itself_by_what_residuals_share(
     """It lies under the kernel everywhere, and no camera tells what should be seen."""
     found = register(Scene(seen_scene(900, 0.3).points_mm), distorted(factors), TRUE)
     assert found.outcome is Outcome.FAILED
-    assert found.reasons == (Reason.SURFACE_MISFIT.value,)
+    assert found.reasons == (Reason.SURFACE_MISFIT,)
     assert found.estimate.rms_mm < 0.6
 
 
@@ -211,7 +211,7 @@ def test_a_fit_that_runs_out_of_steps_is_no_registration(monkeypatch: pytest.Mon
     monkeypatch.setattr(point_to_point, "_MAX_ITERATIONS", 1)
     found = register(scene, MODEL, start, "icp")
     assert found.outcome is Outcome.FAILED
-    assert found.reasons == (Reason.NOT_CONVERGED.value,)
+    assert found.reasons == (Reason.NOT_CONVERGED,)
 
 
 def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
@@ -225,7 +225,7 @@ def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
     )
     found = register(scene, RegistrationModel(BoneModel("egg", egg)), quarter, is_global=True)
     assert found.outcome is Outcome.FAILED
-    assert Reason.AMBIGUOUS.value in found.reasons
+    assert Reason.AMBIGUOUS in found.reasons
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -262,8 +262,8 @@ def test_what_a_simple_surface_leaves_free_is_said_in_words(
     scene, pose = surface_scene(bone, has_camera=has_camera)
     found = register(scene, RegistrationModel(bone), pose)
     assert found.outcome is Outcome.DEGENERATE, found.reasons
-    assert found.reasons[0] == Reason.DEGENERATE.value
-    words = [reason.split(" (")[0] for reason in found.reasons[1:]]
+    assert found.reasons[0] is Reason.DEGENERATE
+    words = [text.split(" (")[0] for text in found.details]
     assert words.count("not fixed: rotation about") == n_turns
     assert words.count("not fixed: translation along") == n_shifts
 
@@ -273,7 +273,7 @@ def test_a_pose_with_a_free_direction_has_no_predicted_error() -> None:
     scene, pose = surface_scene(bone, has_camera=True)
     found = register(scene, RegistrationModel(bone), pose)
     assert found.predicted_tre_mm is None
-    assert found.reasons[-1] == Reason.POSE_UNCERTAIN.value
+    assert found.reasons[-1] is Reason.POSE_UNCERTAIN
 
 
 @pytest.mark.parametrize("mesh", [ball_mesh(30.0, 2500), tube_mesh(25.0, 40.0)])
@@ -315,7 +315,7 @@ def test_a_meagre_scene_has_a_reason_and_is_never_a_registration(name: str, meth
         assert found.reasons
         assert len(set(found.reasons)) == len(found.reasons)
         if name in ("empty", "one point"):
-            assert found.reasons == (Reason.TOO_FEW_POINTS.value,)
+            assert found.reasons == (Reason.TOO_FEW_POINTS,)
 
 
 @pytest.mark.parametrize("name", meagre_scenes())
@@ -392,7 +392,7 @@ def test_a_pose_that_is_fixed_too_loosely_is_none() -> None:
     assert found.outcome is not Outcome.CONVERGED
     assert found.predicted_tre_mm is not None
     assert found.predicted_tre_mm > 2.0
-    assert Reason.POSE_UNCERTAIN.value in found.reasons
+    assert Reason.POSE_UNCERTAIN in found.reasons
 
 
 def test_what_is_smaller_than_a_kernel_fits_everywhere() -> None:
@@ -400,7 +400,8 @@ def test_what_is_smaller_than_a_kernel_fits_everywhere() -> None:
     tiny = points.mean(axis=0) + 0.02 * (points - points.mean(axis=0))
     found = register(Scene(tiny), MODEL, TRUE)
     assert found.outcome is Outcome.FAILED
-    assert "the scene is too small to fix a bone" in found.reasons
+    assert Reason.SIZE_DIFFERS in found.reasons
+    assert "the scene is too small to fix a bone" in found.details
 
 
 def test_a_scene_that_holds_no_bone_is_no_registration() -> None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.registration import Candidate
+from navapp.registration import Candidate, rank_fits, select_poses
 from navapp.tracking.frame import Fit
-from navapp.tracking.scoring import FitScorer, rank_fits, select_poses
+from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import WIDE_VIEW
 from navapp.values import Reason, Stopwatch
 from tests.registration.shapes import TRUE
@@ -29,14 +29,14 @@ def turned(fit: Fit, turn_rad: float) -> Fit:
 
 
 def test_a_different_pose_that_explains_as_much_makes_the_best_a_guess() -> None:
-    model, fit = room().tracker.model, found_at_the_truth()
+    centre_mm, fit = room().tracker.centre_mm, found_at_the_truth()
     other = turned(fit, 0.4)
-    best, second = rank_fits([other, fit], [0.5, 0.52], model)
+    best, second = rank_fits([other, fit], [0.5, 0.52], centre_mm)
     assert best.pose is fit.pose
     assert second is other
     assert Reason.AMBIGUOUS in best.estimate.reasons
-    assert rank_fits([other, fit], [0.3, 0.52], model)[0] is fit
-    assert rank_fits([fit, fit], [0.5, 0.52], model)[0] is fit
+    assert rank_fits([other, fit], [0.3, 0.52], centre_mm)[0] is fit
+    assert rank_fits([fit, fit], [0.5, 0.52], centre_mm)[0] is fit
 
 
 def test_the_right_pose_explains_most_and_a_wrong_one_is_not_there() -> None:
@@ -58,5 +58,5 @@ def test_a_pose_that_nothing_fixes_explains_nothing() -> None:
 @pytest.mark.parametrize(("most", "expected"), [(1, 1), (3, 2)])
 def test_only_what_explains_enough_beside_the_best_is_refined(most: int, expected: int) -> None:
     found = [Candidate(TRUE, score) for score in (0.8, 0.5, 0.3)]
-    assert len(select_poses(found, most, 0.5)) == expected
-    assert select_poses([], most, 0.5) == []
+    assert len(select_poses(found, most)) == expected
+    assert select_poses([], most) == []

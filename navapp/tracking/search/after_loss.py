@@ -6,9 +6,9 @@ part that is spread over all directions, until every start had its turn.
 """
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import make_scattered_starts
+from navapp.registration import make_scattered_starts, select_poses
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.scoring import FitScorer, select_poses
+from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.surface_meter import WIDE_VIEW, SurfaceMeter
 
@@ -18,8 +18,8 @@ _RINGS = (
     (40.0, ((20.0, 6), (35.0, 8))),
 )
 _PARTS = 10
-# So many of the answers are measured exactly, if they explain so much of what the best does.
-_N_SETTLED, _SETTLED_FRACTION = 2, 0.7
+# So many of the answers are measured exactly.
+_N_REFINED = 2
 
 
 class SearchAfterLoss:
@@ -38,7 +38,7 @@ class SearchAfterLoss:
         if measured is None or len(measured.cloud) == 0:
             return [self._near.find_freely(frame, self._near.settings.search)]
         candidates = self._scorer.find_candidates(measured, starts)
-        poses = select_poses(candidates, _N_SETTLED, _SETTLED_FRACTION) or [frame.start]
+        poses = select_poses(candidates, _N_REFINED) or [frame.start]
         # Far from where it was, a bone may look like itself in several ways.
         return [self._scorer.rank([self._near.settle(frame, measured, one) for one in poses])[0]]
 

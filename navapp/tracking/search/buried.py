@@ -14,10 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import DepthMap, PoseSampler
+from navapp.registration import DepthMap, PoseSampler, rank_fits
 from navapp.tracking.following import Follower
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.scoring import rank_fits
 from navapp.tracking.search.near import NearSettings
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 
@@ -160,7 +159,7 @@ class BuriedSearch:
         if not fits:
             return None
         fitting = [max(fit.variance_ratio, 1e-6) ** -0.5 for fit in fits]
-        return rank_fits(fits, fitting, self._meter.model)[0]
+        return rank_fits(fits, fitting, self._meter.model.centre_mm)[0]
 
     @cached_property
     def _lever_mm(self) -> float:
