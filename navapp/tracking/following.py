@@ -64,7 +64,7 @@ class Follower:
             None when the bone is elsewhere or out of view, or too few points answer.
         """
         settings, watch, model = self._settings, frame.watch, self._meter.model
-        fit, expected = None, None
+        fit, expected, moved_mm = None, None, 0.0
         for n_rounds in range(1, settings.max_rounds + 1):
             # After a small move, what was rendered is still what is expected.
             expected = expected or self._meter.render(frame.pair, pose, self._margins)
@@ -87,16 +87,13 @@ class Follower:
                 break
             moved_mm, pose = pose.mean_motion_mm(rested, model.hull_mm), rested
             if is_near:
-                fit = Fit(estimate, measured, moved_mm)
+                fit = Fit(estimate, measured)
             if moved_mm >= settings.settled_mm:
                 expected = None
             elif is_near:
                 break
             is_near |= moved_mm < settings.near_mm or n_rounds >= settings.max_sampled
-        return None if fit is None else self._doubt_motion(fit)
-
-    def _doubt_motion(self, fit: Fit) -> Fit:
-        """The fit; with a reason against it when its last step still moved the bone."""
-        if fit.moved_mm < self._settings.near_mm:
+        if fit is None or moved_mm < settings.near_mm:
             return fit
+        # The last step still moved the bone.
         return fit.with_reason(Reason.NOT_CONVERGED)

@@ -57,12 +57,10 @@ class Fit:
     Attributes:
         estimate: of the pose.
         measured: the surface.
-        moved_mm: how far the last round of measuring and fitting moved the bone's surface.
     """
 
     estimate: PoseEstimate
     measured: Measurement
-    moved_mm: float = float("inf")
 
     @property
     def pose(self) -> RigidTransform:

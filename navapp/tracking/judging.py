@@ -31,8 +31,6 @@ from navapp.values import (
     Verdict,
 )
 
-# A model that moved by less looks the same.
-_SAME_VIEW_MM = 0.05
 # Errors of a cartilage's thickness go together over much of a bone: no number of points averages
 # them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
 _COMMON_ERROR_SIGMAS = 2.0
@@ -88,14 +86,11 @@ class PoseJudge:
             noise_variance_ratio = NOISE_RATIO**2 if agreement.lies_open else 1.0
             fit = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
             fit = fit.with_correlated_residuals(noise_variance_ratio)
-        is_on_model = agreement is not None
-        if np.isfinite(fit.estimate.covariance).all() and not (
-            # A model that the fit has moved no longer looks as it was matched.
-            agreement is not None and fit.moved_mm < _SAME_VIEW_MM
-        ):
+        # On the model it was compared where it was matched, which is where it rests.
+        if agreement is None and np.isfinite(fit.estimate.covariance).all():
             agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
         evidence = self._evidence_of_pair(health, depth_mm)
-        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted, is_on_model)
+        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
         verdict = decide(evidence)
         frame.watch.lap("judge")
         estimate = None if verdict.predicted_tre_mm is None else self._unrectify(fit.estimate)
@@ -140,10 +135,10 @@ class PoseJudge:
         agreement: Agreement | None,
         goal: Goal,
         predicted: RigidTransform | None,
-        is_on_model: bool,
     ) -> Evidence:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
+        is_on_model = fit.measured.view is not None
         correlated_ratio = fit.variance_ratio / NOISE_RATIO**2 if is_on_model else math.nan
         if not np.isfinite(estimate.covariance).all():
             return replace(known, estimate=estimate, correlated_ratio=correlated_ratio)

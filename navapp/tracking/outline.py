@@ -91,8 +91,7 @@ class OutlineMeter:
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
         joined = join(estimate, MODEL_FIT.n_sigmas, block, centre_mm, noise_variance_ratio)
-        moved_mm = fit.pose.mean_motion_mm(joined.camera_from_bone, self._model.hull_mm)
-        return replace(fit, estimate=joined, moved_mm=fit.moved_mm + moved_mm)
+        return replace(fit, estimate=joined)
 
     def block(
         self,

@@ -51,15 +51,9 @@ def altered(checks: PairChecks, fit: Fit, **changes) -> Told:
 class SurfaceAlone:
     """Stands for the meter of the outline: finds none."""
 
-    def __init__(self, moved_mm: float | None = None) -> None:
-        self._moved_mm = moved_mm
-
     def join(self, pair, fit: Fit, coarse_px, noise_variance_ratio: float = 1.0) -> Fit:
         covariance = noise_variance_ratio * fit.estimate.covariance
-        moved_mm = fit.moved_mm if self._moved_mm is None else self._moved_mm
-        return replace(
-            fit, estimate=replace(fit.estimate, covariance=covariance), moved_mm=moved_mm
-        )
+        return replace(fit, estimate=replace(fit.estimate, covariance=covariance))
 
 
 def judged(

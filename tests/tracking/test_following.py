@@ -25,7 +25,6 @@ def test_a_near_pose_comes_to_rest_where_the_bone_is(start: RigidTransform) -> N
     fit = follower(meter).follow(frame_at(start), start)
     assert error_mm(fit.pose) < 0.05
     assert len(meter.asked) <= RestSettings().max_rounds
-    assert fit.moved_mm < RestSettings().settled_mm
     assert set(meter.margins) == {MARGINS}
 
 
@@ -40,10 +39,9 @@ def test_samples_come_first_and_the_whole_model_last() -> None:
 
 def test_at_rest_the_model_is_rendered_once() -> None:
     meter = FakeMeter()
-    fit = follower(meter).follow(frame_at(TRUE), TRUE)
+    follower(meter).follow(frame_at(TRUE), TRUE)
     assert meter.asked == ["sampled", "on_model"]
     assert meter.n_rendered == 1
-    assert fit.moved_mm < RestSettings().settled_mm
 
 
 def test_after_a_move_the_model_is_rendered_again() -> None:

@@ -14,7 +14,7 @@ from navapp.tracking.frame import FREE_FIT, Fit, Frame
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW
 from navapp.values import Reason, Status, Stopwatch, TrackedFrame
-from tests.tracking.judged import SurfaceAlone, altered
+from tests.tracking.judged import SurfaceAlone, Told, altered
 from tests.tracking.rooms import GOAL, Room, room
 
 
@@ -77,18 +77,19 @@ def test_a_claim_is_believed_less_while_the_bone_lies_open(
     assert told.verdict.predicted_tre_mm == pytest.approx(noise * claimed_mm, rel=1e-6)
 
 
-def test_a_model_that_the_fit_moved_is_compared_where_it_came_to_rest() -> None:
+def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it_rests() -> None:
     a = room()
     frame, checks, fit = found_at_the_truth(a)
     as_matched = altered(checks, fit, coverage=0.77)
-    for moved_mm, is_as_matched in ((0.04, True), (0.06, False)):
-        judge = judge_with(SurfaceAlone(moved_mm))
-        coverage = judge.judge(frame, as_matched, fit, GOAL).verdict.coverage
-        assert (coverage == 0.77) == is_as_matched
-    coarse_px = as_matched.check(fit.measured, fit.pose).result().coarse_px
-    geometry = a.tracker.meter.geometry
-    there = compare_at(fit.pose, a.tracker.model, fit.measured.disparity, geometry, coarse_px)
-    assert coverage == there.coverage
+    judge = judge_with(SurfaceAlone())
+    assert judge.judge(frame, as_matched, fit, GOAL).verdict.coverage == 0.77
+    check = as_matched.check(fit.measured, fit.pose).result()
+    free = replace(fit, measured=replace(fit.measured, view=None))
+    answer = judge.judge(frame, Told(check._replace(agreement=None)), free, GOAL)
+    there = compare_at(
+        fit.pose, a.tracker.model, fit.measured.disparity, a.tracker.meter.geometry, check.coarse_px
+    )
+    assert answer.verdict.coverage == there.coverage != 0.77
 
 
 def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> None:
@@ -96,7 +97,7 @@ def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> N
     a = room()
     frame, checks, fit = found_at_the_truth(a)
     rough = replace(fit.estimate, rms_mm=0.95 * fit.estimate.expected_rms_mm)
-    on_model = replace(fit, estimate=rough, moved_mm=0.0)
+    on_model = replace(fit, estimate=rough)
     free = replace(on_model, measured=replace(fit.measured, view=None))
     for one, is_misfit in ((fit, False), (on_model, True), (free, False)):
         verdict = judge_with(SurfaceAlone()).judge(frame, checks, one, GOAL).verdict
