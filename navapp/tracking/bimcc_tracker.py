@@ -22,7 +22,7 @@ from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.surface_meter import NEAR_VIEW
-from navapp.tracking.tracker import TrackerBase, TrackerSettings
+from navapp.tracking.tracker import Tracker, TrackerSettings
 from navapp.values import (
     AspectGraph,
     BoneModel,
@@ -34,7 +34,7 @@ from navapp.values import (
 )
 
 
-class BimccTracker(TrackerBase):
+class BimccTracker(Tracker):
     """Finds and follows one bone under one rig.
 
     Args:
@@ -64,7 +64,7 @@ class BimccTracker(TrackerBase):
         after_loss: SearchAfterLoss | None = None,
         diagnosis: Diagnosis | None = None,
     ) -> None:
-        super().__init__(rig, bone, settings or TrackerSettings(), judge, diagnosis)
+        super().__init__(rig, bone, settings, judge, diagnosis)
         meter, scorer = self.meter, self.scorer
         self.near = near or NearSearch(meter, scorer.score, self.settings.near)
         self.buried = buried or BuriedSearch(meter, self.settings.near)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.geometry.rig import StereoRig
 from navapp.registration import fit_icp
 from navapp.registration.verdict import Goal, with_cause
 from navapp.stereo import match_baseline
@@ -16,8 +15,8 @@ from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import NEAR_VIEW, Margins
-from navapp.tracking.tracker import TrackerBase, TrackerSettings
-from navapp.values import BoneModel, DisparityMap, Prior, Reason, Status, Stopwatch, TrackedFrame
+from navapp.tracking.tracker import Tracker
+from navapp.values import DisparityMap, Prior, Reason, Status, Stopwatch, TrackedFrame
 
 
 def match_gradients(pair: RectifiedPair, band_px: tuple[float, float]) -> DisparityMap:
@@ -25,19 +24,8 @@ def match_gradients(pair: RectifiedPair, band_px: tuple[float, float]) -> Dispar
     return match_baseline(pair, band_px).disparity
 
 
-class IcpTracker(TrackerBase):
-    """Finds one bone from a pose and follows it by its box.
-
-    Args:
-        rig: of the pictures.
-        bone: what is followed.
-        settings: how.
-    """
-
-    def __init__(
-        self, rig: StereoRig, bone: BoneModel, settings: TrackerSettings | None = None
-    ) -> None:
-        super().__init__(rig, bone, settings or TrackerSettings())
+class IcpTracker(Tracker):
+    """Finds one bone from a pose and follows it by its box."""
 
     def track(
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
@@ -58,16 +46,13 @@ class IcpTracker(TrackerBase):
         if best.verdict.status is Status.LOST:
             for place in self.boxes.starts(expected, box):
                 frame = self.begin(left, right, place, watch)
-                checks, fits = (
-                    PairChecks(self.meter, frame.pair),
-                    [self._fit(frame, margins.search)],
-                )
+                checks = PairChecks(self.meter, frame.pair)
+                fits = [self._fit(frame, margins.search)]
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
                 if best.verdict.status is Status.OK:
                     break
-        state = replace(state, box=box)
         best = with_cause(best, self.find_cause(left, right, left_from_bone, state, best))
-        return self.update(best, state, left, captured_ns, watch)
+        return self.update(best, replace(state, box=box), left, captured_ns, watch)
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """The one fit around the start."""

@@ -5,7 +5,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 from navapp.geometry.bands import begin_beside
 from navapp.geometry.rectification import Image
@@ -26,19 +26,19 @@ from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFr
 
 Method = Literal["bimcc", "icp"]
 
-# It is asked so often, counted in lost frames, whether the pictures are swapped; chosen.
-_LOST_BETWEEN = 10
+# So often, in lost frames, it is asked whether the pictures are swapped; chosen.
+_FRAMES_BETWEEN_DIAGNOSES = 10
 
 
 @dataclass(frozen=True, slots=True)
 class TrackerSettings:
-    """How a tracker works.
+    """How a tracker works; chosen.
 
     Attributes:
         method: `bimcc` is the production chain, `icp` the paper's baseline.
         near: how the bone is located around an expected pose.
         depth_mm: nearest and farthest surface that the rig is used for.
-        max_points: about so many measured points enter an estimate.
+        max_points: about so many measured points enter a fit.
     """
 
     method: Method = "bimcc"
@@ -47,58 +47,15 @@ class TrackerSettings:
     max_points: int = 2500
 
 
-class Tracker(Protocol):
-    """Finds and follows one bone under one rig; what is remembered travels in a `TrackState`."""
+class Tracker(ABC):
+    """Finds and follows one bone under one rig.
 
-    @property
-    def centre_mm(self) -> FloatArray:
-        """(3,) mean of the model's vertices, in bone coordinates."""
-        ...
-
-    def register(
-        self,
-        left: Image,
-        right: Image,
-        prior: Prior,
-        goal: Goal,
-        on_progress: Callable[[float], None] = ignore,
-    ) -> list[TrackedFrame]:
-        """Find the bone from a rough pose, a box or a cone: distinct candidates, best first.
-
-        Args:
-            left: picture of the left camera.
-            right: of the right one, at the same instant.
-            prior: a pose of this bone; or a box, a cone, or both, which are used without one.
-            goal: for the judge.
-            on_progress: told the fraction done; what it raises stops the search.
-        """
-        ...
-
-    def track(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
-    ) -> tuple[TrackedFrame, TrackState]:
-        """Follow the bone into the next frame, and search for it when it is lost."""
-        ...
-
-    def glance(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
-    ) -> tuple[TrackedFrame, TrackState]:
-        """Follow the bone into the next frame, lost or not, if it is near where it is expected."""
-        ...
-
-    def assess(
-        self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
-    ) -> TrackedFrame:
-        """Judge a pose as it stands, without moving it."""
-        ...
-
-
-class TrackerBase(ABC):
-    """What trackers share: pictures around an expected bone, judged fits, and the bone's box.
+    `register`, `track`, `glance` and `assess` are what the controller asks for; the other methods
+    are what trackers share. `left` and `right` are pictures of the same instant. What is remembered
+    travels in a `TrackState`: a tracker keeps nothing of a frame.
 
     Attributes:
         settings: of the tracker.
-        rig: of the pictures.
         model: of the bone.
         meter: of its surface.
         judge: of its poses.
@@ -111,13 +68,14 @@ class TrackerBase(ABC):
         self,
         rig: StereoRig,
         bone: BoneModel,
-        settings: TrackerSettings,
+        settings: TrackerSettings | None = None,
         judge: PoseJudge | None = None,
         diagnosis: Diagnosis | None = None,
     ) -> None:
-        self.settings, self.rig = settings, rig
+        self.settings = settings or TrackerSettings()
         self.model = RegistrationModel(bone)
-        self.meter = SurfaceMeter(rig, self.model, settings.depth_mm, settings.max_points)
+        depth_mm, max_points = self.settings.depth_mm, self.settings.max_points
+        self.meter = SurfaceMeter(rig, self.model, depth_mm, max_points)
         self.judge = judge or PoseJudge(self.meter, rig.quality)
         self.boxes = BoxTracker(rig, self.model)
         self.scorer = FitScorer(self.meter)
@@ -129,13 +87,34 @@ class TrackerBase(ABC):
         return self.model.centre_mm
 
     @abstractmethod
+    def register(
+        self,
+        left: Image,
+        right: Image,
+        prior: Prior,
+        goal: Goal,
+        on_progress: Callable[[float], None] = ignore,
+    ) -> list[TrackedFrame]:
+        """Find the bone: distinct candidates, best first.
+
+        From the prior's pose of this bone; without one from its box, its cone, or both. Progress is
+        a fraction; what it raises stops the search.
+        """
+
+    @abstractmethod
+    def track(
+        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+    ) -> tuple[TrackedFrame, TrackState]:
+        """Follow the bone into the next frame, and search for it when it is lost."""
+
+    @abstractmethod
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """The fits that are soon found near the start of a frame."""
 
     def glance(
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
-        """Follow the bone into the next frame, lost or not, if it is near where it is expected.
+        """Follow the bone into the next frame without any search, lost or not.
 
         It takes a frame's time or two, and sees no further than some millimetres.
         """
@@ -148,18 +127,17 @@ class TrackerBase(ABC):
                 frame, checks, fits, goal, frame.start,
                 is_enough=lambda verdict: not is_place_doubted(verdict),
             )  # fmt: skip
-        best = with_cause(best, state.cause)
-        tracked, after = self.update(best, state, left, captured_ns, watch)
+        tracked, after = self.update(with_cause(best, state.cause), state, left, captured_ns, watch)
         # A doubt that nothing was searched for puts off no search.
         return tracked, replace(after, n_doubted=0)
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
     ) -> TrackedFrame:
-        """Judge a pose as it stands, without moving it, by the surface that is seen there.
+        """Judge a pose as it stands, without moving it.
 
-        Measured freely, a surface tells whether the pose is the right one, but fixes it less well
-        than a bone that is followed: only the stage's tolerance counts.
+        The surface is measured freely. That tells whether the pose is the right one, but fixes it
+        less well than following does: only the stage's tolerance counts.
         """
         frame = self.begin(left, right, left_from_bone, Stopwatch(), NEAR_VIEW)
         measured = self.meter.measure_freely(frame.pair, frame.start, self.settings.near.tracking)
@@ -241,7 +219,7 @@ class TrackerBase(ABC):
             # Swapped pictures show no bone: they are no longer.
             return None
         is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
-        if not is_lost or is_known or state.n_lost % _LOST_BETWEEN != 0:
+        if not is_lost or is_known or state.n_lost % _FRAMES_BETWEEN_DIAGNOSES != 0:
             return state.cause
         return self.diagnosis.explain_loss(left, right, self.rectify_pose(left_from_bone))
 
