@@ -41,20 +41,16 @@ class Candidate:
     score: float
 
 
-class RankedFit(Protocol):
-    """A fit of a candidate."""
+class _RankedFit(Protocol):
+    """What `rank_fits` asks of a fit."""
 
     @property
-    def estimate(self) -> PoseEstimate:
-        """Of the pose."""
-        ...
+    def estimate(self) -> PoseEstimate: ...
 
-    def with_reason(self, reason: Reason) -> Self:
-        """The same fit with one more reason against it."""
-        ...
+    def with_reason(self, reason: Reason) -> Self: ...
 
 
-AnyFit = TypeVar("AnyFit", bound=RankedFit)
+AnyFit = TypeVar("AnyFit", bound=_RankedFit)
 
 
 def make_near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
@@ -70,14 +66,7 @@ def make_far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidT
 def make_tilted_starts(
     pose: RigidTransform, centre_mm: FloatArray, tilt_deg: float, n_tilts: int
 ) -> list[RigidTransform]:
-    """The pose and tilts of it, axes spread over the sphere.
-
-    Args:
-        pose: `scene_from_bone`.
-        centre_mm: (3,) what it is tilted about, in the scene's frame.
-        tilt_deg: angle of each tilt.
-        n_tilts: how many.
-    """
+    """A pose and tilts of it about a place (3,) in the scene's frame, axes all around."""
     starts = [pose]
     for axis in sphere_spiral(n_tilts):
         twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
@@ -99,7 +88,7 @@ def make_scattered_starts(
         pose: `scene_from_bone`.
         centre_mm: (3,) what it is tilted about, in the scene's frame.
         step_mm: length of the shifts.
-        tilts: angle in degrees and number, of each kind of tilt.
+        tilts: (angle in degrees, how many) of each kind.
         has_middle: the pose itself, not shifted, is the first.
     """
     axes = np.vstack([np.zeros((1, 3)) if has_middle else np.empty((0, 3)), np.eye(3), -np.eye(3)])
@@ -117,18 +106,13 @@ def find_candidates(
     model: RegistrationModel,
     starts: Sequence[RigidTransform],
     score: Callable[[RigidTransform], float] | None = None,
-    on_progress: Callable[[float], None] = lambda share: None,
+    on_progress: Callable[[float], None] = lambda fraction: None,
     settings: BimccSettings = NEAR,
 ) -> list[Candidate]:
-    """Approach from every start on a thinned scene; distinct answers, best score first.
+    """Fit coarsely from every start (`scene_from_bone`); distinct answers, best score first.
 
-    Args:
-        scene: what was measured.
-        model: prepared bone.
-        starts: `scene_from_bone` each.
-        score: of a pose, larger is better; by default `compute_explained_fraction`.
-        on_progress: told the share done; may raise to cancel.
-        settings: of the approach.
+    The score is `compute_explained_fraction` by default. Progress is a fraction; what it raises
+    stops the search.
     """
     thinned = replace(scene, thinned_to=_COARSE_POINTS)
     _ = thinned.grid, model.arrays  # made here once, not in both threads
@@ -153,10 +137,10 @@ def compute_explained_fraction(
     model: RegistrationModel,
     scene_from_bone: RigidTransform,
 ) -> float:
-    """How much a pose explains: share of the scene on the model x share of the model in the scene.
+    """Fraction of the scene that lies on the model, times the model's coverage.
 
-    Both under a kernel as wide as the largest noise, so that poses compare. Without a camera the
-    second is left out.
+    Both under a kernel as wide as the largest noise, so that poses compare. Without a camera there
+    is no coverage.
     """
     settings = BimccSettings()
     sigma_mm = 0.5 * settings.widest_at_rest_mm
@@ -168,10 +152,10 @@ def compute_explained_fraction(
     n = pair_forward(arrays, model.arrays, rotation, shift, camera, scene.every, pairs)
     measure_pairs(arrays, model.arrays, rotation, shift, camera, pairs, 0, n)
     kernels: float = weigh(pairs, n, sigma_mm, settings.n_sigmas, 0.0).kernels
-    share = kernels / max(n_asked, 1)
+    fraction = kernels / max(n_asked, 1)
     if scene.camera_mm is None:
-        return share
-    return share * coverage(scene, model, scene_from_bone, sigma_mm)
+        return fraction
+    return fraction * coverage(scene, model, scene_from_bone, sigma_mm)
 
 
 def select_poses(candidates: Sequence[Candidate], most: int = _N_REFINED) -> list[RigidTransform]:
@@ -183,15 +167,10 @@ def select_poses(candidates: Sequence[Candidate], most: int = _N_REFINED) -> lis
 def rank_fits(
     fits: Sequence[AnyFit], scores: Sequence[float], centre_mm: FloatArray
 ) -> list[AnyFit]:
-    """Fits of different candidates, best first; the best says so when it is a guess.
+    """Fits of candidates, best score first; the best is AMBIGUOUS if another one scores as much.
 
-    It is one when a different pose explains as much. Along a free direction every pose does: that
-    is said already.
-
-    Args:
-        fits: of the candidates.
-        scores: how much each explains.
-        centre_mm: (3,) of the model, in the bone's frame.
+    Along a free direction every pose does, and the fit says so already. `centre_mm` (3,) is the
+    model's, in the bone's frame.
     """
     order = sorted(range(len(fits)), key=lambda k: -scores[k])
     ranked = [fits[k] for k in order]

@@ -54,27 +54,20 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """A registered pose and what is to be thought of it.
+    """A registered pose and what is to be thought of it."""
 
-    Attributes:
-        outcome: only CONVERGED is a registration.
-        reasons: why it is not.
-        details: which directions are not fixed, and what is too small, in words for people.
-        estimate: the pose, `scene_from_bone`.
-        coverage: fraction of the model facing the camera that has the scene's surface on it; None
-            without a camera.
-        predicted_tre_mm: 95 % bound of the mean error over the points that face the camera; None
-            when a direction is not fixed at all or no point faces the camera.
-        n_starts: so many starts were tried.
-    """
-
-    outcome: Outcome
-    reasons: tuple[Reason, ...]
+    outcome: Outcome  # only CONVERGED is a registration
+    reasons: tuple[Reason, ...]  # why it is not
+    # which directions are not fixed, and what is too small, in words for people.
     details: tuple[str, ...]
-    estimate: PoseEstimate
+    estimate: PoseEstimate  # the pose, `scene_from_bone`
+    # fraction of the model facing the camera that has the scene's surface on it; None without a
+    # camera.
     coverage: float | None
+    # 95 % bound of the mean error over the points that face the camera; None when a direction is
+    # not fixed at all or no point faces the camera.
     predicted_tre_mm: float | None
-    n_starts: int
+    n_starts: int  # so many starts were tried
 
     @property
     def is_doubtful(self) -> bool:
@@ -96,19 +89,19 @@ def register(
     is_global: bool = False,
     on_progress: Callable[[float], None] = lambda fraction: None,
 ) -> Registration:
-    """Register a model to a scene, check the answer, and try more starts when it is doubtful.
+    """Register a model to a scene, judge the answer, and try more starts when it is doubtful.
 
-    Near starts when the answer is in doubt; far ones when it still fails; as in the first
-    registration of a tracker.
+    Near starts when the answer is in doubt, far ones when it still fails, as a tracker's first
+    registration does. The paper's methods are for comparison: from the start alone.
 
     Args:
         scene: what was measured.
         model: prepared bone.
         start: rough `scene_from_bone`.
-        method: production, or one of the paper's for comparison (from the start alone).
+        method: of the fit.
         is_global: try the near starts in any case; when doubt remains, centre the model on the
             scene and tilt it all around.
-        on_progress: told the fraction done; may raise to cancel.
+        on_progress: told the fraction done; what it raises stops the search.
     """
     if method != "bimcc":
         solve = solve_icp if method == "icp" else solve_bimcc_literal
@@ -129,11 +122,7 @@ def register(
 
 
 class _Search:
-    """The best of what one start and then others lead to.
-
-    Attributes:
-        best: answer so far.
-    """
+    """The best of what one start and then others lead to."""
 
     def __init__(self, scene: Scene, model: RegistrationModel, start: RigidTransform) -> None:
         self._scene, self._model = scene, model
@@ -234,13 +223,10 @@ def _is_little(seen: float | None) -> bool:
 
 
 def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
-    """Rms of what the mean residuals of cells have in common with those of the cells beside them.
+    """Square root of the covariance of the residuals of neighbouring cells; 0 when it is negative.
 
-    Noise has nothing in common with the noise beside it; another shape has.
-
-    Args:
-        solution: with points and residuals that fit.
-        cell_mm: residuals within a cell are averaged; wider than what neighbours share by matching.
+    Noise is not correlated with the noise beside it; residuals of another shape are. Residuals
+    within a cell are averaged: cells are wider than what neighbours share by matching.
     """
     from scipy.spatial import cKDTree
 

@@ -1,8 +1,8 @@
-"""The verdict: every rule by which a pose is shown, doubted or lost.
+"""The verdict: every rule by which a pose is shown (OK), doubted (DEGRADED) or not there (LOST).
 
-A wrong pose is worse than none. `RULES` is the whole of it: what speaks against a pose, from which
-value on, and where that value comes from. What is measured to judge by is `Evidence`; nothing else
-adds a reason, but for a cause that the diagnosis finds once a bone is lost (`with_cause`).
+`RULES` is the whole of it: what speaks against a pose, from which value on, and where that value
+comes from. What is measured to judge by is `Evidence`. Nothing else adds a reason, but for a cause
+that the diagnosis finds once a bone is lost (`with_cause`).
 """
 
 import math
@@ -21,23 +21,14 @@ UNUSABLE_FRACTION = 0.7
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Comparison of the rendered model with what was measured.
+    """Comparison of the rendered model with what was measured."""
 
-    Attributes:
-        n_visible: model pixels in the box.
-        coverage: share of them that was measured and agrees.
-        hidden_fraction: share of them that something nearer hides.
-        behind_fraction: share of them through which the scene is seen.
-        inlier_fraction: share of the measured ones that agrees; hidden ones do not count.
-        spread_ratio: spread of the differences over the sigma that they claim; 0 when none is
-            measured.
-    """
-
-    n_visible: int
-    coverage: float
-    hidden_fraction: float
-    behind_fraction: float
-    inlier_fraction: float
+    n_visible: int  # model pixels in the box
+    coverage: float  # share of them that was measured and agrees
+    hidden_fraction: float  # share of them that something nearer hides
+    behind_fraction: float  # share of them through which the scene is seen
+    inlier_fraction: float  # share of the measured ones that agrees; hidden ones do not count
+    # spread of the differences over the sigma that they claim; 0 when none is measured.
     spread_ratio: float
 
     @property
@@ -56,67 +47,47 @@ NO_AGREEMENT = Agreement(0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
-    """What a pose is measured against.
+    """What a pose is measured against."""
 
-    Attributes:
-        targets_mm: (N, 3) of the stage, in bone coordinates.
-        tolerance_mm: of the stage: all that is known against the pose must stay below it.
-        seen_mm: what is seen must fix the pose at least so well. What the plan's own cartilage may
-            cost goes on top, in squares: no better view mends it.
-    """
-
-    targets_mm: FloatArray
-    tolerance_mm: float
+    targets_mm: FloatArray  # (N, 3) of the stage, in bone coordinates
+    tolerance_mm: float  # of the stage: all that is known against the pose must stay below it
+    # what is seen must fix the pose at least so well. What the plan's own cartilage may cost goes
+    # on top, in squares: no better view mends it.
     seen_mm: float = OK_ERROR_MM
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What is known of a pose when it is judged; NaN and None where nothing is.
+    """What is known of a pose when it is judged; NaN and None where nothing is."""
 
-    Attributes:
-        missing: why there is no pose to be judged.
-        estimate: in the rectified left camera.
-        is_fixed: some surface fixes the pose in all directions.
-        agreement: of the model at the pose with what was measured.
-        dark_fraction, saturated_fraction: of the darker and of the brighter picture's pixels.
-        detail_ratio: sharper over blurred picture; 0 when light already tells.
-        has_lost_rows: the cameras' rows are too far apart to be compared.
-        rows_mm: error in depth that rows which surely disagree stand for.
-        correlated_ratio: variance of the residuals over what right poses show of the noise.
-        kernel_fraction: width of the fit's kernel over the widest at rest, of points that do not
-            know their noise.
-        smooth_excess_mm: what the residuals of such points share with those beside them, over what
-            a right pose leaves.
-        extent_mm: longest side of the scene or of the model, the smaller one's.
-        is_rig_accepted: by its calibration.
-        size_excess_mm: by which the bone surely has another size than the model, over what may be.
-        view_mm, plan_mm: 95 % bounds of the error by what is seen, by the plan's own surface.
-        bound_mm: 95 % bound of the error by all that is known; None without a pose.
-        cartilage_sd_mm: rms standard deviation of the cartilage over the seen surface.
-        jump_mm, jump_deg: of the bone's centre from where it was expected, and turn.
-        goal: of the stage.
-    """
-
-    missing: Reason | None = None
-    estimate: PoseEstimate | None = None
-    is_fixed: bool = False
-    agreement: Agreement | None = None
+    missing: Reason | None = None  # why there is no pose to be judged
+    estimate: PoseEstimate | None = None  # in the rectified left camera
+    is_fixed: bool = False  # some surface fixes the pose in all directions
+    agreement: Agreement | None = None  # of the model at the pose with what was measured
+    # dark_fraction, saturated_fraction: of the darker and of the brighter picture's pixels.
     dark_fraction: float = math.nan
     saturated_fraction: float = math.nan
-    detail_ratio: float = math.nan
-    has_lost_rows: bool = False
-    rows_mm: float = 0.0
+    detail_ratio: float = math.nan  # sharper over blurred picture; 0 when light already tells
+    has_lost_rows: bool = False  # the cameras' rows are too far apart to be compared
+    rows_mm: float = 0.0  # error in depth that rows which surely disagree stand for
+    # variance of the residuals over what right poses show of the noise.
     correlated_ratio: float = math.nan
+    # width of the fit's kernel over the widest at rest, of points that do not know their noise.
     kernel_fraction: float = math.nan
+    # what the residuals of such points share with those beside them, over what a right pose leaves.
     smooth_excess_mm: float = math.nan
-    extent_mm: float = math.nan
-    is_rig_accepted: bool = True
+    extent_mm: float = math.nan  # longest side of the scene or of the model, the smaller one's
+    is_rig_accepted: bool = True  # by its calibration
+    # by which the bone surely has another size than the model, over what may be.
     size_excess_mm: float = math.nan
+    # view_mm, plan_mm: 95 % bounds of the error by what is seen, by the plan's own surface.
     view_mm: float = math.nan
     plan_mm: float = math.nan
+    # 95 % bound of the error by all that is known; None without a pose.
     bound_mm: float | None = None
+    # rms standard deviation of the cartilage over the seen surface.
     cartilage_sd_mm: float = math.nan
+    # jump_mm, jump_deg: of the bone's centre from where it was expected, and turn.
     jump_mm: float = math.nan
     jump_deg: float = math.nan
     goal: Goal | None = None
@@ -164,26 +135,17 @@ _UNKNOWN = Agreement(0, *[math.nan] * 5)
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One reason against a pose.
-
-    Attributes:
-        reason: that is given.
-        quantity: what is looked at, for people.
-        measure: it, of the evidence; NaN is no reason.
-        degraded, lost: beyond these the pose is not shown, or not there; None is never.
-        source: of the limits: a command that measures them, or "chosen".
-        is_below: smaller is worse.
-        doubts_place: speaks against the pose's place, not only against its accuracy.
-    """
+    """One reason against a pose."""
 
     reason: Reason
-    quantity: str
-    measure: Callable[[Evidence], float]
+    quantity: str  # what is looked at, for people
+    measure: Callable[[Evidence], float]  # it, of the evidence; NaN is no reason
+    # degraded, lost: beyond these the pose is not shown, or not there; None is never.
     degraded: float | None
     lost: float | None
-    source: str
-    is_below: bool = False
-    doubts_place: bool = False
+    source: str  # of the limits: a command that measures them, or "chosen"
+    is_below: bool = False  # smaller is worse
+    doubts_place: bool = False  # speaks against the pose's place, not only against its accuracy
 
     def status(self, evidence: Evidence) -> Status:
         """What this rule alone says."""
@@ -316,7 +278,7 @@ def is_place_doubted(verdict: Verdict) -> bool:
 def is_worth_a_search(tracked: TrackedFrame) -> bool:
     """Whether the place is in doubt, and a search could find one that is not.
 
-    While the cameras' rows disagree no answer can be OK: only what is lost has something to gain.
+    While the cameras' rows disagree no answer can be OK: only a lost bone has something to gain.
     """
     is_lost = tracked.verdict.status is Status.LOST
     return is_place_doubted(tracked.verdict) and (is_lost or not tracked.rows_disagree)

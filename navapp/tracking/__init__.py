@@ -3,13 +3,11 @@
 from navapp.registration.verdict import Goal
 from navapp.tracking.methods import make_tracker
 from navapp.tracking.motion import TrackState
-from navapp.tracking.search.near import NearSettings
 from navapp.tracking.tracker import Method, Tracker, TrackerSettings
 
 __all__ = [
     "Goal",
     "Method",
-    "NearSettings",
     "TrackState",
     "Tracker",
     "TrackerSettings",

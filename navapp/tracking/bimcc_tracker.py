@@ -66,8 +66,8 @@ class BimccTracker(Tracker):
     ) -> None:
         super().__init__(rig, bone, settings, judge, diagnosis)
         meter, scorer = self.meter, self.scorer
-        self.near = near or NearSearch(meter, scorer.score, self.settings.near)
-        self.buried = buried or BuriedSearch(meter, self.settings.near)
+        self.near = near or NearSearch(meter, scorer.score)
+        self.buried = buried or BuriedSearch(meter)
         self.after_loss = after_loss or SearchAfterLoss(meter, self.near, scorer)
         self.whole_view = WholeViewSearch(meter, aspects)
 
@@ -105,7 +105,7 @@ class BimccTracker(Tracker):
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """Where the model itself rests next to the start; nothing is measured around it."""
-        return self.near.find_rests(frame)
+        return self.near.find_on_model(frame)
 
     def register(
         self,

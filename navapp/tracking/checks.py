@@ -1,7 +1,4 @@
-"""What a measurement says beside the fit: of its pair of pictures, and of the model.
-
-Neither asks for the pose that the fit finds: both are worked out while it is looked for.
-"""
+"""Checks of a measurement that need no fitted pose: they run on the helper, beside the fit."""
 
 from functools import partial
 from typing import NamedTuple, Self
@@ -19,29 +16,19 @@ from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
 
 
 class PairCheck(NamedTuple):
-    """What is known of one measurement.
+    """What is known of one measurement."""
 
-    Attributes:
-        health: of its pair of pictures.
-        agreement: of the model where it was matched; None of a free measurement.
-        coarse_px: (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
-    """
-
-    health: StereoHealth
-    agreement: Agreement | None
+    health: StereoHealth  # of its pair of pictures
+    agreement: Agreement | None  # of the model where it was matched; None of a free measurement
+    # (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
     coarse_px: NDArray[np.float32] | None
 
 
 class PairChecks:
     """Checks what is measured in one pair, one measurement at a time, on the helper.
 
-    As a context it leaves nothing running.
-
-    Args:
-        meter: of the bone's surface.
-        pair: grey, rectified.
-        coarse: being made: whatever lies around the bone; where it does not reach, or without one,
-            a check matches anew.
+    As a context manager it leaves nothing running. `coarse` is the map of what lies around the
+    bone, being made; where it does not reach, or without one, a check matches anew.
     """
 
     def __init__(
@@ -54,12 +41,7 @@ class PairChecks:
         self._begun: tuple[Measurement, Job[PairCheck]] | None = None
 
     def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
-        """The check of a measurement: the one that was begun, or a new one, which ends that.
-
-        Args:
-            measured: in the pair.
-            pose: rectified left camera from bone, where it was measured or came to rest.
-        """
+        """The check of a measurement at a pose: the one begun, or a new one, which ends that."""
         if self._begun is None or self._begun[0] is not measured:
             self._drop()
             run = partial(_run_check, self._meter, self._pair, self._coarse, measured, pose)

@@ -10,7 +10,7 @@ from navapp.registration import distinct, make_far_starts, make_near_starts, sel
 from navapp.registration.verdict import Goal, with_cause
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.surface_meter import Measurement
+from navapp.tracking.surface_meter import WIDE_BOX, Measurement
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
 
 if TYPE_CHECKING:
@@ -60,8 +60,7 @@ class FirstRegistration:
     def _register_around(self, frame: Frame, goal: Goal) -> list[TrackedFrame]:
         """Around a rough pose: near starts, far ones, partly buried, until one gives an OK."""
         tracker, report = self._tracker, frame.on_progress
-        margins = tracker.settings.near.search
-        measured = tracker.meter.measure_freely(frame.pair, frame.start, margins)
+        measured = tracker.meter.measure_freely(frame.pair, frame.start, WIDE_BOX)
         frame.watch.lap("stereo")
         if measured is None or len(measured.cloud) == 0:
             return [tracker.judge.lost(Reason.NO_SURFACE, frame.watch)]
@@ -69,7 +68,7 @@ class FirstRegistration:
         def fit_from(starts: list[RigidTransform], done: float, part: float) -> list[Fit]:
             told = lambda share: report(done + part * share)  # noqa: E731
             found = select_poses(self._scorer.find_candidates(measured, starts, told))
-            return [tracker.near.settle(frame, measured, pose) for pose in found]
+            return [tracker.near.fit_nearby(frame, measured, pose) for pose in found]
 
         centre_mm = frame.start.apply(tracker.centre_mm)
         fits = fit_from(make_near_starts(frame.start, centre_mm), 0.0, _NEAR_PART)
@@ -118,7 +117,7 @@ class FirstRegistration:
         Clutter around a bone can pull it away from where the first finds it.
         """
         near = self._tracker.near
-        fits = (*near.find(frame), near.find_freely(frame, near.settings.search))
+        fits = (*near.find(frame), near.find_freely(frame, WIDE_BOX))
         found = (fit for fit in fits if fit is not None)
         return max(found, key=self._scorer.score, default=None)
 

@@ -5,25 +5,18 @@ from dataclasses import dataclass
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import fit_bimcc, fit_pose
 from navapp.tracking.frame import MODEL_FIT, Fit, Frame, OnMeasured, ignore
-from navapp.tracking.surface_meter import Margins, SurfaceMeter
+from navapp.tracking.surface_meter import NEAR_BOX, SurfaceMeter
 from navapp.values import Reason
 
 
 @dataclass(frozen=True, slots=True)
 class RestSettings:
-    """When a pose rests on the model; all chosen, reach in `tests.bench.follower_reach`.
+    """When a pose rests on the model; all chosen, reach in `tests.bench.follower_reach`."""
 
-    Attributes:
-        max_sampled: so often only samples of the model are matched, at most ...
-        near_mm: ... until a fit moves the bone by less.
-        max_rounds: matchings, of samples or of everything, at most.
-        settled_mm: after a move of less, the bone rests.
-    """
-
-    max_sampled: int = 3
-    near_mm: float = 0.2
-    max_rounds: int = 6
-    settled_mm: float = 0.05
+    max_sampled: int = 3  # so often only samples of the model are matched, at most ..
+    near_mm: float = 0.2  # ... until a fit moves the bone by less.
+    max_rounds: int = 6  # matchings, of samples or of everything, at most
+    rest_mm: float = 0.05  # after a move of less, the bone rests
 
 
 class Follower:
@@ -32,11 +25,10 @@ class Follower:
     Args:
         meter: of the bone's surface.
         settings: when it rests.
-        margins: around the expected bone.
     """
 
-    def __init__(self, meter: SurfaceMeter, settings: RestSettings, margins: Margins) -> None:
-        self._meter, self._settings, self._margins = meter, settings, margins
+    def __init__(self, meter: SurfaceMeter, settings: RestSettings | None = None) -> None:
+        self._meter, self._settings = meter, settings or RestSettings()
 
     def follow(
         self,
@@ -44,30 +36,30 @@ class Follower:
         pose: RigidTransform,
         least_fraction: float = 0.0,
         *,
-        is_near: bool = False,
+        skips_samples: bool = False,
         on_measured: OnMeasured = ignore,
     ) -> Fit | None:
-        """The pose where the model rests, near an expected one.
+        """The pose at which measuring and fitting in turns come to rest, near an expected one.
 
-        First on samples of the model: they are soon measured, in more steps, and so they see
-        further. Once the bone moves little, everywhere.
+        First on samples of the model, which are soon measured and see further; once the bone moves
+        little, on all of it.
 
         Args:
             frame: whose pair is measured.
             pose: expected, rectified left camera from bone.
-            least_fraction: when fewer of the samples answer, the bone is elsewhere.
-            is_near: the pose is next to where it rests: samples see further than is good for it.
-            on_measured: told what was measured on all of the model, and at which pose, before it is
-                fitted to.
+            least_fraction: of the samples; when fewer are matched, the bone is elsewhere.
+            skips_samples: the pose is so near that samples could only lead away.
+            on_measured: told what was measured on all of the model, and at which pose.
 
         Returns:
-            None when the bone is elsewhere or out of view, or too few points answer.
+            None when the bone is elsewhere or out of view, or too few points are matched.
         """
         settings, watch, model = self._settings, frame.watch, self._meter.model
+        is_near = skips_samples
         fit, expected, moved_mm = None, None, 0.0
         for n_rounds in range(1, settings.max_rounds + 1):
             # After a small move, what was rendered is still what is expected.
-            expected = expected or self._meter.render(frame.pair, pose, self._margins)
+            expected = expected or self._meter.render(frame.pair, pose, NEAR_BOX)
             if expected is None:
                 break
             if is_near:
@@ -88,7 +80,7 @@ class Follower:
             moved_mm, pose = pose.mean_motion_mm(rested, model.hull_mm), rested
             if is_near:
                 fit = Fit(estimate, measured)
-            if moved_mm >= settings.settled_mm:
+            if moved_mm >= settings.rest_mm:
                 expected = None
             elif is_near:
                 break

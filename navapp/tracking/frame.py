@@ -29,35 +29,22 @@ def ignore(*_: object) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A rectified pair, where the bone is expected in it, and what is asked of a search.
+    """A rectified pair, where the bone is expected in it, and what is asked of a search."""
 
-    Attributes:
-        pair: grey pictures, rectified as far around the bone as is looked.
-        start: rectified left camera from bone, expected.
-        watch: of this frame.
-        n_lost: frames in which the bone was lost before this one.
-        searches: a search that takes as long as many frames is worth it.
-        on_measured: told what is measured on all of the model near `start`, and at which pose.
-        on_progress: told the fraction done of a long search; what it raises stops the search.
-    """
-
-    pair: RectifiedPair
-    start: RigidTransform
+    pair: RectifiedPair  # grey pictures, rectified as far around the bone as is looked
+    start: RigidTransform  # rectified left camera from bone, expected
     watch: Stopwatch
-    n_lost: int = 0
-    searches: bool = True
+    n_lost: int = 0  # frames in which the bone was lost before this one
+    searches: bool = True  # a search that takes as long as many frames is worth it
+    # told what is measured on all of the model near `start`, and at which pose.
     on_measured: OnMeasured = ignore
+    # told the fraction done of a long search; what it raises stops the search.
     on_progress: Callable[[float], None] = ignore
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A pose in the rectified left camera, and the surface it was fitted to.
-
-    Attributes:
-        estimate: of the pose.
-        measured: the surface.
-    """
+    """A pose in the rectified left camera, and the surface it was fitted to."""
 
     estimate: PoseEstimate
     measured: Measurement
@@ -83,17 +70,13 @@ class Fit:
         return replace(self, estimate=self.estimate.with_reason(reason))
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
-        """The fit on the model with what its residuals show beyond noise in its covariance.
+        """The fit on the model, its covariance grown by what its residuals show beyond noise.
 
-        Noise has nothing in common with the noise a window further. Tissue that rises from the
-        bone, or a model that lies half a millimetre off, leaves residuals that go together over
-        centimetres: no number of points averages them out. That part goes together over as many
-        pixels as errors of a free measurement do, noise over a matching window: with e the ratio of
-        its variance to the claimed one, the covariance grows by 1 + e / n^2 (l_free / l_model)^2.
-
-        Args:
-            noise_variance_ratio: n^2, of the noise to the claimed one: its covariance was made
-                with it.
+        Noise is correlated over a matching window, l_model. Tissue that rises from the bone, or a
+        model that lies half a millimetre off, leaves residuals that are correlated over
+        centimetres, as errors of a free measurement are, l_free: no number of points averages them
+        out. With e the ratio of their variance to the claimed one, and n^2 = `noise_variance_ratio`
+        that of the noise, the covariance grows by 1 + e / n^2 (l_free / l_model)^2.
         """
         excess = max(0.0, self.variance_ratio - NOISE_RATIO**2)
         lengths = FREE_CORRELATION_PX / MODEL_CORRELATION_PX

@@ -14,7 +14,7 @@ from navapp.stereo import match_baseline
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
-from navapp.tracking.surface_meter import NEAR_VIEW, Margins
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, Margins
 from navapp.tracking.tracker import Tracker
 from navapp.values import DisparityMap, Prior, Reason, Status, Stopwatch, TrackedFrame
 
@@ -31,7 +31,7 @@ class IcpTracker(Tracker):
         self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone's box into the next frame, match in it, and fit."""
-        watch, margins = Stopwatch(), self.settings.near
+        watch = Stopwatch()
         left_from_bone = state.predict(captured_ns, self.centre_mm)
         predicted = self.rectify_pose(left_from_bone)
         # The box comes from the pictures, and the start from the box.
@@ -41,13 +41,13 @@ class IcpTracker(Tracker):
         if state.n_lost == 0:
             frame = self.begin(left, right, expected, watch, NEAR_VIEW)
             with self.check_beside(frame) as checks:
-                fits = [self._fit(frame, margins.tracking)]
+                fits = [self._fit(frame, NEAR_BOX)]
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
         if best.verdict.status is Status.LOST:
             for place in self.boxes.starts(expected, box):
                 frame = self.begin(left, right, place, watch)
                 checks = PairChecks(self.meter, frame.pair)
-                fits = [self._fit(frame, margins.search)]
+                fits = [self._fit(frame, WIDE_BOX)]
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
                 if best.verdict.status is Status.OK:
                     break
@@ -56,7 +56,7 @@ class IcpTracker(Tracker):
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """The one fit around the start."""
-        return [self._fit(frame, self.settings.near.tracking)]
+        return [self._fit(frame, NEAR_BOX)]
 
     def register(
         self,
@@ -71,7 +71,7 @@ class IcpTracker(Tracker):
         if start is None:
             return []
         frame = self.begin(left, right, start, Stopwatch())
-        fit = self._fit(frame, self.settings.near.search)
+        fit = self._fit(frame, WIDE_BOX)
         if fit is None or len(fit.measured.cloud) == 0:
             return [self.judge.lost(Reason.NO_SURFACE, frame.watch)]
         return [self.judge.judge(frame, PairChecks(self.meter, frame.pair), fit, goal)]

@@ -20,26 +20,18 @@ _MOST_BETWEEN_SEARCHES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackState:
-    """What is remembered of one bone from frame to frame.
+    """What is remembered of one bone from frame to frame."""
 
-    Attributes:
-        left_from_bone: pose of the newest frame that was not lost.
-        captured_ns: when that was.
-        velocity: (6,) twist per second (mm/s, rad/s), left, about the model's centre.
-        n_lost: frames lost since then.
-        n_doubted: answers in a row whose place was in doubt. A lost frame neither counts nor ends
-            the row; what searches nothing ends it: a glance, a pair whose rows disagree.
-        box: of the bone in the newest picture, and what it looks like; None before the first.
-        cause: what was found to be wrong for good, until a frame is OK.
-    """
-
-    left_from_bone: RigidTransform
-    captured_ns: int
-    velocity: FloatArray
-    n_lost: int = 0
+    left_from_bone: RigidTransform  # pose of the newest frame that was not lost
+    captured_ns: int  # when that was
+    velocity: FloatArray  # (6,) twist per second (mm/s, rad/s), left, about the model's centre
+    n_lost: int = 0  # frames lost since then
+    # answers in a row whose place was in doubt. A lost frame neither counts nor ends the row; what
+    # searches nothing ends it: a glance, a pair whose rows disagree.
     n_doubted: int = 0
+    # of the bone in the newest picture, and what it looks like; None before the first.
     box: BoxState | None = None
-    cause: Reason | None = None
+    cause: Reason | None = None  # what was found to be wrong for good, until a frame is OK
 
     @classmethod
     def at_rest(

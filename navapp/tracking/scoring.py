@@ -35,7 +35,7 @@ class FitScorer:
         return not is_elsewhere(compare_at(fit.pose, model, fit.measured.disparity, geometry))
 
     def rank(self, fits: list[Fit]) -> list[Fit]:
-        """Fits of different candidates, best first; see `rank_fits`."""
+        """Fits of candidates, best first, as `rank_fits` does."""
         return rank_fits(fits, [self.score(fit) for fit in fits], self._meter.model.centre_mm)
 
     def find_candidates(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.masks import large_regions
-from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair, Rectifier
+from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
@@ -27,8 +27,9 @@ from navapp.stereo import (
 )
 from navapp.values import DisparityMap, SurfaceCloud
 
-# Errors of a free measurement go together over smooth bone, and over tissue that lies flush with
-# it; on the model's own surface over a window.
+# All chosen but where a source stands beside it.
+# Errors of a free measurement are correlated over smooth bone, and over tissue that lies flush with
+# it; those on the model over a matching window. Every covariance depends on them.
 FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
 _SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, stops_at_rest=True, last_step_px=0.3)
 _SAMPLES_PX = 6
@@ -36,10 +37,8 @@ _SAMPLES_PX = 6
 # reach far into it see both, and most of what covers a bone lies in front of it.
 _LARGEST_HIGHLIGHT_PX2 = 400
 _MIXED_PX = 3
-# Where less than this share would be left, the gaps come from a pose that is still off.
-_LEAST_UNMIXED = 0.5
-
-
+# Where a smaller fraction would be left, the gaps come from a pose that is still off.
+_LEAST_UNMIXED_FRACTION = 0.5
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -60,8 +59,11 @@ class Margins:
     band_mm: float
 
 
-# Rectified around an expected bone: a little more than is matched when it is there, for it may have
-# moved; much more when it has to be searched.
+# Matched around an expected bone from frame to frame; at first, and after a loss.
+NEAR_BOX = Margins(box_px=16, band_mm=15.0)
+WIDE_BOX = Margins(box_px=60, band_mm=35.0)
+# Rectified around it: a little more than is matched when it is there, for it may have moved; much
+# more when it has to be searched.
 NEAR_VIEW = Margins(box_px=56, band_mm=60.0)
 WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
 # What hides the bone may be so much nearer; what is seen through a wrong pose, so much further.
@@ -70,20 +72,13 @@ _AROUND = Margins(box_px=24, band_mm=60.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """The surface in the bone's box.
+    """The surface in the bone's box."""
 
-    Attributes:
-        disparity: over the box.
-        cloud: of the measured pixels, thinned.
-        answered_fraction: of the pixels that were asked for: the box's, or the model's.
-        correlation_px: distance in the picture over which its errors go together.
-        view: the model that it was measured on; None of a free measurement.
-    """
-
-    disparity: DisparityMap
-    cloud: SurfaceCloud
-    answered_fraction: float
-    correlation_px: float
+    disparity: DisparityMap  # over the box
+    cloud: SurfaceCloud  # of the measured pixels, thinned
+    answered_fraction: float  # of the pixels that were asked for: the box's, or the model's
+    correlation_px: float  # distance in the picture over which its errors go together
+    # the model that it was measured on; None of a free measurement.
     view: RenderedView | None = None
 
     @property
@@ -94,30 +89,19 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Expected:
-    """What is to be seen of the model at a pose.
+    """What is to be seen of the model at a pose."""
 
-    Attributes:
-        pair: with the model's box.
-        support_px: (h, w) disparity of the model over the box, NaN beside it.
-        view: the model in that box.
-    """
-
-    pair: RectifiedPair
-    support_px: NDArray[np.float32]
-    view: RenderedView
+    pair: RectifiedPair  # with the model's box
+    support_px: NDArray[np.float32]  # (h, w) disparity of the model over the box, NaN beside it
+    view: RenderedView  # the model in that box
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseMap:
-    """What lies where, to about a pixel.
+    """What lies where, to about a pixel."""
 
-    Attributes:
-        disparity_px: (h, w) over the box, NaN where unknown.
-        box: of the rectified left view.
-    """
-
-    disparity_px: NDArray[np.float32]
-    box: Box
+    disparity_px: NDArray[np.float32]  # (h, w) over the box, NaN where unknown
+    box: Box  # of the rectified left view
 
     def over(self, box: Box) -> NDArray[np.float32] | None:
         """(h, w) of a box inside this one; None when it reaches beyond."""
@@ -129,11 +113,11 @@ class CoarseMap:
 class SurfaceMeter:
     """Measures the surface of one bone under one rig.
 
-    Attributes:
+    Args:
+        rig: of the pictures.
         model: of the bone.
-        rectifier: of the rig's pictures.
-        geometry: of its rectified pairs.
         depth_mm: nearest and farthest surface that the rig is used for.
+        max_points: about so many enter a cloud.
     """
 
     def __init__(
@@ -143,13 +127,12 @@ class SurfaceMeter:
         depth_mm: tuple[float, float],
         max_points: int,
     ) -> None:
+        self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
         self.rectifier = Rectifier(rig)
-        self.model = model
-        self.depth_mm = depth_mm
-        self._max_points = max_points
         self.geometry = self.rectifier.geometry
-        # Several steps ask for the same few poses.
-        self._bounds = lru_cache(_KEPT_BOUNDS)(partial(_find_bounds, model, self.geometry))
+        # Several steps ask for the same few poses. No method: it would keep the meter alive.
+        bounds = partial(bounds_of, model.hull_mm, geometry=self.geometry)
+        self._bounds = lru_cache(_KEPT_BOUNDS)(bounds)
 
     def rectify(
         self, left: Image, right: Image, around: RigidTransform, margins: Margins
@@ -175,10 +158,7 @@ class SurfaceMeter:
         margins: Margins,
         match: Matcher = match_smooth_surface,
     ) -> Measurement | None:
-        """Whatever surface is in the box and depth band around a pose; None out of view.
-
-        It sees whatever is there, also where the bone is not.
-        """
+        """Whatever surface is in the box and depth band around a pose; None out of view."""
         region = self._region(pose, margins)
         if region is None:
             return None
@@ -189,12 +169,9 @@ class SurfaceMeter:
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
     ) -> CoarseMap | None:
-        """Whatever lies in a box, as a coarse map; None out of view or depth.
+        """Whatever lies in a box at the bone's depth; None out of view or depth.
 
-        Args:
-            pair: pictures.
-            pose: of the bone: tells the depth.
-            box: of the rectified left view; None is around the bone, with some room.
+        The box is of the rectified left view; without one it is around the bone, with some room.
         """
         region = self._region(pose, _AROUND)
         if region is None:
@@ -225,24 +202,23 @@ class SurfaceMeter:
         found = refine_on_model(expected.pair, expected.support_px)
         is_expected = np.isfinite(expected.support_px)
         cloud = self._cloud(without_gap_rims(found, is_expected))
-        share = (
-            found.matched_fraction * found.origin.size / max(int(np.count_nonzero(is_expected)), 1)
-        )
-        return Measurement(found, cloud, share, MODEL_CORRELATION_PX, expected.view)
+        n_expected = max(int(np.count_nonzero(is_expected)), 1)
+        answered = found.matched_fraction * found.origin.size / n_expected
+        return Measurement(found, cloud, answered, MODEL_CORRELATION_PX, expected.view)
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
-        """As `measure_on_model`, only on samples, in more steps if it needs them: it sees further.
+        """As `measure_on_model` at every sixth pixel each way, in more steps: it sees further.
 
-        What hides the bone counts as well: nothing is left out for the company that it keeps.
+        Rims of large gaps are kept.
         """
         support_px = expected.support_px
         thin = refine_samples(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
         asked = support_px[::_SAMPLES_PX, ::_SAMPLES_PX]
-        n_asked = int(np.count_nonzero(np.isfinite(asked)))
-        share = int(np.count_nonzero(thin.origin)) / max(n_asked, 1)
+        n_asked = max(int(np.count_nonzero(np.isfinite(asked))), 1)
+        answered = int(np.count_nonzero(thin.origin)) / n_asked
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = found.reproject(self.geometry, _SAMPLES_PX)
-        return Measurement(found, cloud, share, MODEL_CORRELATION_PX, expected.view)
+        return Measurement(found, cloud, answered, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About as many points as the line wants."""
@@ -265,21 +241,8 @@ class SurfaceMeter:
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
 
 
-# Not a method: the cache of a meter must not keep that meter alive.
-def _find_bounds(
-    model: RegistrationModel, geometry: RectifiedGeometry, pose: RigidTransform
-) -> tuple[Box | None, tuple[float, float]]:
-    """What bounds the model at a pose: its box, and nearest and farthest depth, mm."""
-    return bounds_of(model.hull_mm, pose, geometry)
-
-
 def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
-    """Without the rims of large gaps, unless that leaves too little.
-
-    Args:
-        found: on the model.
-        is_expected: (h, w) where the model is; what is not expected is no gap.
-    """
+    """Without the rims of large gaps in what is expected (h, w), unless that leaves too little."""
     import cv2
 
     is_matched = found.origin > 0
@@ -287,7 +250,7 @@ def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> Dis
     size = 2 * _MIXED_PX + 1
     around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     stays = is_matched & ~around
-    if np.count_nonzero(stays) < _LEAST_UNMIXED * np.count_nonzero(is_matched):
+    if np.count_nonzero(stays) < _LEAST_UNMIXED_FRACTION * np.count_nonzero(is_matched):
         return found
     return found.only(stays)
 

@@ -4,7 +4,7 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from navapp.geometry.bands import begin_beside
@@ -20,8 +20,7 @@ from navapp.tracking.frame import FREE_FIT, Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
 from navapp.tracking.scoring import FitScorer
-from navapp.tracking.search.near import NearSettings
-from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 
 Method = Literal["bimcc", "icp"]
@@ -32,19 +31,12 @@ _FRAMES_BETWEEN_DIAGNOSES = 10
 
 @dataclass(frozen=True, slots=True)
 class TrackerSettings:
-    """How a tracker works; chosen.
+    """How a tracker works; chosen."""
 
-    Attributes:
-        method: `bimcc` is the production chain, `icp` the paper's baseline.
-        near: how the bone is located around an expected pose.
-        depth_mm: nearest and farthest surface that the rig is used for.
-        max_points: about so many measured points enter a fit.
-    """
-
-    method: Method = "bimcc"
-    near: NearSettings = field(default_factory=NearSettings)
+    method: Method = "bimcc"  # `bimcc` is the production chain, `icp` the paper's baseline
+    # nearest and farthest surface that the rig is used for.
     depth_mm: tuple[float, float] = (300.0, 700.0)
-    max_points: int = 2500
+    max_points: int = 2500  # about so many measured points enter a fit
 
 
 class Tracker(ABC):
@@ -140,7 +132,7 @@ class Tracker(ABC):
         less well than following does: only the stage's tolerance counts.
         """
         frame = self.begin(left, right, left_from_bone, Stopwatch(), NEAR_VIEW)
-        measured = self.meter.measure_freely(frame.pair, frame.start, self.settings.near.tracking)
+        measured = self.meter.measure_freely(frame.pair, frame.start, NEAR_BOX)
         frame.watch.lap("stereo")
         if measured is None:
             return self.judge.lost(Reason.OUT_OF_VIEW, frame.watch)

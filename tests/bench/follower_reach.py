@@ -14,6 +14,7 @@ import numpy as np
 
 from navapp.registration import fit_bimcc
 from navapp.tracking.frame import MODEL_FIT
+from navapp.tracking.surface_meter import NEAR_BOX
 from navapp.values import BoneModel, Reason
 from tests.bench.bone_scenes import Sequence, disturbed, simulated_sequence
 from tests.bench.tracker_parts import TrackerParts
@@ -52,7 +53,7 @@ def rounds(
         for seed in range(n_seeds):
             turn_deg = float(np.degrees(shift_mm / radius_mm))
             start = disturbed(scene.pose, parts.centre_mm, turn_deg, shift_mm, seed)
-            expected = meter.render(scene.pair, start, parts.settings.near.tracking)
+            expected = meter.render(scene.pair, start, NEAR_BOX)
             assert expected is not None
             measured = meter.measure_on_samples(expected)
             found = fit_bimcc(measured.scene, model, start, MODEL_FIT)

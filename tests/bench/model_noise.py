@@ -14,8 +14,7 @@ import numpy as np
 
 from navapp.registration import RegistrationModel
 from navapp.stereo import MODEL_REFINEMENT
-from navapp.tracking import NearSettings
-from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, SurfaceMeter
 from navapp.values import Origin
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
@@ -44,7 +43,7 @@ def _row(seed: int) -> str:
     frame = knee.frames(1)[0]
     true = meter.geometry.rectified_from_left @ knee.truth(frame)
     pair = meter.rectify(frame.left, frame.right, true, NEAR_VIEW)
-    expected = meter.render(pair, true, NearSettings().tracking)
+    expected = meter.render(pair, true, NEAR_BOX)
     assert expected is not None
     found = meter.measure_on_model(expected).disparity
     is_matched = found.origin == Origin.MATCHED

@@ -25,6 +25,7 @@ from navapp.registration.information import near
 from navapp.tracking.edge_kernels import missing_share, sample_across, strongest_edge
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
+from navapp.tracking.surface_meter import NEAR_BOX
 from navapp.values import BoneModel
 from tests.bench.first_registration import Case, simulated
 from tests.bench.tracker_parts import TrackerParts
@@ -90,7 +91,7 @@ def edges_of(case: Case, parts: TrackerParts) -> Iterator[Edge]:
     frame = case.frames[0]
     true = parts.rectify_pose(frame.true)
     pair = parts.frame(frame.left, frame.right, true).pair
-    expected = parts.meter.render(pair, true, parts.settings.near.tracking)
+    expected = parts.meter.render(pair, true, NEAR_BOX)
     if expected is None:
         return
     wide, flank = np.empty(31), np.empty(17)

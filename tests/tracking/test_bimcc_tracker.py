@@ -13,6 +13,7 @@ from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import FREE_FIT, Fit
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.search.near import NearSearch
+from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import FrameTimings, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -157,7 +158,7 @@ class Never:
 def never_searching(near: NearSearch) -> BimccTracker:
     """A tracker that fails when it looks for more than where the model rests."""
     a = room()
-    near = Never(find_rests=near.find_rests)
+    near = Never(find_on_model=near.find_on_model)
     return BimccTracker(
         a.rig, a.tracker.model.bone, near=near, buried=Never(), after_loss=Never(),
         diagnosis=Never(),
@@ -274,7 +275,7 @@ def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_po
     judge = EqualAnswers(a.tracker.meter)
     tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=judge)
     view = tracker.begin(frame.left, frame.right, truth, Stopwatch())
-    measured = tracker.meter.measure_freely(view.pair, view.start, tracker.settings.near.search)
+    measured = tracker.meter.measure_freely(view.pair, view.start, WIDE_BOX)
     away = view.start.move((0.0, 0.0, 25.0, 0.2, 0.0, 0.0), view.start.translation_mm)
     fits = [
         Fit(estimate_at(measured.scene, tracker.model, pose, FREE_FIT), measured)

@@ -4,19 +4,17 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking.following import Follower, RestSettings
-from navapp.tracking.search.near import NearSettings
-from navapp.tracking.surface_meter import Measurement
+from navapp.tracking.surface_meter import NEAR_BOX, Measurement
 from navapp.values import Reason
 from tests.registration.shapes import TRUE
 from tests.tracking.meters import FakeMeter, Laps, error_mm, frame_at, moved
 
-MARGINS = NearSettings().tracking
 NEAR = moved((0.3, -0.2, 0.4), (0.2, -0.3, 0.2))
-RESTLESS = RestSettings(settled_mm=0.0)
+RESTLESS = RestSettings(rest_mm=0.0)
 
 
 def follower(meter: FakeMeter, settings: RestSettings | None = None) -> Follower:
-    return Follower(meter, settings or RestSettings(), MARGINS)
+    return Follower(meter, settings)
 
 
 @pytest.mark.parametrize("start", [TRUE, NEAR, moved((0.5, 0.5, 0.9), (0.0,) * 3)])
@@ -25,7 +23,7 @@ def test_a_near_pose_comes_to_rest_where_the_bone_is(start: RigidTransform) -> N
     fit = follower(meter).follow(frame_at(start), start)
     assert error_mm(fit.pose) < 0.05
     assert len(meter.asked) <= RestSettings().max_rounds
-    assert set(meter.margins) == {MARGINS}
+    assert set(meter.margins) == {NEAR_BOX}
 
 
 def test_samples_come_first_and_the_whole_model_last() -> None:
@@ -53,7 +51,7 @@ def test_after_a_move_the_model_is_rendered_again() -> None:
 @pytest.mark.parametrize("max_rounds", [2, 3, 6])
 def test_it_never_takes_more_rounds_than_allowed(max_rounds: int) -> None:
     meter = FakeMeter()
-    settings = RestSettings(max_sampled=1, max_rounds=max_rounds, settled_mm=0.0)
+    settings = RestSettings(max_sampled=1, max_rounds=max_rounds, rest_mm=0.0)
     fit = follower(meter, settings).follow(frame_at(TRUE), TRUE)
     assert fit is not None
     assert len(meter.asked) == max_rounds
@@ -62,7 +60,7 @@ def test_it_never_takes_more_rounds_than_allowed(max_rounds: int) -> None:
 
 def test_a_bone_that_keeps_moving_is_measured_everywhere_all_the_same() -> None:
     meter = FakeMeter()
-    restless = RestSettings(near_mm=0.0, settled_mm=0.0)
+    restless = RestSettings(near_mm=0.0, rest_mm=0.0)
     follower(meter, restless).follow(frame_at(TRUE), TRUE)
     assert meter.asked == ["sampled"] * restless.max_sampled + ["on_model"] * (
         restless.max_rounds - restless.max_sampled
@@ -101,7 +99,7 @@ def test_a_matching_without_points_does_not_replace_a_fit(
             return measured
 
     meter = GoesBlind()
-    settings = RestSettings(max_sampled=1, settled_mm=0.0)
+    settings = RestSettings(max_sampled=1, rest_mm=0.0)
     fit = follower(meter, settings).follow(frame_at(NEAR), NEAR)
     if blind_after == "sampled":
         assert fit is None

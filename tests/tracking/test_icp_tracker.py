@@ -9,7 +9,7 @@ from navapp.registration import fit_icp
 from navapp.tracking import TrackerSettings, TrackState, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.icp_tracker import IcpTracker, match_gradients
-from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, WIDE_VIEW
 from navapp.values import Prior, Reason, Status, Stopwatch
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, room
@@ -35,15 +35,14 @@ def test_one_matching_and_one_fit_make_an_answer() -> None:
     a = room()
     frame, truth = a.frames[0], a.truth(a.frames[0])
     start = truth.move((0.5, -0.5, 1.0, 0.01, 0.0, 0.0), truth.apply(a.tracker.centre_mm))
-    for name, view in (("tracking", NEAR_VIEW), ("search", WIDE_VIEW)):
+    for margins, view in ((NEAR_BOX, NEAR_VIEW), (WIDE_BOX, WIDE_VIEW)):
         icp = tracker()
         icp.meter = meter = Listening(icp.meter)
         given = (frame.left, frame.right)
-        if name == "tracking":
+        if margins is NEAR_BOX:
             tracked, _ = icp.glance(*given, 0, TrackState.at_rest(start, 0), GOAL)
         else:
             (tracked,) = icp.register(*given, Prior({"femur": start}), GOAL)
-        margins = getattr(icp.settings.near, name)
         assert meter.asked == ["measure_freely"]
         assert meter.given[0][2:] == (margins, match_gradients)
         begun = icp.begin(*given, start, Stopwatch(), view)
@@ -99,7 +98,7 @@ def test_it_is_lost_where_it_was_and_looks_no_further_off() -> None:
         meter.given.clear()
         icp.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
         margins = [given[2] for given in meter.given]
-        assert margins[-1] == icp.settings.near.search
+        assert margins[-1] == WIDE_BOX
         assert len(margins) == (2 if n_lost == 0 else 1)
 
 

@@ -12,7 +12,7 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import FREE_FIT, Fit, Frame
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW
 from navapp.values import Reason, Status, Stopwatch, TrackedFrame
 from tests.tracking.judged import SurfaceAlone, Told, altered
 from tests.tracking.rooms import GOAL, Room, room
@@ -54,7 +54,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     frame, tracker, truth = a.frames[0], a.tracker, a.truth(a.frames[0])
     estimate = tracker.assess(frame.left, frame.right, truth, GOAL).estimate
     begun = tracker.begin(frame.left, frame.right, truth, Stopwatch(), WIDE_VIEW)
-    measured = tracker.meter.measure_freely(begun.pair, begun.start, tracker.settings.near.tracking)
+    measured = tracker.meter.measure_freely(begun.pair, begun.start, NEAR_BOX)
     inside = estimate_at(measured.scene, tracker.model, begun.start, FREE_FIT)
     turn = np.kron(np.eye(2), tracker.meter.geometry.rectified_from_left.rotation)
     np.testing.assert_allclose(

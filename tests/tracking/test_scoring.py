@@ -8,7 +8,7 @@ import pytest
 from navapp.registration import Candidate, rank_fits, select_poses
 from navapp.tracking.frame import Fit
 from navapp.tracking.scoring import FitScorer
-from navapp.tracking.surface_meter import WIDE_VIEW
+from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
 from navapp.values import Reason, Stopwatch
 from tests.registration.shapes import TRUE
 from tests.tracking.rooms import room
@@ -18,7 +18,7 @@ def found_at_the_truth() -> Fit:
     a = room()
     frame, tracker = a.frames[0], a.tracker
     begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch(), WIDE_VIEW)
-    fit = tracker.near.find_freely(begun, tracker.settings.near.tracking)
+    fit = tracker.near.find_freely(begun, NEAR_BOX)
     assert fit is not None
     return fit
 

@@ -10,7 +10,7 @@ from navapp.registration import make_scattered_starts, select_poses
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import NearSearch
-from navapp.tracking.surface_meter import WIDE_VIEW, SurfaceMeter
+from navapp.tracking.surface_meter import WIDE_BOX, WIDE_VIEW, SurfaceMeter
 
 # Steps along each axis, and the tilts of each: (mm, ((deg, how many), ...)); chosen.
 _RINGS = (
@@ -36,11 +36,12 @@ class SearchAfterLoss:
             measured = self._meter.measure_freely(frame.pair, frame.start, WIDE_VIEW)
             frame.watch.lap("stereo")
         if measured is None or len(measured.cloud) == 0:
-            return [self._near.find_freely(frame, self._near.settings.search)]
+            return [self._near.find_freely(frame, WIDE_BOX)]
         candidates = self._scorer.find_candidates(measured, starts)
         poses = select_poses(candidates, _N_REFINED) or [frame.start]
         # Far from where it was, a bone may look like itself in several ways.
-        return [self._scorer.rank([self._near.settle(frame, measured, one) for one in poses])[0]]
+        fits = [self._near.fit_nearby(frame, measured, pose) for pose in poses]
+        return [self._scorer.rank(fits)[0]]
 
 
 def starts_after_loss(

@@ -7,7 +7,6 @@ that then come to rest the one whose residuals show least stands.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,9 +14,8 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import DepthMap, PoseSampler, rank_fits
-from navapp.tracking.following import Follower
+from navapp.tracking.following import Follower, RestSettings
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.search.near import NearSettings
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 
 # Always the same draws: the same pictures give the same pose.
@@ -71,14 +69,12 @@ class BuriedSearch:
 
     Args:
         meter: of the bone's surface.
-        settings: how the bone is located otherwise.
     """
 
-    def __init__(self, meter: SurfaceMeter, settings: NearSettings) -> None:
+    def __init__(self, meter: SurfaceMeter) -> None:
         self._meter = meter
-        self._follower = Follower(meter, settings.rest, settings.tracking)
-        one_step = replace(settings.rest, max_rounds=1)
-        self._stepper = Follower(meter, one_step, settings.tracking)
+        self._follower = Follower(meter)
+        self._stepper = Follower(meter, RestSettings(max_rounds=1))
 
     @cached_property
     def _sampler(self) -> PoseSampler:
@@ -86,7 +82,7 @@ class BuriedSearch:
 
     def find(self, frame: Frame) -> Iterator[Fit | None]:
         """From one frame to the next: where the start rests, then the best around it, if asked."""
-        fit = self._follower.follow(frame, frame.start, is_near=True)
+        fit = self._follower.follow(frame, frame.start, skips_samples=True)
         if fit is not None:
             yield fit
         if not frame.searches:
@@ -125,7 +121,7 @@ class BuriedSearch:
         """Where one step onto the model leads from each start."""
         places = []
         for start in starts:
-            fit = self._stepper.follow(frame, start, is_near=True)
+            fit = self._stepper.follow(frame, start, skips_samples=True)
             if fit is not None and np.isfinite(fit.estimate.covariance).all():
                 depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
                 score = self._sampler.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
@@ -154,7 +150,7 @@ class BuriedSearch:
 
     def _select_rest(self, frame: Frame, places: list[Place]) -> Fit | None:
         """Of all that come to rest, what leaves least; a guess when another leaves as little."""
-        found = (self._follower.follow(frame, one.fit.pose, is_near=True) for one in places)
+        found = (self._follower.follow(frame, one.fit.pose, skips_samples=True) for one in places)
         fits = [fit for fit in found if fit is not None]
         if not fits:
             return None

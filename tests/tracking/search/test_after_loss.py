@@ -6,6 +6,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotation_from_vector
 from navapp.tracking.frame import Frame
 from navapp.tracking.search.after_loss import SearchAfterLoss, starts_after_loss
+from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import Stopwatch
 
 CENTRE = np.array([3.0, -20.0, 15.0])
@@ -56,10 +57,8 @@ def test_all_directions_are_looked_in() -> None:
 
 def test_what_does_not_look_further_off_searches_where_it_was() -> None:
     """And measures nothing beside: a meter would be asked in vain."""
-    near = SimpleNamespace(
-        settings=SimpleNamespace(search="margins"), find_freely=lambda *given: given
-    )
+    near = SimpleNamespace(find_freely=lambda *given: given)
     meter = SimpleNamespace(model=SimpleNamespace(centre_mm=CENTRE))
     search = SearchAfterLoss(meter, near, scorer=None)
     frame = Frame(None, LAST, Stopwatch(), n_lost=2)
-    assert list(search.find(frame)) == [(frame, "margins")]
+    assert list(search.find(frame)) == [(frame, WIDE_BOX)]

@@ -6,6 +6,7 @@ import pytest
 
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import Prior, Status, Stopwatch
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -27,9 +28,7 @@ def error_mm(a: Room, fit: Fit) -> float:
 def test_a_rough_pose_leads_to_the_bone() -> None:
     a, told = room(), []
     frame = replace(off(a, (9.0, -8.0, 6.0, 0.1, 0.08, -0.06)), on_progress=told.append)
-    measured = a.tracker.meter.measure_freely(
-        frame.pair, frame.start, a.tracker.settings.near.search
-    )
+    measured = a.tracker.meter.measure_freely(frame.pair, frame.start, WIDE_BOX)
     found = a.tracker.buried.find_around(frame, measured)
     assert error_mm(a, found) < 0.2
     assert told == sorted(told)

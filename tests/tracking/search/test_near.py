@@ -10,7 +10,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import NearSearch, NearSettings
-from navapp.tracking.surface_meter import Margins
+from navapp.tracking.surface_meter import NEAR_BOX, WIDE_BOX, Margins
 from navapp.values import Reason, Stopwatch
 from tests.registration.shapes import TRUE
 from tests.tracking.meters import FakeMeter, Laps, Listening, error_mm, frame_at, moved
@@ -21,11 +21,10 @@ FAR = moved((1.0, -1.0, 4.8), (0.0, 5.0, 0.0))
 
 def search_of(
     meter: FakeMeter,
-    settings: NearSettings | None = None,
     score: Callable[[Fit], float] | None = None,
 ) -> NearSearch:
     by_share = score or (lambda fit: fit.measured.answered_fraction)
-    return NearSearch(meter, by_share, settings or NearSettings())
+    return NearSearch(meter, by_share, NearSettings())
 
 
 def find(search: NearSearch, start: RigidTransform | Frame) -> Fit | None:
@@ -59,7 +58,7 @@ def test_a_pose_that_is_far_off_is_found_through_a_free_search(start: RigidTrans
 def test_a_search_ends_on_the_model() -> None:
     """What the free measurement is wrong by is gone: the model's own surface is exact."""
     meter = FakeMeter(free_bias_mm=0.4)
-    found = search_of(meter).find_freely(frame_at(FAR), NearSettings().search)
+    found = search_of(meter).find_freely(frame_at(FAR), WIDE_BOX)
     assert meter.asked[0] == "freely"
     assert meter.asked[-1] == "on_model"
     assert meter.asked.count("freely") == 1
@@ -108,7 +107,7 @@ def test_the_better_of_staying_and_searching_wins(sign: float, is_search: bool) 
 def test_a_bone_half_hidden_where_it_was_expected_is_not_searched() -> None:
     settings = NearSettings()
     meter = FakeMeter()
-    meter.share = 0.5 * (settings.hidden_fraction + settings.near_fraction)
+    meter.share = 0.5 * (settings.least_fraction + settings.sure_fraction)
     near = moved((0.0, 0.0, 0.5 * settings.stay_mm), (0.0,) * 3)
     assert error_mm(find(search_of(meter), near).pose) < 0.05
     assert "freely" not in meter.asked
@@ -119,7 +118,7 @@ def test_a_bone_half_hidden_where_it_was_expected_is_not_searched() -> None:
 
 def test_too_small_an_answer_is_not_followed() -> None:
     meter = FakeMeter()
-    meter.share = NearSettings().hidden_fraction - 0.01
+    meter.share = NearSettings().least_fraction - 0.01
     find(search_of(meter), TRUE)
     assert meter.asked.index("freely") <= 1
 
@@ -138,14 +137,14 @@ def test_a_bone_lost_during_the_search_leaves_what_stayed() -> None:
 
 def test_a_rest_is_looked_for_on_the_model_and_never_freely() -> None:
     meter = FakeMeter()
-    sampled, whole = search_of(meter).find_rests(frame_at(moved((0.5, -0.5, 0.8), (0.0,) * 3)))
+    sampled, whole = search_of(meter).find_on_model(frame_at(moved((0.5, -0.5, 0.8), (0.0,) * 3)))
     assert error_mm(sampled.pose) < 0.05
     assert error_mm(whole.pose) < 0.05
     assert "freely" not in meter.asked
-    meter.share = NearSettings().hidden_fraction - 0.01
-    assert len(list(search_of(meter).find_rests(frame_at(TRUE)))) == 1
+    meter.share = NearSettings().least_fraction - 0.01
+    assert len(list(search_of(meter).find_on_model(frame_at(TRUE)))) == 1
     meter.is_in_view = False
-    assert list(search_of(meter).find_rests(frame_at(TRUE))) == []
+    assert list(search_of(meter).find_on_model(frame_at(TRUE))) == []
 
 
 @pytest.mark.parametrize(
@@ -160,7 +159,7 @@ def test_the_time_of_every_matching_and_fit_is_told(
     meter.share = share
     search, frame = search_of(meter), frame_at(start, watch)
     if is_free:
-        search.find_freely(frame, NearSettings().search)
+        search.find_freely(frame, WIDE_BOX)
     else:
         find(search, frame)
     assert watch.parts.count("stereo") == len(meter.asked)
@@ -172,14 +171,13 @@ def test_the_time_of_every_matching_and_fit_is_told(
 
 
 def test_the_margins_of_tracking_and_of_a_first_search_are_kept_apart() -> None:
-    settings = NearSettings(tracking=Margins(3, 4.0), search=Margins(50, 60.0))
     meter = FakeMeter()
-    find(search_of(meter, settings), FAR)
-    assert set(meter.margins) == {settings.tracking}
+    find(search_of(meter), FAR)
+    assert set(meter.margins) == {NEAR_BOX}
     meter = FakeMeter()
-    search_of(meter, settings).find_freely(frame_at(FAR), settings.search)
-    assert meter.margins[0] == settings.search
-    assert set(meter.margins[1:]) == {settings.tracking}
+    search_of(meter).find_freely(frame_at(FAR), WIDE_BOX)
+    assert meter.margins[0] == WIDE_BOX
+    assert set(meter.margins[1:]) == {NEAR_BOX}
 
 
 def test_what_is_measured_next_to_the_expected_pose_is_told() -> None:
@@ -198,7 +196,7 @@ def seen_knee() -> tuple[Frame, NearSearch, list[str]]:
     frame, tracker = a.frames[0], a.tracker
     begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch())
     meter = Listening(tracker.meter)
-    search = NearSearch(meter, FitScorer(tracker.meter).score, NearSettings())
+    search = NearSearch(meter, FitScorer(tracker.meter).score)
     return begun, search, meter.asked
 
 
