@@ -23,32 +23,15 @@ from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.surface_meter import NEAR_VIEW
 from navapp.tracking.tracker import Tracker, TrackerSettings
-from navapp.values import (
-    AspectGraph,
-    BoneModel,
-    Prior,
-    Reason,
-    Status,
-    Stopwatch,
-    TrackedFrame,
-)
+from navapp.values import AspectGraph, BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame
 
 
 class BimccTracker(Tracker):
     """Finds and follows one bone under one rig.
 
-    Args:
-        rig: of the pictures.
-        bone: what is followed.
-        settings: how.
-        aspects: edges of the bone, for a first registration without a pose. Without them it goes by
-            the measured surface alone, which finds the bone in a box, but less often in the whole
-            view (docs/registration.md).
-        judge: of poses; this part and the following ones have defaults.
-        near: search near an expected pose.
-        buried: search for a bone that tissue continues.
-        after_loss: search around and further off.
-        diagnosis: why a bone is not found.
+    `aspects`, edges of the bone, are for a first registration without a pose: without them it goes
+    by the measured surface alone, which finds the bone in a box, but less often in the whole view
+    (docs/registration.md). The other parts have defaults; a test replaces them.
     """
 
     def __init__(

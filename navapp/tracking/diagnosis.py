@@ -1,7 +1,7 @@
-"""Why a bone is not found: pictures that are swapped, or a plan of the other knee.
+"""Why a bone is not found: the pictures are swapped, or the plan is of the other knee.
 
-The judge says that nothing fits. Here it is asked whether something else would: the same pictures
-the other way round, or the same bone's mirror image. Only asked when a bone is not found.
+Asked only when a bone is not found: do the pictures fit when exchanged, or does the bone's mirror
+image fit them?
 """
 
 from collections.abc import Callable
@@ -25,12 +25,7 @@ _MIRROR = np.diag([-1.0, 1.0, 1.0])
 
 
 class Diagnosis:
-    """Looks for what may be wrong for good with one bone under one rig.
-
-    Args:
-        meter: of the bone's surface.
-        scorer: tells how much of the model a fit explains.
-    """
+    """Looks for what stays wrong until somebody mends it, for one bone under one rig."""
 
     def __init__(self, meter: SurfaceMeter, scorer: FitScorer) -> None:
         self._meter, self._scorer = meter, scorer
@@ -48,7 +43,7 @@ class Diagnosis:
         Args:
             left: picture of the left camera.
             right: of the right one.
-            around: pose in the rectified camera that the bone was looked for at, if any.
+            around: rectified left camera from bone, where it was looked for; None everywhere.
             failed: the best answer.
             on_progress: told that it goes on; what it raises stops the search.
         """
@@ -68,11 +63,9 @@ class Diagnosis:
         self, left: Image, right: Image, around: RigidTransform | None
     ) -> Reason | None:
         """Whether the pictures are swapped, around a pose or in the whole view."""
-        given, exchanged = (
-            self._meter.rectify_surroundings(*pictures, around)
-            for pictures in ((left, right), (right, left))
-        )
-        return Reason.PICTURES_SWAPPED if are_swapped(*given, exchanged[0]) else None
+        given = self._meter.rectify_surroundings(left, right, around)
+        exchanged, _ = self._meter.rectify_surroundings(right, left, around)
+        return Reason.PICTURES_SWAPPED if are_swapped(*given, exchanged) else None
 
     def _explain_misfit(
         self, pair: RectifiedPair, pose: RigidTransform, on_progress: Callable[[float], None]
@@ -95,10 +88,7 @@ class Diagnosis:
         return Reason.OTHER_SIDE if is_better else None
 
     def _fit_best(
-        self,
-        measured: Measurement,
-        start: RigidTransform,
-        on_progress: Callable[[float], None],
+        self, measured: Measurement, start: RigidTransform, on_progress: Callable[[float], None]
     ) -> Fit | None:
         """Of the fits that a start and tilts of it lead to, the one that explains most."""
         starts = make_near_starts(start, start.apply(self._meter.model.centre_mm))
@@ -112,11 +102,9 @@ class Diagnosis:
 
 
 def mirror_pose(pose: RigidTransform, centre_mm: FloatArray) -> RigidTransform:
-    """Where a bone stands in the mirrored camera when its mirror image stands at a pose.
+    """Where a bone stands in the mirrored camera when its mirror image is at a pose.
 
-    Args:
-        pose: of the bone mirrored left to right about its centre.
-        centre_mm: (3,) of the bone.
+    It is mirrored left to right about its centre (3,).
     """
     rotation = _MIRROR @ pose.rotation @ _MIRROR
     shift_mm = pose.apply(np.array([2.0 * centre_mm[0], 0.0, 0.0]))

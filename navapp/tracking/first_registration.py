@@ -22,11 +22,7 @@ _NEAR_PART, _FAR_PART = 0.05, 0.45
 
 
 class FirstRegistration:
-    """Finds one bone under one rig for the first time.
-
-    Args:
-        tracker: whose pictures, searches and judge it uses.
-    """
+    """Finds one bone for the first time, with a tracker's meter, searches and judge."""
 
     def __init__(self, tracker: "BimccTracker") -> None:
         self._tracker, self._scorer = tracker, tracker.scorer
@@ -112,10 +108,7 @@ class FirstRegistration:
         return self._judge_distinct(Frame(pair, poses[0], watch), fits, goal)
 
     def _fit_candidate(self, frame: Frame) -> Fit | None:
-        """What explains more: the model matched where it is expected, or what lies around it.
-
-        Clutter around a bone can pull it away from where the first finds it.
-        """
+        """What explains more: the model matched where it is expected, or what lies around it."""
         near = self._tracker.near
         fits = (*near.find(frame), near.find_freely(frame, WIDE_BOX))
         found = (fit for fit in fits if fit is not None)

@@ -1,4 +1,4 @@
-"""A fit becomes an answer: joined with the outline, weighed against all evidence, judged."""
+"""A fit becomes an answer: it is joined with the outline, evidence is gathered, rules decide."""
 
 import math
 from dataclasses import replace
@@ -22,17 +22,11 @@ from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import NOISE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
-from navapp.values import (
-    PoseEstimate,
-    Reason,
-    RowCheck,
-    Stopwatch,
-    TrackedFrame,
-    Verdict,
-)
+from navapp.values import PoseEstimate, Reason, RowCheck, Stopwatch, TrackedFrame, Verdict
 
-# Errors of a cartilage's thickness go together over much of a bone: no number of points averages
-# them out, and the pose takes up to so many of their standard deviations (docs/accuracy.md).
+# All chosen. Errors of a cartilage's thickness are correlated over much of a bone: no number of
+# points averages them out, and the pose takes up to so many of their standard deviations
+# (docs/accuracy.md).
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
 # About so many targets are used for the predicted error; for time alone.
@@ -42,10 +36,7 @@ _MOST_TARGETS = 200
 class PoseJudge:
     """Judges fits of one bone under one rig.
 
-    Args:
-        meter: of the bone's surface.
-        quality: what the rig's calibration says of itself; without it the rig is taken as it is.
-        outline: of the bone.
+    Without the `quality` that its calibration tells of itself, the rig is taken as it is.
     """
 
     def __init__(
@@ -71,9 +62,9 @@ class PoseJudge:
         Args:
             frame: that it was fitted in.
             checks: of that frame's pair.
-            fit: of the bone; None out of view.
+            fit: None out of view.
             goal: of the stage.
-            predicted: pose expected by the motion model, in the rectified left camera.
+            predicted: rectified left camera from bone, as the motion lets expect.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, frame.watch)
@@ -81,8 +72,8 @@ class PoseJudge:
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         health, agreement, coarse_px = checks.check(fit.measured, fit.pose).result()
         if agreement is not None:
-            # Of a bone in the open the noise is what right poses show at most, whatever this one
-            # shows; of a hidden one the claim stands: what lies flush with it may fit as well.
+            # In the open the noise is what right poses show at most, whatever this one shows; of a
+            # hidden bone the claim stands: what lies flush with it may fit as well.
             noise_variance_ratio = NOISE_RATIO**2 if agreement.lies_open else 1.0
             fit = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
             fit = fit.with_correlated_residuals(noise_variance_ratio)
@@ -112,9 +103,9 @@ class PoseJudge:
         if max(dark, saturated) <= UNUSABLE_FRACTION:
             least, most = sorted(one.detail for one in both)
             detail_ratio = most / least if least > 0.0 else math.inf if most > 0.0 else 0.0
-        # Rows tell of turns about the line between the cameras, and those alone cost little. But
-        # what turned a camera about that line turned it as far about others, and a turn that moves
-        # a picture sideways by v px moves the measured depth by z^2 / (f B) v.
+        # Rows tell of turns about the baseline, which alone cost little. But what turned a camera
+        # about it turned it as far about others, and a turn that moves a picture sideways by v px
+        # moves the measured depth by z^2 / (f B) v.
         geometry = self._meter.geometry
         offset_px = abs(health.row_offset_px)
         is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
@@ -201,11 +192,7 @@ class PoseJudge:
 
 
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:
-    """What a pair says of its rig; None when its pictures or its points are too poor to tell.
-
-    Rows that are lost tell nothing either: what is matched where nothing is to be matched looks
-    the same.
-    """
+    """What a pair says of its rig; None when its pictures or its points are too poor to tell."""
     light = (Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE)
     if math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons):
         return None

@@ -9,12 +9,12 @@ from navapp.registration.verdict import is_place_doubted, is_worth_a_search
 from navapp.tracking.box.tracker import BoxState
 from navapp.values import Reason, Status, TrackedFrame
 
-# A patient's limb slows down: the prediction takes this part of the last velocity.
+# All chosen. A patient's limb slows down: the prediction takes this part of the last velocity.
 _DAMPING = 0.7
 # A gap longer than this says nothing about the velocity any more.
 _MAX_GAP_NS = 400_000_000
-# A search for a buried bone that keeps finding nothing is made again after twice as many frames, at
-# most so many: it takes as long as many frames do.
+# A search for a buried bone takes as long as many frames. While it finds nothing it is made again
+# after twice as many frames, at most so many.
 _MOST_BETWEEN_SEARCHES = 8
 
 
@@ -26,8 +26,8 @@ class TrackState:
     captured_ns: int  # when that was
     velocity: FloatArray  # (6,) twist per second (mm/s, rad/s), left, about the model's centre
     n_lost: int = 0  # frames lost since then
-    # answers in a row whose place was in doubt. A lost frame neither counts nor ends the row; what
-    # searches nothing ends it: a glance, a pair whose rows disagree.
+    # frames in a row whose place was in doubt; lost ones do not count, and a glance, or a pair whose
+    # rows disagree, ends the row.
     n_doubted: int = 0
     # of the bone in the newest picture, and what it looks like; None before the first.
     box: BoxState | None = None
@@ -56,20 +56,13 @@ class TrackState:
         return self.left_from_bone.move(twist, self.left_from_bone.apply(centre_mm))
 
     def carry(self, moved: RigidTransform) -> "TrackState":
-        """As if it had moved with something else; what it does besides is not foreseen.
-
-        Args:
-            moved: motion of that, in the left camera.
-        """
+        """As if it had moved with something else, whose motion is given in the left camera."""
         return replace(self, left_from_bone=moved @ self.left_from_bone, velocity=np.zeros(6))
 
     def update(
         self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
     ) -> "TrackState":
-        """After a frame: a lost one, or one that found something else, keeps the pose.
-
-        The box stays.
-        """
+        """After a frame; the pose stays when the bone was lost or something else was found."""
         pose = tracked.left_from_bone
         verdict = tracked.verdict
         # What lies far from where it was expected, and fits badly too, is something else.

@@ -1,8 +1,7 @@
-"""After a loss: where else the bone may be, a part of it in every other frame.
+"""After a loss: around the last pose, and in every other lost frame further off.
 
-A search around the last pose finds what moved by little. Further off, only some of the starts
-around it lead to the bone, and a frame has no time for all of them: each other lost frame tries a
-part that is spread over all directions, until every start had its turn.
+A frame has no time for all starts further off: each tries a part of them that is spread over all
+directions, until every start had its turn.
 """
 
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -47,7 +46,7 @@ class SearchAfterLoss:
 def starts_after_loss(
     last: RigidTransform, centre_mm: FloatArray, n_lost: int
 ) -> list[RigidTransform]:
-    """What to start from besides the last pose; nothing in every other frame.
+    """Starts further off than the last pose; none in every other frame.
 
     Args:
         last: pose of the bone when it was seen last.

@@ -1,9 +1,9 @@
-"""A bone that is partly buried in tissue which continues its surface.
+"""A buried bone: one that is partly covered by tissue which continues its surface.
 
-Such a bone has many places to rest within a millimetre of the true one: tissue that lies flush
-holds it in each. At the true one most of the model answers to within the noise. Steps onto the
-model are therefore taken from many starts, those that find most are the next starts, and of all
-that then come to rest the one whose residuals show least stands.
+Fits of such a bone come to rest at many places within a millimetre of the true one. At the true one
+most of the model is matched to within the noise. So one step onto the model is taken from many
+starts, the best ends are the next starts, and of all that then come to rest the one with the
+smallest residuals stands.
 """
 
 from collections.abc import Iterator
@@ -18,9 +18,9 @@ from navapp.tracking.following import Follower, RestSettings
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 
-# Always the same draws: the same pictures give the same pose.
+# All chosen; compared in tests.bench.buried_bone. The same pictures give the same draws.
 _SEED = 20
-# What the model finds at a pose: under a kernel of its own noise, asked at so many points.
+# A place is scored under a kernel as wide as the noise on the model, at so many points.
 _SIGMA_MM, _N_POINTS = 0.1, 3000
 # So much of the work is the search on the free measurement, then come the steps.
 _SEARCH_FRACTION = 0.3
@@ -65,11 +65,7 @@ _FRAME_ROUNDS = (Round(6, 0.5, 0.8, 4), Round(5, 0.3, 0.5, 3))
 
 
 class BuriedSearch:
-    """Searches for one bone that tissue continues.
-
-    Args:
-        meter: of the bone's surface.
-    """
+    """Searches for one bone that tissue continues."""
 
     def __init__(self, meter: SurfaceMeter) -> None:
         self._meter = meter
@@ -99,11 +95,9 @@ class BuriedSearch:
             yield fit
 
     def find_around(self, frame: Frame, measured: Measurement) -> Fit | None:
-        """The bone around a rough start; it says so when it is a guess. None when nothing answers.
+        """The bone around a rough start, from what was measured freely around it.
 
-        Args:
-            frame: with the rough pose as its start.
-            measured: freely around it.
+        The fit says so when it is a guess; None when nothing is matched.
         """
         report = frame.on_progress
         depth = DepthMap.of(self._meter.geometry, measured.disparity)
