@@ -38,7 +38,7 @@ _DOUBTFUL_COVERAGE = 0.85
 _SMOOTH_MM, _SMOOTH_SPACINGS = 0.2, 0.05
 _CELL_MM, _APART_CELLS = 3.0, (0.8, 1.6)
 # A pose that is no better known than this is not known; no stage asks for more.
-_GOAL = Goal(np.empty((0, 3)), tolerance_mm=np.inf, seen_mm=2.0)
+_GOAL = Goal(np.empty((0, 3)), tolerance_mm=np.inf, view_limit_mm=2.0)
 _LEAST_FACING_COSINE, _N_TRE_POINTS = 0.2, 200
 # Tilts that leave no orientation far from a start: angles, and how many of each.
 _RINGS_DEG, _N_RING_TILTS = (35.0, 70.0, 105.0, 140.0, 175.0), 14

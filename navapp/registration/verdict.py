@@ -21,15 +21,14 @@ UNUSABLE_FRACTION = 0.7
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Comparison of the rendered model with what was measured."""
+    """Comparison of the rendered model with what was measured; fractions of its visible pixels."""
 
     n_visible: int  # model pixels in the box
-    coverage: float  # share of them that was measured and agrees
-    hidden_fraction: float  # share of them that something nearer hides
-    behind_fraction: float  # share of them through which the scene is seen
-    inlier_fraction: float  # share of the measured ones that agrees; hidden ones do not count
-    # spread of the differences over the sigma that they claim; 0 when none is measured.
-    spread_ratio: float
+    coverage: float  # measured, and agreeing
+    hidden_fraction: float  # hidden by something nearer
+    behind_fraction: float  # the scene is seen through them
+    inlier_fraction: float  # of the measured ones that nothing hides: agreeing
+    spread_ratio: float  # of the differences over the sigma that they claim; 0 without any
 
     @property
     def open_coverage(self) -> float:
@@ -50,46 +49,37 @@ class Goal:
     """What a pose is measured against."""
 
     targets_mm: FloatArray  # (N, 3) of the stage, in bone coordinates
-    tolerance_mm: float  # of the stage: all that is known against the pose must stay below it
-    # what is seen must fix the pose at least so well. What the plan's own cartilage may cost goes
-    # on top, in squares: no better view mends it.
-    seen_mm: float = OK_ERROR_MM
+    tolerance_mm: float  # of the stage: the bound by all that is known must stay below it
+    # The bound by what is seen must stay below this and, in squares, what the plan's own surface
+    # may cost: no better view mends that.
+    view_limit_mm: float = OK_ERROR_MM
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What is known of a pose when it is judged; NaN and None where nothing is."""
+    """What is known of a pose when it is judged; NaN and None where nothing is. Bounds are 95 %."""
 
     missing: Reason | None = None  # why there is no pose to be judged
     estimate: PoseEstimate | None = None  # in the rectified left camera
     is_fixed: bool = False  # some surface fixes the pose in all directions
     agreement: Agreement | None = None  # of the model at the pose with what was measured
-    # dark_fraction, saturated_fraction: of the darker and of the brighter picture's pixels.
-    dark_fraction: float = math.nan
-    saturated_fraction: float = math.nan
+    dark_fraction: float = math.nan  # of the darker picture
+    saturated_fraction: float = math.nan  # of the brighter picture
     detail_ratio: float = math.nan  # sharper over blurred picture; 0 when light already tells
     has_lost_rows: bool = False  # the cameras' rows are too far apart to be compared
     rows_mm: float = 0.0  # error in depth that rows which surely disagree stand for
-    # variance of the residuals over what right poses show of the noise.
-    correlated_ratio: float = math.nan
-    # width of the fit's kernel over the widest at rest, of points that do not know their noise.
-    kernel_fraction: float = math.nan
-    # what the residuals of such points share with those beside them, over what a right pose leaves.
-    smooth_excess_mm: float = math.nan
+    correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
+    kernel_fraction: float = math.nan  # of the widest at rest, for points of unknown noise
+    smooth_excess_mm: float = math.nan  # correlated residuals of such points, over what may be
     extent_mm: float = math.nan  # longest side of the scene or of the model, the smaller one's
     is_rig_accepted: bool = True  # by its calibration
-    # by which the bone surely has another size than the model, over what may be.
-    size_excess_mm: float = math.nan
-    # view_mm, plan_mm: 95 % bounds of the error by what is seen, by the plan's own surface.
-    view_mm: float = math.nan
-    plan_mm: float = math.nan
-    # 95 % bound of the error by all that is known; None without a pose.
-    bound_mm: float | None = None
-    # rms standard deviation of the cartilage over the seen surface.
-    cartilage_sd_mm: float = math.nan
-    # jump_mm, jump_deg: of the bone's centre from where it was expected, and turn.
-    jump_mm: float = math.nan
-    jump_deg: float = math.nan
+    size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be
+    view_mm: float = math.nan  # bound of the error by what is seen
+    plan_mm: float = math.nan  # bound of the error by the plan's own surface
+    bound_mm: float | None = None  # bound of the error by all that is known; None without a pose
+    cartilage_sd_mm: float = math.nan  # rms over the seen surface
+    jump_mm: float = math.nan  # of the bone's centre from where it was expected
+    jump_deg: float = math.nan  # turn from how it was expected
     goal: Goal | None = None
 
     def says(self, reason: Reason) -> bool:
@@ -119,8 +109,8 @@ class Evidence:
     @property
     def view_excess_mm(self) -> float:
         """By which what is seen fixes the pose too loosely."""
-        seen_mm = math.nan if self.goal is None else self.goal.seen_mm
-        return self.view_mm - math.hypot(seen_mm, self.plan_mm)
+        limit_mm = math.nan if self.goal is None else self.goal.view_limit_mm
+        return self.view_mm - math.hypot(limit_mm, self.plan_mm)
 
     @property
     def tolerance_excess_mm(self) -> float:
@@ -140,9 +130,8 @@ class Rule:
     reason: Reason
     quantity: str  # what is looked at, for people
     measure: Callable[[Evidence], float]  # it, of the evidence; NaN is no reason
-    # degraded, lost: beyond these the pose is not shown, or not there; None is never.
-    degraded: float | None
-    lost: float | None
+    degraded: float | None  # beyond this the pose is not shown; None is never
+    lost: float | None  # beyond this it is not there
     source: str  # of the limits: a command that measures them, or "chosen"
     is_below: bool = False  # smaller is worse
     doubts_place: bool = False  # speaks against the pose's place, not only against its accuracy

@@ -26,7 +26,7 @@ class TrackState:
     captured_ns: int  # when that was
     velocity: FloatArray  # (6,) twist per second (mm/s, rad/s), left, about the model's centre
     n_lost: int = 0  # frames lost since then
-    # frames in a row whose place was in doubt; lost ones do not count, and a glance, or a pair whose
+    # frames in a row whose place was in doubt; lost ones do not count; a glance, or a pair whose
     # rows disagree, ends the row.
     n_doubted: int = 0
     # of the bone in the newest picture, and what it looks like; None before the first.

@@ -139,7 +139,7 @@ class Tracker(ABC):
         fit = Fit(estimate_at(measured.scene, self.model, frame.start, FREE_FIT), measured)
         frame.watch.lap("estimate")
         checks = PairChecks(self.meter, frame.pair)
-        return self.judge.judge(frame, checks, fit, replace(goal, seen_mm=math.inf))
+        return self.judge.judge(frame, checks, fit, replace(goal, view_limit_mm=math.inf))
 
     def rectify_pose(self, left_from_bone: RigidTransform) -> RigidTransform:
         """A pose in the rectified left camera."""

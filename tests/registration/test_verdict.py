@@ -225,8 +225,8 @@ def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
     """In squares."""
     assert told(known(view_mm=0.9)) == (Status.DEGRADED, (Reason.POSE_UNCERTAIN,))
     assert told(known(view_mm=0.9, plan_mm=0.76)) == (Status.OK, ())
-    assert told(known(view_mm=0.9, goal=replace(GOAL, seen_mm=np.inf))) == (Status.OK, ())
-    assert GOAL.seen_mm == OK_ERROR_MM == 0.5
+    assert told(known(view_mm=0.9, goal=replace(GOAL, view_limit_mm=np.inf))) == (Status.OK, ())
+    assert GOAL.view_limit_mm == OK_ERROR_MM == 0.5
 
 
 @pytest.mark.parametrize(
