@@ -2,7 +2,7 @@
 
 from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc, fit_pose
 from navapp.registration.depth_map import DepthMap
-from navapp.registration.initial import InitialSettings, find_initial
+from navapp.registration.initial import find_initial
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     Candidate,
@@ -26,7 +26,6 @@ __all__ = [
     "BimccSettings",
     "Candidate",
     "DepthMap",
-    "InitialSettings",
     "Outcome",
     "PoseSampler",
     "Registration",

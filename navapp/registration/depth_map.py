@@ -1,24 +1,25 @@
-"""Measured depth, pixel by pixel, for scores that look poses up in it."""
+"""Measured depth, and the camera of a scaled or cut picture, as compiled scores read them."""
 
-from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.registration.initial_kernels import Optics
 from navapp.values import DisparityMap, Origin
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DepthMap:
-    """Measured depth.
+class Optics(NamedTuple):
+    """Focal length and centre in pixels of a scaled or cut rectified picture, and the baseline."""
 
-    Attributes:
-        depth_mm: (h, w); 0 where unknown.
-        optics: of its pixels.
-    """
+    focal_px: float
+    centre_x_px: float
+    centre_y_px: float
+    baseline_mm: float
+
+
+class DepthMap(NamedTuple):
+    """Measured depth (h, w), 0 where unknown, and the optics of its pixels."""
 
     depth_mm: NDArray[np.float32]
     optics: Optics
@@ -30,5 +31,15 @@ class DepthMap:
         depth_mm = np.zeros(found.disparity_px.shape, dtype=np.float32)
         scale = geometry.focal_px * geometry.baseline_mm
         np.divide(scale, found.disparity_px, out=depth_mm, where=is_known)
-        centre = geometry.centre_x_px - found.x, geometry.centre_y_px - found.y
-        return cls(depth_mm, Optics(geometry.focal_px, *centre, geometry.baseline_mm))
+        centre_px = geometry.centre_x_px - found.x, geometry.centre_y_px - found.y
+        return cls(depth_mm, Optics(geometry.focal_px, *centre_px, geometry.baseline_mm))
+
+
+def scale_optics(geometry: RectifiedGeometry, scale: int) -> Optics:
+    """Optics of pictures made `scale` times smaller: u' = (u + 0.5) / scale - 0.5."""
+    return Optics(
+        geometry.focal_px / scale,
+        (geometry.centre_x_px + 0.5) / scale - 0.5,
+        (geometry.centre_y_px + 0.5) / scale - 0.5,
+        geometry.baseline_mm,
+    )

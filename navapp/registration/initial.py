@@ -1,34 +1,34 @@
-"""The first registration without a pose: views, rolls and places are tried, the best verified.
+"""The first registration without a pose: hypotheses are scored coarse to fine, the best are fitted.
 
-Hypotheses stand on the measured surface, which gives their distance. They are scored by look-ups,
-coarse to fine: by how much of the view's surface was measured where it should be, and by equations
-2 and 3 in both pictures. The best go through the coarse BiMCC loop and are ranked by what they
-explain.
+A hypothesis puts a point of the bone on the measured surface, which gives its distance. Look-ups
+score how much of the view's surface was measured where it should be, and equations 2 and 3 in both
+pictures. The best go through the coarse BiMCC loop and are ranked by what they explain.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import run_both
-from navapp.geometry.box import Box
+from navapp.geometry.bands import in_row_bands, run_both
 from navapp.geometry.directions import ViewCone
-from navapp.geometry.rectification import RectifiedPair
-from navapp.geometry.transform import RigidTransform, rotation_angle_deg
+from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.bimcc import MIN_POINTS, fit_coarsely
-from navapp.registration.edge_tables import EdgeTables, edge_tables, scale_optics
+from navapp.registration.edge_tables import make_edge_tables
 from navapp.registration.hypotheses import (
     Views,
+    compute_poses,
     find_distinct,
-    places_of,
-    poses_of,
+    make_views,
+    sample_scene,
     select_hypotheses,
     spread_hypotheses,
     thin_views,
     vary_hypotheses,
-    views_of,
 )
 from navapp.registration.initial_kernels import Hypotheses, score_edges, score_surface
 from navapp.registration.model import RegistrationModel
@@ -36,46 +36,32 @@ from navapp.registration.multi_start import ANYWHERE, Candidate, compute_explain
 from navapp.registration.scene import Scene
 from navapp.values import AspectGraph
 
-_CELL_PX = 8
-# Hypotheses that the coarse loop brings to the same end.
-_ALIKE_MM, _ALIKE_DEG = 12.0, 15.0
-# Coarse answers that a fit on all points brings to the same end.
-_BASIN_MM, _BASIN_DEG = 6.0, 8.0
-# Around a hypothesis so much of the scene takes part.
+
+class Level(NamedTuple):
+    """Pictures made `scale` times smaller, the reach of a gradient there, edge points of a view."""
+
+    scale: int
+    reach_px: int
+    n_points: int
+
+
+# All chosen on simulated knees other than those of `python -m tests.bench.first_registration`.
+_COARSE_STEP_DEG, _ROLL_STEP_DEG = 16.0, 24.0
+_COARSE, _FINE = Level(8, 1, 50), Level(4, 2, 120)
+# On the measured surface; fewer when there would be more hypotheses than this.
+_N_PLACES, _N_HYPOTHESES = 2500, 3_000_000
+# A measured depth within this agrees with a hypothesis.
+_REACH_MM = 6.0
+# So many are scored by their edges too, refined, and fitted.
+_N_PASSED, _N_REFINED, _N_FITTED = 8000, 300, 40
+# Hypotheses this close end in the same coarse pose; coarse poses this close, in the same fit.
+_SAME_START_MM, _SAME_START_DEG = 12.0, 15.0
+_SAME_POSE_MM, _SAME_POSE_DEG = 6.0, 8.0
+# So much of the scene around a hypothesis is fitted to.
 _SPARE_PX, _SPARE_MM = 40, 35.0
-_COARSE_POINTS, _JUDGED_POINTS = 400, 1500
-# Shares of the work that are told.
+_FITTED_POINTS, _JUDGED_POINTS = 400, 1500
+# Fractions of the work that are told.
 _SCORED, _REFINED = 0.5, 0.6
-
-
-@dataclass(frozen=True, slots=True)
-class InitialSettings:
-    """How finely is looked.
-
-    Attributes:
-        coarse_step_deg, fine_step_deg: between views.
-        roll_step_deg: between rolls, all around.
-        n_places: on the measured surface, about ...
-        n_hypotheses: ... and fewer when all together would be more than this.
-        n_surface_points: of each view, to be looked up.
-        n_edge_points: of each view, coarse and fine.
-        reach_mm: a measured depth within this agrees with a hypothesis.
-        n_passed: the best of all by surface alone are scored by their edges too.
-        n_refined: the best of those are refined.
-        n_verified: the best distinct ones of those are verified on the surface.
-    """
-
-    coarse_step_deg: float = 16.0
-    fine_step_deg: float = 8.0
-    roll_step_deg: float = 24.0
-    n_places: int = 2500
-    n_hypotheses: int = 3_000_000
-    n_surface_points: int = 40
-    n_edge_points: tuple[int, int] = (50, 120)
-    reach_mm: float = 6.0
-    n_passed: int = 8000
-    n_refined: int = 300
-    n_verified: int = 40
 
 
 def find_initial(
@@ -84,9 +70,7 @@ def find_initial(
     model: RegistrationModel,
     cone: ViewCone,
     aspects: AspectGraph | None = None,
-    *,
-    settings: InitialSettings | None = None,
-    on_progress: Callable[[float], None] = lambda share: None,
+    on_progress: Callable[[float], None] = lambda fraction: None,
 ) -> list[Candidate]:
     """Find a bone in a box without a pose: distinct candidates, best first.
 
@@ -95,169 +79,112 @@ def find_initial(
         scene: what was measured there, in the rectified left camera, not thinned.
         model: prepared bone.
         cone: where the cameras may stand, seen from the bone.
-        aspects: edges of the bone; without them the pictures have no say.
-        settings: how finely is looked.
-        on_progress: told the share done; what it raises stops the search.
+        aspects: edges of the bone, seen from that cone; without them the pictures do not count.
+        on_progress: told the fraction done; what it raises stops the search.
     """
-    settings = settings or InitialSettings()
     on_progress(0.0)
     if len(scene) < MIN_POINTS:
         return []
-    views = views_of(model, cone, settings.fine_step_deg, aspects, settings.n_surface_points)
-    best = _best_hypotheses(pair, scene, views, settings, on_progress)
-    target = pair.geometry.rectified_from_left.target
-    best = select_hypotheses(
-        best, find_distinct(best, model.centre_mm, _ALIKE_MM, _ALIKE_DEG)[: settings.n_verified]
-    )
-    starts = poses_of(best, target, model.bone.name)
-    told = lambda share: on_progress(_REFINED + (1.0 - _REFINED) * share)  # noqa: E731
-    return _verify(pair, scene, model, starts, told)
+    views = make_views(model, cone, aspects)
+    rotations, shifts_mm = compute_poses(_rank_hypotheses(pair, scene, views, on_progress))
+    centres_mm = rotations @ model.centre_mm + shifts_mm
+    distinct = find_distinct(rotations, centres_mm, _SAME_START_MM, _SAME_START_DEG)[:_N_FITTED]
+    frames = pair.geometry.rectified_from_left.target, model.bone.name
+    starts = [RigidTransform.from_parts(*frames, rotations[k], shifts_mm[k]) for k in distinct]
+    return _fit_starts(pair.geometry, scene, model, starts, on_progress)
 
 
-def score_views(
-    some: Hypotheses, aspects: AspectGraph, tables: EdgeTables, n_first: int
-) -> NDArray[np.float32]:
-    """(H,) equations 2 and 3 of hypotheses: 0 to 1, mean over both pictures with the same pose.
-
-    Args:
-        some: hypotheses whose aspects are the graph's views.
-        aspects: edges of the views.
-        tables: of the pictures.
-        n_first: so many points of a view; they are spread evenly for every number.
-    """
-    score = np.zeros(len(some.orientation), dtype=np.float32)
-    points, tangents = np.array(aspects.points_mm), np.array(aspects.tangents)
-    starts = np.array(aspects.starts)
-    _in_halves(
-        len(score),
-        lambda first, last: score_edges(
-            some, points, tangents, starts, n_first, tables.left, tables.right, tables.optics,
-            (first, last), score,
-        ),
-    )  # fmt: skip
-    return score
-
-
-def _best_hypotheses(
-    pair: RectifiedPair,
-    scene: Scene,
-    views: Views,
-    settings: InitialSettings,
-    on_progress: Callable[[float], None],
+def _rank_hypotheses(
+    pair: RectifiedPair, scene: Scene, views: Views, on_progress: Callable[[float], None]
 ) -> Hypotheses:
-    """Hypotheses, best first, coarse to fine."""
-    chosen = thin_views(views, settings.coarse_step_deg)
-    n_orientations = len(chosen) * views.anchors_mm.shape[1] * 360.0 / settings.roll_step_deg
-    n_places = min(settings.n_places, int(settings.n_hypotheses / n_orientations))
-    depth_mm, positions_mm = places_of(scene, pair.geometry, _CELL_PX, n_places)
-    some = spread_hypotheses(views, chosen, settings.roll_step_deg, positions_mm)
-    optics = scale_optics(pair, _CELL_PX)
+    """The refined hypotheses, best first."""
+    chosen = thin_views(views, _COARSE_STEP_DEG)
+    n_orientations = len(chosen) * views.anchors_mm.shape[1] * 360.0 / _ROLL_STEP_DEG
+    n_places = min(_N_PLACES, int(_N_HYPOTHESES / n_orientations))
+    depth, places_mm = sample_scene(scene, pair.geometry, _COARSE.scale, n_places)
     largest_px = pair.geometry.disparity_px(float(scene.points_mm[:, 2].min()))
 
-    def by_surface(these: Hypotheses) -> NDArray[np.float32]:
-        score = np.zeros(len(these.orientation), dtype=np.float32)
-        fixed = (these, views.surface_mm, views.starts, depth_mm, optics, settings.reach_mm)
-        _in_halves(len(score), lambda a, b: score_surface(*fixed, (a, b), score))
-        return score
+    def score(some: Hypotheses, level: Level | None) -> NDArray[np.float32]:
+        n, found = len(some.place), np.zeros(len(some.place), dtype=np.float32)
+        in_row_bands(n, partial(score_surface, some, views.surface_mm, depth, _REACH_MM, found))
+        if level is None or views.edges is None:
+            return found
+        tables = make_edge_tables(pair, level.scale, level.reach_px, largest_px)
+        on_edges = np.zeros_like(found)
+        in_row_bands(n, partial(score_edges, some, views.edges, level.n_points, tables, on_edges))
+        return found + on_edges
 
-    def by_both(these: Hypotheses, score: NDArray[np.float32], level: int) -> NDArray[np.float32]:
-        if views.edges is None:
-            return score
-        tables = edge_tables(pair, _CELL_PX >> level, 1 + level, largest_px)
-        n_first = settings.n_edge_points[level]
-        return score + score_views(these, views.edges, tables, n_first)
-
-    score = by_surface(some)
-    passed = _largest(score, settings.n_passed)
+    some = spread_hypotheses(views, chosen, _ROLL_STEP_DEG, places_mm)
+    some = select_hypotheses(some, _find_largest(score(some, None), _N_PASSED))
     on_progress(_SCORED)
-    some = select_hypotheses(some, passed)
-    some = select_hypotheses(some, _largest(by_both(some, score[passed], 0), settings.n_refined))
-    steps = 0.75 * settings.coarse_step_deg, settings.roll_step_deg / 3.0, 0.3 * settings.reach_mm
+    some = select_hypotheses(some, _find_largest(score(some, _COARSE), _N_REFINED))
+    steps = 0.75 * _COARSE_STEP_DEG, _ROLL_STEP_DEG / 3.0, 0.3 * _REACH_MM
     some = vary_hypotheses(some, views, *steps)
-    score = by_both(some, by_surface(some), 1)
+    some = select_hypotheses(some, _find_largest(score(some, _FINE), len(some.place)))
     on_progress(_REFINED)
-    return select_hypotheses(some, _largest(score, len(score)))
+    return some
 
 
-def _verify(
-    pair: RectifiedPair,
+def _find_largest(score: NDArray[np.float32], n: int) -> NDArray[np.intp]:
+    """Indices of the n largest scores, largest first; ties in their order."""
+    kept = np.arange(len(score))
+    if n < len(score):
+        kept = np.flatnonzero(score >= np.partition(score, -n)[-n])
+    return kept[np.argsort(-score[kept], kind="stable")][:n]
+
+
+def _fit_starts(
+    geometry: RectifiedGeometry,
     scene: Scene,
     model: RegistrationModel,
     starts: list[RigidTransform],
     on_progress: Callable[[float], None],
 ) -> list[Candidate]:
-    """Where the coarse loop leads from each start, on the scene around it."""
+    """What the coarse loop finds from each start, on the scene around it: distinct, best first."""
     found: list[Candidate | None] = [None] * len(starts)
     _ = model.arrays  # made here once, not in both threads
-    pixels = pair.geometry.project(scene.points_mm)
+    pixels = geometry.project(scene.points_mm)
+
+    def fit(start: RigidTransform) -> Candidate | None:
+        near = _crop_scene(scene, pixels, geometry, start.apply(model.points_mm))
+        if len(near) < MIN_POINTS:
+            return None
+        pose = fit_coarsely(replace(near, thinned_to=_FITTED_POINTS), model, start, ANYWHERE)
+        if pose is None:
+            return None
+        judged = replace(near, thinned_to=_JUDGED_POINTS)
+        # As a fraction of the whole scene, so that candidates compare.
+        explained = compute_explained_fraction(judged, model, pose)
+        return Candidate(pose, explained * len(near) / len(scene))
 
     def run(first: int) -> None:
         for number in range(first, len(starts), 2):
             if first == 0:
-                on_progress(number / len(starts))
-            start = starts[number]
-            near = _near(pair, scene, pixels, model, start)
-            if len(near) < MIN_POINTS:
-                continue
-            pose = fit_coarsely(replace(near, thinned_to=_COARSE_POINTS), model, start, ANYWHERE)
-            if pose is not None:
-                # In shares of the whole scene, so that candidates compare.
-                share = compute_explained_fraction(
-                    replace(near, thinned_to=_JUDGED_POINTS), model, pose
-                )
-                found[number] = Candidate(pose, share * len(near) / len(scene))
+                on_progress(_REFINED + (1.0 - _REFINED) * (number / len(starts)))
+            found[number] = fit(starts[number])
 
     run_both(lambda: run(0), lambda: run(1))
     on_progress(1.0)
     ranked = sorted((one for one in found if one is not None), key=lambda one: -one.score)
-    kept: list[Candidate] = []
-    for one in ranked:
-        if not any(_same_basin(one, other, model) for other in kept):
-            kept.append(one)
-    return kept
+    poses = [one.scene_from_bone for one in ranked]
+    rotations = np.array([pose.rotation for pose in poses])
+    centres_mm = np.array([pose.apply(model.centre_mm) for pose in poses])
+    distinct = find_distinct(rotations, centres_mm, _SAME_POSE_MM, _SAME_POSE_DEG)
+    return [ranked[k] for k in distinct]
 
 
-def _same_basin(a: Candidate, b: Candidate, model: RegistrationModel) -> bool:
-    """Whether two coarse answers are on their way to the same pose."""
-    one, other = a.scene_from_bone, b.scene_from_bone
-    shift_mm = np.linalg.norm(one.apply(model.centre_mm) - other.apply(model.centre_mm))
-    return bool(shift_mm < _BASIN_MM and rotation_angle_deg(one, other) < _BASIN_DEG)
-
-
-def _near(
-    pair: RectifiedPair,
-    scene: Scene,
-    pixels: NDArray[np.float64],
-    model: RegistrationModel,
-    pose: RigidTransform,
+def _crop_scene(
+    scene: Scene, pixels: FloatArray, geometry: RectifiedGeometry, model_mm: FloatArray
 ) -> Scene:
-    """The part of the scene around the model at a pose."""
-    points_mm = pose.apply(model.points_mm)
-    around_model = Box.around(pair.geometry.project(points_mm))
-    if around_model is None:
-        return replace(scene, points_mm=np.empty((0, 3)), sigma_ray_mm=None)
-    box = around_model.grow(_SPARE_PX)
-    z_mm = scene.points_mm[:, 2]
-    inside = (z_mm > points_mm[:, 2].min() - _SPARE_MM) & (z_mm < points_mm[:, 2].max() + _SPARE_MM)
-    inside &= (pixels[:, 0] >= box.x) & (pixels[:, 0] < box.x + box.width)
-    inside &= (pixels[:, 1] >= box.y) & (pixels[:, 1] < box.y + box.height)
-    sigma = scene.sigma_ray_mm
-    return replace(
-        scene,
-        points_mm=scene.points_mm[inside],
-        sigma_ray_mm=None if sigma is None else sigma[inside],
-    )
-
-
-def _largest(score: NDArray[np.float32], n: int) -> NDArray[np.intp]:
-    """Indices of the n largest scores, largest first; ties in their order."""
-    if n < len(score):
-        least = np.partition(score, len(score) - n)[len(score) - n]
-        kept = np.flatnonzero(score >= least)
-    else:
-        kept = np.arange(len(score))
-    return kept[np.argsort(-score[kept], kind="stable")][:n]
-
-
-def _in_halves(n: int, job: Callable[[int, int], object]) -> None:
-    run_both(lambda: job(0, n // 2), lambda: job(n // 2, n))
+    """The part of a scene, seen at `pixels` (N, 2), around points of a model in its frame."""
+    # Some point of the model is in front of the camera: the hypothesis' anchor.
+    model_pixels = geometry.project(model_mm)
+    low = np.floor(np.nanmin(model_pixels, axis=0)) - _SPARE_PX
+    high = np.ceil(np.nanmax(model_pixels, axis=0)) + _SPARE_PX + 1
+    inside = ((pixels >= low) & (pixels < high)).all(axis=1)
+    z_mm, model_z_mm = scene.points_mm[:, 2], model_mm[:, 2]
+    inside &= z_mm > model_z_mm.min() - _SPARE_MM
+    inside &= z_mm < model_z_mm.max() + _SPARE_MM
+    sigma_mm = scene.sigma_ray_mm
+    sigma_mm = None if sigma_mm is None else sigma_mm[inside]
+    return replace(scene, points_mm=scene.points_mm[inside], sigma_ray_mm=sigma_mm)

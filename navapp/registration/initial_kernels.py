@@ -1,4 +1,4 @@
-"""Compiled scores of hypotheses by table look-ups: edges in both pictures, and the surface."""
+"""Compiled scores of hypotheses by look-ups: edges in both pictures, and the measured surface."""
 
 from typing import NamedTuple
 
@@ -6,125 +6,98 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.transform import FloatArray
+from navapp.registration.depth_map import DepthMap, Optics
+
+# Directions k pi / N_BINS of an edge's normal, which has no sign; chosen: one bit of a byte each.
 N_BINS = 8
 
 
 class Hypotheses(NamedTuple):
-    """Poses as the kernels read them: an orientation at a place; H of them.
+    """H poses, each one of O orientations at one of C places; O and C are much fewer than H.
 
     Attributes:
-        orientation: (H,) index into `aspect` and `rotation`.
-        place: (H,) index into `towards` and `position`.
-        aspect: (O,) the view of each orientation.
-        rotation: (O, 3, 3) of each, for a bone on the optical axis.
-        towards: (C, 3, 3) turns the optical axis into the line of sight of each place.
-        position: (C, 3) mm, in the rectified left camera.
-        anchor: (O, 3) the point of the bone, mm, that lies at the place.
+        orientation: (H,) index into `view_index`, `rotation` and `anchor_mm`.
+        place: (H,) index into `towards` and `position_mm`.
+        view_index: (O,) of the view that is seen.
+        rotation: (O, 3, 3) of a bone on the optical axis.
+        anchor_mm: (O, 3) the point of the bone that lies at the place.
+        towards: (C, 3, 3) turns the optical axis into the line of sight of the place.
+        position_mm: (C, 3) in the rectified left camera.
     """
 
     orientation: NDArray[np.int32]
     place: NDArray[np.int32]
-    aspect: NDArray[np.int32]
-    rotation: NDArray[np.float64]
-    towards: NDArray[np.float64]
-    position: NDArray[np.float64]
-    anchor: NDArray[np.float64]
+    view_index: NDArray[np.int32]
+    rotation: FloatArray
+    anchor_mm: FloatArray
+    towards: FloatArray
+    position_mm: FloatArray
 
 
-class Optics(NamedTuple):
-    """A rectified pair that has been scaled: px of its own, and the baseline in mm."""
+class ViewEdges(NamedTuple):
+    """Edges of V views, N points together.
 
-    focal: float
-    centre_x: float
-    centre_y: float
-    baseline: float
-
-
-@njit(cache=True, nogil=True)
-def quantise_gradients(
-    picture: NDArray[np.float32],
-    least: float,
-    rows: tuple[int, int],
-    bins: NDArray[np.uint8],
-) -> None:
-    """The direction of each gradient as one bit of a byte; 0 where it is too weak.
-
-    Args:
-        picture: (h, w).
-        least: a weaker gradient says nothing, grey levels per px.
-        rows: first and last (exclusive) to be done.
-        bins: (h, w) in place; bit k: a direction of about k pi / 8 (a direction has no sign).
+    Attributes:
+        starts: (V + 1,) where each view's points begin.
+        points_mm: (N, 3).
+        tangents: (N, 3) unit, along the edge.
     """
-    height, width = picture.shape
-    for y in range(max(rows[0], 1), min(rows[1], height - 1)):
-        for x in range(1, width - 1):
-            gx = 0.5 * (picture[y, x + 1] - picture[y, x - 1])
-            gy = 0.5 * (picture[y + 1, x] - picture[y - 1, x])
-            if gx * gx + gy * gy <= least * least:
-                continue
-            k = int(np.floor(np.arctan2(gy, gx) * N_BINS / np.pi + 0.5)) % N_BINS
-            bins[y, x] = np.uint8(1 << k)
+
+    starts: NDArray[np.int64]
+    points_mm: FloatArray
+    tangents: FloatArray
 
 
-@njit(cache=True, nogil=True)
-def spread_responses(
-    bins: NDArray[np.uint8],
-    reach: int,
-    answers: NDArray[np.uint8],
-    rows: tuple[int, int],
-    response: NDArray[np.uint8],
-) -> None:
-    """What an edge of each direction finds around each pixel.
+class EdgeTables(NamedTuple):
+    """What an edge of each direction finds at each pixel of both pictures, made smaller.
 
-    Args:
-        bins: (h, w) of `quantise_gradients`.
-        reach: px in both directions within which the best gradient counts.
-        answers: (256, 8) response of a byte of bins to each direction.
-        rows: first and last (exclusive) to be done.
-        response: (h, w, 8) in place.
+    (h, w, N_BINS) each; 255 where a gradient is across the edge.
     """
-    height, width = bins.shape
-    for y in range(rows[0], rows[1]):
-        for x in range(width):
-            around = 0
-            for row in range(max(y - reach, 0), min(y + reach + 1, height)):
-                for column in range(max(x - reach, 0), min(x + reach + 1, width)):
-                    around |= bins[row, column]
-            for k in range(N_BINS):
-                response[y, x, k] = answers[around, k]
+
+    left: NDArray[np.uint8]
+    right: NDArray[np.uint8]
+    optics: Optics
 
 
 @njit(cache=True, nogil=True)
-def pose_of(
-    some: Hypotheses, h: int, rotation: NDArray[np.float64], shift: NDArray[np.float64]
-) -> int:
-    """Rotation and translation of a hypothesis, in place; its view."""
+def rotate(R: FloatArray, vectors: FloatArray, i: int) -> tuple[float, float, float]:
+    """Vector i of (N, 3) after a rotation."""
+    x, y, z = vectors[i, 0], vectors[i, 1], vectors[i, 2]
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@njit(cache=True, nogil=True)
+def compose_pose(some: Hypotheses, h: int, R: FloatArray, t: FloatArray) -> int:
+    """Write rotation (3, 3) and translation (3,) of hypothesis h; returns its view."""
     o, c = some.orientation[h], some.place[h]
-    v: int = some.aspect[o]
     for i in range(3):
-        shift[i] = some.position[c, i]
         for j in range(3):
-            rotation[i, j] = (
+            R[i, j] = (
                 some.towards[c, i, 0] * some.rotation[o, 0, j]
                 + some.towards[c, i, 1] * some.rotation[o, 1, j]
                 + some.towards[c, i, 2] * some.rotation[o, 2, j]
             )
-    for i in range(3):
+        t[i] = some.position_mm[c, i]
         for j in range(3):
-            shift[i] -= rotation[i, j] * some.anchor[o, j]
-    return v
+            t[i] -= R[i, j] * some.anchor_mm[o, j]
+    view: int = some.view_index[o]
+    return view
 
 
 @njit(cache=True, nogil=True)
 def response_at(
-    response: NDArray[np.uint8], u: float, v: float, direction_x: float, direction_y: float
+    response: NDArray[np.uint8], u: float, v: float, normal_x: float, normal_y: float
 ) -> float:
-    """0 to 1: what an edge at a place, with its normal in a direction, finds; 0 outside."""
-    height, width = response.shape[0], response.shape[1]
+    """0 to 1: what an edge with this normal finds at a place in the picture; 0 outside."""
     x, y = int(np.floor(u + 0.5)), int(np.floor(v + 0.5))
-    if not (0 <= x < width and 0 <= y < height):
+    if not (0 <= x < response.shape[1] and 0 <= y < response.shape[0]):
         return 0.0
-    k = int(np.floor(np.arctan2(direction_y, direction_x) * N_BINS / np.pi + 0.5)) % N_BINS
+    k = int(np.floor(np.arctan2(normal_y, normal_x) * N_BINS / np.pi + 0.5)) % N_BINS
     found: float = response[y, x, k] / 255.0
     return found
 
@@ -132,102 +105,84 @@ def response_at(
 @njit(cache=True, nogil=True)
 def score_edges(
     some: Hypotheses,
-    points: NDArray[np.float64],
-    tangents: NDArray[np.float64],
-    starts: NDArray[np.int64],
+    edges: ViewEdges,
     n_first: int,
-    left: NDArray[np.uint8],
-    right: NDArray[np.uint8],
-    optics: Optics,
-    span: tuple[int, int],
+    tables: EdgeTables,
     score: NDArray[np.float32],
+    span: tuple[int, int],
 ) -> None:
     """Equations 2 and 3: mean response of a view's edges, over both pictures.
 
     Args:
-        some: hypotheses.
-        points: (N, 3) of all views, mm.
-        tangents: (N, 3) along their edges.
-        starts: (V + 1,) where each view's points begin.
+        some: H hypotheses.
+        edges: of all views.
         n_first: so many points of a view at most.
-        left: (h, w, 8) response.
-        right: of the other picture.
-        optics: of both.
+        tables: of the pictures.
+        score: (H,) in place, 0 to 1; what is outside the pictures counts as 0.
         span: first and last (exclusive) hypothesis to be done.
-        score: (H,) in place; what is outside the pictures counts as 0.
     """
+    optics = tables.optics
     R, t = np.empty((3, 3)), np.empty(3)
     for h in range(span[0], span[1]):
-        view = pose_of(some, h, R, t)
-        first = starts[view]
-        n = min(starts[view + 1] - first, n_first)
+        view = compose_pose(some, h, R, t)
+        first = edges.starts[view]
+        n = min(edges.starts[view + 1] - first, n_first)
         total = 0.0
         for i in range(first, first + n):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            px = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0]
-            py = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1]
-            pz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2]
-            if pz <= 1e-6:
+            x, y, z = rotate(R, edges.points_mm, i)
+            x, y, z = x + t[0], y + t[1], z + t[2]
+            if z <= 1e-6:
                 continue
-            a, b, c = tangents[i, 0], tangents[i, 1], tangents[i, 2]
-            dx = R[0, 0] * a + R[0, 1] * b + R[0, 2] * c
-            dy = R[1, 0] * a + R[1, 1] * b + R[1, 2] * c
-            dz = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c
-            inverse = optics.focal / pz
-            # Derivative of the projection along the edge, without its factor f / z.
-            along_y = dy - py / pz * dz
-            u, v = px * inverse + optics.centre_x, py * inverse + optics.centre_y
-            total += response_at(left, u, v, -along_y, dx - px / pz * dz)
-            across = dx - (px - optics.baseline) / pz * dz
-            total += response_at(right, u - optics.baseline * inverse, v, -along_y, across)
+            scale = optics.focal_px / z
+            u, v = x * scale + optics.centre_x_px, y * scale + optics.centre_y_px
+            # Derivatives of the projection along the edge, without their factor f / z.
+            dx, dy, dz = rotate(R, edges.tangents, i)
+            along_y = dy - y / z * dz
+            total += response_at(tables.left, u, v, -along_y, dx - x / z * dz)
+            u -= optics.baseline_mm * scale
+            along_x = dx - (x - optics.baseline_mm) / z * dz
+            total += response_at(tables.right, u, v, -along_y, along_x)
         score[h] = total / (2.0 * n) if n > 0 else 0.0
 
 
 @njit(cache=True, nogil=True)
 def score_surface(
     some: Hypotheses,
-    points: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    depth: NDArray[np.float32],
-    optics: Optics,
+    surface_mm: FloatArray,
+    depth: DepthMap,
     reach_mm: float,
-    span: tuple[int, int],
     score: NDArray[np.float32],
+    span: tuple[int, int],
 ) -> None:
-    """Share of a view's surface that was measured there, less what was seen through.
+    """Fraction of a view's surface that was measured there, less what was seen through.
 
     Args:
-        some: hypotheses.
-        points: (N, 3) of the surfaces that all views show, mm.
-        starts: (V + 1,) where each view's points begin.
-        depth: (h, w) measured, mm; 0 where unknown.
-        optics: of that map.
+        some: H hypotheses.
+        surface_mm: (V, n, 3) n points of the surface that each view shows.
+        depth: measured.
         reach_mm: a depth within this agrees; one further away contradicts; what is nearer may
             hide the bone.
-        span: first and last (exclusive) hypothesis to be done.
         score: (H,) in place, -1 to 1.
+        span: first and last (exclusive) hypothesis to be done.
     """
-    height, width = depth.shape
+    depth_mm, optics = depth.depth_mm, depth.optics
+    height, width = depth_mm.shape
+    n = surface_mm.shape[1]
     R, t = np.empty((3, 3)), np.empty(3)
     for h in range(span[0], span[1]):
-        view = pose_of(some, h, R, t)
-        first, last = starts[view], starts[view + 1]
+        points_mm = surface_mm[compose_pose(some, h, R, t)]
         agreeing = 0
-        for i in range(first, last):
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            pz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2]
-            if pz <= 1e-6:
+        for i in range(n):
+            x, y, z = rotate(R, points_mm, i)
+            x, y, z = x + t[0], y + t[1], z + t[2]
+            if z <= 1e-6:
                 continue
-            inverse = optics.focal / pz
-            px = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0]
-            py = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1]
-            u = int(np.floor(px * inverse + optics.centre_x + 0.5))
-            v = int(np.floor(py * inverse + optics.centre_y + 0.5))
-            if not (0 <= u < width and 0 <= v < height) or depth[v, u] <= 0.0:
+            scale = optics.focal_px / z
+            u = int(np.floor(x * scale + optics.centre_x_px + 0.5))
+            v = int(np.floor(y * scale + optics.centre_y_px + 0.5))
+            if not (0 <= u < width and 0 <= v < height) or depth_mm[v, u] <= 0.0:
                 continue
-            behind = depth[v, u] - pz
-            if behind > reach_mm:
-                agreeing -= 1
-            elif behind > -reach_mm:
-                agreeing += 1
-        score[h] = agreeing / (last - first) if last > first else 0.0
+            behind_mm = depth_mm[v, u] - z
+            if behind_mm > -reach_mm:
+                agreeing += 1 if behind_mm <= reach_mm else -1
+        score[h] = agreeing / n

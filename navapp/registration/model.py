@@ -10,7 +10,7 @@ from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays, nearest_vertices
-from navapp.registration.vertex_neighbourhoods import curvature, neighbour_table
+from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.values import BoneModel
 
 _FINEST_VOXEL_MM = 2.0
@@ -72,8 +72,8 @@ class RegistrationModel:
 
         # Most places that are asked for lie far from all points: large, loose boxes answer sooner.
         tree = cKDTree(self.points_mm, leafsize=64, compact_nodes=False, balanced_tree=False)
-        neighbours = neighbour_table(self.points_mm, self.bone.mesh.faces, tree)
-        curvatures, spacing = curvature(self.points_mm, self.normals, neighbours)
+        neighbours = find_neighbours(self.points_mm, self.bone.mesh.faces, tree)
+        curvatures, spacing = compute_curvature(self.points_mm, self.normals, neighbours)
         low = self.points_mm.min(axis=0) - _GRID_MARGIN_MM
         size = np.ptp(self.points_mm, axis=0) + 2.0 * _GRID_MARGIN_MM
         voxel = max(_FINEST_VOXEL_MM, float((size.prod() / _MOST_VOXELS) ** (1.0 / 3.0)))

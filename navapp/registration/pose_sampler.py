@@ -1,41 +1,38 @@
 """A bone that is partly buried: poses are drawn, and scored on a map of measured depth.
 
-Tissue that lies on a bone continues its surface. A fit pairs with it as gladly as with the bone and
-slides away, even from the true pose. Two things tell the true one: more of the model lies on the
-measured surface to within the noise, and nothing is seen through it. Neither is a distance that
-could be followed downhill, so poses are drawn and scored: around a rough one, then ever closer
-around the best (annealing), at last around each distinct one (cross-entropy).
+Tissue that lies on a bone continues its surface: a fit pairs with both and slides away, even from
+the true pose. At that pose more of the model lies on the measured surface to within the noise, and
+nothing is seen through it. Neither can be followed downhill, so poses are drawn and scored: around
+a rough one, then ever closer around the best (annealing), at last around each distinct one
+(cross-entropy).
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import run_both
+from navapp.geometry.bands import in_row_bands
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import Candidate, distinct
 from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
 
-# Always the same draws: the same pictures give the same pose.
+# All settings below are chosen. Always the same draws: the same pictures give the same pose.
 _SEED = 20
-# Spread of the best, so much wider, is where the next are drawn; never narrower than this.
+# The next poses are drawn so much wider than the best ones spread, and at least so wide.
 _WIDENING = 1.2
 _LEAST_MM, _LEAST_RAD = 0.02, 2e-4
 
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """One round of drawing and scoring.
+    """One round: n poses are drawn, scored by n points of the model, and the n best kept.
 
-    Attributes:
-        n_points: of the model, that are asked.
-        n_poses: drawn.
-        n_kept: of them, the best.
-        shift_mm, turn_deg: standard deviation along and about each axis.
+    `shift_mm` and `turn_deg` are the standard deviation along and about each axis.
     """
 
     n_points: int
@@ -50,15 +47,15 @@ class Draw:
         return np.repeat([self.shift_mm, np.radians(self.turn_deg)], 3)
 
 
-# Width of the kernel, and what is drawn. A rough pose may be 20 mm and 15 degrees off. Each round
-# is drawn about as wide as the kernel of the one before lets the best ones differ.
+# Width of the kernel (mm), and what is drawn. A rough pose may be 20 mm and 15 degrees off; each
+# later round is about as wide as the kernel of the one before lets the best poses differ.
 _ROUNDS = (
     (3.0, Draw(300, 20_000, 300, 14.0, 8.0)),
     (2.0, Draw(500, 6_000, 150, 4.0, 4.0)),
     (1.2, Draw(800, 4_000, 150, 2.0, 2.0)),
 )
-# Then so many that differ climb, each on its own, kernel by kernel: many a little, the best of them
-# to the end.
+# Then so many distinct poses climb, each on its own, kernel by kernel: many a little, the best of
+# them to the end.
 _CLIMBS = (
     (60, Draw(500, 100, 15, 1.5, 2.0), (1.2, 1.2, 0.8, 0.8, 0.8)),
     (12, Draw(1000, 200, 25, 0.7, 1.0), (0.5, 0.5, 0.5, 0.5, 0.3, 0.3, 0.3, 0.3)),
@@ -69,14 +66,11 @@ class PoseSampler:
     """Draws poses of one bone and scores them on maps of depth; holds only what is constant."""
 
     def __init__(self, model: RegistrationModel) -> None:
-        """Put the model's points in an order in which the first n are spread evenly."""
         usable = np.flatnonzero(model.is_usable)
-        order = usable[spread_order(model.points_mm[usable])]
+        order = usable[order_evenly(model.points_mm[usable])]
         self._centre_mm = model.centre_mm
         self._surface = SurfacePoints(
-            np.ascontiguousarray(model.points_mm[order]),
-            np.ascontiguousarray(model.normals[order]),
-            np.ascontiguousarray(model.sigma_mm[order] ** 2),
+            model.points_mm[order], model.normals[order], model.sigma_mm[order] ** 2
         )
 
     def search(
@@ -84,15 +78,11 @@ class PoseSampler:
         depth: DepthMap,
         rough: RigidTransform,
         n: int,
-        on_progress: Callable[[float], None] = lambda share: None,
+        on_progress: Callable[[float], None] = lambda fraction: None,
     ) -> list[Candidate]:
-        """At most n distinct poses around a rough one, best first.
+        """At most n distinct poses around a rough one (camera from bone), best first.
 
-        Args:
-            depth: measured freely around it.
-            rough: camera from bone.
-            n: how many.
-            on_progress: told the share done; may raise to cancel.
+        `on_progress` is told the fraction done; it may raise to cancel.
         """
         random = np.random.default_rng(_SEED)
         poses = [rough]
@@ -110,39 +100,14 @@ class PoseSampler:
         return [one for one in found if one.scene_from_bone in kept]
 
     def score(self, depth: DepthMap, pose: RigidTransform, sigma_mm: float, n_points: int) -> float:
-        """Of one pose, as `scores`."""
-        rotation, shift = pose.rotation[None], pose.translation_mm[None]
-        return float(self.scores(depth, rotation, shift, sigma_mm, n_points)[0])
+        """The seen area that agrees, less what is seen through, as a fraction of the seen area.
 
-    def scores(
-        self,
-        depth: DepthMap,
-        rotations: FloatArray,
-        shifts_mm: FloatArray,
-        sigma_mm: float,
-        n_points: int,
-    ) -> FloatArray:
-        """(H,) of poses (H, 3, 3) and (H, 3): the seen area that agrees, less what is seen through.
-
-        Args:
-            depth: measured.
-            rotations: of the poses, camera from bone.
-            shifts_mm: of the poses.
-            sigma_mm: width of the kernel.
-            n_points: so many of the model are asked.
+        Under a kernel of width `sigma_mm`, by the first `n_points` of the model.
         """
-        scores = np.empty(len(shifts_mm))
-        rotations, shifts_mm = np.ascontiguousarray(rotations), np.ascontiguousarray(shifts_mm)
-
-        def run(first: int, last: int) -> None:
-            score_poses(
-                self._surface, n_points, rotations, shifts_mm, depth.depth_mm, depth.optics,
-                sigma_mm, (first, last), scores,
-            )  # fmt: skip
-
-        middle = len(scores) // 2
-        run_both(lambda: run(0, middle), lambda: run(middle, len(scores)))
-        return scores
+        rotation, shift_mm = np.array(pose.rotation[None]), np.array(pose.translation_mm[None])
+        found = np.empty(1)
+        score_poses(self._surface, n_points, rotation, shift_mm, depth, sigma_mm, found, (0, 1))
+        return float(found[0])
 
     def _draw(
         self,
@@ -156,11 +121,12 @@ class PoseSampler:
         parents = random.integers(0, len(poses), draw.n_poses)
         twists = random.standard_normal((draw.n_poses, 6)) * draw.deviations
         parents[: len(poses)], twists[: len(poses)] = np.arange(len(poses)), 0.0
-        rotations, shifts = self._move_poses(poses, twists, parents)
-        scores = self.scores(depth, rotations, shifts, sigma_mm, draw.n_points)
-        names = poses[0].target, poses[0].source
-        best = np.argsort(-scores, kind="stable")[: draw.n_kept]
-        return [RigidTransform.from_parts(*names, rotations[k], shifts[k]) for k in best]
+        rotations = np.array([pose.rotation for pose in poses])[parents]
+        centres_mm = np.array([pose.apply(self._centre_mm) for pose in poses])[parents]
+        rotations, shifts_mm = self._move(rotations, centres_mm, twists)
+        best, _ = self._find_best(depth, (rotations, shifts_mm), draw, sigma_mm)
+        frames = poses[0].target, poses[0].source
+        return [RigidTransform.from_parts(*frames, rotations[k], shifts_mm[k]) for k in best]
 
     def _climb(
         self, depth: DepthMap, start: RigidTransform, draw: Draw, sigmas_mm: tuple[float, ...]
@@ -172,52 +138,50 @@ class PoseSampler:
         random = np.random.default_rng(_SEED)
         mean, covariance = np.zeros(6), np.diag(draw.deviations**2)
         floor = np.diag(np.repeat([_LEAST_MM, _LEAST_RAD], 3) ** 2)
+        rotation, centre_mm = np.array(start.rotation), start.apply(self._centre_mm)
         score = -1.0
         for sigma_mm in sigmas_mm:
             twists = random.multivariate_normal(mean, covariance, draw.n_poses, method="cholesky")
             twists[0] = mean
-            scores = self.scores(depth, *self._move_poses([start], twists), sigma_mm, draw.n_points)
-            best = np.argsort(-scores, kind="stable")[: draw.n_kept]
-            mean, score = twists[best].mean(axis=0), float(scores[best[0]])
+            moved = self._move(rotation, centre_mm, twists)
+            best, score = self._find_best(depth, moved, draw, sigma_mm)
+            mean = twists[best].mean(axis=0)
             covariance = _WIDENING**2 * np.cov(twists[best].T) + floor
-        return Candidate(start.move(mean, start.apply(self._centre_mm)), score)
+        return Candidate(start.move(mean, centre_mm), score)
 
-    def _move_poses(
-        self,
-        poses: list[RigidTransform],
-        twists: FloatArray,
-        parents: NDArray[np.int64] | None = None,
+    def _move(
+        self, rotations: FloatArray, centres_mm: FloatArray, twists: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Rotations (H, 3, 3) and translations (H, 3) of poses moved about the bone's centre."""
-        parents = np.zeros(len(twists), dtype=np.int64) if parents is None else parents
-        rotations = np.array([pose.rotation for pose in poses])[parents]
-        centres_mm = np.array([pose.apply(self._centre_mm) for pose in poses])[parents]
-        rotations = _rotations(twists[:, 3:]) @ rotations
+        """(H, 3, 3) and (H, 3) of poses moved by twists (H, 6) about where the bone's centre is."""
+        from scipy.spatial.transform import Rotation
+
+        rotations = np.asarray(Rotation.from_rotvec(twists[:, 3:]).as_matrix()) @ rotations
         return rotations, centres_mm + twists[:, :3] - rotations @ self._centre_mm
 
+    def _find_best(
+        self, depth: DepthMap, poses: tuple[FloatArray, FloatArray], draw: Draw, sigma_mm: float
+    ) -> tuple[NDArray[np.intp], float]:
+        """Indices of the poses to keep, best first, and the best one's score."""
+        scores = np.empty(draw.n_poses)
+        fixed = self._surface, draw.n_points, *poses, depth, sigma_mm, scores
+        in_row_bands(draw.n_poses, partial(score_poses, *fixed))
+        best = np.argsort(-scores, kind="stable")[: draw.n_kept]
+        return best, float(scores[best[0]])
 
-def spread_order(points_mm: FloatArray) -> NDArray[np.int64]:
+
+def order_evenly(points_mm: FloatArray) -> NDArray[np.int64]:
     """(N,) indices of points (N, 3), such that any first n are spread over all of them.
 
     Poses are the best of thousands: few points that are spread by chance would find a pose that
     suits them alone. Neighbours follow each other along a curve that fills space (Morton); halving
     it again and again (van der Corput) gives the order.
     """
-    size_mm = np.ptp(points_mm, axis=0).max(initial=0.0)
+    size_mm = np.ptp(points_mm, axis=0).max()
     cells = (points_mm - points_mm.min(axis=0)) * (1023.0 / max(size_mm, 1e-9))
     bits = (cells.astype(np.int64)[:, :, None] >> np.arange(10)) & 1
     along = np.argsort((bits << (3 * np.arange(10) + np.arange(3)[:, None])).sum(axis=(1, 2)))
-    n_bits = max(int(len(points_mm) - 1).bit_length(), 1)
-    places = np.arange(1 << n_bits)
-    halved = np.zeros_like(places)
-    for k in range(n_bits):
-        halved |= ((places >> k) & 1) << (n_bits - 1 - k)
+    halved = np.zeros(1, dtype=np.int64)
+    while len(halved) < len(points_mm):
+        halved = np.concatenate([2 * halved, 2 * halved + 1])
     order: NDArray[np.int64] = along[halved[halved < len(points_mm)]]
     return order
-
-
-def _rotations(vectors_rad: FloatArray) -> FloatArray:
-    """(H, 3, 3) rotations about vectors (H, 3) by their lengths in rad."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_rotvec(vectors_rad).as_matrix())

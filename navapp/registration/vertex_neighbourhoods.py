@@ -1,4 +1,4 @@
-"""What lies around each model point: neighbours, and how the surface bends."""
+"""Neighbours of each model point, and how the surface bends there."""
 
 from typing import Any
 
@@ -7,23 +7,20 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 
+# All chosen. Of a vertex at most; of a point that no edge touches.
 _MAX_NEIGHBOURS = 12
 _CLOUD_NEIGHBOURS = 8
 # A radius of curvature below so many spacings is a crease or noise, not a surface that bends.
 _TIGHTEST_RADIUS = 1.5
 
 
-def neighbour_table(
+def find_neighbours(
     points_mm: FloatArray, faces: NDArray[np.int32], tree: Any
 ) -> NDArray[np.int32]:
-    """(V, K) vertices beside each vertex, padded with -1.
+    """(V, K) vertices beside each of (V, 3), padded with -1.
 
-    Along the edges of a mesh; the nearest ones, made mutual, for vertices that no edge touches.
-
-    Args:
-        points_mm: (V, 3).
-        faces: (F, 3), none for a cloud.
-        tree: of the points.
+    Along the edges of the faces (F, 3); the nearest ones, made mutual, for vertices that no edge
+    touches. `tree` is a `cKDTree` of the points.
     """
     n = len(points_mm)
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -45,13 +42,13 @@ def neighbour_table(
     return table
 
 
-def curvature(
+def compute_curvature(
     points_mm: FloatArray, normals: FloatArray, neighbours: NDArray[np.int32]
 ) -> tuple[FloatArray, FloatArray]:
     """How the normal turns around each vertex, and how far its neighbours are.
 
-    The symmetric matrix B that best explains the neighbours' normals, n_j - n_i = B (p_j - p_i), in
-    the tangent plane of i: the second fundamental form.
+    The second fundamental form: the symmetric matrix B in the tangent plane of vertex i that best
+    explains its neighbours' normals, n_j - n_i = B (p_j - p_i).
 
     Returns:
         (V, 6) entries xx, yy, zz, xy, xz, yz of B in 1/mm, and (V,) mean distance in mm.
@@ -67,23 +64,23 @@ def curvature(
     p, q = np.einsum("vkc,vc->vk", turned, u), np.einsum("vkc,vc->vk", turned, v)
     # Unknowns (Buu, Buv, Bvv) of p = Buu a + Buv b and q = Buv a + Bvv b.
     aa, ab, bb = (a * a).sum(1), (a * b).sum(1), (b * b).sum(1)
-    system = np.zeros((len(points_mm), 3, 3))
-    system[:, 0, 0], system[:, 0, 1], system[:, 1, 0] = aa, ab, ab
-    system[:, 1, 1] = aa + bb
-    system[:, 1, 2], system[:, 2, 1], system[:, 2, 2] = ab, ab, bb
-    system += (1e-6 * (aa + bb) + 1e-12)[:, None, None] * np.eye(3)
+    zero = np.zeros(len(points_mm))
+    system = np.array([[aa, ab, zero], [ab, aa + bb, ab], [zero, ab, bb]]).transpose(2, 0, 1)
+    system = system + (1e-6 * (aa + bb) + 1e-12)[:, None, None] * np.eye(3)
     right = np.stack([(p * a).sum(1), (p * b + q * a).sum(1), (q * b).sum(1)], axis=1)
     form = np.linalg.solve(system, right[..., None])[..., 0]
     steepest = np.abs(form).max(axis=1)
     bound = 1.0 / (_TIGHTEST_RADIUS * np.maximum(spacing, 1e-9))
     form *= np.minimum(1.0, bound / np.maximum(steepest, 1e-9))[:, None]
-    outer = (
-        form[:, 0, None, None] * u[:, :, None] * u[:, None, :]
-        + form[:, 1, None, None] * (u[:, :, None] * v[:, None, :] + v[:, :, None] * u[:, None, :])
-        + form[:, 2, None, None] * v[:, :, None] * v[:, None, :]
-    )
+    # Entries of Buu u u^T + Buv (u v^T + v u^T) + Bvv v v^T.
     rows, columns = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
-    return np.ascontiguousarray(outer[:, rows, columns]), spacing
+    buu, buv, bvv = form.T[:, :, None]
+    entries = (
+        buu * u[:, rows] * u[:, columns]
+        + buv * (u[:, rows] * v[:, columns] + v[:, rows] * u[:, columns])
+        + bvv * v[:, rows] * v[:, columns]
+    )
+    return np.ascontiguousarray(entries), spacing
 
 
 def _tangents(normals: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -33,13 +33,13 @@ def responses(bins, reach):
 def edge_score(rotation, shift, points, tangents, pictures, optics):
     """Equations 2 and 3 with the tables' answer instead of |cos|."""
     total = 0.0
-    for response, baseline in zip(pictures, (0.0, optics.baseline), strict=True):
+    for response, baseline in zip(pictures, (0.0, optics.baseline_mm), strict=True):
         for point, tangent in zip(points, tangents, strict=True):
             at = [rotation @ (point + s * tangent) + shift - (baseline, 0, 0) for s in (0.0, 1e-4)]
             (u, v), (u2, v2) = (
                 (
-                    optics.focal * p[0] / p[2] + optics.centre_x,
-                    optics.focal * p[1] / p[2] + optics.centre_y,
+                    optics.focal_px * p[0] / p[2] + optics.centre_x_px,
+                    optics.focal_px * p[1] / p[2] + optics.centre_y_px,
                 )
                 for p in at
             )
@@ -55,8 +55,8 @@ def surface_score(rotation, shift, points, depth, optics, reach):
     total = 0
     for point in points:
         x, y, z = rotation @ point + shift
-        u = int(np.floor(optics.focal * x / z + optics.centre_x + 0.5))
-        v = int(np.floor(optics.focal * y / z + optics.centre_y + 0.5))
+        u = int(np.floor(optics.focal_px * x / z + optics.centre_x_px + 0.5))
+        v = int(np.floor(optics.focal_px * y / z + optics.centre_y_px + 0.5))
         if 0 <= u < depth.shape[1] and 0 <= v < depth.shape[0] and depth[v, u] > 0:
             behind = depth[v, u] - z
             total += -1 if behind > reach else int(behind > -reach)

@@ -5,8 +5,8 @@ import pytest
 
 from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.registration import DepthMap, PoseSampler, is_same_pose
-from navapp.registration.initial_kernels import Optics
-from navapp.registration.pose_sampler import spread_order
+from navapp.registration.depth_map import Optics
+from navapp.registration.pose_sampler import order_evenly
 from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
 from navapp.values import DisparityMap, Origin
 from tests.reference import pose_sampler_reference as reference
@@ -48,7 +48,7 @@ def test_scores_as_the_reference() -> None:
     turn *= np.sign(np.linalg.det(turn))[:, None, None]
     shifts = rng.uniform(-2, 2, (4, 3)) + np.array([0.0, 0.0, 400.0])
     found = np.full(4, np.nan)
-    score_poses(surface, 60, turn, shifts, depth, optics, 1.5, (1, 4), found)
+    score_poses(surface, 60, turn, shifts, DepthMap(depth, optics), 1.5, found, (1, 4))
     assert np.isnan(found[0])
     for k in range(1, 4):
         expected = reference.score(turn[k], shifts[k], surface, depth, optics, 1.5)
@@ -85,12 +85,12 @@ def test_only_what_is_matched_has_a_depth() -> None:
     expected = np.full((6, 8), GEOMETRY.focal_px * GEOMETRY.baseline_mm / 200.0)
     expected[5] = expected[0, 0] = 0.0
     np.testing.assert_allclose(depth.depth_mm, expected, rtol=1e-6)
-    assert (depth.optics.centre_x, depth.optics.centre_y) == (540.0, 310.0)
+    assert (depth.optics.centre_x_px, depth.optics.centre_y_px) == (540.0, 310.0)
 
 
 def test_any_first_points_are_spread() -> None:
     points = np.random.default_rng(1).uniform(0, 10, (3000, 3))
-    order = spread_order(points)
+    order = order_evenly(points)
     assert sorted(order) == list(range(3000))
     for n in (64, 200):
         octants = (points[order[:n]] > 5) @ (1, 2, 4)

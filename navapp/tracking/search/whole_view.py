@@ -1,4 +1,4 @@
-"""A bone looked for without a pose: in an operator's box, or in the whole view."""
+"""The search for a bone without a pose: in an operator's box, or in the whole view."""
 
 from collections.abc import Callable
 
@@ -12,19 +12,18 @@ from navapp.stereo import match_surface
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, SurfaceMeter
 from navapp.values import AspectGraph, Prior
 
-# An operator's box may cut the bone: so much more is looked at, of its size.
+# All chosen. An operator's box may cut the bone: so much of its size is added on each side.
 _SPARE_FRACTION = 0.15
+# Measured points are thinned to about so many.
 _MOST_POINTS = 40_000
-_EDGE_SAMPLES = 9
+# Distortion bends the box's sides: it is projected as a grid of so many points a side.
+_SAMPLES_PER_SIDE = 9
 
 
 class WholeViewSearch:
     """Searches for one bone in an operator's box or in all that the cameras see.
 
-    Args:
-        meter: of the bone's surface.
-        aspects: edges of the bone, of at least the prior's cone; without them the measured surface
-            alone tells.
+    Without aspects (edges of the bone, seen from the prior's cone) only the surface counts.
     """
 
     def __init__(self, meter: SurfaceMeter, aspects: AspectGraph | None) -> None:
@@ -39,10 +38,7 @@ class WholeViewSearch:
     ) -> list[Candidate]:
         """Where the bone may be: rectified left camera from bone, best first.
 
-        Args:
-            pair: see `rectify`.
-            prior: its cone counts for the femur only.
-            on_progress: told the fraction done; may raise to cancel.
+        `on_progress` is told the fraction done; it may raise to cancel.
         """
         if pair.box.is_empty:
             return []
@@ -63,9 +59,8 @@ class WholeViewSearch:
             return None
         x, y, width, height = prior.box
         spare_x, spare_y = _SPARE_FRACTION * width, _SPARE_FRACTION * height
-        columns = np.linspace(x - spare_x, x + width - 1 + spare_x, _EDGE_SAMPLES)
-        rows = np.linspace(y - spare_y, y + height - 1 + spare_y, _EDGE_SAMPLES)
-        # Distortion bends the box's sides.
+        columns = np.linspace(x - spare_x, x + width - 1 + spare_x, _SAMPLES_PER_SIDE)
+        rows = np.linspace(y - spare_y, y + height - 1 + spare_y, _SAMPLES_PER_SIDE)
         pixels = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
         rays = self._meter.rectifier.rig.left.rays(pixels)
         geometry = self._meter.geometry
