@@ -1,6 +1,7 @@
 """From a measured surface and a model to a pose with its covariance."""
 
-from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc, fit_pose
+from navapp.registration.bimcc import estimate_at, fit_bimcc, fit_pose
+from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import InitialSettings, find_initial
 from navapp.registration.model import RegistrationModel
@@ -13,7 +14,7 @@ from navapp.registration.multi_start import (
     make_scattered_starts,
     make_tilted_starts,
 )
-from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
+from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.pose_sampler import PoseSampler
 from navapp.registration.register import Outcome, Registration, register
 from navapp.registration.scene import Scene
@@ -34,11 +35,11 @@ __all__ = [
     "find_candidates",
     "find_initial",
     "fit_bimcc",
-    "fit_bimcc_literal",
-    "fit_icp",
     "fit_pose",
     "is_same_pose",
     "make_scattered_starts",
     "make_tilted_starts",
     "register",
+    "solve_bimcc_literal",
+    "solve_icp",
 ]

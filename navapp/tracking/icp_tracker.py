@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.geometry.rig import StereoRig
-from navapp.registration import fit_icp
+from navapp.registration import solve_icp
 from navapp.stereo import match_baseline
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame, ignore
@@ -97,6 +97,6 @@ class IcpTracker(TrackerBase):
         frame.watch.lap("stereo")
         if measured is None:
             return None
-        estimate = fit_icp(measured.scene, self.model, frame.start)
+        estimate = solve_icp(measured.scene, self.model, frame.start).estimate
         frame.watch.lap("estimate")
         return Fit(estimate, measured)
