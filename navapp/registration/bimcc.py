@@ -148,10 +148,9 @@ class _Fit:
     @property
     def pose(self) -> RigidTransform:
         """`scene_from_bone` as it stands."""
-        if not self._has_moved:
-            return self._start
         start = self._start
-        return RigidTransform.from_parts(start.source, start.target, *self._pose).inverse()
+        inverse = RigidTransform.from_parts(start.source, start.target, *self._pose)
+        return inverse.inverse() if self._has_moved else start
 
     def run(self) -> tuple[int, bool]:
         """Both loops: how many steps, and whether they converged."""

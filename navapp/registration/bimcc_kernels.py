@@ -33,13 +33,13 @@ _SAME_WIDTH = 0.02
 
 
 class BimccSettings(NamedTuple):
-    """How the estimator works; all chosen but for `n_sigmas`.
+    """How the estimator works; all chosen.
 
     Attributes:
         widest_mm: the kernel at most, and the longest backward pair.
         narrowest_mm: the kernel at least.
-        n_sigmas: the kernel's width in standard deviations of the noise; at 2.5 it keeps 97 % of
-            the efficiency that least squares has on pure noise, at 1.6 it keeps 88 %.
+        n_sigmas: the kernel's width in standard deviations of the noise; on pure noise a width k
+            has (1 + 2 / k^2)^1.5 / (1 + 1 / k^2)^3 of the efficiency of least squares: 97 % at 2.5.
         largest_noise_mm: points noisier than this are not expected.
         backward_weight: what all backward pairs weigh beside all forward pairs.
         point_weight: what a pair's whole distance weighs beside its plane's in the coarse loop.

@@ -199,9 +199,9 @@ def _solve_joined(
     is_near: NDArray[np.bool_],
     noise_variance_ratio: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """(7,) twist and common offset to which a surface and a block's near residuals agree.
+    """(7,) twist and common offset on which both agree, and the (6, 6) covariance of the twist.
 
-    Besides, the (6, 6) covariance of the twist. `surface` (7, 7) is the surface's information.
+    `surface` is the surface's information (7, 7), without any of the offset.
     """
     residual, variance = block.residual[is_near], block.variance[is_near]
     n_sharing = block.n_sharing[is_near]
@@ -210,9 +210,9 @@ def _solve_joined(
     offset[6, 6] = 1.0 / block.common_sd**2
     step: FloatArray = np.zeros(7)
     for _ in range(_ROUNDS):
-        left = residual - rows @ step
-        count = np.exp(-0.5 * left**2 / (_KERNEL_SIGMAS**2 * variance)) / n_sharing
-        n, squares = float(count.sum()), float((count * left**2 / variance).sum())
+        misfit = residual - rows @ step
+        count = np.exp(-0.5 * misfit**2 / (_KERNEL_SIGMAS**2 * variance)) / n_sharing
+        n, squares = float(count.sum()), float((count * misfit**2 / variance).sum())
         # What the residuals show of their claimed variance, drawn to 1 when they are few.
         shown = float(noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS))
         scale = (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)

@@ -65,10 +65,10 @@ class Scene:
 
     @cached_property
     def arrays(self) -> SceneArrays:
-        """What the compiled loops read, in an order of its own: thinning must not see rows.
+        """What the compiled loops read, shuffled: thinned rows would be a few columns.
 
-        Among those that it keeps, and among the others, neighbours stay neighbours: the model near
-        them is soon found.
+        The points that thinning keeps, and the others, each keep their order: where near points
+        follow each other, look-ups in the model are faster.
         """
         n = len(self.points_mm)
         order, is_thinned = np.random.default_rng(n).permutation(n), np.arange(n) % self.every == 0
@@ -86,10 +86,7 @@ class Scene:
 
     @cached_property
     def grid(self) -> VoxelGrid:
-        """Which point is near each place around the scene's middle; made when a start is far.
-
-        What lies further away than any bone reaches has no place in it: walls, stray points.
-        """
+        """Which point is near each place; stray points far from the middle are left out."""
         points = self.arrays.points[:: self.every]
         middle, half = np.median(points, axis=0), 0.5 * _MOST_VOXELS * _VOXEL_MM
         low = np.maximum(points.min(axis=0) - _GRID_MARGIN_MM, middle - half)
