@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -314,8 +315,9 @@ def _camera_numbers(camera: Camera) -> NDArray[np.float64]:
     return numbers
 
 
+@lru_cache(maxsize=4)
 def _rays(camera: Camera) -> FloatImage:
-    """(H, W, 2) x / z and y / z of every pixel's ray."""
+    """(H, W, 2) x / z and y / z of every pixel's ray; kept, as each stage has its own renderer."""
     v, u = np.mgrid[0 : camera.height, 0 : camera.width]
     rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
     return np.ascontiguousarray(rays.reshape(camera.height, camera.width, 2), dtype=np.float32)

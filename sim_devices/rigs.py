@@ -1,6 +1,7 @@
 """The stereo rig of the simulated operating room."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,6 +21,7 @@ WORKING_DISTANCE_MM = 450.0
 TOE_IN_DEG = 2.5
 
 
+@lru_cache(maxsize=4)
 def make_default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> StereoRig:
     """Two slightly unequal cameras, 80 mm apart, each turned inwards by 2.5 deg.
 

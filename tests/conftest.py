@@ -1,27 +1,19 @@
 """Shared by all tests: the user's settings hidden, leaks found, skips counted."""
 
-import hashlib
 import itertools
 import os
 import threading
-from collections.abc import Callable, Iterator
-from functools import cached_property
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import psutil
 import pytest
 
 import navapp  # sets the environment before any heavy import
 from navapp.config import Configuration, load
-from navapp.geometry.camera import Camera
-from navapp.registration.model import RegistrationModel
-from sim_devices import renderer
 
 assert navapp.__version__
 
-MOST_KEPT = 16
 DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
 
 
@@ -39,48 +31,6 @@ def _own_settings(_homes: Iterator[Path], monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setenv("XDG_CONFIG_HOME", str(home / "config"))
     monkeypatch.setenv("XDG_STATE_HOME", str(home / "state"))
     monkeypatch.delenv("NO_COLOR", raising=False)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _prepared_once() -> Iterator[None]:
-    """What takes longer than most sessions is made once of equal surfaces and equal cameras."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("arrays", "drawn_mesh"):
-            made = _kept(getattr(RegistrationModel, name).func, _parts_of_model)
-            shared = cached_property(made)
-            shared.__set_name__(RegistrationModel, name)
-            patch.setattr(RegistrationModel, name, shared)
-        patch.setattr(renderer, "_rays", _kept(renderer._rays, _parts_of_camera))
-        yield
-
-
-def _kept(
-    make: Callable[[Any], Any], parts_of: Callable[[Any], tuple[np.ndarray, ...]]
-) -> Callable[[Any], Any]:
-    """Of the last arguments that are told apart by their parts."""
-    kept: dict[bytes, Any] = {}
-
-    def made(given: Any) -> Any:
-        told = hashlib.blake2b()
-        for part in parts_of(given):
-            told.update(str(part.shape).encode() + np.ascontiguousarray(part).tobytes())
-        key = told.digest()
-        if key not in kept:
-            kept[key] = make(given)
-            while len(kept) > MOST_KEPT:
-                del kept[next(iter(kept))]
-        return kept[key]
-
-    return made
-
-
-def _parts_of_model(model: RegistrationModel) -> tuple[np.ndarray, ...]:
-    meshes = (model.bone.mesh.faces, model.seen_mesh.faces)
-    return (model.points_mm, model.normals, model.sigma_mm, model.is_usable, *meshes)
-
-
-def _parts_of_camera(camera: Camera) -> tuple[np.ndarray, ...]:
-    return camera.matrix, camera.distortion, np.array([camera.width, camera.height])
 
 
 @pytest.fixture(autouse=True)

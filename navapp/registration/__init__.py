@@ -1,6 +1,7 @@
 """From a measured surface and a model to a pose with its covariance."""
 
-from navapp.registration.bimcc import BimccSettings, estimate_at, fit_bimcc, fit_pose
+from navapp.registration.bimcc import estimate_at, fit_bimcc, fit_pose
+from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import find_initial
 from navapp.registration.model import RegistrationModel
@@ -17,7 +18,7 @@ from navapp.registration.multi_start import (
     rank_fits,
     select_poses,
 )
-from navapp.registration.point_to_point import fit_bimcc_literal, fit_icp
+from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.pose_sampler import PoseSampler
 from navapp.registration.register import Outcome, Registration, register
 from navapp.registration.scene import Scene
@@ -37,8 +38,6 @@ __all__ = [
     "find_candidates",
     "find_initial",
     "fit_bimcc",
-    "fit_bimcc_literal",
-    "fit_icp",
     "fit_pose",
     "is_same_pose",
     "make_far_starts",
@@ -48,4 +47,6 @@ __all__ = [
     "rank_fits",
     "register",
     "select_poses",
+    "solve_bimcc_literal",
+    "solve_icp",
 ]

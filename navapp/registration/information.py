@@ -9,17 +9,18 @@ from numpy.typing import NDArray
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.pairing_kernels import Pairs
 from navapp.registration.step_kernels import (
-    FREE_SHARE,
+    FREE_FRACTION,
+    find_weighted_centre,
     noise_under_kernel_mm2,
-    plane_system,
-    size_terms,
-    weighted_centre,
+    sum_plane_system,
+    sum_size_terms,
 )
 from navapp.values import PoseEstimate, Reason
 
-_SINGULAR_SHARE = 1e-9
+# Chosen, as all that names no source.
+_SINGULAR_FRACTION = 1e-9
 # A free direction turns when this much of it, in levers, is rotation; else it is a translation.
-_TURN_SHARE = 0.1
+_TURN_FRACTION = 0.1
 # A residual further off than this, in sigma of itself and of the pose, belongs to something else.
 _GATE_SIGMAS = 3.0
 # Width of the kernel in sigma: 97 % of the efficiency of least squares (as `BimccSettings`).
@@ -30,7 +31,8 @@ _APART = 12.59
 # What a block's residuals say of its noise counts beside what it claims, which counts as so many.
 _CLAIM_COUNT = 6.0
 # Those residuals of a wrong pose that happen to be small agree with it: they must not speak for the
-# rest. Of right ones most are near (docs/registration.md), fewer where tissue covers the rim.
+# others. Of right ones most are near (`python -m tests.bench.outline`), fewer where tissue covers
+# the rim.
 _MOST_FAR, _BY_CHANCE = 0.5, 1.0
 _FEWEST = 6.0
 # Residuals that show nothing at all (drawn data) still leave a scale.
@@ -63,71 +65,52 @@ class Information:
 
     def free_in_words(self) -> list[str]:
         """The free directions for people: rotations first, as many as there are, then shifts."""
-        if not self.is_degenerate:
-            return []
         # Mixed so that the rotations stand in as few directions as can be.
         mixing, turns, _ = np.linalg.svd(self.free[:, 3:])
         mixed = mixing.T @ self.free
-        is_turn = np.append(turns, np.zeros(len(mixed)))[: len(mixed)] > _TURN_SHARE
+        n_turns = int((turns > _TURN_FRACTION).sum())
         return [
-            f"rotation about {_axis(twist[3:])}"
-            if turning
-            else f"translation along {_axis(twist[:3])}"
-            for twist, turning in zip(mixed, is_turn, strict=True)
+            *(f"rotation about {_name_axis(twist[3:])}" for twist in mixed[:n_turns]),
+            *(f"translation along {_name_axis(twist[:3])}" for twist in mixed[n_turns:]),
         ]
 
 
-def information_of(
+def compute_information(
     pairs: Pairs, n: int, pose: RigidTransform, centre_mm: FloatArray, n_sharing_errors: float
 ) -> Information:
-    """Information of weighted pairs about a pose.
+    """Information of the first n pairs, weighted by kernel over variance, about `scene_from_bone`.
 
-    Args:
-        pairs: weighted by kernel over variance, in bone coordinates; first n hold.
-        n: how many.
-        pose: `scene_from_bone`.
-        centre_mm: (3,) of the model, bone coordinates.
-        n_sharing_errors: so many neighbouring pairs have their errors in common.
+    Pairs and the model's centre (3,) are in bone coordinates. So many neighbouring pairs as
+    `n_sharing_errors` have their errors in common.
 
     Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
     """
-    H, g, seen_mm = np.empty((6, 6)), np.empty(6), np.empty(3)
-    lever_mm = float(weighted_centre(pairs, n, seen_mm))
-    plane_system(pairs, n, seen_mm, lever_mm, H, g)
+    seen_mm, lever_mm = find_weighted_centre(pairs, n)
+    H, g = sum_plane_system(pairs, n, seen_mm, lever_mm)
     eigenvalues, vectors = np.linalg.eigh(H)
-    is_free = eigenvalues < FREE_SHARE * eigenvalues[-1]
+    is_free = eigenvalues < FREE_FRACTION * eigenvalues[-1]
     # (rotation x lever, translation) of the points become (translation, rotation) of the pose.
     turned = np.zeros((6, 6))
     turned[:3, 3:] = turned[3:, :3] = pose.rotation
     free = (turned @ vectors[:, is_free]).T
-    if eigenvalues[0] <= _SINGULAR_SHARE * eigenvalues[-1]:
+    if eigenvalues[0] <= _SINGULAR_FRACTION * eigenvalues[-1]:
         return Information(np.diag([np.inf] * 6), free)
-    size_mm, size_variance = _size(pairs, n, seen_mm, lever_mm, H, g)
-    plane_system(pairs, n, np.ascontiguousarray(centre_mm), lever_mm, H, g)
-    levers = np.diag([1.0, 1.0, 1.0, 1.0 / lever_mm, 1.0 / lever_mm, 1.0 / lever_mm])
-    change = levers @ turned
+    # The size is a seventh unknown; the motion is eliminated (Schur complement).
+    mixed, squares, product_mm = sum_size_terms(pairs, n, seen_mm, lever_mm)
+    by_motion = np.linalg.solve(H, np.column_stack([mixed, g]))
+    size_information = squares - float(mixed @ by_motion[:, 0])
+    size_mm, size_variance = 0.0, math.inf
+    if size_information > _SINGULAR_FRACTION * squares:
+        size_mm = (product_mm - float(mixed @ by_motion[:, 1])) / size_information
+        size_variance = 1.0 / size_information
+    H, _ = sum_plane_system(pairs, n, centre_mm, lever_mm)
+    change = np.diag([1.0] * 3 + [1.0 / lever_mm] * 3) @ turned
     covariance = n_sharing_errors * change @ np.linalg.inv(H) @ change.T
     size_sigma_mm = math.sqrt(n_sharing_errors * size_variance)
     return Information(0.5 * (covariance + covariance.T), free, size_mm, size_sigma_mm)
 
 
-def _size(
-    pairs: Pairs, n: int, seen_mm: FloatArray, lever_mm: float, H: FloatArray, g: FloatArray
-) -> tuple[float, float]:
-    """Size as a seventh unknown beside the six of the motion, and its variance.
-
-    Source: elimination of the motion from the normal equations (Schur complement).
-    """
-    mixed = np.empty(6)
-    terms = size_terms(pairs, n, seen_mm, lever_mm, mixed)
-    by_motion = np.linalg.solve(H, np.column_stack([mixed, g]))
-    information = terms.squares - float(mixed @ by_motion[:, 0])
-    if information <= _SINGULAR_SHARE * terms.squares:
-        return 0.0, math.inf
-    return (terms.product_mm - float(mixed @ by_motion[:, 1])) / information, 1.0 / information
-
-
-def _axis(vector: FloatArray) -> str:
+def _name_axis(vector: FloatArray) -> str:
     """Direction of a vector, its largest component positive."""
     axis = vector / np.linalg.norm(vector)
     axis = axis * np.sign(axis[np.abs(axis).argmax()])
@@ -154,23 +137,12 @@ class ResidualBlock:
     n_sharing: FloatArray
     common_sd: float
 
-    def only(self, is_kept: NDArray[np.bool_]) -> "ResidualBlock":
-        """Those residuals; how many share an error stays, though some of them may be gone."""
-        return ResidualBlock(
-            self.jacobian[is_kept],
-            self.residual[is_kept],
-            self.variance[is_kept],
-            self.n_sharing[is_kept],
-            self.common_sd,
-        )
-
-
-def near(block: ResidualBlock, covariance: FloatArray) -> NDArray[np.bool_]:
-    """(N,) residuals that a pose of that covariance allows."""
-    by_pose = ((block.jacobian @ covariance) * block.jacobian).sum(axis=1)
-    expected = block.variance + by_pose + block.common_sd**2
-    answer: NDArray[np.bool_] = block.residual**2 < _GATE_SIGMAS**2 * expected
-    return answer
+    def find_near(self, covariance: FloatArray) -> NDArray[np.bool_]:
+        """(N,) residuals that a pose of that covariance allows."""
+        by_pose = ((self.jacobian @ covariance) * self.jacobian).sum(axis=1)
+        expected = self.variance + by_pose + self.common_sd**2
+        is_near: NDArray[np.bool_] = self.residual**2 < _GATE_SIGMAS**2 * expected
+        return is_near
 
 
 def join(
@@ -201,71 +173,55 @@ def join(
     components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
     """
     alone = replace(estimate, covariance=noise_variance_ratio * estimate.covariance)
-    is_near = near(block, estimate.covariance)
-    count_all, count_near = (float((1.0 / block.n_sharing[kept]).sum()) for kept in (..., is_near))
-    if count_all < _FEWEST:
-        return alone
-    if count_all - count_near > _MOST_FAR * count_all + _BY_CHANCE:
+    is_near = block.find_near(estimate.covariance)
+    count = 1.0 / block.n_sharing
+    n_all, n_near = float(count.sum()), float(count[is_near].sum())
+    if n_all >= _FEWEST and n_all - n_near > _MOST_FAR * n_all + _BY_CHANCE:
         return alone.with_reason(Reason.CUES_DISAGREE)
-    if count_near < _FEWEST:
+    if n_near < _FEWEST:
         return alone
-    joined = _solve_joined(
-        estimate, kernel_sigmas, block.only(is_near), centre_mm, noise_variance_ratio
-    )
-    return alone if joined is None else joined
-
-
-def _solve_joined(
-    estimate: PoseEstimate,
-    kernel_sigmas: float,
-    block: ResidualBlock,
-    centre_mm: FloatArray,
-    noise_variance_ratio: float,
-) -> PoseEstimate | None:
-    """What a surface and residuals that agree with it say together; None when they pull apart."""
     surface = np.zeros((7, 7))
     surface[:6, :6] = np.linalg.inv(estimate.covariance)
-    surface_scale = min(_ratio_without_kernel(_squared_rms_ratio(estimate), kernel_sigmas), 1.0)
-    offset = np.zeros((7, 7))
-    offset[6, 6] = 1.0 / block.common_sd**2
-    rows = np.column_stack([block.jacobian, np.ones(len(block.residual))])
-    step: FloatArray = np.zeros(7)
-    scale = 1.0
-    for _ in range(_ROUNDS):
-        rest = block.residual - rows @ step
-        kernel = np.exp(-0.5 * rest**2 / (_KERNEL_SIGMAS**2 * block.variance))
-        count = kernel / block.n_sharing
-        scale = _scale(rest, count, block.variance)
-        weighted = rows.T * (count / block.variance)
-        information = weighted @ rows
-        normal = surface / surface_scale + offset + information / scale
-        step = np.asarray(
-            np.linalg.solve(normal, weighted @ block.residual / scale), dtype=np.float64
-        )
+    # What the surface's residuals show of the variance that they claim, at most all of it.
+    ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
+    scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
+    step, covariance = _solve_joined(surface, scale, block, is_near, noise_variance_ratio)
     if step @ surface @ step > _APART:
-        return None
-    inverse = np.linalg.inv(normal)
-    # A block that shows more noise than it claims is believed.
-    by_surface = noise_variance_ratio * surface / surface_scale**2
-    by_block = information * max(scale, 1.0) / scale**2
-    covariance = (inverse @ (by_surface + offset + by_block) @ inverse)[:6, :6]
+        return alone
     pose = estimate.camera_from_bone.move(step[:6], centre_mm)
     return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
 
 
-def _scale(rest: FloatArray, count: FloatArray, variance: FloatArray) -> float:
-    """Variance that residuals show over the one they claim, drawn to 1 when they are few."""
-    n = float(count.sum())
-    shown = _ratio_without_kernel(
-        float((count * rest**2 / variance).sum()) / max(n, 1e-12), _KERNEL_SIGMAS
-    )
-    return (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
+def _solve_joined(
+    surface: FloatArray,
+    surface_scale: float,
+    block: ResidualBlock,
+    is_near: NDArray[np.bool_],
+    noise_variance_ratio: float,
+) -> tuple[FloatArray, FloatArray]:
+    """(7,) twist and common offset on which both agree, and the (6, 6) covariance of the twist.
 
-
-def _ratio_without_kernel(ratio2: float, kernel_sigmas: float) -> float:
-    """The same of residuals without a kernel, from those under one."""
-    return float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas))
-
-
-def _squared_rms_ratio(estimate: PoseEstimate) -> float:
-    return max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
+    `surface` is the surface's information (7, 7), without any of the offset.
+    """
+    residual, variance = block.residual[is_near], block.variance[is_near]
+    n_sharing = block.n_sharing[is_near]
+    rows = np.column_stack([block.jacobian[is_near], np.ones(len(residual))])
+    offset = np.zeros((7, 7))
+    offset[6, 6] = 1.0 / block.common_sd**2
+    step: FloatArray = np.zeros(7)
+    for _ in range(_ROUNDS):
+        misfit = residual - rows @ step
+        count = np.exp(-0.5 * misfit**2 / (_KERNEL_SIGMAS**2 * variance)) / n_sharing
+        n, squares = float(count.sum()), float((count * misfit**2 / variance).sum())
+        # What the residuals show of their claimed variance, drawn to 1 when they are few.
+        shown = float(noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS))
+        scale = (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
+        weighted = rows.T * (count / variance)
+        information = weighted @ rows
+        normal = surface / surface_scale + offset + information / scale
+        step = np.asarray(np.linalg.solve(normal, weighted @ residual / scale), dtype=np.float64)
+    inverse = np.linalg.inv(normal)
+    # A block that shows more noise than it claims is believed.
+    by_surface = noise_variance_ratio * surface / surface_scale**2
+    by_block = information * max(scale, 1.0) / scale**2
+    return step, (inverse @ (by_surface + offset + by_block) @ inverse)[:6, :6]

@@ -1,14 +1,26 @@
-"""Compiled look-ups: the nearest vertex of a model, the nearest point of a scene.
-
-The model does not change: a grid of nearest vertices is made once. A scene is new with every frame:
-its grid is made by handing points on, which costs less than a tree.
-"""
+"""Compiled look-ups: the nearest vertex of a model, the nearest point of a scene."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray
+
+
+class VoxelGrid(NamedTuple):
+    """Which point is near each place; lengths in mm, in the frame of the points.
+
+    Attributes:
+        nearest: (nx, ny, nz) index of the point nearest to each voxel's centre; -1 for none.
+        origin: (3,) centre of voxel (0, 0, 0).
+        voxel: edge of the voxels.
+    """
+
+    nearest: NDArray[np.int32]
+    origin: FloatArray
+    voxel: float
 
 
 class ModelArrays(NamedTuple):
@@ -23,58 +35,38 @@ class ModelArrays(NamedTuple):
         sigma: (V,) of the surface along the normal.
         can_pair: (V,) False at open borders and where a stage has cut.
         neighbours: (V, K) vertices beside each vertex, -1 padded.
-        grid: (nx, ny, nz) nearest vertex of each voxel's centre.
-        origin: (3,) centre of voxel (0, 0, 0).
-        voxel: edge of the voxels.
+        grid: of nearest vertices; no voxel is without one.
     """
 
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    curvature: NDArray[np.float64]
-    spacing: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    points: FloatArray
+    normals: FloatArray
+    curvature: FloatArray
+    spacing: FloatArray
+    sigma: FloatArray
     can_pair: NDArray[np.bool_]
     neighbours: NDArray[np.int32]
-    grid: NDArray[np.int32]
-    origin: NDArray[np.float64]
-    voxel: float
-
-
-class SceneGrid(NamedTuple):
-    """Which scene point is near each place; lengths in mm, scene coordinates.
-
-    Attributes:
-        nearest: (nx, ny, nz) a point near each voxel's centre, the nearest or almost; -1 without.
-        origin: (3,) centre of voxel (0, 0, 0).
-        voxel: edge of the voxels.
-    """
-
-    nearest: NDArray[np.int32]
-    origin: NDArray[np.float64]
-    voxel: float
+    grid: VoxelGrid
 
 
 @njit(cache=True, nogil=True)
-def voxel_of(
-    x: float, y: float, z: float, origin: NDArray[np.float64], voxel: float
-) -> tuple[int, int, int]:
+def find_voxel(x: float, y: float, z: float, grid: VoxelGrid) -> tuple[int, int, int]:
     """Voxel whose centre is nearest; it may lie outside the grid."""
     return (
-        int(np.floor((x - origin[0]) / voxel + 0.5)),
-        int(np.floor((y - origin[1]) / voxel + 0.5)),
-        int(np.floor((z - origin[2]) / voxel + 0.5)),
+        int(np.floor((x - grid.origin[0]) / grid.voxel + 0.5)),
+        int(np.floor((y - grid.origin[1]) / grid.voxel + 0.5)),
+        int(np.floor((z - grid.origin[2]) / grid.voxel + 0.5)),
     )
 
 
 @njit(cache=True, nogil=True)
-def is_voxel(gx: int, gy: int, gz: int, grid: NDArray[np.int32]) -> bool:
-    """Whether a grid has that voxel."""
-    nx, ny, nz = grid.shape
-    return bool(0 <= gx < nx and 0 <= gy < ny and 0 <= gz < nz)
+def has_voxel(grid: VoxelGrid, ix: int, iy: int, iz: int) -> bool:
+    """Whether the voxel lies inside the grid."""
+    nx, ny, nz = grid.nearest.shape
+    return bool(0 <= ix < nx and 0 <= iy < ny and 0 <= iz < nz)
 
 
 @njit(cache=True, nogil=True)
-def squared_distance(x: float, y: float, z: float, points: NDArray[np.float64], i: int) -> float:
+def squared_distance(x: float, y: float, z: float, points: FloatArray, i: int) -> float:
     """Of a place from point i."""
     dx, dy, dz = x - points[i, 0], y - points[i, 1], z - points[i, 2]
     squared: float = dx * dx + dy * dy + dz * dz
@@ -82,24 +74,17 @@ def squared_distance(x: float, y: float, z: float, points: NDArray[np.float64], 
 
 
 @njit(cache=True, nogil=True)
-def nearest_vertex(
-    x: float,
-    y: float,
-    z: float,
-    points: NDArray[np.float64],
-    neighbours: NDArray[np.int32],
-    grid: NDArray[np.int32],
-    origin: NDArray[np.float64],
-    voxel: float,
+def find_vertex(
+    x: float, y: float, z: float, points: FloatArray, neighbours: NDArray[np.int32], grid: VoxelGrid
 ) -> int:
-    """Nearest vertex of a point: the answer of the grid's nearest voxel, then descent.
+    """Nearest vertex of a place: the answer of the grid's nearest voxel, then descent.
 
-    The arrays are those of `ModelArrays`, one by one: handing over the whole tuple at every point
-    costs as much as the look-up.
+    To hand over all of `ModelArrays` at every point would cost as much as the look-up.
     """
-    nx, ny, nz = grid.shape
-    gx, gy, gz = voxel_of(x, y, z, origin, voxel)
-    best: int = grid[min(max(gx, 0), nx - 1), min(max(gy, 0), ny - 1), min(max(gz, 0), nz - 1)]
+    nx, ny, nz = grid.nearest.shape
+    ix, iy, iz = find_voxel(x, y, z, grid)
+    ix, iy, iz = min(max(ix, 0), nx - 1), min(max(iy, 0), ny - 1), min(max(iz, 0), nz - 1)
+    best: int = grid.nearest[ix, iy, iz]
     least = squared_distance(x, y, z, points, best)
     start = -1
     while start != best:
@@ -116,97 +101,59 @@ def nearest_vertex(
 
 
 @njit(cache=True, nogil=True)
-def nearest_vertices(
-    points_mm: NDArray[np.float64],
-    model: ModelArrays,
-    index: NDArray[np.int32],
-    distance_mm: NDArray[np.float64],
-) -> None:
-    """Nearest vertex of each point.
-
-    Args:
-        points_mm: (N, 3) in bone coordinates.
-        model: prepared.
-        index: (N,) in place.
-        distance_mm: (N,) in place.
-    """
-    for i in range(points_mm.shape[0]):
+def find_vertices(
+    points_mm: FloatArray, model: ModelArrays
+) -> tuple[NDArray[np.int32], FloatArray]:
+    """Nearest vertex of each of (N, 3) points in bone coordinates, and its distance."""
+    n = points_mm.shape[0]
+    index, distance_mm = np.empty(n, dtype=np.int32), np.empty(n)
+    for i in range(n):
         x, y, z = points_mm[i, 0], points_mm[i, 1], points_mm[i, 2]
-        best = nearest_vertex(
-            x, y, z, model.points, model.neighbours, model.grid, model.origin, model.voxel
-        )
+        best = find_vertex(x, y, z, model.points, model.neighbours, model.grid)
         index[i] = best
         distance_mm[i] = np.sqrt(squared_distance(x, y, z, model.points, best))
+    return index, distance_mm
 
 
 @njit(cache=True, nogil=True)
-def scene_point_near(
-    x: float, y: float, z: float, points: NDArray[np.float64], grid: SceneGrid, radius_mm: float
-) -> int:
-    """A scene point near a place, the nearest or almost; -1 beyond the radius or the grid."""
-    gx, gy, gz = voxel_of(x, y, z, grid.origin, grid.voxel)
-    if not is_voxel(gx, gy, gz, grid.nearest):
-        return -1
-    i: int = grid.nearest[gx, gy, gz]
-    if i < 0 or squared_distance(x, y, z, points, i) > radius_mm * radius_mm:
-        return -1
-    return i
+def offer_point(
+    points_mm: FloatArray, i: int, ix: int, iy: int, iz: int, grid: VoxelGrid, squared: FloatArray
+) -> None:
+    """Point i becomes a voxel's nearest if it is; `squared` holds the distances of the nearest."""
+    x = grid.origin[0] + ix * grid.voxel
+    y = grid.origin[1] + iy * grid.voxel
+    z = grid.origin[2] + iz * grid.voxel
+    offered = squared_distance(x, y, z, points_mm, i)
+    if offered < squared[ix, iy, iz]:
+        squared[ix, iy, iz] = offered
+        grid.nearest[ix, iy, iz] = i
 
 
 @njit(cache=True, nogil=True)
-def squared_from_centre(
-    points_mm: NDArray[np.float64], i: int, gx: int, gy: int, gz: int, grid: SceneGrid
-) -> float:
-    """Of point i from the centre of a voxel."""
-    origin, voxel = grid.origin, grid.voxel
-    squared: float = squared_distance(
-        origin[0] + gx * voxel, origin[1] + gy * voxel, origin[2] + gz * voxel, points_mm, i
-    )
-    return squared
-
-
-@njit(cache=True, nogil=True)
-def fill_scene_grid(points_mm: NDArray[np.float64], every: int, grid: SceneGrid) -> None:
+def fill_scene_grid(points_mm: FloatArray, every: int, grid: VoxelGrid) -> None:
     """Hand every n-th point on from voxel to voxel: two sweeps over the six neighbours.
 
-    Args:
-        points_mm: (N, 3) in scene coordinates; those outside the grid are left out.
-        every: 1 for all points.
-        grid: `nearest` in place; must be -1.
+    Points are (N, 3) in scene coordinates; those outside the grid are left out. `grid.nearest` is
+    written in place and must be -1. Cheaper than a tree, which every frame would need anew.
 
     Source: vector distance transform, Danielsson 1980; not exact, which pairs that only widen the
     basin do not need.
     """
-    nearest, origin, voxel = grid.nearest, grid.origin, grid.voxel
-    nx, ny, nz = nearest.shape
-    distance = np.full((nx, ny, nz), np.inf)
+    nx, ny, nz = grid.nearest.shape
+    squared = np.full((nx, ny, nz), np.inf)
     for i in range(0, points_mm.shape[0], every):
-        x, y, z = points_mm[i, 0], points_mm[i, 1], points_mm[i, 2]
-        gx, gy, gz = voxel_of(x, y, z, origin, voxel)
-        if not is_voxel(gx, gy, gz, nearest):
-            continue
-        squared = squared_from_centre(points_mm, i, gx, gy, gz, grid)
-        if squared < distance[gx, gy, gz]:
-            distance[gx, gy, gz] = squared
-            nearest[gx, gy, gz] = i
-    for sweep in range(2):
-        step = 1 - 2 * sweep
-        for kx in range(nx):
-            ix = kx if step == 1 else nx - 1 - kx
-            for ky in range(ny):
-                iy = ky if step == 1 else ny - 1 - ky
-                for kz in range(nz):
-                    iz = kz if step == 1 else nz - 1 - kz
-                    for axis in range(3):
-                        jx = ix - step if axis == 0 else ix
-                        jy = iy - step if axis == 1 else iy
-                        jz = iz - step if axis == 2 else iz
-                        if not is_voxel(jx, jy, jz, nearest):
+        ix, iy, iz = find_voxel(points_mm[i, 0], points_mm[i, 1], points_mm[i, 2], grid)
+        if has_voxel(grid, ix, iy, iz):
+            offer_point(points_mm, i, ix, iy, iz, grid, squared)
+    xs, ys, zs = np.arange(nx), np.arange(ny), np.arange(nz)
+    for step in (1, -1):
+        for ix in xs[::step]:
+            for iy in ys[::step]:
+                for iz in zs[::step]:
+                    for dx, dy, dz in ((step, 0, 0), (0, step, 0), (0, 0, step)):
+                        jx, jy, jz = ix - dx, iy - dy, iz - dz
+                        if not has_voxel(grid, jx, jy, jz):
                             continue
-                        i = nearest[jx, jy, jz]
-                        if i < 0 or i == nearest[ix, iy, iz]:
-                            continue
-                        squared = squared_from_centre(points_mm, i, ix, iy, iz, grid)
-                        if squared < distance[ix, iy, iz]:
-                            distance[ix, iy, iz] = squared
-                            nearest[ix, iy, iz] = i
+                        i = grid.nearest[jx, jy, jz]
+                        if i >= 0 and i != grid.nearest[ix, iy, iz]:
+                            offer_point(points_mm, i, ix, iy, iz, grid, squared)

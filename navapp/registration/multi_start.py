@@ -9,10 +9,11 @@ import numpy as np
 from navapp.geometry.bands import run_both
 from navapp.geometry.directions import sphere_spiral
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
-from navapp.registration.bimcc import BimccSettings, fit_coarsely
+from navapp.registration.bimcc import fit_coarsely
+from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.registration.coverage import coverage
 from navapp.registration.model import RegistrationModel
-from navapp.registration.pairing_kernels import make_pairs, measure_pairs, pair_forward
+from navapp.registration.pairing_kernels import Pose, make_pairs, measure_pairs, pair_forward
 from navapp.registration.scene import Scene
 from navapp.registration.step_kernels import weigh
 from navapp.values import PoseEstimate, Reason
@@ -144,13 +145,12 @@ def compute_explained_fraction(
     """
     settings = BimccSettings()
     sigma_mm = 0.5 * settings.widest_at_rest_mm
-    rotation, shift = scene_from_bone.inverse_parts()
+    pose = Pose(*scene_from_bone.inverse_parts())
     arrays = scene.arrays
     n_asked = len(range(0, len(scene), scene.every))
     pairs = make_pairs(n_asked)
-    camera = rotation @ arrays.camera + shift
-    n = pair_forward(arrays, model.arrays, rotation, shift, camera, scene.every, pairs)
-    measure_pairs(arrays, model.arrays, rotation, shift, camera, pairs, 0, n)
+    n = pair_forward(arrays, model.arrays, pose, scene.every, pairs)
+    measure_pairs(arrays, model.arrays, pose, pairs, n)
     kernels: float = weigh(pairs, n, sigma_mm, settings.n_sigmas, 0.0).kernels
     fraction = kernels / max(n_asked, 1)
     if scene.camera_mm is None:

@@ -7,16 +7,26 @@ from numba import njit
 from numpy.typing import NDArray
 
 from navapp.geometry.facing_kernels import faces
+from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import (
     ModelArrays,
-    SceneGrid,
-    nearest_vertex,
-    scene_point_near,
+    VoxelGrid,
+    find_vertex,
+    find_voxel,
+    has_voxel,
+    squared_distance,
 )
 
-# Beyond so many spacings from its vertex a point is off the model's edge: the vertex's own
-# curvature says nothing there.
+# Chosen: beyond so many spacings from its vertex a point is off the model's edge, where the
+# vertex's own curvature says nothing.
 _CURVATURE_REACH = 2.0
+
+
+class Pose(NamedTuple):
+    """(3, 3) and (3,) of p -> rotation @ p + translation, mm: bone from scene, moved in place."""
+
+    rotation: FloatArray
+    translation: FloatArray
 
 
 class SceneArrays(NamedTuple):
@@ -27,12 +37,16 @@ class SceneArrays(NamedTuple):
         sigma_ray: (N,) standard deviation along the ray of sight.
         camera: (3,) where it was seen from.
         has_camera: False: everything may pair, sigma_ray holds in all directions.
+        knows_noise: False: sigma_ray is 0, the noise shows in the residuals.
+        every: the coarse loop uses every n-th point.
     """
 
-    points: NDArray[np.float64]
-    sigma_ray: NDArray[np.float64]
-    camera: NDArray[np.float64]
+    points: FloatArray
+    sigma_ray: FloatArray
+    camera: FloatArray
     has_camera: bool
+    knows_noise: bool
+    every: int
 
 
 class Pairs(NamedTuple):
@@ -51,12 +65,12 @@ class Pairs(NamedTuple):
 
     scene: NDArray[np.int32]
     vertex: NDArray[np.int32]
-    point: NDArray[np.float64]
-    residual: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    excess: NDArray[np.float64]
-    variance: NDArray[np.float64]
-    weight: NDArray[np.float64]
+    point: FloatArray
+    residual: FloatArray
+    direction: FloatArray
+    excess: FloatArray
+    variance: FloatArray
+    weight: FloatArray
 
 
 def make_pairs(n: int) -> Pairs:
@@ -68,54 +82,41 @@ def make_pairs(n: int) -> Pairs:
 
 
 @njit(cache=True, nogil=True)
-def moved(
-    rotation: NDArray[np.float64],
-    translation: NDArray[np.float64],
-    points: NDArray[np.float64],
-    i: int,
-) -> tuple[float, float, float]:
-    """Point i after a rotation and a translation."""
+def move_point(pose: Pose, points: FloatArray, i: int) -> tuple[float, float, float]:
+    """Point i after a pose."""
+    R, t = pose.rotation, pose.translation
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
     return (
-        rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0],
-        rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
-        rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2],
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0],
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1],
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2],
     )
 
 
 @njit(cache=True, nogil=True)
+def place_camera(scene: SceneArrays, pose: Pose) -> FloatArray:
+    """(3,) the scene's camera in bone coordinates."""
+    camera: FloatArray = pose.rotation @ scene.camera + pose.translation
+    return camera
+
+
+@njit(cache=True, nogil=True)
 def pair_forward(
-    scene: SceneArrays,
-    model: ModelArrays,
-    rotation: NDArray[np.float64],
-    translation: NDArray[np.float64],
-    camera: NDArray[np.float64],
-    every: int,
-    pairs: Pairs,
+    scene: SceneArrays, model: ModelArrays, pose: Pose, every: int, pairs: Pairs
 ) -> int:
     """Every n-th scene point with its nearest model vertex, where that faces the camera.
 
-    Args:
-        scene: what was measured.
-        model: prepared bone.
-        rotation: (3, 3) bone from scene.
-        translation: (3,) of the same, mm.
-        camera: (3,) in bone coordinates.
-        every: 1 for all points.
-        pairs: `scene` and `vertex` written from the beginning.
-
-    Returns:
-        How many.
+    Writes `scene` and `vertex` of the pairs; returns how many there are.
     """
     points, normals, places, can_pair = scene.points, model.normals, model.points, model.can_pair
-    has_camera = scene.has_camera
+    camera = place_camera(scene, pose)
     n = 0
     for i in range(0, points.shape[0], every):
-        x, y, z = moved(rotation, translation, points, i)
-        v = nearest_vertex(x, y, z, places, model.neighbours, model.grid, model.origin, model.voxel)
+        x, y, z = move_point(pose, points, i)
+        v = find_vertex(x, y, z, places, model.neighbours, model.grid)
         if not can_pair[v]:
             continue
-        if has_camera and not faces(camera, places, normals, v, 0.0):
+        if scene.has_camera and not faces(camera, places, normals, v, 0.0):
             continue
         pairs.scene[n] = i
         pairs.vertex[n] = v
@@ -125,73 +126,50 @@ def pair_forward(
 
 @njit(cache=True, nogil=True)
 def pair_backward(
-    scene: SceneArrays,
-    grid: SceneGrid,
-    model: ModelArrays,
-    rotation: NDArray[np.float64],
-    translation: NDArray[np.float64],
-    camera: NDArray[np.float64],
-    every: int,
-    radius_mm: float,
-    least_cosine: float,
-    pairs: Pairs,
-    n: int,
-) -> int:
+    scene: SceneArrays, grid: VoxelGrid, model: ModelArrays, pose: Pose, every: int,
+    radius_mm: float, least_cosine: float, pairs: Pairs, n: int,
+) -> tuple[int, int]:  # fmt: skip
     """Every n-th visible model vertex with a nearest scene point within a radius.
 
-    Args:
-        scene: what was measured.
-        grid: of the scene.
-        model: prepared bone.
-        rotation: (3, 3) bone from scene.
-        translation: (3,) of the same, mm.
-        camera: (3,) in bone coordinates.
-        every: 1 for all vertices.
-        radius_mm: no pair is longer.
-        least_cosine: of the angle between normal and line of sight.
-        pairs: `scene` and `vertex` written from n on.
-        n: so many pairs are there.
-
-    Returns:
-        How many there are now.
+    A vertex is visible when the cosine between its normal and its line of sight is large enough.
+    Writes `scene` and `vertex` of the pairs from n on; returns how many pairs there are now, and
+    how many vertices are visible.
     """
     points, normals, places, can_pair = scene.points, model.normals, model.points, model.can_pair
-    inverse = rotation.T.copy()
-    shift = -(inverse @ translation)
+    camera = place_camera(scene, pose)
+    rotation = pose.rotation.T.copy()
+    inverse = Pose(rotation, -(rotation @ pose.translation))
+    n_visible = 0
     for v in range(0, places.shape[0], every):
         if not can_pair[v]:
             continue
         if scene.has_camera and not faces(camera, places, normals, v, least_cosine):
             continue
-        x, y, z = moved(inverse, shift, places, v)
-        i = scene_point_near(x, y, z, points, grid, radius_mm)
-        if i >= 0:
+        n_visible += 1
+        x, y, z = move_point(inverse, places, v)
+        ix, iy, iz = find_voxel(x, y, z, grid)
+        if not has_voxel(grid, ix, iy, iz):
+            continue
+        i = grid.nearest[ix, iy, iz]
+        if i >= 0 and squared_distance(x, y, z, points, i) <= radius_mm * radius_mm:
             pairs.scene[n] = i
             pairs.vertex[n] = v
             n += 1
-    return n
+    return n, n_visible
 
 
 @njit(cache=True, nogil=True)
-def measure_pairs(
-    scene: SceneArrays,
-    model: ModelArrays,
-    rotation: NDArray[np.float64],
-    translation: NDArray[np.float64],
-    camera: NDArray[np.float64],
-    pairs: Pairs,
-    first: int,
-    n: int,
-) -> None:
-    """Residual, direction, excess and variance of pairs `first` to `n` at a pose.
+def measure_pairs(scene: SceneArrays, model: ModelArrays, pose: Pose, pairs: Pairs, n: int) -> None:
+    """Point, residual, direction, excess and variance of the first n pairs at a pose.
 
-    The surface around a vertex v with normal n is taken as f(p) = n.(p - v) + (p - v).B(p - v) / 2:
-    a plane would lie off a curved bone by what the vertices are apart.
+    Around a vertex v with normal n the surface is f(p) = n.(p - v) + (p - v).B(p - v) / 2 = 0: a
+    plane would lie off a curved bone between the vertices.
     """
     points, places, normals, curvature = scene.points, model.points, model.normals, model.curvature
-    for k in range(first, n):
+    camera = place_camera(scene, pose)
+    for k in range(n):
         i, v = pairs.scene[k], pairs.vertex[k]
-        x, y, z = moved(rotation, translation, points, i)
+        x, y, z = move_point(pose, points, i)
         pairs.point[k, 0], pairs.point[k, 1], pairs.point[k, 2] = x, y, z
         dx, dy, dz = x - places[v, 0], y - places[v, 1], z - places[v, 2]
         gx, gy, gz = normals[v, 0], normals[v, 1], normals[v, 2]
@@ -215,16 +193,3 @@ def measure_pairs(
             cosine = gx * rx + gy * ry + gz * rz
             seen2 *= cosine * cosine / max(rx * rx + ry * ry + rz * rz, 1e-12)
         pairs.variance[k] = seen2 + model.sigma[v] ** 2
-
-
-@njit(cache=True, nogil=True)
-def count_visible(
-    model: ModelArrays, camera: NDArray[np.float64], every: int, least_cosine: float
-) -> int:
-    """So many vertices face the camera: those that `pair_backward` asks about."""
-    normals, places = model.normals, model.points
-    n = 0
-    for v in range(0, places.shape[0], every):
-        is_seen = faces(camera, places, normals, v, least_cosine)
-        n += 1 if is_seen and model.can_pair[v] else 0
-    return n

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 
 from navapp.geometry.transform import RigidTransform
-from navapp.registration.bimcc import MIN_POINTS, BimccSettings, Solution, solve_bimcc
+from navapp.registration.bimcc import MIN_POINTS, Solution, solve_bimcc
+from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.registration.coverage import coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (

@@ -6,16 +6,15 @@ from functools import cached_property
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
-from navapp.registration.lookup_kernels import SceneGrid, fill_scene_grid
+from navapp.registration.lookup_kernels import VoxelGrid, fill_scene_grid
 from navapp.registration.pairing_kernels import SceneArrays
 from navapp.values import SurfaceCloud
 
-_VOXEL_MM = 6.0
-_GRID_MARGIN_MM = 6.0
-_MOST_VOXELS = 64
+# Of the grid; all chosen.
+_VOXEL_MM, _GRID_MARGIN_MM, _MOST_VOXELS = 6.0, 6.0, 64
 
 # No place has a point near it.
-NO_GRID = SceneGrid(np.full((1, 1, 1), -1, dtype=np.int32), np.zeros(3), 1.0)
+NO_GRID = VoxelGrid(np.full((1, 1, 1), -1, dtype=np.int32), np.zeros(3), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,9 +25,9 @@ class Scene:
         points_mm: (N, 3) in the scene's frame.
         camera_mm: (3,) where it was seen from; None when unknown: then every model point may pair.
         sigma_ray_mm: (N,) standard deviation along the ray of sight (in all directions without a
-            camera); None when unknown: it is then taken from the residuals.
+            camera); None when unknown: the residuals then tell it.
         n_sharing_errors: so many neighbouring points have their errors in common and count as one.
-        thinned_to: the search from far uses about so many points.
+        thinned_to: the coarse loop uses about so many points.
 
     Raises:
         ValueError: points of another shape, or not finite.
@@ -42,12 +41,7 @@ class Scene:
 
     @classmethod
     def from_stereo(cls, cloud: SurfaceCloud, correlation_px: float) -> "Scene":
-        """A cloud of the stereo camera, which stands at the origin.
-
-        Args:
-            cloud: in the rectified left camera.
-            correlation_px: distance in the picture over which the matcher's errors go together.
-        """
+        """A cloud in the rectified left camera, whose errors go together over a distance."""
         n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
         return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors)
 
@@ -66,15 +60,15 @@ class Scene:
 
     @property
     def every(self) -> int:
-        """The search from far uses every n-th point."""
+        """The coarse loop uses every n-th point."""
         return max(1, -(-len(self.points_mm) // self.thinned_to))
 
     @cached_property
     def arrays(self) -> SceneArrays:
-        """What the compiled loops read, in an order of its own: thinning must not see rows.
+        """What the compiled loops read, shuffled: thinned rows would be a few columns.
 
-        Among those that it keeps, and among the others, neighbours stay neighbours: the model near
-        them is soon found.
+        The points that thinning keeps, and the others, each keep their order: where near points
+        follow each other, look-ups in the model are faster.
         """
         n = len(self.points_mm)
         order, is_thinned = np.random.default_rng(n).permutation(n), np.arange(n) % self.every == 0
@@ -86,19 +80,18 @@ class Scene:
             np.ascontiguousarray(sigma[order], dtype=np.float64),
             np.zeros(3) if self.camera_mm is None else np.asarray(self.camera_mm, dtype=np.float64),
             self.camera_mm is not None,
+            self.knows_noise,
+            self.every,
         )
 
     @cached_property
-    def grid(self) -> SceneGrid:
-        """Which point is near each place around the scene's middle; made when a start is far.
-
-        What lies further away than any bone reaches has no place in it: walls, stray points.
-        """
+    def grid(self) -> VoxelGrid:
+        """Which point is near each place; stray points far from the middle are left out."""
         points = self.arrays.points[:: self.every]
         middle, half = np.median(points, axis=0), 0.5 * _MOST_VOXELS * _VOXEL_MM
         low = np.maximum(points.min(axis=0) - _GRID_MARGIN_MM, middle - half)
         high = np.minimum(points.max(axis=0) + _GRID_MARGIN_MM, middle + half)
         counts = np.ceil((high - low) / _VOXEL_MM).astype(int) + 1
-        grid = SceneGrid(np.full(tuple(counts), -1, dtype=np.int32), low, _VOXEL_MM)
+        grid = VoxelGrid(np.full(tuple(counts), -1, dtype=np.int32), low, _VOXEL_MM)
         fill_scene_grid(self.arrays.points, self.every, grid)
         return grid

@@ -9,19 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import ModelArrays
-from navapp.registration.pairing_kernels import Pairs
+from navapp.registration.pairing_kernels import Pairs, Pose
 
 # Smallest over largest eigenvalue of the information below which a direction counts as free.
-# One-sided views of bones have more (docs/registration.md), balls and cylinders next to nothing.
-FREE_SHARE = 5e-3
-# Squared distance in widths beyond which a kernel is nothing.
+# One-sided views of bones have 0.03 and more (`python -m tests.bench.registration`), balls and
+# cylinders next to nothing.
+FREE_FRACTION = 5e-3
+# All chosen. Squared distance in widths beyond which a kernel is nothing; the largest step; the
+# shortest lever.
 _FARTHEST2 = 50.0
-_LARGEST_TURN_RAD = 0.25
-_LARGEST_SHIFT_MM = 10.0
-_SMALLEST_MM = 1e-6
+_LARGEST_TURN_RAD, _LARGEST_SHIFT_MM = 0.25, 10.0
+_SHORTEST_MM = 1e-6
 
 
 class Weighed(NamedTuple):
@@ -34,14 +35,10 @@ class Weighed(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def weigh(pairs: Pairs, n: int, sigma_mm: float, n_sigmas: float, noise_mm2: float) -> Weighed:
-    """Correntropy weights of the first n pairs, divided by each pair's variance.
+    """Correntropy weights of the first n pairs, divided by each pair's variance; in place.
 
-    Args:
-        pairs: `weight` in place.
-        n: how many.
-        sigma_mm: width of the kernel; a pair's is never narrower than `n_sigmas` of its own noise.
-        n_sigmas: see above.
-        noise_mm2: variance that the points do not know of themselves.
+    A pair's kernel is never narrower than `n_sigmas` of its own noise. `noise_mm2` is variance that
+    the points do not know of themselves.
     """
     total, squares, variances = 0.0, 0.0, 0.0
     for i in range(n):
@@ -69,15 +66,32 @@ def noise_under_kernel_mm2(squares_mm2: float, kernels: float, sigma_mm: float) 
 
 
 @njit(cache=True, nogil=True)
-def twist_row(
-    pairs: Pairs, i: int, centre: NDArray[np.float64], lever_mm: float, row: NDArray[np.float64]
+def find_weighted_centre(pairs: Pairs, n: int) -> tuple[FloatArray, float]:
+    """(3,) weighted mean of the points, and the rms distance from it, never 0."""
+    centre = np.zeros(3)
+    total = 0.0
+    for i in range(n):
+        total += pairs.weight[i]
+        for k in range(3):
+            centre[k] += pairs.weight[i] * pairs.point[i, k]
+    if total <= 0.0:
+        return centre, _SHORTEST_MM
+    centre /= total
+    squares = 0.0
+    for i in range(n):
+        for k in range(3):
+            squares += pairs.weight[i] * (pairs.point[i, k] - centre[k]) ** 2
+    return centre, max(float(np.sqrt(squares / total)), _SHORTEST_MM)
+
+
+@njit(cache=True, nogil=True)
+def set_motion_row(
+    pairs: Pairs, i: int, centre: FloatArray, lever_mm: float, row: FloatArray
 ) -> None:
-    """How one residual grows with the motion; `row` is (6,) in place, else as `plane_system`."""
-    x, y, z = (
-        pairs.point[i, 0] - centre[0],
-        pairs.point[i, 1] - centre[1],
-        pairs.point[i, 2] - centre[2],
-    )
+    """How one residual grows with the motion; `row` is (6,) in place."""
+    x = pairs.point[i, 0] - centre[0]
+    y = pairs.point[i, 1] - centre[1]
+    z = pairs.point[i, 2] - centre[2]
     nx, ny, nz = pairs.direction[i, 0], pairs.direction[i, 1], pairs.direction[i, 2]
     row[0] = (y * nz - z * ny) / lever_mm
     row[1] = (z * nx - x * nz) / lever_mm
@@ -86,82 +100,72 @@ def twist_row(
 
 
 @njit(cache=True, nogil=True)
-def plane_system(
-    pairs: Pairs, n: int, centre: NDArray[np.float64], lever_mm: float, H: NDArray[np.float64],
-    g: NDArray[np.float64],
-) -> None:  # fmt: skip
-    """Normal equations of the weighted residuals for a motion of the points.
-
-    Args:
-        pairs: weighted; first n hold.
-        n: how many.
-        centre: (3,) of the rotation, bone coordinates.
-        lever_mm: makes rotations and translations comparable: unknowns are (rotation x lever,
-            translation), all in mm.
-        H: (6, 6) in place.
-        g: (6,) in place.
-    """
-    H[:] = 0.0
-    g[:] = 0.0
-    row = np.empty(6)
-    for i in range(n):
-        w = pairs.weight[i]
-        twist_row(pairs, i, centre, lever_mm, row)
-        for a in range(6):
-            scaled = w * row[a]
-            g[a] += scaled * pairs.residual[i]
-            for b in range(a, 6):
-                H[a, b] += scaled * row[b]
+def mirror(H: FloatArray) -> None:
+    """Copy the upper triangle into the lower one, in place."""
     for a in range(6):
         for b in range(a):
             H[a, b] = H[b, a]
 
 
-class SizeTerms(NamedTuple):
-    """What a seventh unknown, the size, adds to the normal equations beside its mixed terms."""
+@njit(cache=True, nogil=True)
+def sum_plane_system(
+    pairs: Pairs, n: int, centre: FloatArray, lever_mm: float
+) -> tuple[FloatArray, FloatArray]:
+    """Normal equations H (6, 6), g (6,) of the weighted residuals for a motion of the points.
 
-    squares: float
-    product_mm: float
+    Unknowns are (rotation about the centre x lever, translation), all in mm: the lever makes them
+    comparable.
+    """
+    H, g, row = np.zeros((6, 6)), np.zeros(6), np.empty(6)
+    for i in range(n):
+        w = pairs.weight[i]
+        set_motion_row(pairs, i, centre, lever_mm, row)
+        for a in range(6):
+            scaled = w * row[a]
+            g[a] += scaled * pairs.residual[i]
+            for b in range(a, 6):
+                H[a, b] += scaled * row[b]
+    mirror(H)
+    return H, g
 
 
 @njit(cache=True, nogil=True)
-def size_terms(
-    pairs: Pairs, n: int, centre: NDArray[np.float64], lever_mm: float, mixed: NDArray[np.float64]
-) -> SizeTerms:
-    """Terms of a growth of the model about a centre, in mm at the distance of the lever.
+def sum_size_terms(
+    pairs: Pairs, n: int, centre: FloatArray, lever_mm: float
+) -> tuple[FloatArray, float, float]:
+    """What a seventh unknown adds to the plane system: growth about the centre, mm at the lever.
 
-    Arguments as of `plane_system`; `mixed` is (6,) in place, with the six unknowns of the motion.
+    Its (6,) mixed terms with the motion, its own squares, and its product with the residuals.
     """
-    mixed[:] = 0.0
-    squares, product = 0.0, 0.0
-    row = np.empty(6)
+    mixed, row = np.zeros(6), np.empty(6)
+    squares, product_mm = 0.0, 0.0
     for i in range(n):
         w = pairs.weight[i]
-        twist_row(pairs, i, centre, lever_mm, row)
+        set_motion_row(pairs, i, centre, lever_mm, row)
         outward = 0.0
         for k in range(3):
             outward += (pairs.point[i, k] - centre[k]) * pairs.direction[i, k]
         outward /= lever_mm
         scaled = w * outward
         squares += scaled * outward
-        product += scaled * pairs.residual[i]
+        product_mm += scaled * pairs.residual[i]
         for k in range(6):
             mixed[k] += scaled * row[k]
-    return SizeTerms(squares, product)
+    return mixed, squares, product_mm
 
 
 @njit(cache=True, nogil=True)
 def add_point_system(
-    pairs: Pairs, n: int, model: ModelArrays, share: float, centre: NDArray[np.float64],
-    lever_mm: float, H: NDArray[np.float64], g: NDArray[np.float64],
+    pairs: Pairs, n: int, model: ModelArrays, point_weight: float, centre: FloatArray,
+    lever_mm: float, H: FloatArray, g: FloatArray,
 ) -> None:  # fmt: skip
-    """Add the distances of the points from their vertices, weighted by a share, to both.
+    """Add the points' whole distances from their vertices to the plane system, in place.
 
-    From far, planes alone let the bone slide along itself; the whole distance holds it back.
-    Arguments as of `plane_system`; `share` is what the whole distance weighs beside the plane's.
+    While far, planes alone let the bone slide along itself; the whole distance holds it back.
+    `point_weight` is what it weighs beside the plane's.
     """
     for i in range(n):
-        w = pairs.weight[i] * share
+        w = pairs.weight[i] * point_weight
         v = pairs.vertex[i]
         x = (pairs.point[i, 0] - centre[0]) / lever_mm
         y = (pairs.point[i, 1] - centre[1]) / lever_mm
@@ -190,73 +194,57 @@ def add_point_system(
         H[2, 4] += w * x
         for a in range(3, 6):
             H[a, a] += w
-    for a in range(6):
-        for b in range(a):
-            H[a, b] = H[b, a]
+    mirror(H)
 
 
 @njit(cache=True, nogil=True)
-def weighted_centre(pairs: Pairs, n: int, centre: NDArray[np.float64]) -> float:
-    """Weighted mean of the points into `centre`; the rms distance from it, never 0."""
-    centre[:] = 0.0
-    total = 0.0
-    for i in range(n):
-        total += pairs.weight[i]
-        for k in range(3):
-            centre[k] += pairs.weight[i] * pairs.point[i, k]
-    if total <= 0.0:
-        return _SMALLEST_MM
-    centre /= total
-    squares = 0.0
-    for i in range(n):
-        for k in range(3):
-            squares += pairs.weight[i] * (pairs.point[i, k] - centre[k]) ** 2
-    return max(float(np.sqrt(squares / total)), _SMALLEST_MM)
-
-
-@njit(cache=True, nogil=True)
-def plane_step(
-    H: NDArray[np.float64], g: NDArray[np.float64], lever_mm: float, twist: NDArray[np.float64]
-) -> None:
-    """Gauss-Newton step into `twist`: rotation rad first, then translation mm, both capped.
+def solve_step(H: FloatArray, g: FloatArray, lever_mm: float) -> FloatArray:
+    """(6,) Gauss-Newton step: rotation rad first, then translation mm, both capped.
 
     A direction that nothing fixes stays where it is: noise would move it without end.
     """
     values, vectors = np.linalg.eigh(H)
     step = np.zeros(6)
     for k in range(6):
-        if values[k] > FREE_SHARE * values[5]:
+        if values[k] > FREE_FRACTION * values[5]:
             along = vectors[:, k].copy()
             step += (along @ g) / values[k] * along
     turn = float(np.linalg.norm(step[:3])) / lever_mm
     shift = float(np.linalg.norm(step[3:]))
-    less_turn = min(1.0, _LARGEST_TURN_RAD / max(turn, 1e-300))
-    less_shift = min(1.0, _LARGEST_SHIFT_MM / max(shift, 1e-300))
-    twist[:3] = -step[:3] / lever_mm * less_turn
-    twist[3:] = -step[3:] * less_shift
+    twist = np.empty(6)
+    twist[:3] = -step[:3] / lever_mm * min(1.0, _LARGEST_TURN_RAD / max(turn, 1e-300))
+    twist[3:] = -step[3:] * min(1.0, _LARGEST_SHIFT_MM / max(shift, 1e-300))
+    return twist
 
 
 @njit(cache=True, nogil=True)
-def apply_twist(
-    twist: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    rotation: NDArray[np.float64],
-    translation: NDArray[np.float64],
-) -> None:
+def apply_twist(twist: FloatArray, centre: FloatArray, pose: Pose) -> None:
     """Move a pose (bone from scene) by a rotation about `centre`, then a translation; in place."""
     x, y, z = twist[0], twist[1], twist[2]
     angle = np.sqrt(x * x + y * y + z * z)
-    first = 1.0 - angle * angle / 6.0 if angle < 1e-6 else np.sin(angle) / angle
-    second = 0.5 if angle < 1e-6 else (1.0 - np.cos(angle)) / (angle * angle)
-    turn = np.empty((3, 3))
-    turn[0, 0], turn[0, 1], turn[0, 2] = (
-        1.0 - second * (y * y + z * z), second * x * y - first * z, second * x * z + first * y,
-    )  # fmt: skip
-    turn[1, 0], turn[1, 1], turn[1, 2] = (
-        second * x * y + first * z, 1.0 - second * (x * x + z * z), second * y * z - first * x,
-    )  # fmt: skip
-    turn[2, 0], turn[2, 1], turn[2, 2] = (
-        second * x * z - first * y, second * y * z + first * x, 1.0 - second * (x * x + y * y),
-    )  # fmt: skip
-    rotation[:] = turn @ rotation
-    translation[:] = turn @ (translation - centre) + centre + twist[3:]
+    # Rodrigues' formula: I + a [w]x + b [w]x^2.
+    a = 1.0 - angle * angle / 6.0 if angle < 1e-6 else np.sin(angle) / angle
+    b = 0.5 if angle < 1e-6 else (1.0 - np.cos(angle)) / (angle * angle)
+    turn = np.array(
+        [
+            [1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y],
+            [b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x],
+            [b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)],
+        ]
+    )
+    pose.rotation[:] = turn @ pose.rotation
+    pose.translation[:] = turn @ (pose.translation - centre) + centre + twist[3:]
+
+
+@njit(cache=True, nogil=True)
+def make_step(
+    pairs: Pairs, n: int, model: ModelArrays, point_weight: float, pose: Pose
+) -> tuple[float, float, float]:
+    """Move the pose by one step of the weighted pairs; its angle, its length, and the lever."""
+    centre, lever_mm = find_weighted_centre(pairs, n)
+    H, g = sum_plane_system(pairs, n, centre, lever_mm)
+    if point_weight > 0.0:
+        add_point_system(pairs, n, model, point_weight, centre, lever_mm, H, g)
+    twist = solve_step(H, g, lever_mm)
+    apply_twist(twist, centre, pose)
+    return float(np.linalg.norm(twist[:3])), float(np.linalg.norm(twist[3:])), lever_mm

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.registration import fit_icp
+from navapp.registration import solve_icp
 from navapp.registration.verdict import Goal, with_cause
 from navapp.stereo import match_baseline
 from navapp.tracking.checks import PairChecks
@@ -82,6 +82,6 @@ class IcpTracker(Tracker):
         frame.watch.lap("stereo")
         if measured is None:
             return None
-        estimate = fit_icp(measured.scene, self.model, frame.start)
+        estimate = solve_icp(measured.scene, self.model, frame.start).estimate
         frame.watch.lap("estimate")
         return Fit(estimate, measured)

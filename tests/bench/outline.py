@@ -21,7 +21,6 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
-from navapp.registration.information import near
 from navapp.tracking.edge_kernels import missing_share, sample_across, strongest_edge
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
@@ -156,7 +155,7 @@ def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
     block = parts.outline.block(frame.pair, fit.pose, measured.view, measured.disparity, coarse_px)
     weight = 1.0 / block.n_sharing
     if weight.sum() >= FEWEST:
-        yield float(weight[near(block, fit.estimate.covariance)].sum() / weight.sum())
+        yield float(weight[block.find_near(fit.estimate.covariance)].sum() / weight.sum())
 
 
 def row(low: float, high: float, edges: list[Edge]) -> str:

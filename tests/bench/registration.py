@@ -26,11 +26,11 @@ from navapp.registration import (
     RegistrationModel,
     Scene,
     fit_bimcc,
-    fit_bimcc_literal,
-    fit_icp,
     make_far_starts,
     make_near_starts,
     register,
+    solve_bimcc_literal,
+    solve_icp,
 )
 from tests.bench.registration_peers import RADII_MM, Peer, open3d_plane, peers
 from tests.bench.registration_scenes import (
@@ -157,10 +157,10 @@ def _own() -> dict[str, Method]:
         return found.estimate.camera_from_bone, found.outcome
 
     def literal(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
-        return fit_bimcc_literal(_seen(scene), model, scene.start).camera_from_bone, None
+        return solve_bimcc_literal(_seen(scene), model, scene.start).estimate.camera_from_bone, None
 
     def plain(scene: Clouded, model: RegistrationModel) -> tuple[RigidTransform, Outcome | None]:
-        return fit_icp(_seen(scene), model, scene.start).camera_from_bone, None
+        return solve_icp(_seen(scene), model, scene.start).estimate.camera_from_bone, None
 
     return {
         "bimcc, the loops alone": once,

@@ -1,6 +1,8 @@
 """`navapp calibrate latency` on the simulated display and cameras."""
 
+import io
 import json
+import sys
 import tomllib
 
 import pytest
@@ -87,17 +89,22 @@ def test_wrong_arguments_are_refused(measure, capsys, wrong) -> None:
     assert not out.exists()
 
 
-def test_an_interrupt_is_130_and_writes_nothing(measure, monkeypatch) -> None:
-    from sim_devices.camera import SimulatedCamera
+class InterruptedTerminal(io.StringIO):
+    """Somebody presses Ctrl-C while half of the bar is drawn."""
 
-    read, n_reads = SimulatedCamera.read, iter(range(1000))
+    def isatty(self) -> bool:
+        return True
 
-    def interrupted(self, timeout_s):
-        if next(n_reads) == 50:
+    def write(self, text: str) -> int:
+        if " 50 %" in text:
             raise KeyboardInterrupt
-        return read(self, timeout_s)
+        return super().write(text)
 
-    monkeypatch.setattr(SimulatedCamera, "read", interrupted)
+
+def test_an_interrupt_is_130_and_writes_nothing(measure, monkeypatch) -> None:
+    terminal = InterruptedTerminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
     code, out = measure(SMALL)
     assert code == 130
+    assert terminal.getvalue().endswith("navapp: error: interrupted\n")
     assert not out.exists()

@@ -156,7 +156,7 @@ def point_system(measured, model, vertex, weight, centre, lever_mm):
     return H, g
 
 
-def plane_step(H, g, lever_mm):
+def solve_step(H, g, lever_mm):
     """(6,) step along what is fixed: rotation rad, translation mm, at most 0.25 rad and 10 mm."""
     step = -np.linalg.pinv(H, rcond=5e-3, hermitian=True) @ g
     turn, shift = step[:3] / lever_mm, step[3:]
@@ -173,35 +173,36 @@ def apply_twist(twist, centre, R, t):
     return turn @ R, turn @ (t - centre) + centre + twist[3:]
 
 
-def step_from_far(scene, grid, model, R, t, sigma_mm, settings):
-    """(R, t, J) after one iteration of the loop from far."""
-    forward = pair_forward(scene, model, R, t, settings.scene_every)
+def step_coarse(scene, grid, model, R, t, sigma_mm, settings):
+    """(R, t) after one iteration of the coarse loop."""
+    forward = pair_forward(scene, model, R, t, scene.every)
     radius_mm = min(3.0 * sigma_mm, settings.widest_mm)
-    backward = pair_backward(scene, grid, model, R, t, settings.model_every, radius_mm, 0.2)
+    model_every = max(1, len(model.points) // settings.model_points)
+    backward = pair_backward(scene, grid, model, R, t, model_every, radius_mm, 0.2)
     chosen, vertex = np.concatenate([forward, backward], axis=1)
     measured = measure_pairs(scene, model, R, t, chosen, vertex)
     off_mm2 = (sigma_mm / settings.n_sigmas) ** 2
-    kernels, weight = weigh(measured, sigma_mm, settings.n_sigmas, off_mm2)
+    _, weight = weigh(measured, sigma_mm, settings.n_sigmas, off_mm2)
     n, n_backward = len(forward[0]), max(len(backward[0]), 1)
     weight[n:] *= settings.backward_weight * n / n_backward
     centre, lever_mm = weighted_centre(measured.point, weight)
     H, g = plane_system(measured, weight, centre, lever_mm)
     H_point, g_point = point_system(measured, model, vertex, weight, centre, lever_mm)
     H, g = H + settings.point_weight * H_point, g + settings.point_weight * g_point
-    return *apply_twist(plane_step(H, g, lever_mm), centre, R, t), kernels.mean()
+    return apply_twist(solve_step(H, g, lever_mm), centre, R, t)
 
 
-def step_to_rest(scene, model, R, t, sigma_mm, settings):
-    """(R, t, J, wanted sigma) after one iteration of the loop to rest."""
+def step_fine(scene, model, R, t, sigma_mm, settings):
+    """(R, t, wanted sigma) after one iteration of the fine loop."""
     chosen, vertex = pair_forward(scene, model, R, t, 1)
     measured = measure_pairs(scene, model, R, t, chosen, vertex)
     kernels, weight = weigh(measured, sigma_mm, settings.n_sigmas, 0.0)
     centre, lever_mm = weighted_centre(measured.point, weight)
-    twist = plane_step(*plane_system(measured, weight, centre, lever_mm), lever_mm)
+    twist = solve_step(*plane_system(measured, weight, centre, lever_mm), lever_mm)
     noise_mm = np.sqrt(noise_under_kernel_mm2(measured, kernels, sigma_mm))
     widest_mm = settings.widest_at_rest_mm
     wanted_mm = np.clip(settings.n_sigmas * noise_mm, settings.narrowest_mm, widest_mm)
-    return *apply_twist(twist, centre, R, t), kernels.mean(), wanted_mm
+    return *apply_twist(twist, centre, R, t), wanted_mm
 
 
 def twist_information(measured, weight, pose, centre_mm):

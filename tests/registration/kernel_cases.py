@@ -7,8 +7,14 @@ import numpy as np
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel, Scene
-from navapp.registration.lookup_kernels import ModelArrays, SceneGrid
-from navapp.registration.pairing_kernels import Pairs, SceneArrays, make_pairs, measure_pairs
+from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid
+from navapp.registration.pairing_kernels import (
+    Pairs,
+    Pose,
+    SceneArrays,
+    make_pairs,
+    measure_pairs,
+)
 from tests.reference import bimcc_reference as reference
 from tests.registration.shapes import blob
 
@@ -19,13 +25,18 @@ POSE = RigidTransform.from_parts(
 
 @dataclass
 class Case:
-    """Arrays as the kernels take them; `R` and `t` are bone from scene."""
+    """Arrays as the kernels read them; `R` and `t` are bone from scene."""
 
     scene: SceneArrays
-    grid: SceneGrid
+    grid: VoxelGrid
     model: ModelArrays
     R: np.ndarray
     t: np.ndarray
+
+    @property
+    def pose(self) -> Pose:
+        """A copy, for the kernels to move."""
+        return Pose(self.R.copy(), self.t.copy())
 
     @property
     def camera(self) -> np.ndarray:
@@ -65,6 +76,6 @@ def measured_pairs(case: Case) -> tuple[Pairs, int, reference.Measured, np.ndarr
     """Forward pairs measured by the kernel and by the reference, and the vertices."""
     chosen, vertex = reference.pair_forward(case.scene, case.model, case.R, case.t, 1)
     pairs, n = as_pairs(chosen, vertex), len(chosen)
-    measure_pairs(case.scene, case.model, case.R, case.t, case.camera, pairs, 0, n)
+    measure_pairs(case.scene, case.model, case.pose, pairs, n)
     expected = reference.measure_pairs(case.scene, case.model, case.R, case.t, chosen, vertex)
     return pairs, n, expected, vertex

@@ -5,7 +5,8 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector, vector_from_rotation
 from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
-from navapp.registration.bimcc import BimccSettings, fit_coarsely, fit_pose
+from navapp.registration.bimcc import fit_coarsely, fit_pose
+from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.values import BoneModel, PoseEstimate, Reason
 from tests.registration.shapes import (
     TRUE,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.registration import RegistrationModel, Scene, fit_bimcc
-from navapp.registration.information import information_of
+from navapp.registration.information import compute_information
 from navapp.registration.pairing_kernels import Pairs, make_pairs
 from navapp.registration.step_kernels import weigh
 from tests.reference import bimcc_reference as reference
@@ -31,7 +31,7 @@ def pairs_on(points: np.ndarray, normals: np.ndarray) -> tuple[Pairs, int]:
 def test_the_covariance_is_the_inverse_of_the_information() -> None:
     pairs, n, measured, _ = measured_pairs(make_case())
     weigh(pairs, n, 1.0, 2.5, 0.0)
-    found = information_of(pairs, n, POSE, CENTRE, 1.0)
+    found = compute_information(pairs, n, POSE, CENTRE, 1.0)
     expected = np.linalg.inv(reference.twist_information(measured, pairs.weight[:n], POSE, CENTRE))
     np.testing.assert_allclose(
         found.covariance, expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max()
@@ -44,13 +44,17 @@ def test_the_covariance_is_the_inverse_of_the_information() -> None:
 def test_points_that_share_their_errors_count_as_one() -> None:
     pairs, n, _, _ = measured_pairs(make_case())
     weigh(pairs, n, 1.0, 2.5, 0.0)
-    alone = information_of(pairs, n, POSE, CENTRE, 1.0).covariance
-    np.testing.assert_allclose(information_of(pairs, n, POSE, CENTRE, 9.0).covariance, 9.0 * alone)
+    alone = compute_information(pairs, n, POSE, CENTRE, 1.0).covariance
+    np.testing.assert_allclose(
+        compute_information(pairs, n, POSE, CENTRE, 9.0).covariance, 9.0 * alone
+    )
 
 
 def test_a_ball_leaves_three_rotations_free() -> None:
     mesh = ball_mesh(20.0, 1000)
-    found = information_of(*pairs_on(mesh.vertices_mm, mesh.vertices_mm / 20.0), POSE, CENTRE, 1.0)
+    found = compute_information(
+        *pairs_on(mesh.vertices_mm, mesh.vertices_mm / 20.0), POSE, CENTRE, 1.0
+    )
     assert len(found.free) == 3
     np.testing.assert_allclose(found.free[:, :3], 0.0, atol=1e-3)
     np.testing.assert_allclose(np.linalg.norm(found.free, axis=1), 1.0)
@@ -59,7 +63,9 @@ def test_a_ball_leaves_three_rotations_free() -> None:
 
 def test_a_plane_leaves_two_translations_and_a_rotation_free() -> None:
     points = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3)) * (1.0, 1.0, 0.0)
-    found = information_of(*pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0)
+    found = compute_information(
+        *pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0
+    )
     assert len(found.free) == 3
     words = sorted(words.split(" (")[0] for words in found.free_in_words())
     assert words == ["rotation about", "translation along", "translation along"]
@@ -72,7 +78,7 @@ def test_a_plane_leaves_two_translations_and_a_rotation_free() -> None:
 
 def test_a_tube_leaves_a_rotation_and_a_translation_free() -> None:
     mesh = tube_mesh(20.0, 30.0)
-    found = information_of(*pairs_on(mesh.vertices_mm, mesh.normals), POSE, CENTRE, 1.0)
+    found = compute_information(*pairs_on(mesh.vertices_mm, mesh.normals), POSE, CENTRE, 1.0)
     assert len(found.free) == 2
     words = found.free_in_words()
     assert sorted(w.split(" (")[0] for w in words) == ["rotation about", "translation along"]
@@ -84,18 +90,18 @@ def test_a_tube_leaves_a_rotation_and_a_translation_free() -> None:
 
 def test_a_bone_and_a_bowl_leave_nothing_free_or_a_turn() -> None:
     bone = blob_mesh()
-    assert not information_of(
+    assert not compute_information(
         *pairs_on(bone.vertices_mm, bone.normals), POSE, CENTRE, 1.0
     ).is_degenerate
     bowl = grid_mesh(lambda x, y: 0.02 * (x * x + y * y), 30.0)
-    free = information_of(*pairs_on(bowl.vertices_mm, bowl.normals), POSE, CENTRE, 1.0).free
+    free = compute_information(*pairs_on(bowl.vertices_mm, bowl.normals), POSE, CENTRE, 1.0).free
     assert len(free) == 1
     np.testing.assert_allclose(np.abs(free[0, 3:] @ AXES[2]), 1.0, atol=1e-3)
 
 
 def test_a_single_point_fixes_one_direction_of_six() -> None:
     points, normals = np.tile(CENTRE, (80, 1)), np.tile([0.0, 0.0, 1.0], (80, 1))
-    found = information_of(*pairs_on(points, normals), POSE, CENTRE, 1.0)
+    found = compute_information(*pairs_on(points, normals), POSE, CENTRE, 1.0)
     assert len(found.free) == 5
     assert not np.isfinite(np.diag(found.covariance)).any()
 
@@ -116,5 +122,7 @@ def test_the_size_of_a_bone_is_told_beside_its_pose(size: float) -> None:
 
 def test_one_side_of_a_plane_has_no_size() -> None:
     points = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3)) * (1.0, 1.0, 0.0)
-    found = information_of(*pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0)
+    found = compute_information(
+        *pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0
+    )
     assert found.size_sigma_mm == np.inf

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from navapp.registration import RegistrationModel
-from navapp.registration.lookup_kernels import SceneGrid, fill_scene_grid
+from navapp.registration.lookup_kernels import VoxelGrid, fill_scene_grid
 from tests.reference import bimcc_reference as reference
 from tests.reference.lookup_reference import nearest_by_trying_all
 from tests.registration.shapes import blob
@@ -45,10 +45,10 @@ def test_no_point_is_a_valid_question() -> None:
     assert len(index) == len(distance) == 0
 
 
-def grid_of(points: np.ndarray, every: int, voxel_mm: float) -> SceneGrid:
+def grid_of(points: np.ndarray, every: int, voxel_mm: float) -> VoxelGrid:
     low = points.min(axis=0) - voxel_mm
     shape = np.ceil((np.ptp(points, axis=0) + 2.0 * voxel_mm) / voxel_mm).astype(int) + 1
-    grid = SceneGrid(np.full(tuple(shape), -1, dtype=np.int32), low, voxel_mm)
+    grid = VoxelGrid(np.full(tuple(shape), -1, dtype=np.int32), low, voxel_mm)
     fill_scene_grid(points, every, grid)
     return grid
 

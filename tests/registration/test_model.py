@@ -86,22 +86,22 @@ def test_a_cloud_with_normals_is_a_model_all_of_which_may_pair() -> None:
 
 def test_the_grid_reaches_beyond_the_bone_and_names_the_nearest_vertices() -> None:
     model = RegistrationModel(blob())
-    arrays = model.arrays
-    last = arrays.origin + arrays.voxel * (np.array(arrays.grid.shape) - 1)
-    assert (arrays.origin <= model.points_mm.min(axis=0) - 14.0).all()
+    grid = model.arrays.grid
+    last = grid.origin + grid.voxel * (np.array(grid.nearest.shape) - 1)
+    assert (grid.origin <= model.points_mm.min(axis=0) - 14.0).all()
     assert (last >= model.points_mm.max(axis=0) + 14.0).all()
-    cells = np.random.default_rng(1).integers(0, arrays.grid.shape, (300, 3))
-    centres = arrays.origin + arrays.voxel * cells
+    cells = np.random.default_rng(1).integers(0, grid.nearest.shape, (300, 3))
+    centres = grid.origin + grid.voxel * cells
     expected, _ = nearest_by_trying_all(centres, model.points_mm)
-    np.testing.assert_array_equal(arrays.grid[tuple(cells.T)], expected)
+    np.testing.assert_array_equal(grid.nearest[tuple(cells.T)], expected)
 
 
 def test_a_huge_model_gets_larger_voxels_and_not_more_of_them() -> None:
     mesh = blob().mesh
     huge = TriangleMesh(1000.0 * mesh.vertices_mm, mesh.faces)
-    arrays = RegistrationModel(BoneModel("femur", huge)).arrays
-    assert arrays.grid.size < 500_000
-    assert arrays.voxel > 100.0
+    grid = RegistrationModel(BoneModel("femur", huge)).arrays.grid
+    assert grid.nearest.size < 500_000
+    assert grid.voxel > 100.0
 
 
 def test_the_arrays_are_made_once() -> None:

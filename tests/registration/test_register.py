@@ -8,7 +8,7 @@ import pytest
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import Outcome, RegistrationModel, Scene, point_to_point, register
-from navapp.registration.bimcc import BimccSettings, solution_at
+from navapp.registration.bimcc import solution_at
 from navapp.registration.multi_start import Candidate
 from navapp.registration.register import smooth_part_mm
 from navapp.values import BoneModel, Reason
@@ -198,7 +198,7 @@ def test_the_smooth_part_is_the_rms_of_a_wave_beneath_the_noise(wave_mm: float) 
     rng = np.random.default_rng(1)
     points = rng.uniform(-30.0, 30.0, (4000, 3)) * (1.0, 1.0, 0.0)
     wave = wave_mm * np.sin(2.0 * np.pi * points[:, 0] / 30.0)
-    solution = solution_at(seen_scene(900, 0.3), MODEL, TRUE, BimccSettings())
+    solution = solution_at(seen_scene(900, 0.3), MODEL, TRUE)
     residual = wave + rng.normal(0.0, 0.3, 4000)
     found = smooth_part_mm(replace(solution, points_mm=points, residual_mm=residual), 3.0)
     assert found == pytest.approx(wave_mm / np.sqrt(2.0), abs=0.07)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.registration.information import ResidualBlock, join, near
+from navapp.registration.information import ResidualBlock, join
 from navapp.values import PoseEstimate, Reason
 from tests.registration.shapes import TRUE
 
@@ -88,7 +88,7 @@ def test_residuals_of_something_else_are_left_out() -> None:
     residual = block.residual.copy()
     residual[::8] += 6.0
     spoilt = replace(block, residual=residual)
-    assert near(spoilt, SURFACE.covariance)[::8].mean() < 0.05
+    assert spoilt.find_near(SURFACE.covariance)[::8].mean() < 0.05
     clean = moved_by(join(SURFACE, WIDE, block, CENTRE_MM))
     robust = moved_by(join(SURFACE, WIDE, spoilt, CENTRE_MM))
     assert (np.abs(robust - clean) < 0.5 * SIGMAS).all()

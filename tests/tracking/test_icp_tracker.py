@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.registration import fit_icp
+from navapp.registration import solve_icp
 from navapp.tracking import TrackerSettings, TrackState, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.icp_tracker import IcpTracker, match_gradients
@@ -47,7 +47,7 @@ def test_one_matching_and_one_fit_make_an_answer() -> None:
         assert meter.given[0][2:] == (margins, match_gradients)
         begun = icp.begin(*given, start, Stopwatch(), view)
         measured = a.tracker.meter.measure_freely(begun.pair, begun.start, margins, match_gradients)
-        expected = fit_icp(measured.scene, icp.model, begun.start).camera_from_bone
+        expected = solve_icp(measured.scene, icp.model, begun.start).estimate.camera_from_bone
         left_from_rectified = icp.meter.geometry.rectified_from_left.inverse()
         np.testing.assert_array_equal(
             tracked.left_from_bone.matrix, (left_from_rectified @ expected).matrix

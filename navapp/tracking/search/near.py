@@ -1,7 +1,7 @@
 """The bone near an expected pose: matched on the model itself, or measured freely around it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings, fit_bimcc
@@ -9,7 +9,7 @@ from navapp.tracking.following import Follower
 from navapp.tracking.frame import FREE_FIT, Fit, Frame
 from navapp.tracking.surface_meter import NEAR_BOX, Margins, Measurement, SurfaceMeter
 
-_NEARBY_FIT = replace(FREE_FIT, widest_mm=3.0)
+_NEARBY_FIT = FREE_FIT._replace(widest_mm=3.0)
 
 
 @dataclass(frozen=True, slots=True)
