@@ -37,18 +37,13 @@ _NEAR_SIGMA_MM = 5.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """A pose and what stands behind it.
+    """A pose and what stands behind it."""
 
-    Attributes:
-        estimate: the pose with its covariance.
-        information: what the pairs fix, and what they leave free; None when too few pair.
-        sigma_mm: width of the kernel at the end.
-        points_mm, residual_mm: (M, 3) in bone coordinates and (M,), of the pairs that fit.
-    """
-
-    estimate: PoseEstimate
+    estimate: PoseEstimate  # the pose with its covariance
+    # what the pairs fix, and what they leave free; None when too few pair.
     information: Information | None
-    sigma_mm: float
+    sigma_mm: float  # width of the kernel at the end
+    # points_mm, residual_mm: (M, 3) in bone coordinates and (M,), of the pairs that fit.
     points_mm: FloatArray
     residual_mm: FloatArray
 

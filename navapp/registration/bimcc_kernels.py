@@ -33,29 +33,20 @@ _SAME_WIDTH = 0.02
 
 
 class BimccSettings(NamedTuple):
-    """How the estimator works; all chosen.
+    """How the estimator works; all chosen."""
 
-    Attributes:
-        widest_mm: the kernel at most, and the longest backward pair.
-        narrowest_mm: the kernel at least.
-        n_sigmas: the kernel's width in standard deviations of the noise; on pure noise a width k
-            has (1 + 2 / k^2)^1.5 / (1 + 1 / k^2)^3 of the efficiency of least squares: 97 % at 2.5.
-        largest_noise_mm: points noisier than this are not expected.
-        backward_weight: what all backward pairs weigh beside all forward pairs.
-        point_weight: what a pair's whole distance weighs beside its plane's in the coarse loop.
-        model_points: so many model points ask backward, about.
-        max_iterations: of each loop.
-        stop_mm, stop_rad: a smaller step ends the fit.
-    """
-
-    widest_mm: float = 12.0
-    narrowest_mm: float = 0.3
+    widest_mm: float = 12.0  # the kernel at most, and the longest backward pair
+    narrowest_mm: float = 0.3  # the kernel at least
+    # the kernel's width in standard deviations of the noise; on pure noise a width k has (1 + 2 /
+    # k^2)^1.5 / (1 + 1 / k^2)^3 of the efficiency of least squares: 97 % at 2.5.
     n_sigmas: float = 2.5
-    largest_noise_mm: float = 1.0
-    backward_weight: float = 1.5
+    largest_noise_mm: float = 1.0  # points noisier than this are not expected
+    backward_weight: float = 1.5  # what all backward pairs weigh beside all forward pairs
+    # what a pair's whole distance weighs beside its plane's in the coarse loop.
     point_weight: float = 0.1
-    model_points: int = 1500
-    max_iterations: int = 60
+    model_points: int = 1500  # so many model points ask backward, about
+    max_iterations: int = 60  # of each loop
+    # stop_mm, stop_rad: a smaller step ends the fit.
     stop_mm: float = 2e-3
     stop_rad: float = 2e-5
 
@@ -66,19 +57,13 @@ class BimccSettings(NamedTuple):
 
 
 class LoopState(NamedTuple):
-    """How a loop ended.
+    """How a loop ended."""
 
-    Attributes:
-        iterations: so many steps were made.
-        has_finished: the kernel is as narrow as the noise (coarse), the pose stands still (fine).
-        sigma_mm: width of the kernel; 0 when too few points paired.
-        n_pairs: the last so many pairs.
-    """
-
-    iterations: int
+    iterations: int  # so many steps were made
+    # the kernel is as narrow as the noise (coarse), the pose stands still (fine).
     has_finished: bool
-    sigma_mm: float
-    n_pairs: int
+    sigma_mm: float  # width of the kernel; 0 when too few points paired
+    n_pairs: int  # the last so many pairs
 
 
 @njit(cache=True, nogil=True)

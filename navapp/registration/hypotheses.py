@@ -25,19 +25,12 @@ _OFF_MIDDLE_COST = 0.02
 
 
 class Views(NamedTuple):
-    """A bone from V sides.
+    """A bone from V sides."""
 
-    Attributes:
-        directions: (V, 3) unit, towards the camera.
-        surface_mm: (V, n, 3) points of the surface that each view shows.
-        anchors_mm: (V, 2, 3) points that are likely to be measured.
-        edges: of the same views, where they are known.
-    """
-
-    directions: FloatArray
-    surface_mm: FloatArray
-    anchors_mm: FloatArray
-    edges: ViewEdges | None
+    directions: FloatArray  # (V, 3) unit, towards the camera
+    surface_mm: FloatArray  # (V, n, 3) points of the surface that each view shows
+    anchors_mm: FloatArray  # (V, 2, 3) points that are likely to be measured
+    edges: ViewEdges | None  # of the same views, where they are known
 
 
 def make_views(model: RegistrationModel, cone: ViewCone, aspects: AspectGraph | None) -> Views:

@@ -41,22 +41,18 @@ _LEAST_SQUARED_RATIO = 1e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Information:
-    """How well a scene fixes a pose.
+    """How well a scene fixes a pose."""
 
-    Attributes:
-        covariance: (6, 6) of the public twist (translation mm, rotation rad; from the left, about
-            the model's centre); infinite when a direction is not fixed at all.
-        free: (K, 6) directions that are not fixed, as twists about the seen surface's centre in
-            levers: unit vectors, translation first, in the scene's frame.
-        size_mm: by how much the pairs show the seen surface to be larger than the model's, at its
-            rms distance from its centre.
-        size_sigma_mm: standard deviation of that; infinite when nothing fixes it.
-    """
-
+    # (6, 6) of the public twist (translation mm, rotation rad; from the left, about the model's
+    # centre); infinite when a direction is not fixed at all.
     covariance: FloatArray
+    # (K, 6) directions that are not fixed, as twists about the seen surface's centre in levers:
+    # unit vectors, translation first, in the scene's frame.
     free: FloatArray
+    # by how much the pairs show the seen surface to be larger than the model's, at its rms distance
+    # from its centre.
     size_mm: float = 0.0
-    size_sigma_mm: float = math.inf
+    size_sigma_mm: float = math.inf  # standard deviation of that; infinite when nothing fixes it
 
     @property
     def is_degenerate(self) -> bool:
@@ -120,22 +116,15 @@ def _name_axis(vector: FloatArray) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResidualBlock:
-    """Residuals of one kind at a pose, r = observed - predicted, and how a motion changes them.
+    """Residuals of one kind at a pose, r = observed - predicted, and how a motion changes them."""
 
-    Attributes:
-        jacobian: (N, 6) of the prediction by the public twist: translation mm, rotation rad, from
-            the left, about the model's centre.
-        residual: (N,) in the block's own unit.
-        variance: (N,) of them.
-        n_sharing: (N,) so many residuals, itself included, share one's error.
-        common_sd: standard deviation of an offset that all of them have in common.
-    """
-
+    # (N, 6) of the prediction by the public twist: translation mm, rotation rad, from the left,
+    # about the model's centre.
     jacobian: FloatArray
-    residual: FloatArray
-    variance: FloatArray
-    n_sharing: FloatArray
-    common_sd: float
+    residual: FloatArray  # (N,) in the block's own unit
+    variance: FloatArray  # (N,) of them
+    n_sharing: FloatArray  # (N,) so many residuals, itself included, share one's error
+    common_sd: float  # standard deviation of an offset that all of them have in common
 
     def find_near(self, covariance: FloatArray) -> NDArray[np.bool_]:
         """(N,) residuals that a pose of that covariance allows."""

@@ -14,39 +14,23 @@ N_BINS = 8
 
 
 class Hypotheses(NamedTuple):
-    """H poses, each one of O orientations at one of C places; O and C are much fewer than H.
+    """H poses, each one of O orientations at one of C places; O and C are much fewer than H."""
 
-    Attributes:
-        orientation: (H,) index into `view_index`, `rotation` and `anchor_mm`.
-        place: (H,) index into `towards` and `position_mm`.
-        view_index: (O,) of the view that is seen.
-        rotation: (O, 3, 3) of a bone on the optical axis.
-        anchor_mm: (O, 3) the point of the bone that lies at the place.
-        towards: (C, 3, 3) turns the optical axis into the line of sight of the place.
-        position_mm: (C, 3) in the rectified left camera.
-    """
-
-    orientation: NDArray[np.int32]
-    place: NDArray[np.int32]
-    view_index: NDArray[np.int32]
-    rotation: FloatArray
-    anchor_mm: FloatArray
-    towards: FloatArray
-    position_mm: FloatArray
+    orientation: NDArray[np.int32]  # (H,) index into `view_index`, `rotation` and `anchor_mm`
+    place: NDArray[np.int32]  # (H,) index into `towards` and `position_mm`
+    view_index: NDArray[np.int32]  # (O,) of the view that is seen
+    rotation: FloatArray  # (O, 3, 3) of a bone on the optical axis
+    anchor_mm: FloatArray  # (O, 3) the point of the bone that lies at the place
+    towards: FloatArray  # (C, 3, 3) turns the optical axis into the line of sight of the place
+    position_mm: FloatArray  # (C, 3) in the rectified left camera
 
 
 class ViewEdges(NamedTuple):
-    """Edges of V views, N points together.
+    """Edges of V views, N points together."""
 
-    Attributes:
-        starts: (V + 1,) where each view's points begin.
-        points_mm: (N, 3).
-        tangents: (N, 3) unit, along the edge.
-    """
-
-    starts: NDArray[np.int64]
-    points_mm: FloatArray
-    tangents: FloatArray
+    starts: NDArray[np.int64]  # (V + 1,) where each view's points begin
+    points_mm: FloatArray  # (N, 3)
+    tangents: FloatArray  # (N, 3) unit, along the edge
 
 
 class EdgeTables(NamedTuple):

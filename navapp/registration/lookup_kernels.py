@@ -10,42 +10,27 @@ from navapp.geometry.transform import FloatArray
 
 
 class VoxelGrid(NamedTuple):
-    """Which point is near each place; lengths in mm, in the frame of the points.
+    """Which point is near each place; lengths in mm, in the frame of the points."""
 
-    Attributes:
-        nearest: (nx, ny, nz) index of the point nearest to each voxel's centre; -1 for none.
-        origin: (3,) centre of voxel (0, 0, 0).
-        voxel: edge of the voxels.
-    """
-
+    # (nx, ny, nz) index of the point nearest to each voxel's centre; -1 for none.
     nearest: NDArray[np.int32]
-    origin: FloatArray
-    voxel: float
+    origin: FloatArray  # (3,) centre of voxel (0, 0, 0)
+    voxel: float  # edge of the voxels
 
 
 class ModelArrays(NamedTuple):
-    """A model as the kernels read it; lengths in mm, bone coordinates.
+    """A model as the kernels read it; lengths in mm, bone coordinates."""
 
-    Attributes:
-        points: (V, 3) of the surface.
-        normals: (V, 3) unit, outward.
-        curvature: (V, 6) how the normal turns along the surface: xx, yy, zz, xy, xz, yz of a
-            symmetric matrix, 1/mm.
-        spacing: (V,) mean distance to the neighbours.
-        sigma: (V,) of the surface along the normal.
-        can_pair: (V,) False at open borders and where a stage has cut.
-        neighbours: (V, K) vertices beside each vertex, -1 padded.
-        grid: of nearest vertices; no voxel is without one.
-    """
-
-    points: FloatArray
-    normals: FloatArray
+    points: FloatArray  # (V, 3) of the surface
+    normals: FloatArray  # (V, 3) unit, outward
+    # (V, 6) how the normal turns along the surface: xx, yy, zz, xy, xz, yz of a symmetric matrix,
+    # 1/mm.
     curvature: FloatArray
-    spacing: FloatArray
-    sigma: FloatArray
-    can_pair: NDArray[np.bool_]
-    neighbours: NDArray[np.int32]
-    grid: VoxelGrid
+    spacing: FloatArray  # (V,) mean distance to the neighbours
+    sigma: FloatArray  # (V,) of the surface along the normal
+    can_pair: NDArray[np.bool_]  # (V,) False at open borders and where a stage has cut
+    neighbours: NDArray[np.int32]  # (V, K) vertices beside each vertex, -1 padded
+    grid: VoxelGrid  # of nearest vertices; no voxel is without one
 
 
 @njit(cache=True, nogil=True)

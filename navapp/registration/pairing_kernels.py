@@ -30,47 +30,27 @@ class Pose(NamedTuple):
 
 
 class SceneArrays(NamedTuple):
-    """A scene as the kernels read it; lengths in mm, scene coordinates.
+    """A scene as the kernels read it; lengths in mm, scene coordinates."""
 
-    Attributes:
-        points: (N, 3).
-        sigma_ray: (N,) standard deviation along the ray of sight.
-        camera: (3,) where it was seen from.
-        has_camera: False: everything may pair, sigma_ray holds in all directions.
-        knows_noise: False: sigma_ray is 0, the noise shows in the residuals.
-        every: the coarse loop uses every n-th point.
-    """
-
-    points: FloatArray
-    sigma_ray: FloatArray
-    camera: FloatArray
-    has_camera: bool
-    knows_noise: bool
-    every: int
+    points: FloatArray  # (N, 3)
+    sigma_ray: FloatArray  # (N,) standard deviation along the ray of sight
+    camera: FloatArray  # (3,) where it was seen from
+    has_camera: bool  # False: everything may pair, sigma_ray holds in all directions
+    knows_noise: bool  # False: sigma_ray is 0, the noise shows in the residuals
+    every: int  # the coarse loop uses every n-th point
 
 
 class Pairs(NamedTuple):
-    """Pairs at a pose, in bone coordinates; only the first n entries hold.
+    """Pairs at a pose, in bone coordinates; only the first n entries hold."""
 
-    Attributes:
-        scene: (P,) index of the scene point.
-        vertex: (P,) index of the model point.
-        point: (P, 3) the scene point.
-        residual: (P,) its signed distance from the model's surface, mm.
-        direction: (P, 3) in which that grows.
-        excess: (P,) how far beyond the vertex's own surroundings the point lies, mm.
-        variance: (P,) of the residual, mm^2.
-        weight: (P,).
-    """
-
-    scene: NDArray[np.int32]
-    vertex: NDArray[np.int32]
-    point: FloatArray
-    residual: FloatArray
-    direction: FloatArray
-    excess: FloatArray
-    variance: FloatArray
-    weight: FloatArray
+    scene: NDArray[np.int32]  # (P,) index of the scene point
+    vertex: NDArray[np.int32]  # (P,) index of the model point
+    point: FloatArray  # (P, 3) the scene point
+    residual: FloatArray  # (P,) its signed distance from the model's surface, mm
+    direction: FloatArray  # (P, 3) in which that grows
+    excess: FloatArray  # (P,) how far beyond the vertex's own surroundings the point lies, mm
+    variance: FloatArray  # (P,) of the residual, mm^2
+    weight: FloatArray  # (P,)
 
 
 def make_pairs(n: int) -> Pairs:

@@ -19,17 +19,11 @@ BEHIND_WEIGHT = 2.0
 
 
 class SurfacePoints(NamedTuple):
-    """Points of a model.
+    """Points of a model."""
 
-    Attributes:
-        points_mm: (N, 3).
-        normals: (N, 3) unit, outward.
-        variance_mm2: (N,) along the normal.
-    """
-
-    points_mm: FloatArray
-    normals: FloatArray
-    variance_mm2: FloatArray
+    points_mm: FloatArray  # (N, 3)
+    normals: FloatArray  # (N, 3) unit, outward
+    variance_mm2: FloatArray  # (N,) along the normal
 
 
 @njit(cache=True, nogil=True)

@@ -21,23 +21,19 @@ NO_GRID = VoxelGrid(np.full((1, 1, 1), -1, dtype=np.int32), np.zeros(3), 1.0)
 class Scene:
     """Points of a surface, the place that they were seen from, and how exact they are.
 
-    Attributes:
-        points_mm: (N, 3) in the scene's frame.
-        camera_mm: (3,) where it was seen from; None when unknown: then every model point may pair.
-        sigma_ray_mm: (N,) standard deviation along the ray of sight (in all directions without a
-            camera); None when unknown: the residuals then tell it.
-        n_sharing_errors: so many neighbouring points have their errors in common and count as one.
-        thinned_to: the coarse loop uses about so many points.
-
     Raises:
         ValueError: points of another shape, or not finite.
     """
 
-    points_mm: FloatArray
+    points_mm: FloatArray  # (N, 3) in the scene's frame
+    # (3,) where it was seen from; None when unknown: then every model point may pair.
     camera_mm: FloatArray | None = None
+    # (N,) standard deviation along the ray of sight (in all directions without a camera); None when
+    # unknown: the residuals then tell it.
     sigma_ray_mm: FloatArray | None = None
+    # so many neighbouring points have their errors in common and count as one.
     n_sharing_errors: float = 1.0
-    thinned_to: int = 500
+    thinned_to: int = 500  # the coarse loop uses about so many points
 
     @classmethod
     def from_stereo(cls, cloud: SurfaceCloud, correlation_px: float) -> "Scene":
