@@ -98,8 +98,10 @@ class OutlineMeter:
             rim = find_rim(self.ridges, rotation, translation_mm, eye)
             rim = thin_rim(_only(rim, is_outline(rim, depth_mm, first_column, view.box.y)))
             offset_px = find_steps(picture, rim)
-            is_kept = np.isfinite(offset_px) & self._is_free(rim, view.box, measured, coarse_px)
-            return offset_px[is_kept], *self._linearise(_only(rim, is_kept), eye, pose)
+            is_found = np.isfinite(offset_px)
+            rim, offset_px = _only(rim, is_found), offset_px[is_found]
+            is_free = self._is_free(rim, view.box, measured, coarse_px)
+            return offset_px[is_free], *self._linearise(_only(rim, is_free), eye, pose)
 
         both = run_both(
             lambda: find_edges(pair.left, self._left, view.depth_mm, view.box.x),

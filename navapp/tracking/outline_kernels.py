@@ -71,8 +71,11 @@ def find_rim(
     """
     vertices, edges, faces, planes = ridges.vertices_mm, ridges.edges, ridges.faces, ridges.planes
     seat = (rotation.T @ (np.array([eye.x_mm, 0.0, 0.0]) - translation)).astype(np.float32)
-    is_facing = planes[0] * seat[0] + planes[1] * seat[1] + planes[2] * seat[2] > planes[3]
-    found = np.flatnonzero(is_facing[faces[:, 0]] != is_facing[faces[:, 1]])
+    is_facing = np.empty(planes.shape[1], dtype=np.bool_)
+    x, y, z = seat[0], seat[1], seat[2]
+    for f in range(len(is_facing)):
+        is_facing[f] = planes[0, f] * x + planes[1, f] * y + planes[2, f] * z > planes[3, f]
+    found = [i for i in range(len(faces)) if is_facing[faces[i, 0]] != is_facing[faces[i, 1]]]
     n = len(found)
     point, pixel, normal = np.empty((n, 3)), np.empty((n, 2)), np.empty((n, 2))
     length, vertex = np.empty(n), np.empty(n, dtype=np.int32)
@@ -94,7 +97,8 @@ def find_rim(
         length[m] = np.sqrt(dx * dx + dy * dy)
         if length[m] < _SHORTEST_PX:
             continue
-        point[m] = 0.5 * (corner[0] + corner[1])
+        for a in range(3):
+            point[m, a] = 0.5 * (corner[0, a] + corner[1, a])
         _project(point[m], eye, pixel[m])
         inward = dy * (place[2, 0] - place[0, 0]) - dx * (place[2, 1] - place[0, 1])
         outward = (-1.0 if inward > 0.0 else 1.0) / length[m]
