@@ -1,6 +1,6 @@
 """Edges of a mesh and the triangles on both sides: where it ends, where its outline can run."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +9,7 @@ from navapp.geometry.mesh import IntArray, TriangleMesh
 from navapp.geometry.transform import FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RidgeEdges:
+class RidgeEdges(NamedTuple):
     """Edges over which a mesh bends outward, and the planes of its triangles.
 
     An outline runs over such edges only: of their two triangles one looks at the eye, the other

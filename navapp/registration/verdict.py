@@ -41,9 +41,6 @@ class Agreement:
         return self.coverage > self.hidden_fraction
 
 
-NO_AGREEMENT = Agreement(0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Goal:
     """What a pose is measured against."""

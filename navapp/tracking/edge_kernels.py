@@ -6,23 +6,22 @@ from numpy.typing import NDArray
 
 from navapp.tracking.outline_kernels import Rim
 
-# Samples along the normal, and the derivative of a Gaussian that finds edges in them.
-_STEP_PX, _SIGMA_PX = 0.5, 0.8
-_TAPS = 6
+# All chosen, but where a source is named. Distance of the samples along a normal.
+_STEP_PX = 0.5
+# Edges are found by the derivative of a Gaussian, over so many samples to either side.
+_SIGMA_PX, _TAPS = 0.8, 6
+# Samples to either side in which the steepest slope is searched, and in which it must lie.
 _SEARCH, _NEAR_ENOUGH = 9, 4
 _HALF = _SEARCH + _TAPS
-# The levels on either side of an edge, from so many samples, the ones next to it left out.
-_FLANK, _LEVEL_FROM = 8, 4
+# The levels beside an edge are means over the samples from the first of these to the last.
+_LEVEL_FROM, _FLANK = 4, 8
+# Where behind the outline it is less dark than this, the edge is as often that of tissue on the
+# bone (python -m tests.bench.outline; docs/registration.md).
+_LEAST_MISSING = 0.7
 
-
-def _derivative() -> NDArray[np.float64]:
-    at = _STEP_PX * np.arange(-_TAPS, _TAPS + 1)
-    weight = np.exp(-0.5 * (at / _SIGMA_PX) ** 2)
-    slope: NDArray[np.float64] = -at * weight / (weight * at * at).sum()
-    return slope
-
-
-DERIVATIVE = _derivative()
+_TAPS_PX = _STEP_PX * np.arange(-_TAPS, _TAPS + 1)
+_GAUSSIAN = np.exp(-0.5 * (_TAPS_PX / _SIGMA_PX) ** 2)
+_DERIVATIVE = -_TAPS_PX * _GAUSSIAN / (_GAUSSIAN * _TAPS_PX * _TAPS_PX).sum()
 
 
 @njit(cache=True, nogil=True)
@@ -59,22 +58,22 @@ def sample_across(
 
 
 @njit(cache=True, nogil=True)
-def strongest_edge(profile: NDArray[np.float64]) -> float:
+def find_strongest_edge(profile: NDArray[np.float64]) -> float:
     """Place of the steepest slope of a profile, px from its middle; NaN when not near it.
 
-    Bright inside or dark inside: only the strongest counts, so that a weaker slope nearby is not
-    taken for the outline.
+    Only the strongest counts, bright or dark inside: a weaker one nearby is not the outline.
     """
     middle = profile.shape[0] // 2
     slope = np.empty(2 * _SEARCH + 1)
     for k in range(-_SEARCH, _SEARCH + 1):
         total = 0.0
         for tap in range(-_TAPS, _TAPS + 1):
-            total -= DERIVATIVE[tap + _TAPS] * profile[middle + k + tap]
+            total -= _DERIVATIVE[tap + _TAPS] * profile[middle + k + tap]
         slope[k + _SEARCH] = abs(total)
     best = int(slope.argmax())
     if abs(best - _SEARCH) > _NEAR_ENOUGH:
         return np.nan
+    # The vertex of a parabola through three slopes.
     before, here, after = slope[best - 1], slope[best], slope[best + 1]
     bend = before - 2.0 * here + after
     part = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
@@ -82,39 +81,29 @@ def strongest_edge(profile: NDArray[np.float64]) -> float:
 
 
 @njit(cache=True, nogil=True)
-def missing_share(profile: NDArray[np.float64]) -> float:
-    """Share of the level inside an edge that is missing outside.
-
-    Args:
-        profile: grey values across the edge, from inside to outside, its middle on it.
-    """
+def measure_missing_fraction(profile: NDArray[np.float64]) -> float:
+    """Fraction of the level inside an edge, which is the middle of a profile, missing outside."""
     middle = profile.shape[0] // 2
     inside = profile[: middle - _LEVEL_FROM + 1].mean()
     outside = profile[middle + _LEVEL_FROM :].mean()
-    share: float = (inside - outside) / max(inside, 1.0)
-    return share
+    fraction: float = (inside - outside) / max(inside, 1.0)
+    return fraction
 
 
 @njit(cache=True, nogil=True)
-def find_steps(picture: NDArray[np.uint8], rim: Rim, darker: float) -> NDArray[np.float64]:
-    """(N,) px from each point to the picture's edge along the normal; NaN without one.
-
-    Args:
-        picture: (h, w).
-        rim: of the eye that took it.
-        darker: least share of the level inside that is missing outside.
-    """
+def find_steps(picture: NDArray[np.uint8], rim: Rim) -> NDArray[np.float64]:
+    """(N,) px from each point of a rim to its picture's edge along the normal; NaN without one."""
     wide, flank = np.empty(2 * _HALF + 1), np.empty(2 * _FLANK + 1)
     offset = np.full(rim.pixel.shape[0], np.nan)
     for i in range(len(offset)):
         x, y, ux, uy = rim.pixel[i, 0], rim.pixel[i, 1], rim.normal[i, 0], rim.normal[i, 1]
         if not sample_across(picture, (x, y), (ux, uy), wide):
             continue
-        if wide[_HALF:].min() > (1.0 - darker) * wide[: _HALF + 1].max():
+        if wide[_HALF:].min() > (1.0 - _LEAST_MISSING) * wide[: _HALF + 1].max():
             continue
-        at = strongest_edge(wide)
+        at = find_strongest_edge(wide)
         if np.isnan(at) or not sample_across(picture, (x + at * ux, y + at * uy), (ux, uy), flank):
             continue
-        if missing_share(flank) >= darker:
+        if measure_missing_fraction(flank) >= _LEAST_MISSING:
             offset[i] = at
     return offset

@@ -13,7 +13,7 @@ from navapp.values import Reason
 class RestSettings:
     """When a pose rests on the model; all chosen, reach in `tests.bench.follower_reach`."""
 
-    max_sampled: int = 3  # so often only samples of the model are matched, at most ..
+    max_sampled: int = 3  # so often only samples of the model are matched, at most .
     near_mm: float = 0.2  # ... until a fit moves the bone by less.
     max_rounds: int = 6  # matchings, of samples or of everything, at most
     rest_mm: float = 0.05  # after a move of less, the bone rests

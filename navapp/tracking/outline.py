@@ -5,7 +5,7 @@ their normals in the left and the right picture, point to line.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,51 +22,30 @@ from navapp.registration.information import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.edge_kernels import find_steps
 from navapp.tracking.frame import MODEL_FIT, Fit
-from navapp.tracking.outline_kernels import (
-    Eye,
-    Ridges,
-    Rim,
-    find_rim,
-    is_outline,
-    thin_rim,
-    warp_depth,
-)
+from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim, warp_depth
 from navapp.tracking.surface_meter import MODEL_CORRELATION_PX
 from navapp.values import DisparityMap, Origin
 
-# Where behind the outline it is less dark than this, the edge is as often that of tissue on the
-# bone (from simulated knees: docs/registration.md).
-_DARKER = 0.7
-# Inside the outline the bone itself has to be measured, at these distances and so often.
+# All chosen, but where a source is named. The bone must be measured inside the outline, in this
+# fraction of the pixels at these distances.
 _INSIDE_PX, _LEAST_INSIDE = np.arange(4, 13), 0.4
-# Beside it nothing may be nearer by this much.
+# At this distance outside, nothing may be nearer than the outline by this much.
 _BESIDE_PX, _NEARER_PX = 9, 1.0
-# Of an edge's place: sampling, texture up to the rim.
+# Standard deviation of an edge's place: sampling, and texture that reaches the rim.
 _EDGE_SIGMA_PX = 0.15
-# The tone curve of video cameras moves all edges towards the dark by about so much, a linear one
-# does not.
+# Standard deviation of an offset that all edges share: the tone curve of video cameras (ITU-R
+# BT.709, computed: docs/registration.md) moves edges towards the dark, a linear one does not.
 _COMMON_SD_PX = 0.3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Steps:
-    """Edges found in one picture: where the model has them, and how far off they are, px."""
-
-    rim: Rim
-    offset_px: FloatArray
-    eye: Eye
 
 
 class OutlineMeter:
     """Measures the outline of one bone under one rig."""
 
     def __init__(self, model: RegistrationModel, geometry: RectifiedGeometry) -> None:
-        self._model = model
-        self._geometry = geometry
-        found = ridge_edges(model.seen_mesh)
-        self.ridges = Ridges(
-            found.vertices_mm, found.edges, found.faces, found.opposite, found.planes
-        )
+        self._model, self._geometry = model, geometry
+        self.ridges = ridge_edges(model.seen_mesh)
+        self._left = Eye(0.0, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
+        self._right = self._left._replace(x_mm=geometry.baseline_mm)
 
     def join(
         self,
@@ -80,10 +59,10 @@ class OutlineMeter:
         Any other fit stays as it is: from it the outline cannot be told from what lies around.
 
         Args:
-            pair: that it was fitted in.
+            pair: in which it was fitted.
             fit: of the bone.
             coarse_px: (h, w) coarse disparity of whatever lies in its box.
-            noise_variance_ratio: of the surface's noise to what it claims.
+            noise_variance_ratio: variance of the surface's noise over the one it claims.
         """
         estimate, view = fit.estimate, fit.measured.view
         if view is None or not np.isfinite(estimate.covariance).all():
@@ -110,95 +89,65 @@ class OutlineMeter:
             measured: on the model, in the view's box.
             coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
-        left, right = self._eye(0.0), self._eye(self._geometry.baseline_mm)
+        rotation, translation_mm = np.array(pose.rotation), np.array(pose.translation_mm)
 
-        def residuals_in(
-            picture: Image, eye: Eye, depth_mm: NDArray[np.float32], box: Box
-        ) -> ResidualBlock:
-            steps = self._steps(picture, eye, pose, depth_mm, box)
-            return self._residuals(self._free(steps, view.box, measured, coarse_px), pose)
+        def find_edges(
+            picture: Image, eye: Eye, depth_mm: NDArray[np.float32], first_column: int
+        ) -> tuple[FloatArray, ...]:
+            rim = find_rim(self.ridges, rotation, translation_mm, eye)
+            rim = thin_rim(_only(rim, is_outline(rim, depth_mm, first_column, view.box.y)))
+            offset_px = find_steps(picture, rim)
+            is_found = np.isfinite(offset_px)
+            rim, offset_px = _only(rim, is_found), offset_px[is_found]
+            is_free = self._is_free(rim, view.box, measured, coarse_px)
+            return offset_px[is_free], *self._linearise(_only(rim, is_free), eye, pose)
 
-        blocks = run_both(
-            lambda: residuals_in(pair.left, left, view.depth_mm, view.box),
-            lambda: residuals_in(pair.right, right, *self._project_to_right(view, right)),
+        both = run_both(
+            lambda: find_edges(pair.left, self._left, view.depth_mm, view.box.x),
+            lambda: find_edges(pair.right, self._right, *self._warp_to_right(view)),
         )
-        return ResidualBlock(
-            np.concatenate([block.jacobian for block in blocks]),
-            np.concatenate([block.residual for block in blocks]),
-            np.concatenate([block.variance for block in blocks]),
-            np.concatenate([block.n_sharing for block in blocks]),
-            _COMMON_SD_PX,
-        )
+        offset_px, jacobian, variance, n_sharing = map(np.concatenate, zip(*both, strict=True))
+        return ResidualBlock(jacobian, offset_px, variance, n_sharing, _COMMON_SD_PX)
 
-    def _eye(self, x_mm: float) -> Eye:
-        geometry = self._geometry
-        return Eye(x_mm, geometry.focal_px, geometry.centre_x_px, geometry.centre_y_px)
-
-    def _project_to_right(self, view: RenderedView, right: Eye) -> tuple[NDArray[np.float32], Box]:
-        depth, box = view.depth_mm, view.box
-        nearest_mm, farthest_mm = find_known_range(depth)
-        if nearest_mm > farthest_mm:
-            return depth, box
-        near, far = (self._geometry.disparity_px(z) for z in (nearest_mm, farthest_mm))
-        x = box.x - math.ceil(near)
-        width = box.width + math.ceil(near) - math.floor(far)
+    def _warp_to_right(self, view: RenderedView) -> tuple[NDArray[np.float32], int]:
+        """The view's depth as the right camera sees it, and its first column there."""
+        box = view.box
+        near_px, far_px = map(self._geometry.disparity_px, find_known_range(view.depth_mm))
+        first_column = box.x - math.ceil(near_px)
+        width = box.width + math.ceil(near_px) - math.floor(far_px)
         warped = np.full((box.height, width), np.nan, dtype=np.float32)
-        warp_depth(depth, box.x, right, warped, x)
-        return warped, replace(box, x=x, width=width)
+        warp_depth(view.depth_mm, box.x, self._right, warped, first_column)
+        return warped, first_column
 
-    def _steps(
-        self,
-        picture: Image,
-        eye: Eye,
-        pose: RigidTransform,
-        depth_mm: NDArray[np.float32],
-        box: Box,
-    ) -> Steps:
-        rim = find_rim(self.ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye)
-        rim = thin_rim(_only(rim, is_outline(rim, depth_mm, box.x, box.y)))
-        offset_px = find_steps(picture, rim, _DARKER)
-        is_found = np.isfinite(offset_px)
-        return Steps(_only(rim, is_found), offset_px[is_found], eye)
-
-    def _free(
-        self,
-        steps: Steps,
-        box: Box,
-        measured: DisparityMap,
-        coarse_px: NDArray[np.float32] | None,
-    ) -> Steps:
-        """Those with the bone measured inside and nothing nearer beside them."""
-        rim, geometry = steps.rim, self._geometry
-        pixel = geometry.project(rim.point)
+    def _is_free(
+        self, rim: Rim, box: Box, measured: DisparityMap, coarse_px: NDArray[np.float32] | None
+    ) -> NDArray[np.bool_]:
+        """(N,) points with the bone measured inside and nothing nearer outside."""
+        pixel = self._geometry.project(rim.point)
         inner = pixel[:, None] - _INSIDE_PX[:, None] * rim.normal[:, None]
-        share = (_at(measured.origin, inner, box, 0) == Origin.MATCHED).mean(axis=1)
-        is_free = share >= _LEAST_INSIDE
+        is_measured = _look_up(measured.origin, inner, box, 0) == Origin.MATCHED
+        is_free: NDArray[np.bool_] = is_measured.mean(axis=1) >= _LEAST_INSIDE
         if coarse_px is not None:
-            next_px = _at(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
-            is_free &= ~(next_px > geometry.disparity_map_px(rim.point[:, 2]) + _NEARER_PX)
-        return Steps(_only(rim, is_free), steps.offset_px[is_free], steps.eye)
+            beside_px = _look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
+            rim_px = self._geometry.disparity_map_px(rim.point[:, 2])
+            is_free &= ~(beside_px > rim_px + _NEARER_PX)
+        return is_free
 
-    def _residuals(self, steps: Steps, pose: RigidTransform) -> ResidualBlock:
-        rim, focal = steps.rim, steps.eye.focal_px
-        seen = rim.point - (steps.eye.x_mm, 0.0, 0.0)
-        per_mm = focal / seen[:, 2]
+    def _linearise(
+        self, rim: Rim, eye: Eye, pose: RigidTransform
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(N, 6) Jacobian of the offsets, (N,) their variance, (N,) how many share an error."""
+        seen = rim.point - (eye.x_mm, 0.0, 0.0)
+        per_mm = eye.focal_px / seen[:, 2]
         # The derivative of u . projection by the point; sliding along the surface changes nothing.
-        slope = np.column_stack(
-            [
-                rim.normal * per_mm[:, None],
-                -(rim.normal * seen[:, :2]).sum(axis=1) * per_mm / seen[:, 2],
-            ]
-        )
+        by_depth = -(rim.normal * seen[:, :2]).sum(axis=1) * per_mm / seen[:, 2]
+        slope = np.column_stack([rim.normal * per_mm[:, None], by_depth])
         arm = rim.point - pose.apply(self._model.centre_mm)
         surface_px = self._model.sigma_mm[rim.vertex] * per_mm
         apart = np.linalg.norm(rim.pixel[:, None] - rim.pixel[None], axis=2)
-        return ResidualBlock(
-            np.column_stack([slope, np.cross(arm, slope)]),
-            steps.offset_px,
-            _EDGE_SIGMA_PX**2 + surface_px**2,
-            (apart <= 0.5 * MODEL_CORRELATION_PX).sum(axis=1).astype(np.float64),
-            _COMMON_SD_PX,
-        )
+        n_sharing = (apart <= 0.5 * MODEL_CORRELATION_PX).sum(axis=1).astype(np.float64)
+        jacobian = np.column_stack([slope, np.cross(arm, slope)])
+        return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing
 
 
 def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
@@ -207,7 +156,7 @@ def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
     )
 
 
-def _at(values: NDArray[Any], pixels: FloatArray, box: Box, elsewhere: float) -> NDArray[Any]:
+def _look_up(values: NDArray[Any], pixels: FloatArray, box: Box, elsewhere: float) -> NDArray[Any]:
     """Values (h, w) of a box at pixels (..., 2) of the picture, rounded; `elsewhere` out of it."""
     column = np.floor(pixels[..., 0] + 0.5).astype(int) - box.x
     row = np.floor(pixels[..., 1] + 0.5).astype(int) - box.y

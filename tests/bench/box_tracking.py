@@ -116,10 +116,9 @@ class Scene:
         width, height = self.knee.rig.width, self.knee.rig.height
         true_box = self.boxes.project(truth)
         assert true_box is not None
-        seen = true_box.seen_fraction(width, height)
-        if box is None:
-            return -1.0, seen
-        return box.clip(width, height).overlap(true_box.clip(width, height)), seen
+        inside = true_box.clip(width, height)
+        seen = inside.width * inside.height / (true_box.width * true_box.height)
+        return -1.0 if box is None else box.clip(width, height).overlap(inside), seen
 
 
 @dataclass

@@ -21,7 +21,11 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
-from navapp.tracking.edge_kernels import missing_share, sample_across, strongest_edge
+from navapp.tracking.edge_kernels import (
+    find_strongest_edge,
+    measure_missing_fraction,
+    sample_across,
+)
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
 from navapp.tracking.surface_meter import NEAR_BOX
@@ -97,10 +101,10 @@ def edges_of(case: Case, parts: TrackerParts) -> Iterator[Edge]:
     for pixel, normal in outline(parts, true, expected.view):
         if not sample_across(pair.left, tuple(pixel), tuple(normal), wide):
             continue
-        at = strongest_edge(wide)
+        at = find_strongest_edge(wide)
         middle = pixel + at * normal
         if not np.isnan(at) and sample_across(pair.left, tuple(middle), tuple(normal), flank):
-            yield Edge(at, missing_share(flank))
+            yield Edge(at, measure_missing_fraction(flank))
 
 
 def outline(

@@ -72,8 +72,8 @@ def profile(picture, x, y, normal, half):
     return np.mean(values, axis=0)
 
 
-def missing_share(values):
-    """Share of the level inside an edge, 2 to 4 px from it, that is missing outside."""
+def missing_fraction(values):
+    """Fraction of the level inside an edge, 2 to 4 px from it, that is missing outside."""
     at = 0.5 * np.arange(-8, 9)
     inside, outside = values[at <= -2.0].mean(), values[at >= 2.0].mean()
     return (inside - outside) / max(inside, 1.0)

@@ -10,15 +10,11 @@ from navapp.registration import RegistrationModel
 from navapp.registration.verdict import Agreement
 from navapp.tracking.agreement import compare
 from navapp.tracking.agreement_kernels import (
-    AGREES,
     COARSELY_FURTHER,
     COARSELY_NEARER,
     FURTHER,
-    MEASURED,
     NEARER,
-    Comparison,
     classify_pixels,
-    gather_open,
 )
 from navapp.values import DisparityMap, Origin
 from tests.reference.agreement_reference import classify_slowly
@@ -103,6 +99,15 @@ def test_what_was_measured_outweighs_a_coarse_map() -> None:
     assert found.coverage > 0.9
 
 
+def test_what_is_hidden_is_neither_an_outlier_nor_spread() -> None:
+    part = half()
+    nearer_px = np.where(part, MAP.disparity_px + np.float32(12.0), MAP.disparity_px)
+    found = agreement(replace(MAP, disparity_px=nearer_px))
+    assert found.hidden_fraction == pytest.approx(part.sum() / SEEN.sum(), abs=0.1)
+    assert found.inlier_fraction > 0.95
+    assert found.spread_ratio < 1.1
+
+
 def test_specks_are_neither_occluder_nor_gap() -> None:
     part = np.zeros_like(SEEN)
     rows, columns = np.nonzero(SEEN)
@@ -153,16 +158,14 @@ def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
     if with_coarse:
         coarse_px = (EXPECTED_PX + rng.normal(0.0, 3.0, shape)).astype(np.float32)
         coarse_px[rng.random(shape) < 0.2] = np.nan
-    limits = Comparison(GEOMETRY.focal_px * GEOMETRY.baseline_mm, 0.4, 2.0, 1.5, 2.5)
-    classes = np.empty(shape, np.uint8)
-    deviation, sigma = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    scale_px_mm = GEOMETRY.focal_px * GEOMETRY.baseline_mm
     face_sigma_mm = rng.uniform(0.05, 0.6, len(MODEL.drawn_mesh.faces))
-    n_visible, n_agreeing = classify_pixels(
+    classes, deviation, sigma, n_visible, n_agreeing = classify_pixels(
         VIEW.depth_mm, VIEW.face_index, face_sigma_mm, noisy.disparity_px, noisy.sigma_px,
-        noisy.origin == Origin.MATCHED, coarse_px, limits, classes, deviation, sigma,
+        noisy.origin == Origin.MATCHED, coarse_px, scale_px_mm,
     )  # fmt: skip
     masks, expected, expected_sigma, clearance_px = classify_slowly(
-        VIEW, face_sigma_mm, noisy, coarse_px, limits
+        VIEW, face_sigma_mm, noisy, coarse_px, scale_px_mm
     )
     # Single precision may decide the others either way.
     is_clear = clearance_px > 1e-4
@@ -170,27 +173,16 @@ def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
     assert n_visible == SEEN.sum()
     assert abs(n_agreeing - masks["agrees"].sum()) <= (~is_clear).sum()
     assert n_agreeing > 0
-    for bit, (name, mask) in zip(
-        (MEASURED, NEARER, FURTHER, COARSELY_NEARER, COARSELY_FURTHER, AGREES),
-        masks.items(),
-        strict=True,
-    ):
-        found = (classes & bit) > 0
+    bits = {
+        "nearer": NEARER,
+        "further": FURTHER,
+        "coarsely nearer": COARSELY_NEARER,
+        "coarsely further": COARSELY_FURTHER,
+    }
+    for name, bit in bits.items():
+        found, mask = classes == bit, masks[name]
         np.testing.assert_array_equal(found[is_clear], mask[is_clear], err_msg=name)
         assert mask.any() == (with_coarse or "coarse" not in name), name
     measured = masks["measured"]
     np.testing.assert_allclose(deviation[measured], expected[measured], atol=1e-4)
     np.testing.assert_allclose(sigma[measured], expected_sigma[measured], rtol=1e-5)
-
-
-def test_open_deviations_are_gathered_every_so_many_pixels() -> None:
-    classes = np.full((5, 7), MEASURED | AGREES, np.uint8)
-    classes[0, 0], classes[4, 6] = 0, NEARER
-    is_hidden = np.zeros((5, 7), bool)
-    is_hidden[2] = True
-    values = np.arange(35, dtype=np.float32).reshape(5, 7)
-    deviations, sigmas = np.empty(12, np.float32), np.empty(12, np.float32)
-    n_open, n = gather_open(classes, is_hidden, values, 2 * values, 2, deviations, sigmas)
-    assert n_open == 35 - 1 - 1 - 7
-    np.testing.assert_array_equal(deviations[:n], [2, 4, 6, 28, 30, 32])
-    np.testing.assert_array_equal(sigmas[:n], [4, 8, 12, 56, 60, 64])

@@ -6,15 +6,14 @@ from scipy.ndimage import gaussian_filter
 
 from navapp.tracking.edge_kernels import (
     find_steps,
-    missing_share,
+    find_strongest_edge,
+    measure_missing_fraction,
     sample_across,
-    strongest_edge,
 )
 from navapp.tracking.outline_kernels import Rim
 from tests.reference import outline_reference as reference
 
 SIZE = 64
-DARKER = 0.7
 
 
 def picture(angle_deg: float, offset_px: float, inside: float = 180.0, outside: float = 20.0):
@@ -41,31 +40,31 @@ def test_an_edge_is_found_where_it_is(angle_deg: float, largest_px: float) -> No
     offsets_px = np.arange(-1.5, 1.51, 0.25)
     pictures = [picture(angle_deg, offset_px) for offset_px in offsets_px]
     rim = rim_at(angle_deg)
-    found = np.array([find_steps(seen, rim, DARKER)[0] for seen in pictures])
+    found = np.array([find_steps(seen, rim)[0] for seen in pictures])
     assert np.abs(found - offsets_px).max() < largest_px
     assert abs((found - offsets_px).mean()) < 0.02
 
 
 def test_an_edge_that_is_not_dark_enough_is_none() -> None:
-    assert np.isnan(find_steps(picture(0.0, 0.0, 180.0, 80.0), rim_at(0.0), DARKER)[0])
+    assert np.isnan(find_steps(picture(0.0, 0.0, 180.0, 80.0), rim_at(0.0))[0])
 
 
 def test_dark_inside_is_none() -> None:
-    assert np.isnan(find_steps(picture(0.0, 0.0, 20.0, 180.0), rim_at(0.0), DARKER)[0])
+    assert np.isnan(find_steps(picture(0.0, 0.0, 20.0, 180.0), rim_at(0.0))[0])
 
 
 def test_a_stronger_edge_nearby_forbids_the_weaker_one() -> None:
     seen = picture(0.0, 0.0, 100.0, 25.0).astype(int)
     seen[:, 36:] = 255
-    assert np.isnan(find_steps(seen.astype(np.uint8), rim_at(0.0), DARKER)[0])
+    assert np.isnan(find_steps(seen.astype(np.uint8), rim_at(0.0))[0])
 
 
 def test_nothing_is_found_in_noise_or_out_of_view() -> None:
     noise = np.random.default_rng(1).integers(0, 255, (SIZE, SIZE)).astype(np.uint8)
     rims = [rim_at(0.0, x, y) for x in np.arange(20.0, 44.0, 2.0) for y in (20.0, 31.0, 42.0)]
-    found = np.concatenate([find_steps(noise, rim, DARKER) for rim in rims])
+    found = np.concatenate([find_steps(noise, rim) for rim in rims])
     assert np.isnan(found).all()
-    assert np.isnan(find_steps(picture(0.0, 0.0), rim_at(0.0, 3.0), DARKER)[0])
+    assert np.isnan(find_steps(picture(0.0, 0.0), rim_at(0.0, 3.0))[0])
 
 
 def test_samples_and_levels_are_those_of_the_reference() -> None:
@@ -76,10 +75,10 @@ def test_samples_and_levels_are_those_of_the_reference() -> None:
         assert sample_across(seen, (31.3, 32.6), normal, values)
         expected = reference.profile(seen, 31.3, 32.6, normal, 8)
         np.testing.assert_allclose(values, expected, atol=1e-9)
-        assert missing_share(values) == pytest.approx(reference.missing_share(values))
+        assert measure_missing_fraction(values) == pytest.approx(reference.missing_fraction(values))
 
 
 def test_a_far_edge_is_not_near() -> None:
     at = 0.5 * np.arange(-15, 16)
-    assert strongest_edge(np.where(at < 1.0, 100.0, 0.0)) == pytest.approx(0.75, abs=0.3)
-    assert np.isnan(strongest_edge(np.where(at < 3.6, 100.0, 0.0)))
+    assert find_strongest_edge(np.where(at < 1.0, 100.0, 0.0)) == pytest.approx(0.75, abs=0.3)
+    assert np.isnan(find_strongest_edge(np.where(at < 3.6, 100.0, 0.0)))

@@ -9,7 +9,6 @@ from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.zbuffer import project_box, render_rectified
 from navapp.tracking.outline_kernels import (
     Eye,
-    Ridges,
     Rim,
     find_rim,
     is_outline,
@@ -24,15 +23,10 @@ LEFT = Eye(0.0, GEOMETRY.focal_px, GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
 RIGHT = LEFT._replace(x_mm=GEOMETRY.baseline_mm)
 
 
-def ridges_of(mesh) -> Ridges:
-    found = ridge_edges(mesh)
-    return Ridges(found.vertices_mm, found.edges, found.faces, found.opposite, found.planes)
-
-
 @cache
 def rim_of(eye: Eye) -> Rim:
     return find_rim(
-        ridges_of(femur().mesh), np.array(TRUE.rotation), np.array(TRUE.translation_mm), eye
+        ridge_edges(femur().mesh), np.array(TRUE.rotation), np.array(TRUE.translation_mm), eye
     )
 
 
@@ -43,7 +37,7 @@ def left_view():
 
 
 def test_the_rim_is_that_of_the_reference() -> None:
-    ridges = ridges_of(femur().mesh)
+    ridges = ridge_edges(femur().mesh)
     for eye in (LEFT, RIGHT):
         rim = rim_of(eye)
         point, pixel, normal, length, found = reference.rim(*ridges, TRUE, eye)
@@ -58,7 +52,7 @@ def test_the_rim_is_that_of_the_reference() -> None:
 def test_rays_to_the_rim_of_a_ball_touch_it() -> None:
     ball = sphere(20.0, 48)
     eye_mm = np.array([RIGHT.x_mm, 0.0, 0.0])
-    rim = find_rim(ridges_of(ball), np.eye(3), np.array([10.0, -5.0, 450.0]), RIGHT)
+    rim = find_rim(ridge_edges(ball), np.eye(3), np.array([10.0, -5.0, 450.0]), RIGHT)
     ray = rim.point - eye_mm
     ray /= np.linalg.norm(ray, axis=1, keepdims=True)
     arm = np.array([10.0, -5.0, 450.0]) - eye_mm

@@ -18,12 +18,11 @@ class PictureBox:
 
     @classmethod
     def around(cls, pixels: FloatArray) -> "PictureBox | None":
-        """The smallest box around pixel positions (N, 2); None unless all are finite."""
-        if len(pixels) == 0 or not np.isfinite(pixels).all():
+        """The smallest box around pixel positions (N, 2); None without area, or one not finite."""
+        if not np.isfinite(pixels).all():
             return None
-        columns, rows = pixels[:, 0], pixels[:, 1]
-        x, y = float(columns.min()), float(rows.min())
-        width, height = float(columns.max()) - x, float(rows.max()) - y
+        (x, y), (right, bottom) = pixels.min(axis=0).tolist(), pixels.max(axis=0).tolist()
+        width, height = right - x, bottom - y
         return cls(x, y, width, height) if width > 0.0 and height > 0.0 else None
 
     @property
@@ -33,7 +32,7 @@ class PictureBox:
 
     def resize(self, factor: float) -> "PictureBox":
         """The same box after its picture was resized: u' = s (u + 0.5) - 0.5."""
-        x, y = (factor * (place + 0.5) - 0.5 for place in (self.x, self.y))
+        x, y = (factor * (corner + 0.5) - 0.5 for corner in (self.x, self.y))
         return PictureBox(x, y, factor * self.width, factor * self.height)
 
     def move(self, shift: FloatArray, scale: float = 1.0) -> "PictureBox":
@@ -47,11 +46,6 @@ class PictureBox:
         x0, x1 = np.clip([self.x, self.x + self.width], 0.0, width - 1.0)
         y0, y1 = np.clip([self.y, self.y + self.height], 0.0, height - 1.0)
         return PictureBox(float(x0), float(y0), float(x1 - x0), float(y1 - y0))
-
-    def seen_fraction(self, width: int, height: int) -> float:
-        """Which part of its area lies inside a picture."""
-        inside = self.clip(width, height)
-        return inside.width * inside.height / (self.width * self.height)
 
     def overlap(self, other: "PictureBox") -> float:
         """Intersection over union, 0 to 1."""

@@ -6,8 +6,8 @@ from navapp.tracking.box.detector import (
     MOST_EXAMPLES,
     detect,
     learn,
-    likeness,
     polish,
+    rate,
 )
 from tests.tracking.box.pictures import BOX, box_at, empty, scene, texture
 
@@ -29,8 +29,8 @@ def memory():
 def test_a_thing_is_found_anywhere_in_any_light(memory, shift, scale, gain) -> None:
     best = detect(memory, scene(shift, scale, gain, seed=7))[0]
     assert best.box.overlap(box_at(shift, scale)) > 0.8
-    assert best.likeness.similarity > 0.7
-    assert best.likeness.relative > 0.54
+    assert best.similarity > 0.7
+    assert best.relative > 0.54
 
 
 @pytest.mark.parametrize("hidden_fraction", [0.2, 0.4])
@@ -38,7 +38,7 @@ def test_the_whole_box_of_a_thing_that_is_hidden_in_part(memory, hidden_fraction
     shift = (-40.0, 12.0)
     best = detect(memory, scene(shift, hidden_fraction=hidden_fraction, seed=7))[0]
     assert best.box.overlap(box_at(shift)) > 0.7
-    assert best.likeness.similarity > 0.5
+    assert best.similarity > 0.5
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -47,7 +47,7 @@ def test_nothing_else_is_like_it(memory, seed: int) -> None:
     clutter = np.clip(clutter, 0.0, 255.0).astype(np.uint8)
     for picture in (clutter, empty(seed)):
         for one in detect(memory, picture):
-            assert one.likeness.similarity < 0.5
+            assert one.similarity < 0.5
     assert detect(memory, np.full((180, 320), 90, np.uint8)) == []
 
 
@@ -56,8 +56,8 @@ def test_a_part_that_is_lit_otherwise_does_not_count(memory) -> None:
     picture = scene(seed=7).astype(float)
     picture[: int(BOX.centre[1])] *= 0.5
     picture = np.clip(picture, 0.0, 255.0).astype(np.uint8)
-    assert likeness(memory, scene(seed=7), BOX).similarity > 0.9
-    assert likeness(memory, picture, BOX).similarity < 0.6
+    assert rate(memory, scene(seed=7), BOX).similarity > 0.9
+    assert rate(memory, picture, BOX).similarity < 0.6
 
 
 def test_a_box_a_little_off_is_put_right(memory) -> None:
@@ -75,9 +75,9 @@ def test_a_look_alike_becomes_a_counterexample(memory) -> None:
         y : y + half, x : x + int(BOX.width)
     ]
     other = box_at((10.0 - BOX.x, 20.0))
-    before = likeness(memory, double, other)
+    before = rate(memory, double, other)
     # The thing as it is seen now is new to the memory: half of it is hidden.
-    after = likeness(learn(memory, _half_hidden(double), BOX), double, other)
+    after = rate(learn(memory, _half_hidden(double), BOX), double, other)
     assert before.relative > 0.54
     assert after.relative < before.relative - 0.05
 
@@ -89,7 +89,7 @@ def _half_hidden(picture: np.ndarray) -> np.ndarray:
 
 
 def test_the_memory_is_bounded_and_keeps_the_first(memory) -> None:
-    grown, first = memory, memory.examples.parts[0]
+    grown, first = memory, memory.examples[0]
     for seed in range(2 * MOST_EXAMPLES):
         clutter = 110.0 + texture((180, 320), 3.0, 30.0, 100 + seed)
         picture = np.clip(clutter, 0.0, 255.0).astype(np.uint8)
@@ -97,8 +97,8 @@ def test_the_memory_is_bounded_and_keeps_the_first(memory) -> None:
         assert len(grown.examples) <= MOST_EXAMPLES
         assert len(grown.counterexamples) <= MOST_COUNTEREXAMPLES
     assert len(grown.examples) == MOST_EXAMPLES
-    np.testing.assert_array_equal(grown.examples.parts[0], first)
-    assert likeness(grown, scene(seed=7), BOX).similarity > 0.9
+    np.testing.assert_array_equal(grown.examples[0], first)
+    assert rate(grown, scene(seed=7), BOX).similarity > 0.9
 
 
 def test_what_is_known_is_not_kept_twice(memory) -> None:

@@ -23,7 +23,7 @@ def right(state: BoxState, shift, scale: float = 1.0) -> bool:
 def test_a_pose_places_the_box() -> None:
     state = start()
     assert state.picture_box.overlap(LARGE) == pytest.approx(1.0)
-    assert state.picture.shape == (180, 320)
+    assert reduce_picture(state.newest).shape == (180, 320)
     assert place_box(state, enlarged(scene()), None, None).box is None
 
 
@@ -94,7 +94,7 @@ def test_a_hand_over_the_bone_is_not_learned() -> None:
 def test_other_pictures_than_before_are_searched_anew() -> None:
     other = enlarged(scene(seed=1))[:600]
     state = follow_box(start(), np.ascontiguousarray(other))
-    assert state.picture.shape == (150, 320)
+    assert reduce_picture(state.newest).shape == (150, 320)
     assert right(state, (0.0, 0.0))
 
 
@@ -149,7 +149,7 @@ def test_only_an_ok_frame_teaches() -> None:
     estimate = PoseEstimate(truth, np.eye(6), 500, 1.0, 0.2, 0.2, 3, True)
     ok = TrackedFrame("femur", estimate, Verdict(Status.OK), FrameTimings())
     doubted = replace(ok, verdict=Verdict(Status.DEGRADED))
-    lost = replace(ok, verdict=Verdict(Status.LOST))
+    lost = replace(ok, estimate=None, verdict=Verdict(Status.LOST))
     assert boxes().place(None, left, ok).memory is not None
     state = boxes().place(None, left, doubted)
     assert state.memory is None
