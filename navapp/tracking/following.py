@@ -55,8 +55,7 @@ class Follower:
             None when the bone is elsewhere or out of view, or too few points are matched.
         """
         settings, watch, model = self._settings, frame.watch, self._meter.model
-        is_near = skips_samples
-        fit, expected, moved_mm = None, None, 0.0
+        fit, expected, moved_mm, is_near = None, None, 0.0, skips_samples
         for n_rounds in range(1, settings.max_rounds + 1):
             # After a small move, what was rendered is still what is expected.
             expected = expected or self._meter.render(frame.pair, pose, NEAR_BOX)
@@ -68,6 +67,7 @@ class Follower:
                 on_measured(measured, pose)
                 estimate = fit_bimcc(measured.scene, model, pose, MODEL_FIT)
                 has_enough = Reason.TOO_FEW_POINTS not in estimate.reasons
+                fit = Fit(estimate, measured) if has_enough else fit
                 rested = estimate.camera_from_bone if has_enough else None
             else:
                 measured = self._meter.measure_on_samples(expected)
@@ -78,8 +78,6 @@ class Follower:
             if rested is None:
                 break
             moved_mm, pose = pose.mean_motion_mm(rested, model.hull_mm), rested
-            if is_near:
-                fit = Fit(estimate, measured)
             if moved_mm >= settings.rest_mm:
                 expected = None
             elif is_near:
