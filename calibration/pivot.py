@@ -22,17 +22,11 @@ _CHI2_3_95 = 7.815
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PivotFit:
-    """A fitted tip and the residual of every pose.
+    """A fitted tip and the residual of every pose."""
 
-    Attributes:
-        tip_mm: (3,) in the tool's frame.
-        pivot_mm: (3,) the place that it stood on, in the tracker's frame.
-        residuals_mm: (N, 3) where each pose has the tip, less `pivot_mm`.
-    """
-
-    tip_mm: FloatArray
-    pivot_mm: FloatArray
-    residuals_mm: FloatArray
+    tip_mm: FloatArray  # (3,) in the tool's frame
+    pivot_mm: FloatArray  # (3,) the place that it stood on, in the tracker's frame
+    residuals_mm: FloatArray  # (N, 3) where each pose has the tip, less `pivot_mm`
 
     @property
     def lengths_mm(self) -> FloatArray:
@@ -42,26 +36,17 @@ class PivotFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pivot:
-    """The tip of a tool, in its tracked frame.
+    """The tip of a tool, in its tracked frame."""
 
-    Attributes:
-        linear: least squares over all poses.
-        robust: least squares over the poses that agree with each other.
-        is_used: (N,) these poses.
-        sigma_mm: standard deviation of a component of their residuals.
-        covariance_mm2: (3, 3) of the robust tip.
-        half_angle_deg: largest angle of the tool's shaft (from its origin to its tip) to its mean
-            direction.
-        gain: how many times the error of one pose enters the tip, along the direction that the
-            motion says least of.
-    """
-
-    linear: PivotFit
-    robust: PivotFit
-    is_used: NDArray[np.bool_]
-    sigma_mm: float
-    covariance_mm2: FloatArray
+    linear: PivotFit  # least squares over all poses
+    robust: PivotFit  # least squares over the poses that agree with each other
+    is_used: NDArray[np.bool_]  # (N,) these poses
+    sigma_mm: float  # standard deviation of a component of their residuals
+    covariance_mm2: FloatArray  # (3, 3) of the robust tip
+    # largest angle of the tool's shaft (from its origin to its tip) to its mean direction.
     half_angle_deg: float
+    # how many times the error of one pose enters the tip, along the direction that the motion says
+    # least of.
     gain: float
 
     @property

@@ -14,20 +14,16 @@ from navapp.errors import DeviceProtocolError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthaiPair:
-    """Two pictures of one message group, with their times, exposure and sensitivity.
+    """Two pictures of one message group, with their times, exposure and sensitivity."""
 
-    Attributes:
-        left, right: (H, W) uint8, arrays of their own.
-        captured_ns: mid exposure of the left one, mapped to the host's clock by DepthAI.
-        skew_ns: right minus left on the camera's own clock, which is common to both and is not
-            corrected between two pictures.
-        exposure_ms, iso: with which the left picture was taken.
-    """
-
+    # left, right: (H, W) uint8, arrays of their own.
     left: Image
     right: Image
-    captured_ns: int
+    captured_ns: int  # mid exposure of the left one, mapped to the host's clock by DepthAI
+    # right minus left on the camera's own clock, which is common to both and is not corrected
+    # between two pictures.
     skew_ns: int
+    # exposure_ms, iso: with which the left picture was taken.
     exposure_ms: float
     iso: float
 

@@ -26,26 +26,17 @@ class GroupQueue(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthaiParts:
-    """What the driver needs of a booted camera: the lowest seam for a fake.
+    """What the driver needs of a booted camera: the lowest seam for a fake."""
 
-    Attributes:
-        device_id: its serial number.
-        usb_speed: as DepthAI names it.
-        boot_s: how long the boot took.
-        queue: of pairs, the newest only.
-        calibration: its `CalibrationHandler`.
-        send_exposure: asks both eyes for ms and ISO.
-        set_infrared: brightness of `ir_dots` or `ir_flood`; whether it was taken.
-        close: ends pipeline and connection; the camera then starts anew, for some seconds.
-    """
-
-    device_id: str
-    usb_speed: str
-    boot_s: float
-    queue: GroupQueue
-    calibration: Any
-    send_exposure: Callable[[float, float], None]
+    device_id: str  # its serial number
+    usb_speed: str  # as DepthAI names it
+    boot_s: float  # how long the boot took
+    queue: GroupQueue  # of pairs, the newest only
+    calibration: Any  # its `CalibrationHandler`
+    send_exposure: Callable[[float, float], None]  # asks both eyes for ms and ISO
+    # brightness of `ir_dots` or `ir_flood`; whether it was taken.
     set_infrared: Callable[[str, float], bool]
+    # ends pipeline and connection; the camera then starts anew, for some seconds.
     close: Callable[[], None]
 
 

@@ -13,26 +13,20 @@ _CONTROLS = {"exposure_ms": 5.0, "iso": 200.0, "ir_dots": 0.0, "ir_flood": 0.0}
 class DepthaiSettings:
     """Which OAK camera, and its settings.
 
-    Attributes:
-        device: its id; empty when only one is connected.
-        width, height: of one picture, px.
-        rate_hz: pairs in a second.
-        controls: `exposure_ms` and `iso`, locked for both eyes, `ir_dots` and `ir_flood`, the
-            brightness of the infrared projectors from 0 (off) to 1; those left out have defaults.
-        max_skew_ms: pictures that are farther apart make no pair.
-        max_age_ms: an older pair is dropped.
-
     Raises:
         UsageError: values that no camera has.
     """
 
-    device: str = ""
+    device: str = ""  # its id; empty when only one is connected
+    # width, height: of one picture, px.
     width: int = 1280
     height: int = 720
-    rate_hz: float = 15.0
+    rate_hz: float = 15.0  # pairs in a second
+    # `exposure_ms` and `iso`, locked for both eyes, `ir_dots` and `ir_flood`, the brightness of the
+    # infrared projectors from 0 (off) to 1; those left out have defaults.
     controls: Mapping[str, float] = field(default_factory=dict)
-    max_skew_ms: float = 1.0
-    max_age_ms: float = 250.0
+    max_skew_ms: float = 1.0  # pictures that are farther apart make no pair
+    max_age_ms: float = 250.0  # an older pair is dropped
 
     def __post_init__(self) -> None:
         is_rate = math.isfinite(self.rate_hz) and self.rate_hz > 0.0

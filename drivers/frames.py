@@ -11,25 +11,17 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoFrame:
-    """Two pictures of one instant.
+    """Two pictures of one instant."""
 
-    Attributes:
-        left, right: uint8, (H, W) grey or (H, W, 3) BGR, the same shape, not rectified.
-        captured_ns: mid exposure of the left picture, on the host's monotonic clock.
-        received_ns: when the driver had both pictures.
-        skew_ns: capture time of the right picture minus that of the left one.
-        sequence: counts the frames that the source handed out, strictly increasing.
-        rig_id: identity of the rig that took them.
-        source_index: number of the picture in a recorded folder; None for a live camera.
-    """
-
+    # left, right: uint8, (H, W) grey or (H, W, 3) BGR, the same shape, not rectified.
     left: Image
     right: Image
-    captured_ns: int
-    received_ns: int
-    skew_ns: int
-    sequence: int
-    rig_id: str
+    captured_ns: int  # mid exposure of the left picture, on the host's monotonic clock
+    received_ns: int  # when the driver had both pictures
+    skew_ns: int  # capture time of the right picture minus that of the left one
+    sequence: int  # counts the frames that the source handed out, strictly increasing
+    rig_id: str  # identity of the rig that took them
+    # number of the picture in a recorded folder; None for a live camera.
     source_index: int | None = None
 
     def __post_init__(self) -> None:

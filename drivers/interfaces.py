@@ -17,40 +17,28 @@ from navapp.geometry.rig import StereoRig
 
 @dataclass(frozen=True, slots=True)
 class CameraInfo:
-    """Properties of a stereo camera.
+    """Properties of a stereo camera."""
 
-    Attributes:
-        name: for people; a simulated camera's name begins with `sim:`.
-        backend: as in the configuration.
-        is_simulated: the pictures are not of this world.
-        is_stepped: `read` computes or loads the next frame at once and drops none; otherwise the
-            camera runs by itself and must be read by a `ReaderThread`.
-        width, height: of one picture, px.
-        serials: left, right; empty texts when unknown.
-        measured_rate_hz, measured_skew_ms: of the frames handed out so far, None before.
-        factory_rig: a calibration that the device itself carries.
-        n_frames: length of a finite source, None for a live one.
-        n_unpaired: pictures that found no partner of their instant, since it was opened.
-        n_stale: pictures that came too old or damaged, since it was opened.
-        controls: as the device told them last, by the names of `set`.
-        notes: what else it told when it was opened: link, source of its times.
-    """
-
-    name: str
-    backend: str
-    is_simulated: bool
+    name: str  # for people; a simulated camera's name begins with `sim:`
+    backend: str  # as in the configuration
+    is_simulated: bool  # the pictures are not of this world
+    # `read` computes or loads the next frame at once and drops none; otherwise the camera runs by
+    # itself and must be read by a `ReaderThread`.
     is_stepped: bool
+    # width, height: of one picture, px.
     width: int
     height: int
-    serials: tuple[str, str] = ("", "")
+    serials: tuple[str, str] = ("", "")  # left, right; empty texts when unknown
+    # measured_rate_hz, measured_skew_ms: of the frames handed out so far, None before.
     measured_rate_hz: float | None = None
     measured_skew_ms: float | None = None
-    factory_rig: StereoRig | None = None
-    n_frames: int | None = None
-    n_unpaired: int = 0
-    n_stale: int = 0
+    factory_rig: StereoRig | None = None  # a calibration that the device itself carries
+    n_frames: int | None = None  # length of a finite source, None for a live one
+    n_unpaired: int = 0  # pictures that found no partner of their instant, since it was opened
+    n_stale: int = 0  # pictures that came too old or damaged, since it was opened
+    # as the device told them last, by the names of `set`.
     controls: Mapping[str, float] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what else it told when it was opened: link, source of its times
 
 
 class StereoCamera(Protocol):

@@ -20,20 +20,14 @@ from navapp.errors import DeviceError, DeviceLost, UnsupportedControl, UsageErro
 class OpencvStereoSettings:
     """Which USB cameras, and their settings.
 
-    Attributes:
-        left: serial number, or path below `/dev/v4l/by-id` or `/dev/v4l/by-path`.
-        right: the same; None when the left one sends both eyes side by side.
-        eye: format and controls; the width is that of one eye.
-        max_skew_ms: pairs whose pictures are farther apart in time are not made.
-
     Raises:
         UsageError: the same camera twice, a limit at which a picture has two partners.
     """
 
-    left: str
-    right: str | None
-    eye: UvcSettings
-    max_skew_ms: float = 5.0
+    left: str  # serial number, or path below `/dev/v4l/by-id` or `/dev/v4l/by-path`
+    right: str | None  # the same; None when the left one sends both eyes side by side
+    eye: UvcSettings  # format and controls; the width is that of one eye
+    max_skew_ms: float = 5.0  # pairs whose pictures are farther apart in time are not made
 
     def __post_init__(self) -> None:
         if not self.left or self.right == "":

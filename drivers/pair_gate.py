@@ -5,21 +5,13 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class PairGate:
-    """Accepts new and recent pairs of one instant, and counts the others.
+    """Accepts new and recent pairs of one instant, and counts the others."""
 
-    Attributes:
-        max_skew_ns: greatest difference of the capture times in a pair.
-        max_age_ns: greatest age of a pair.
-        heard_ns: when the last new pair came, good or not.
-        n_unpaired: pictures in pairs that were too far apart.
-        n_stale: pairs that were too old.
-    """
-
-    max_skew_ns: int
-    max_age_ns: int
-    heard_ns: int
-    n_unpaired: int = 0
-    n_stale: int = 0
+    max_skew_ns: int  # greatest difference of the capture times in a pair
+    max_age_ns: int  # greatest age of a pair
+    heard_ns: int  # when the last new pair came, good or not
+    n_unpaired: int = 0  # pictures in pairs that were too far apart
+    n_stale: int = 0  # pairs that were too old
     _last_ns: int = -1
 
     def admits(self, captured_ns: int, skew_ns: int, now_ns: int) -> bool:

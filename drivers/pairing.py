@@ -12,15 +12,10 @@ _MOST_WAITING = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedPicture:
-    """A picture and when it was taken.
+    """A picture and when it was taken."""
 
-    Attributes:
-        picture: (H, W) or (H, W, 3) uint8.
-        captured_ns: mid exposure.
-    """
-
-    picture: Image
-    captured_ns: int
+    picture: Image  # (H, W) or (H, W, 3) uint8
+    captured_ns: int  # mid exposure
 
 
 class PairMatcher:

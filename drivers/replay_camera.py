@@ -27,22 +27,16 @@ Order = Literal["forward", "pingpong"]
 class ReplaySettings:
     """Order, range and rate of a replay.
 
-    Attributes:
-        order: `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.
-        n_frames: at most so many.
-        start: frames with a smaller number are left out.
-        rate_hz: where the source has neither times nor a rate.
-        is_side_by_side: each picture of the one video holds both eyes.
-
     Raises:
         UsageError: settings that mean nothing.
     """
 
+    # `pingpong` walks 0 1 2 1 0 1 ..., and without `n_frames` there and back once.
     order: Order = "forward"
-    n_frames: int | None = None
-    start: int = 0
-    rate_hz: float = 15.0
-    is_side_by_side: bool = False
+    n_frames: int | None = None  # at most so many
+    start: int = 0  # frames with a smaller number are left out
+    rate_hz: float = 15.0  # where the source has neither times nor a rate
+    is_side_by_side: bool = False  # each picture of the one video holds both eyes
 
     def __post_init__(self) -> None:
         if self.order not in get_args(Order):

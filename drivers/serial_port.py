@@ -67,15 +67,10 @@ class Address(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SerialAddress:
-    """A port of this machine (`/dev/serial/by-id/...`) or of the network (`socket://host:port`).
+    """A port of this machine (`/dev/serial/by-id/...`) or of the network (`socket://host:port`)."""
 
-    Attributes:
-        name: path or URL.
-        baud_rate: 8 data bits, no parity, one stop bit, no flow control.
-    """
-
-    name: str
-    baud_rate: int
+    name: str  # path or URL
+    baud_rate: int  # 8 data bits, no parity, one stop bit, no flow control
 
     @property
     def is_simulated(self) -> bool:

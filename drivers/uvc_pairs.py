@@ -22,20 +22,14 @@ _ANSWER_S = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedPair:
-    """Two pictures of one instant.
+    """Two pictures of one instant."""
 
-    Attributes:
-        left, right: alike in shape.
-        captured_ns: of the left one.
-        received_ns: when both were there.
-        skew_ns: right minus left.
-    """
-
+    # left, right: alike in shape.
     left: Image
     right: Image
-    captured_ns: int
-    received_ns: int
-    skew_ns: int
+    captured_ns: int  # of the left one
+    received_ns: int  # when both were there
+    skew_ns: int  # right minus left
 
 
 class UvcPairs:

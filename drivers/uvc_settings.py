@@ -11,25 +11,20 @@ from navapp.errors import UsageError
 class UvcSettings:
     """Format and controls of a camera; both eyes of a pair have the same.
 
-    Attributes:
-        fourcc: pixel format; two cameras on one USB 2 line need a compressed one.
-        width, height: of the picture that the camera sends, px.
-        rate_hz: pictures in a second.
-        controls: `exposure_ms` (in steps of 0.1, at most the frame period), `gain`,
-            `white_balance_k` and `focus` (another one than at the calibration voids the rig); those
-            left out stay where the camera has them, without their automatic.
-        max_age_ms: a picture that is older when it is grabbed or read is dropped.
-
     Raises:
         UsageError: values that mean nothing.
     """
 
-    fourcc: str = "MJPG"
+    fourcc: str = "MJPG"  # pixel format; two cameras on one USB 2 line need a compressed one
+    # width, height: of the picture that the camera sends, px.
     width: int = 1280
     height: int = 720
-    rate_hz: float = 30.0
+    rate_hz: float = 30.0  # pictures in a second
+    # `exposure_ms` (in steps of 0.1, at most the frame period), `gain`, `white_balance_k` and
+    # `focus` (another one than at the calibration voids the rig); those left out stay where the
+    # camera has them, without their automatic.
     controls: Mapping[str, float] = field(default_factory=dict)
-    max_age_ms: float = 250.0
+    max_age_ms: float = 250.0  # a picture that is older when it is grabbed or read is dropped
 
     def __post_init__(self) -> None:
         if len(self.fourcc) != 4 or not self.fourcc.isascii():

@@ -12,32 +12,20 @@ _PICTURES = "-video-index0"
 
 @dataclass(frozen=True, slots=True)
 class FoundCamera:
-    """A connected camera.
+    """A connected camera."""
 
-    Attributes:
-        path: a name of its device that stays when it is plugged in again.
-        node: the device behind it.
-        serial: its serial number; of a camera without one, the name that the system made for it.
-    """
-
-    path: Path
-    node: Path
-    serial: str
+    path: Path  # a name of its device that stays when it is plugged in again
+    node: Path  # the device behind it
+    serial: str  # its serial number; of a camera without one, the name that the system made for it
 
 
 @dataclass(frozen=True, slots=True)
 class V4lNames:
-    """The names that Linux gives to video devices.
+    """The names that Linux gives to video devices."""
 
-    Attributes:
-        links: folder with `by-id` and `by-path`.
-        sysfs: folder with a folder for every video device.
-        devices: folder of the devices themselves.
-    """
-
-    links: Path = Path("/dev/v4l")
-    sysfs: Path = Path("/sys/class/video4linux")
-    devices: Path = Path("/dev")
+    links: Path = Path("/dev/v4l")  # folder with `by-id` and `by-path`
+    sysfs: Path = Path("/sys/class/video4linux")  # folder with a folder for every video device
+    devices: Path = Path("/dev")  # folder of the devices themselves
 
     def list_cameras(self) -> tuple[FoundCamera, ...]:
         """Every camera once, by its serial number where that names it alone."""

@@ -22,17 +22,13 @@ _ERRORS = {kind.__name__: kind for kind in (DeviceError, DeviceNotFound, WrongDe
 
 @dataclass(frozen=True, slots=True)
 class WindowSettings:
-    """Output, size and flips of a window.
+    """Output, size and flips of a window."""
 
-    Attributes:
-        output: name of the monitor or projector as SDL tells it; empty: the only one.
-        width, height: of the output, px.
-        flips_horizontally, flips_vertically: what the window does to every picture.
-    """
-
-    output: str
+    output: str  # name of the monitor or projector as SDL tells it; empty: the only one
+    # width, height: of the output, px.
     width: int
     height: int
+    # flips_horizontally, flips_vertically: what the window does to every picture.
     flips_horizontally: bool = False
     flips_vertically: bool = False
 

@@ -40,19 +40,12 @@ _REJECTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What the device answered.
+    """What the device answered."""
 
-    Attributes:
-        is_busy: the axis moves.
-        warning: two letters, the most urgent one; empty for none.
-        data: what was asked for; of a rejection its reason.
-        is_accepted: not rejected.
-    """
-
-    is_busy: bool
-    warning: str
-    data: str
-    is_accepted: bool
+    is_busy: bool  # the axis moves
+    warning: str  # two letters, the most urgent one; empty for none
+    data: str  # what was asked for; of a rejection its reason
+    is_accepted: bool  # not rejected
 
 
 class ZaberLine:

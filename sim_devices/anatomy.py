@@ -59,25 +59,17 @@ class KneeSpec:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KneeAnatomy:
-    """A knee in extension; LPS mm, the origin in the middle between the femur's epicondyles.
+    """A knee in extension; LPS mm, the origin in the middle between the femur's epicondyles."""
 
-    Attributes:
-        spec: what it was made from.
-        bones: "femur", "tibia", "patella": closed surfaces.
-        landmarks: "bone/name" to (3,); on the surface, except "patella/centre".
-        curves: name to (N, 3) polyline beside the bones.
-        solids: the implicit function of each bone, whose zero level is the mesh.
-        scale: (3,) factors from the proportions of `bone_shapes`; x negative for a left knee.
-        shape: the random part of the proportions.
-    """
-
-    spec: KneeSpec
-    bones: Mapping[str, TriangleMesh]
+    spec: KneeSpec  # what it was made from
+    bones: Mapping[str, TriangleMesh]  # "femur", "tibia", "patella": closed surfaces
+    # "bone/name" to (3,); on the surface, except "patella/centre".
     landmarks: Mapping[str, FloatArray]
-    curves: Mapping[str, FloatArray]
-    solids: Mapping[str, Field]
+    curves: Mapping[str, FloatArray]  # name to (N, 3) polyline beside the bones
+    solids: Mapping[str, Field]  # the implicit function of each bone, whose zero level is the mesh
+    # (3,) factors from the proportions of `bone_shapes`; x negative for a left knee.
     scale: FloatArray
-    shape: ShapeDraws
+    shape: ShapeDraws  # the random part of the proportions
 
 
 @lru_cache(maxsize=8)

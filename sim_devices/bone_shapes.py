@@ -24,41 +24,23 @@ from sim_devices.implicit import (
 
 @dataclass(frozen=True, slots=True)
 class ShapeDraws:
-    """What differs between two knees of one size; lengths in mm before scaling.
+    """What differs between two knees of one size; lengths in mm before scaling."""
 
-    Attributes:
-        lateral_forward: how much further the lateral trochlear facet stands forward.
-        lateral_short: how much shorter the lateral condyle is behind.
-        distal_difference: how much further down the medial condyle reaches.
-        groove_depth: depth of the trochlear groove.
-        groove_x: lateral offset (negative) of the groove.
-        notch_radius: half width of the intercondylar notch.
-        divergence: sideways divergence of the condyles per mm towards the back.
-        torsion_rad_per_mm: twist of the shafts.
-        bow: forward bow of the femoral shaft.
-        slope_deg: posterior slope of the tibial plateau.
-        dish: depth of the medial plateau.
-        dome: height of the lateral plateau.
-        spine: height of the intercondylar eminence.
-        tubercle: prominence of the tibial tubercle.
-        ridge_x: lateral-medial offset of the patellar ridge.
-    """
-
-    lateral_forward: float
-    lateral_short: float
-    distal_difference: float
-    groove_depth: float
-    groove_x: float
-    notch_radius: float
-    divergence: float
-    torsion_rad_per_mm: float
-    bow: float
-    slope_deg: float
-    dish: float
-    dome: float
-    spine: float
-    tubercle: float
-    ridge_x: float
+    lateral_forward: float  # how much further the lateral trochlear facet stands forward
+    lateral_short: float  # how much shorter the lateral condyle is behind
+    distal_difference: float  # how much further down the medial condyle reaches
+    groove_depth: float  # depth of the trochlear groove
+    groove_x: float  # lateral offset (negative) of the groove
+    notch_radius: float  # half width of the intercondylar notch
+    divergence: float  # sideways divergence of the condyles per mm towards the back
+    torsion_rad_per_mm: float  # twist of the shafts
+    bow: float  # forward bow of the femoral shaft
+    slope_deg: float  # posterior slope of the tibial plateau
+    dish: float  # depth of the medial plateau
+    dome: float  # height of the lateral plateau
+    spine: float  # height of the intercondylar eminence
+    tubercle: float  # prominence of the tibial tubercle
+    ridge_x: float  # lateral-medial offset of the patellar ridge
 
 
 def draw_shape(rng: np.random.Generator) -> ShapeDraws:

@@ -19,19 +19,12 @@ END_MARGIN_MM = 6.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtVolume:
-    """A CT; voxel (i, j, k) lies at origin + direction @ (spacing * (i, j, k)), LPS mm.
+    """A CT; voxel (i, j, k) lies at origin + direction @ (spacing * (i, j, k)), LPS mm."""
 
-    Attributes:
-        hounsfield: (nz, ny, nx) int16, so hounsfield[k, j, i].
-        spacing_mm: (3,) along x, y, z.
-        origin_mm: (3,) centre of the first voxel.
-        direction: (3, 3) columns are the directions of i, j, k.
-    """
-
-    hounsfield: NDArray[np.int16]
-    spacing_mm: FloatArray
-    origin_mm: FloatArray
-    direction: FloatArray
+    hounsfield: NDArray[np.int16]  # (nz, ny, nx) int16, so hounsfield[k, j, i]
+    spacing_mm: FloatArray  # (3,) along x, y, z
+    origin_mm: FloatArray  # (3,) centre of the first voxel
+    direction: FloatArray  # (3, 3) columns are the directions of i, j, k
 
 
 def make_ct(

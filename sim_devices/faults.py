@@ -30,22 +30,16 @@ class FaultKind(Enum):
 class Fault:
     """One fault: active for `start_s` <= t < `start_s` + `duration_s`.
 
-    Attributes:
-        kind: what goes wrong.
-        start_s: since the camera was opened for the first time.
-        duration_s: infinite for a fault that stays.
-        delay_s: of a DELAY: how much later frames come.
-        turn_deg: of a TURN, about the right camera's axes: x moves its picture up and down, y
-            sideways, z turns it in its plane.
-
     Raises:
         ValueError: a negative or missing time, a turn that is no number.
     """
 
-    kind: FaultKind
-    start_s: float
-    duration_s: float
-    delay_s: float = 0.3
+    kind: FaultKind  # what goes wrong
+    start_s: float  # since the camera was opened for the first time
+    duration_s: float  # infinite for a fault that stays
+    delay_s: float = 0.3  # of a DELAY: how much later frames come
+    # of a TURN, about the right camera's axes: x moves its picture up and down, y sideways, z turns
+    # it in its plane.
     turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:

@@ -148,23 +148,14 @@ class Cone:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roller:
-    """A thick disc with rounded shoulders, its outline a chain of discs in the y-z plane.
+    """A thick disc with rounded shoulders, its outline a chain of discs in the y-z plane."""
 
-    Attributes:
-        discs: (K, 3) y, z, radius of the outline's discs.
-        centre_x_mm: x of the middle plane at y = 0.
-        shear: change of that x per mm of y (condyles diverge towards the back).
-        half_width_mm: half the thickness along x.
-        shoulder_mm: radius of the rounding between tread and side.
-        crown_per_mm: curvature of the tread across its width.
-    """
-
-    discs: FloatArray
-    centre_x_mm: float
-    shear: float
-    half_width_mm: float
-    shoulder_mm: float
-    crown_per_mm: float
+    discs: FloatArray  # (K, 3) y, z, radius of the outline's discs
+    centre_x_mm: float  # x of the middle plane at y = 0
+    shear: float  # change of that x per mm of y (condyles diverge towards the back)
+    half_width_mm: float  # half the thickness along x
+    shoulder_mm: float  # radius of the rounding between tread and side
+    crown_per_mm: float  # curvature of the tread across its width
 
     def outline(self, points: FloatArray) -> FloatArray:
         """Distance to the outline in the y-z plane."""
@@ -191,19 +182,12 @@ class Roller:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loft:
-    """An endless column along z whose section is made of four quarter superellipses.
+    """An endless column along z whose section is made of four quarter superellipses."""
 
-    Attributes:
-        z_mm: (K,) increasing heights of the table.
-        table: (6, K) centre x, centre y, radius to -x, +x, -y, +y at those heights.
-        exponent: 2 for ellipses, more for squarer sections.
-        twist_rad_per_mm: rotation of the section about z per mm of height.
-    """
-
-    z_mm: FloatArray
-    table: FloatArray
-    exponent: float
-    twist_rad_per_mm: float = 0.0
+    z_mm: FloatArray  # (K,) increasing heights of the table
+    table: FloatArray  # (6, K) centre x, centre y, radius to -x, +x, -y, +y at those heights
+    exponent: float  # 2 for ellipses, more for squarer sections
+    twist_rad_per_mm: float = 0.0  # rotation of the section about z per mm of height
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Values (N,) at points (N, 3)."""
@@ -235,17 +219,11 @@ def make_loft(rows: list[list[float]], exponent: float, twist_rad_per_mm: float 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Below:
-    """The half space where one coordinate is below a function of the two others.
+    """The half space where one coordinate is below a function of the two others."""
 
-    Attributes:
-        height_mm: maps (N, 3) points to the limit; must not use the limited coordinate.
-        axis: 0, 1 or 2, the coordinate that is limited.
-        upwards: False for the half space above the limit instead.
-    """
-
-    height_mm: Field
-    axis: int
-    upwards: bool = True
+    height_mm: Field  # maps (N, 3) points to the limit; must not use the limited coordinate
+    axis: int  # 0, 1 or 2, the coordinate that is limited
+    upwards: bool = True  # False for the half space above the limit instead
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Values (N,) at points (N, 3)."""

@@ -31,34 +31,26 @@ class Material:
     """One surface; colours are linear BGR reflectances.
 
     The noise mixes `colour` with `second`; a vertex's mark (0 to 1) mixes in `marked`.
-
-    Attributes:
-        mix_at, mix_width: noise level (in deviations) where the second colour starts, and how soft.
-        contrast_fine, contrast_coarse: deviation of the texture relative to its mean.
-        pores: darkening in small pits.
-        bump: slope of the fine relief per deviation of the noise.
-        mark_noise: how much the noise frays the border of the mark.
-        specular, shininess: strength and narrowness of the wet highlight.
-        marked_specular: the highlight's factor where the mark is 1.
-        blood_at: noise level above which blood lies.
-        wrap: how far light creeps round an edge (0 hard, 0.5 soft).
     """
 
     colour: Colour
     second: Colour
     marked: Colour
+    # mix_at, mix_width: noise level (in deviations) where the second colour starts, and how soft.
     mix_at: float = 9.0
     mix_width: float = 1.0
+    # contrast_fine, contrast_coarse: deviation of the texture relative to its mean.
     contrast_fine: float = 0.05
     contrast_coarse: float = 0.05
-    pores: float = 0.0
-    bump: float = 0.0
-    mark_noise: float = 0.0
+    pores: float = 0.0  # darkening in small pits
+    bump: float = 0.0  # slope of the fine relief per deviation of the noise
+    mark_noise: float = 0.0  # how much the noise frays the border of the mark
+    # specular, shininess: strength and narrowness of the wet highlight.
     specular: float = 0.0
     shininess: float = 60.0
-    marked_specular: float = 1.0
-    blood_at: float = _NO_BLOOD
-    wrap: float = 0.15
+    marked_specular: float = 1.0  # the highlight's factor where the mark is 1
+    blood_at: float = _NO_BLOOD  # noise level above which blood lies
+    wrap: float = 0.15  # how far light creeps round an edge (0 hard, 0.5 soft)
 
     def row(self) -> list[float]:
         """In the order that the kernel reads."""

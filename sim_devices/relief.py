@@ -9,17 +9,11 @@ from navapp.geometry.transform import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waves:
-    """Smooth seeded relief: a sum of plane waves in random directions.
+    """Smooth seeded relief: a sum of plane waves in random directions."""
 
-    Attributes:
-        wave_vectors: (W, 3) rad per mm.
-        phases_rad: (W,).
-        amplitudes_mm: (W,).
-    """
-
-    wave_vectors: FloatArray
-    phases_rad: FloatArray
-    amplitudes_mm: FloatArray
+    wave_vectors: FloatArray  # (W, 3) rad per mm
+    phases_rad: FloatArray  # (W,)
+    amplitudes_mm: FloatArray  # (W,)
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Heights in mm, (N,) at points (N, 3)."""
@@ -49,17 +43,11 @@ def make_waves(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bumps:
-    """Relief of round bumps, such as osteophytes.
+    """Relief of round bumps, such as osteophytes."""
 
-    Attributes:
-        centres_mm: (M, 3).
-        widths_mm: (M,) standard deviations.
-        heights_mm: (M,).
-    """
-
-    centres_mm: FloatArray
-    widths_mm: FloatArray
-    heights_mm: FloatArray
+    centres_mm: FloatArray  # (M, 3)
+    widths_mm: FloatArray  # (M,) standard deviations
+    heights_mm: FloatArray  # (M,)
 
     def __call__(self, points: FloatArray) -> FloatArray:
         """Heights in mm, (N,) at points (N, 3)."""

@@ -28,58 +28,38 @@ _EMPTY_DEPTH_MM = 700.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A rigid piece of the scene.
+    """A rigid piece of the scene."""
 
-    Attributes:
-        body: whose pose it follows.
-        mesh: in that body's frame, closed or seen from its front only.
-        material: of its surface.
-        mark: (V,) 0 to 1, where the material's marked colour shows; None for nowhere.
-        exposure: (V,) 0 to 1, light that reaches the vertex; None for all.
-        texture_sign: -1 looks the texture up mirrored in x (a left knee).
-    """
-
-    body: str
-    mesh: TriangleMesh
-    material: MaterialId
+    body: str  # whose pose it follows
+    mesh: TriangleMesh  # in that body's frame, closed or seen from its front only
+    material: MaterialId  # of its surface
+    # (V,) 0 to 1, where the material's marked colour shows; None for nowhere.
     mark: NDArray[np.float64] | None = None
+    # (V,) 0 to 1, light that reaches the vertex; None for all.
     exposure: NDArray[np.float64] | None = None
-    texture_sign: float = 1.0
+    texture_sign: float = 1.0  # -1 looks the texture up mirrored in x (a left knee)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
-    """Materials, texture and lamps of a rendering.
+    """Materials, texture and lamps of a rendering."""
 
-    Attributes:
-        materials: table of `materials.make_material_table`.
-        tile: the solid noise.
-        lamps: (L, 4) direction towards the lamp in the lamps' frame, strength. Operating lamps
-            hang a metre away and are broad: over the site their direction is constant.
-        ambient: light from everywhere.
-        vignetting: loss of light in the corner of the picture, 0 to 1.
-    """
-
-    materials: NDArray[np.float32]
-    tile: NoiseTile
+    materials: NDArray[np.float32]  # table of `materials.make_material_table`
+    tile: NoiseTile  # the solid noise
+    # (L, 4) direction towards the lamp in the lamps' frame, strength. Operating lamps hang a metre
+    # away and are broad: over the site their direction is constant.
     lamps: NDArray[np.float64]
-    ambient: float = 0.16
-    vignetting: float = 0.18
+    ambient: float = 0.16  # light from everywhere
+    vignetting: float = 0.18  # loss of light in the corner of the picture, 0 to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthPicture:
-    """What each pixel of a picture shows.
+    """What each pixel of a picture shows."""
 
-    Attributes:
-        depth_mm: (H, W) float32 along the optical axis; 0 where nothing is seen.
-        body: (H, W) int16 index into `bodies`; -1 where nothing is seen.
-        bodies: names.
-    """
-
-    depth_mm: FloatImage
-    body: NDArray[np.int16]
-    bodies: tuple[str, ...]
+    depth_mm: FloatImage  # (H, W) float32 along the optical axis; 0 where nothing is seen
+    body: NDArray[np.int16]  # (H, W) int16 index into `bodies`; -1 where nothing is seen
+    bodies: tuple[str, ...]  # names
 
 
 class _Geometry:

@@ -14,31 +14,25 @@ InstrumentKind = Literal["none", "sweep"]
 class Scenario:
     """Patient, scene and what happens in it; the same values give the same pictures.
 
-    Attributes:
-        seed: of the anatomy, the textures, the tissue, the placement and the motion.
-        side, sex, age_group: of the patient.
-        cartilage_mm: mean thickness of the cartilage on the joint surfaces, 0 (bare bone) to 2.6;
-            it is up to 3.2 in places.
-        motion: of the leg.
-        instrument: "sweep" passes a hand with an instrument in front every six seconds.
-        stage: the surgical stage at the start.
-        contrast: of the bone's texture (RMS of grey levels divided by their mean), 0.03 to 0.08.
-        blood: 0 is dry, 1 is very bloody.
-
     Raises:
         UsageError: a value out of its bounds, or a knee, motion or instrument that there is not.
     """
 
-    seed: int = 1
+    seed: int = 1  # of the anatomy, the textures, the tissue, the placement and the motion
+    # side, sex, age_group: of the patient.
     side: Side = "right"
     sex: Sex = "female"
     age_group: AgeGroup = "middle"
+    # mean thickness of the cartilage on the joint surfaces, 0 (bare bone) to 2.6; it is up to 3.2
+    # in places.
     cartilage_mm: float = 0.0
-    motion: MotionKind = "breathing"
+    motion: MotionKind = "breathing"  # of the leg
+    # "sweep" passes a hand with an instrument in front every six seconds.
     instrument: InstrumentKind = "none"
-    stage: str = "opening"
+    stage: str = "opening"  # the surgical stage at the start
+    # of the bone's texture (RMS of grey levels divided by their mean), 0.03 to 0.08.
     contrast: float = 0.05
-    blood: float = 0.3
+    blood: float = 0.3  # 0 is dry, 1 is very bloody
 
     def __post_init__(self) -> None:
         for name, highest in (("cartilage_mm", 2.6), ("contrast", 0.2), ("blood", 1.0)):

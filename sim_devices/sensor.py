@@ -24,27 +24,19 @@ class SensorModel:
     read from one tile of random numbers, every row from its own place, which depends on the seed,
     the frame and the eye alone: the same frame always gets the same noise.
 
-    Attributes:
-        full_well_e: electrons of a saturated pixel.
-        read_noise_e: standard deviation of the read-out, electrons.
-        psf_sigma_px: blur of the lens.
-        exposure: relative to the nominal one.
-        gain_left, gain_right: amplification after the noise; two cameras are never quite equal.
-        seed: of the noise.
-        is_grey: one channel instead of three.
-
     Raises:
         ValueError: a value that no sensor has.
     """
 
-    full_well_e: float = 20000.0
-    read_noise_e: float = 7.0
-    psf_sigma_px: float = 0.5
-    exposure: float = 1.0
+    full_well_e: float = 20000.0  # electrons of a saturated pixel
+    read_noise_e: float = 7.0  # standard deviation of the read-out, electrons
+    psf_sigma_px: float = 0.5  # blur of the lens
+    exposure: float = 1.0  # relative to the nominal one
+    # gain_left, gain_right: amplification after the noise; two cameras are never quite equal.
     gain_left: float = 1.0
     gain_right: float = 1.04
-    seed: int = 0
-    is_grey: bool = False
+    seed: int = 0  # of the noise
+    is_grey: bool = False  # one channel instead of three
 
     def __post_init__(self) -> None:
         positive = (self.full_well_e, self.exposure, self.gain_left, self.gain_right)

@@ -26,18 +26,14 @@ _EDGE_PX = 2
 class PrintedSheet:
     """A printed sheet: its picture, resolution and place.
 
-    Attributes:
-        white: (h, w) uint8, 255 where the paper is white, 0 where it is black.
-        px_per_mm: of it.
-        left_mm, top_mm: the sheet's own x and y at the left and upper edge of the first pixel. Its
-            frame: x along the rows, y down, z away from who reads it.
-
     Raises:
         ValueError: no picture, or no size.
     """
 
-    white: NDArray[np.uint8]
-    px_per_mm: float
+    white: NDArray[np.uint8]  # (h, w) uint8, 255 where the paper is white, 0 where it is black
+    px_per_mm: float  # of it
+    # left_mm, top_mm: the sheet's own x and y at the left and upper edge of the first pixel. Its
+    # frame: x along the rows, y down, z away from who reads it.
     left_mm: float
     top_mm: float
 

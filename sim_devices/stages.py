@@ -29,21 +29,15 @@ HOLE_DEPTH_MM = 25.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Site:
-    """The operating site before any stage has changed it, as for a right knee.
+    """The operating site before any stage has changed it, as for a right knee."""
 
-    Attributes:
-        bones: in their own frames, cartilage included.
-        worn: (V,) of the femur: 1 where its cartilage is worn, 0 elsewhere.
-        is_covered: whether the bones carry cartilage.
-        tissue, drape: in the table's frame.
-        entry_mm, entry_axis: where a drill enters the femur, and the unit direction into it.
-    """
-
-    bones: Mapping[str, TriangleMesh]
-    worn: FloatArray
-    is_covered: bool
+    bones: Mapping[str, TriangleMesh]  # in their own frames, cartilage included
+    worn: FloatArray  # (V,) of the femur: 1 where its cartilage is worn, 0 elsewhere
+    is_covered: bool  # whether the bones carry cartilage
+    # tissue, drape: in the table's frame.
     tissue: Sheet
     drape: Sheet
+    # entry_mm, entry_axis: where a drill enters the femur, and the unit direction into it.
     entry_mm: FloatArray
     entry_axis: FloatArray
 

@@ -31,17 +31,11 @@ EDGES = np.array(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """A regular lattice of sample points.
+    """A regular lattice of sample points."""
 
-    Attributes:
-        origin_mm: (3,) first point.
-        spacing_mm: (3,) along x, y, z.
-        shape: number of points along x, y, z.
-    """
-
-    origin_mm: FloatArray
-    spacing_mm: FloatArray
-    shape: tuple[int, int, int]
+    origin_mm: FloatArray  # (3,) first point
+    spacing_mm: FloatArray  # (3,) along x, y, z
+    shape: tuple[int, int, int]  # number of points along x, y, z
 
     def points(self, index: NDArray[np.intp]) -> FloatArray:
         """(N, 3) positions of integer or fractional indices (N, 3)."""

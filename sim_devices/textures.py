@@ -22,13 +22,10 @@ _LONGEST_VOXELS = 28.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseTile:
-    """Two independent channels of noise, periodic in all directions.
+    """Two independent channels of noise, periodic in all directions."""
 
-    Attributes:
-        values: (n, n, n) uint16: the first channel in the low byte, the second in the high one;
-            mean 128, 40 steps per standard deviation.
-    """
-
+    # (n, n, n) uint16: the first channel in the low byte, the second in the high one; mean 128, 40
+    # steps per standard deviation.
     values: NDArray[np.uint16]
 
     @property

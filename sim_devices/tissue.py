@@ -30,17 +30,11 @@ WALL_MM = 24.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sheet:
-    """A surface with values per vertex for the renderer.
+    """A surface with values per vertex for the renderer."""
 
-    Attributes:
-        mesh: in the table's frame.
-        mark: (V,) 0 flesh, 1 skin (of the tissue); 1 stained (of the drape).
-        exposure: (V,) 0 to 1, light that reaches the vertex.
-    """
-
-    mesh: TriangleMesh
-    mark: FloatArray
-    exposure: FloatArray
+    mesh: TriangleMesh  # in the table's frame
+    mark: FloatArray  # (V,) 0 flesh, 1 skin (of the tissue); 1 stained (of the drape)
+    exposure: FloatArray  # (V,) 0 to 1, light that reaches the vertex
 
 
 def make_tissue(

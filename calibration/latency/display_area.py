@@ -16,15 +16,10 @@ _TURN_MS = 1000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WatchedCells:
-    """Grey values of one eye's pictures, frame by frame.
+    """Grey values of one eye's pictures, frame by frame."""
 
-    Attributes:
-        times_ms: (n,) stamps of its exposures, rising.
-        cells: (n, c) mean grey value of every cell of its pictures.
-    """
-
-    times_ms: FloatArray
-    cells: NDArray[np.float32]
+    times_ms: FloatArray  # (n,) stamps of its exposures, rising
+    cells: NDArray[np.float32]  # (n, c) mean grey value of every cell of its pictures
 
     def only(self, is_in: NDArray[np.bool_]) -> "WatchedCells":
         """Some (n,) of its frames."""
@@ -33,15 +28,10 @@ class WatchedCells:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Area:
-    """The cells of a camera's pictures that follow the code.
+    """The cells of a camera's pictures that follow the code."""
 
-    Attributes:
-        is_in: (c,) these cells.
-        lag_ms: at which they follow it, coarsely.
-    """
-
-    is_in: NDArray[np.bool_]
-    lag_ms: float
+    is_in: NDArray[np.bool_]  # (c,) these cells
+    lag_ms: float  # at which they follow it, coarsely
 
     def series(self, watched: WatchedCells) -> FloatArray:
         """(n,) their mean grey value."""

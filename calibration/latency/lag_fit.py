@@ -25,17 +25,13 @@ class BlockSums:
     """Products summed over blocks of frames, each less the means of its block, at k lags.
 
     Slow changes of the room's light move all frames of a block alike and leave no trace.
-
-    Attributes:
-        lags_ms: (k,).
-        lit_grey, lit_lit: (b, k) of lit share and grey value, of lit share and itself.
-        grey_grey: (b,).
     """
 
-    lags_ms: FloatArray
+    lags_ms: FloatArray  # (k,)
+    # lit_grey, lit_lit: (b, k) of lit share and grey value, of lit share and itself.
     lit_grey: FloatArray
     lit_lit: FloatArray
-    grey_grey: FloatArray
+    grey_grey: FloatArray  # (b,)
 
     def compute_explained(self, counts: FloatArray) -> FloatArray:
         """(r, k) share of the grey values' squares that the code explains; upside down it is 0.

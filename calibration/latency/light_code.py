@@ -30,12 +30,9 @@ def draw_pauses_ms(duration_s: float, seed: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Switches:
-    """Times at which the display was told to switch between dark and light.
+    """Times at which the display was told to switch between dark and light."""
 
-    Attributes:
-        times_ms: (m,) rising, m even; dark before the first, lit after it, dark after the next.
-    """
-
+    # (m,) rising, m even; dark before the first, lit after it, dark after the next.
     times_ms: FloatArray
 
     def compute_lit_fractions(

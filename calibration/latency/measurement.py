@@ -32,12 +32,9 @@ _T95 = 2.05
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A time and its standard error.
+    """A time and its standard error."""
 
-    Attributes:
-        value_ms, sigma_ms: and its standard error.
-    """
-
+    # value_ms, sigma_ms: and its standard error.
     value_ms: float
     sigma_ms: float
 
@@ -49,45 +46,32 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class EyeLag:
-    """Lag of one eye behind the code, and how well the code explains its pictures.
+    """Lag of one eye behind the code, and how well the code explains its pictures."""
 
-    Attributes:
-        lag: from the call that changed the display to the change in the pictures, on their stamps.
-        width_ms: of the window in which a switch is seen: exposure and spread together.
-        drift: how much later the second half of the frames saw it than the first.
-        swing: grey values between darkness and light.
-        area_fraction: of the picture.
-        explained: share of the area's changes that the code explains.
-        wrong_fraction: of the frames that saw light where the code says darkness, or the reverse.
-        other_peak_fraction: of resampled recordings that another delay fits better.
-    """
-
+    # from the call that changed the display to the change in the pictures, on their stamps.
     lag: Estimate
-    width_ms: float
-    drift: Estimate
-    swing: float
-    area_fraction: float
-    explained: float
+    width_ms: float  # of the window in which a switch is seen: exposure and spread together
+    drift: Estimate  # how much later the second half of the frames saw it than the first
+    swing: float  # grey values between darkness and light
+    area_fraction: float  # of the picture
+    explained: float  # share of the area's changes that the code explains
+    # of the frames that saw light where the code says darkness, or the reverse.
     wrong_fraction: float
-    other_peak_fraction: float
+    other_peak_fraction: float  # of resampled recordings that another delay fits better
 
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Result of a latency measurement.
+    """Result of a latency measurement."""
 
-    Attributes:
-        left, right: the eyes.
-        late: how much later the right eye exposes than the stamps of its pictures say, the left
-            one taken as it is.
-        stamped_ms: how much later it exposes by the stamps; median.
-        n_frames, n_switches: that were used.
-    """
-
+    # left, right: the eyes.
     left: EyeLag
     right: EyeLag
+    # how much later the right eye exposes than the stamps of its pictures say, the left one taken
+    # as it is.
     late: Estimate
-    stamped_ms: float
+    stamped_ms: float  # how much later it exposes by the stamps; median
+    # n_frames, n_switches: that were used.
     n_frames: int
     n_switches: int
 

@@ -21,47 +21,33 @@ _FINENESS = 3
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits that a calibration has to meet.
+    """Limits that a calibration has to meet."""
 
-    Attributes:
-        fewest_pairs: that must be used.
-        least_coverage: share of the cells of a picture, of those where the working volume is seen,
-            that must hold marks.
-        least_tilt_deg: a third of the views must show the board turned out of the picture's plane
-            by as much.
-        worst_rms_px: of what is left.
-        worst_held_out: held-out over solved residuals.
-        accept_mm: largest predicted 95 % error in the working volume.
-        known_fraction: largest difference from a length that is known.
-        depth_mm: nearest and farthest surface of the working volume; None: where the board was.
-    """
-
-    fewest_pairs: int = 8
+    fewest_pairs: int = 8  # that must be used
+    # share of the cells of a picture, of those where the working volume is seen, that must hold
+    # marks.
     least_coverage: float = 0.5
+    # a third of the views must show the board turned out of the picture's plane by as much.
     least_tilt_deg: float = 12.0
-    worst_rms_px: float = 0.6
-    worst_held_out: float = 1.5
-    accept_mm: float = 0.40
-    known_fraction: float = 0.005
+    worst_rms_px: float = 0.6  # of what is left
+    worst_held_out: float = 1.5  # held-out over solved residuals
+    accept_mm: float = 0.40  # largest predicted 95 % error in the working volume
+    known_fraction: float = 0.005  # largest difference from a length that is known
+    # nearest and farthest surface of the working volume; None: where the board was.
     depth_mm: tuple[float, float] | None = (350.0, 550.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """How well the views cover the pictures, depths and tilts.
+    """How well the views cover the pictures, depths and tilts."""
 
-    Attributes:
-        left, right: shares of the cells that the working volume needs, with marks in them.
-        bare: (2, 6, 8) bool, left and right: cells that it needs, without any.
-        depth_mm: nearest and farthest mark.
-        tilts_deg: (V,) of the board's normal against the optical axis, per view; of both cameras
-            the smaller. A board parallel to the picture tells no focal length, wherever it is.
-    """
-
+    # left, right: shares of the cells that the working volume needs, with marks in them.
     left: float
     right: float
-    bare: NDArray[np.bool_]
-    depth_mm: tuple[float, float]
+    bare: NDArray[np.bool_]  # (2, 6, 8) bool, left and right: cells that it needs, without any
+    depth_mm: tuple[float, float]  # nearest and farthest mark
+    # (V,) of the board's normal against the optical axis, per view; of both cameras the smaller. A
+    # board parallel to the picture tells no focal length, wherever it is.
     tilts_deg: FloatArray
 
 

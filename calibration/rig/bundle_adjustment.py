@@ -21,25 +21,18 @@ _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
-    """Result of a bundle adjustment: rig, poses of the board, information and residuals.
+    """Result of a bundle adjustment: rig, poses of the board, information and residuals."""
 
-    Attributes:
-        model: which numbers were solved for.
-        shared: (n_shared,) `parameters` tells their order.
-        left_from_board: (V, 6) rotation vector and translation of each view.
-        normal: (n_shared, n_shared) information about the shared numbers, the poses eliminated.
-        scale: robust standard deviation of what is left, in units of the marks' standard errors.
-        residuals_px: per view (n, 2) and (m, 2): seen less predicted, left and right.
-        is_settled: the steps came to rest.
-    """
-
-    model: RigModel
-    shared: FloatArray
-    left_from_board: FloatArray
+    model: RigModel  # which numbers were solved for
+    shared: FloatArray  # (n_shared,) `parameters` tells their order
+    left_from_board: FloatArray  # (V, 6) rotation vector and translation of each view
+    # (n_shared, n_shared) information about the shared numbers, the poses eliminated.
     normal: FloatArray
+    # robust standard deviation of what is left, in units of the marks' standard errors.
     scale: float
+    # per view (n, 2) and (m, 2): seen less predicted, left and right.
     residuals_px: list[tuple[FloatArray, FloatArray]]
-    is_settled: bool
+    is_settled: bool  # the steps came to rest
 
     @property
     def covariance(self) -> FloatArray:

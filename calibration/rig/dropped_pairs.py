@@ -40,17 +40,11 @@ FAULTS_OF_CAPTURE = (Fault.OUT_OF_ORDER, Fault.MOVED)
 
 @dataclass(frozen=True, slots=True)
 class DroppedPair:
-    """A pair that is not used.
+    """A pair that is not used."""
 
-    Attributes:
-        index: of the pair.
-        fault: its kind.
-        reason: for people.
-    """
-
-    index: int
-    fault: Fault
-    reason: str
+    index: int  # of the pair
+    fault: Fault  # its kind
+    reason: str  # for people
 
 
 def find_blurred_pairs(pairs: Sequence[SeenPair]) -> list[DroppedPair]:

@@ -18,17 +18,13 @@ N_FOLDS = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOut:
-    """Residuals of views under rigs that were solved without them.
+    """Residuals of views under rigs that were solved without them."""
 
-    Attributes:
-        squares_px2: (V,) mean squared distance between marks seen and predicted, per view.
-        costs: (V,) the same in units of the marks' standard errors, large ones counted linearly.
-        rigs: (K, n_shared) numbers of the rigs that were solved without one fold each.
-    """
-
+    # (V,) mean squared distance between marks seen and predicted, per view.
     squares_px2: FloatArray
+    # (V,) the same in units of the marks' standard errors, large ones counted linearly.
     costs: FloatArray
-    rigs: FloatArray
+    rigs: FloatArray  # (K, n_shared) numbers of the rigs that were solved without one fold each
 
     @property
     def rms_px(self) -> float:

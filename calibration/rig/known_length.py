@@ -20,28 +20,18 @@ _N_UNKNOWN = 7
 
 @dataclass(frozen=True, slots=True)
 class MeasuredLength:
-    """A board's measured size relative to its true one, from one pair.
+    """A board's measured size relative to its true one, from one pair."""
 
-    Attributes:
-        ratio: measured over true.
-        sigma: its standard error, from what the marks leave.
-    """
-
-    ratio: float
-    sigma: float
+    ratio: float  # measured over true
+    sigma: float  # its standard error, from what the marks leave
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LengthMeter:
-    """Finds a board in pairs of pictures and measures it with a rig.
+    """Finds a board in pairs of pictures and measures it with a rig."""
 
-    Attributes:
-        board: of known size.
-        rig: that is trusted or not.
-    """
-
-    board: Board
-    rig: StereoRig
+    board: Board  # of known size
+    rig: StereoRig  # that is trusted or not
 
     def __call__(self, left: Image, right: Image) -> MeasuredLength | None:
         """Measure; None where not both pictures show enough of the board."""

@@ -29,16 +29,11 @@ _EXPECTED_FRACTION_OFF = (0.01, 0.01, 0.05)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Views:
-    """Observations and model of a bundle adjustment, the same in all steps.
+    """Observations and model of a bundle adjustment, the same in all steps."""
 
-    Attributes:
-        board: that was seen.
-        model: which numbers are solved for.
-        pictures: V left and right ones: the marks, and their standard errors (n,) px.
-    """
-
-    board: Board
-    model: RigModel
+    board: Board  # that was seen
+    model: RigModel  # which numbers are solved for
+    # V left and right ones: the marks, and their standard errors (n,) px.
     pictures: Sequence[tuple[tuple[SeenBoard, FloatArray], ...]]
 
     @classmethod
@@ -56,21 +51,13 @@ class Views:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PictureLinearisation:
-    """Residuals of one picture and their derivatives.
+    """Residuals of one picture and their derivatives."""
 
-    Attributes:
-        residual_px: (n, 2) seen less predicted.
-        by_shared: (2 n, n_shared) slopes.
-        by_pose: (2 n, 6) slopes.
-        sigma_px: (n,) standard errors.
-        length: (n,) of the residuals, in standard errors.
-    """
-
-    residual_px: FloatArray
-    by_shared: FloatArray
-    by_pose: FloatArray
-    sigma_px: FloatArray
-    length: FloatArray
+    residual_px: FloatArray  # (n, 2) seen less predicted
+    by_shared: FloatArray  # (2 n, n_shared) slopes
+    by_pose: FloatArray  # (2 n, 6) slopes
+    sigma_px: FloatArray  # (n,) standard errors
+    length: FloatArray  # (n,) of the residuals, in standard errors
 
 
 class Linearisation:

@@ -20,16 +20,11 @@ N_COEFFICIENTS = (4, 5, 8, 12)
 
 @dataclass(frozen=True, slots=True)
 class RigModel:
-    """Which parameters of a rig are solved for.
+    """Which parameters of a rig are solved for."""
 
-    Attributes:
-        n_coefficients: of each lens, one of `N_COEFFICIENTS`.
-        n_marks: of the board, whose places are solved for as well; 0: it is as it should be.
-        width, height: of a picture, px.
-    """
-
-    n_coefficients: int
-    n_marks: int
+    n_coefficients: int  # of each lens, one of `N_COEFFICIENTS`
+    n_marks: int  # of the board, whose places are solved for as well; 0: it is as it should be
+    # width, height: of a picture, px.
     width: int
     height: int
 

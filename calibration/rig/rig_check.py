@@ -20,25 +20,15 @@ _FEWEST_PAIRS, _N_SIGMAS = 3, 2.0
 
 @dataclass(frozen=True, slots=True)
 class RigCheck:
-    """Result of checking a rig on new views.
+    """Result of checking a rig on new views."""
 
-    Attributes:
-        n_pairs: that saw the board.
-        rms_px: of marks seen less predicted, only the board's poses solved for.
-        epipolar_rms_px: of right marks from the left ones' lines.
-        epipolar_offset_px: their median: cameras that turned against each other.
-        length_mean: triangulated over true length on the board.
-        length_error: its standard error.
-        reasons: why the rig should not be used; empty when it may.
-    """
-
-    n_pairs: int
-    rms_px: float
-    epipolar_rms_px: float
-    epipolar_offset_px: float
-    length_mean: float
-    length_error: float
-    reasons: tuple[str, ...]
+    n_pairs: int  # that saw the board
+    rms_px: float  # of marks seen less predicted, only the board's poses solved for
+    epipolar_rms_px: float  # of right marks from the left ones' lines
+    epipolar_offset_px: float  # their median: cameras that turned against each other
+    length_mean: float  # triangulated over true length on the board
+    length_error: float  # its standard error
+    reasons: tuple[str, ...]  # why the rig should not be used; empty when it may
 
 
 def check_rig(

@@ -43,37 +43,23 @@ _CHANCE = 1.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """A solved rig with its residuals, coverage and predicted errors.
+    """A solved rig with its residuals, coverage and predicted errors."""
 
-    Attributes:
-        rig: with its quality record.
-        board: that was seen.
-        pairs: that were used.
-        dropped: those that were not, and why.
-        solved: the bundle.
-        held_out: what views say of rigs solved without them.
-        held_out_rms_px: of views that were set aside, or of `held_out`.
-        bounds_mm: (n,) predicted 95 % errors of points of the working volume; none when both
-            cameras see nothing of it.
-        points_mm: (n, 3) these points, in the left camera's frame.
-        depth_mm: nearest and farthest surface of that volume.
-        covered: where and how the board was shown.
-        epipolar_rms_px: distance of the right marks from the left marks' lines.
-        length_ratios: of triangulated to true distances between marks of a view, all views.
-    """
-
-    rig: StereoRig
-    board: Board
-    pairs: list[SeenPair]
-    dropped: list[DroppedPair]
-    solved: Bundle
-    held_out: HeldOut
-    held_out_rms_px: float
+    rig: StereoRig  # with its quality record
+    board: Board  # that was seen
+    pairs: list[SeenPair]  # that were used
+    dropped: list[DroppedPair]  # those that were not, and why
+    solved: Bundle  # the bundle
+    held_out: HeldOut  # what views say of rigs solved without them
+    held_out_rms_px: float  # of views that were set aside, or of `held_out`
+    # (n,) predicted 95 % errors of points of the working volume; none when both cameras see nothing
+    # of it.
     bounds_mm: FloatArray
-    points_mm: FloatArray
-    depth_mm: tuple[float, float]
-    covered: Coverage
-    epipolar_rms_px: float
+    points_mm: FloatArray  # (n, 3) these points, in the left camera's frame
+    depth_mm: tuple[float, float]  # nearest and farthest surface of that volume
+    covered: Coverage  # where and how the board was shown
+    epipolar_rms_px: float  # distance of the right marks from the left marks' lines
+    # of triangulated to true distances between marks of a view, all views.
     length_ratios: FloatArray
 
 

@@ -36,25 +36,18 @@ _FEWEST_SQUARES, _FEWEST_CIRCLES = 3, 2
 
 @dataclass(frozen=True)
 class Board:
-    """A flat calibration target.
+    """A flat calibration target."""
 
-    Attributes:
-        kind: of the target.
-        columns, rows: squares of a board of squares (inner corners + 1), circles of the others.
-        spacing_mm: side of a square; distance of neighbouring circles in a row; of an asymmetric
-            grid half of that, which is also the distance of its rows.
-        mark_mm: side of a marker, diameter of a circle; 0 on a chessboard.
-        dictionary: of a ChArUco board's markers, OpenCV's name.
-        is_legacy: a ChArUco board as OpenCV drew it before 4.6.
-    """
-
-    kind: BoardKind
+    kind: BoardKind  # of the target
+    # columns, rows: squares of a board of squares (inner corners + 1), circles of the others.
     columns: int
     rows: int
+    # side of a square; distance of neighbouring circles in a row; of an asymmetric grid half of
+    # that, which is also the distance of its rows.
     spacing_mm: float
-    mark_mm: float = 0.0
-    dictionary: str = ""
-    is_legacy: bool = False
+    mark_mm: float = 0.0  # side of a marker, diameter of a circle; 0 on a chessboard
+    dictionary: str = ""  # of a ChArUco board's markers, OpenCV's name
+    is_legacy: bool = False  # a ChArUco board as OpenCV drew it before 4.6
 
     @property
     def has_squares(self) -> bool:

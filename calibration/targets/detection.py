@@ -28,19 +28,12 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenBoard:
-    """Marks of a target found in one picture.
+    """Marks of a target found in one picture."""
 
-    Attributes:
-        ids: (n,) rows of `Board.points_mm`, ascending.
-        pixels: (n, 2) where they are seen; integer coordinates are centres of pixels.
-        sigma_px: (n,) standard error of each coordinate, from what the fit leaves.
-        blur_px: median standard deviation of the blur of the marks' edges.
-    """
-
-    ids: NDArray[np.intp]
-    pixels: FloatArray
-    sigma_px: FloatArray
-    blur_px: float
+    ids: NDArray[np.intp]  # (n,) rows of `Board.points_mm`, ascending
+    pixels: FloatArray  # (n, 2) where they are seen; integer coordinates are centres of pixels
+    sigma_px: FloatArray  # (n,) standard error of each coordinate, from what the fit leaves
+    blur_px: float  # median standard deviation of the blur of the marks' edges
 
 
 def find_board(picture: Image, board: Board) -> SeenBoard | None:

@@ -11,16 +11,11 @@ from navapp.geometry.transform import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """Black shapes on white paper; x right, y down, from the board's own origin.
+    """Black shapes on white paper; x right, y down, from the board's own origin."""
 
-    Attributes:
-        rectangles_mm: (n, 4) left, top, right, bottom.
-        discs_mm: (n, 3) centre and radius.
-        low_mm, high_mm: (2,) corners of what is printed.
-    """
-
-    rectangles_mm: FloatArray
-    discs_mm: FloatArray
+    rectangles_mm: FloatArray  # (n, 4) left, top, right, bottom
+    discs_mm: FloatArray  # (n, 3) centre and radius
+    # low_mm, high_mm: (2,) corners of what is printed.
     low_mm: FloatArray
     high_mm: FloatArray
 

@@ -11,17 +11,11 @@ from navapp.geometry.transform import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenPair:
-    """Marks of a target found in both pictures of one instant.
+    """Marks of a target found in both pictures of one instant."""
 
-    Attributes:
-        index: number of the pair, as its files are called.
-        left: seen by the left camera.
-        right: by the right one.
-    """
-
-    index: int
-    left: SeenBoard
-    right: SeenBoard
+    index: int  # number of the pair, as its files are called
+    left: SeenBoard  # seen by the left camera
+    right: SeenBoard  # by the right one
 
     def common(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
         """Ids (n,) of the marks that both see, and their pixels, (n, 2) left and right."""

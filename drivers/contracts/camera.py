@@ -26,21 +26,14 @@ from navapp.errors import DeviceLost, DeviceTimeout, UnsupportedControl
 
 @dataclass(frozen=True, slots=True)
 class CameraUnderTest:
-    """A camera that was never opened, and what must be known to test it.
+    """A camera that was never opened, and what must be known to test it."""
 
-    Attributes:
-        camera: fresh; the checks open and close it.
-        clock: the one that its time stamps are from.
-        control: name of a control and a value that it must accept; None when it has no control.
-        n_frames: how many frames can be read at least, 3 or more.
-        timeout_s: within which a frame comes when all goes well.
-    """
-
-    camera: StereoCamera
-    clock: Clock
+    camera: StereoCamera  # fresh; the checks open and close it
+    clock: Clock  # the one that its time stamps are from
+    # name of a control and a value that it must accept; None when it has no control.
     control: tuple[str, float] | None = None
-    n_frames: int = 4
-    timeout_s: float = 2.0
+    n_frames: int = 4  # how many frames can be read at least, 3 or more
+    timeout_s: float = 2.0  # within which a frame comes when all goes well
 
 
 MakeCamera = Callable[[], CameraUnderTest]

@@ -25,19 +25,13 @@ from navapp.errors import DeviceLost
 
 @dataclass(frozen=True, slots=True)
 class DisplayUnderTest:
-    """A display that was never opened, and an eye on it.
+    """A display that was never opened, and an eye on it."""
 
-    Attributes:
-        display: fresh; the checks open and close it.
-        clock: the one that its expiries are from.
-        visible_image: what can be seen on it now, (H, W, 3) uint8 BGR; black also when it is off.
-        latency_ns: within which a picture is there, or gone.
-    """
-
-    display: Display
-    clock: Clock
+    display: Display  # fresh; the checks open and close it
+    clock: Clock  # the one that its expiries are from
+    # what can be seen on it now, (H, W, 3) uint8 BGR; black also when it is off.
     visible_image: Callable[[], Image]
-    latency_ns: int = 0
+    latency_ns: int = 0  # within which a picture is there, or gone
 
 
 MakeDisplay = Callable[[], DisplayUnderTest]

@@ -19,19 +19,12 @@ from navapp.errors import DeviceLost, UnsupportedControl
 
 @dataclass(frozen=True, slots=True)
 class MirrorUnderTest:
-    """A mount that was never opened and, when movable, not homed.
+    """A mount that was never opened and, when movable, not homed."""
 
-    Attributes:
-        mirror: fresh; the checks open and close it.
-        angle_deg: where it can be moved to, or where it is fixed.
-        tolerance_deg: how near it gets.
-        timeout_s: within which it is homed, or moved.
-    """
-
-    mirror: MirrorMount
-    angle_deg: float
-    tolerance_deg: float = 0.05
-    timeout_s: float = 30.0
+    mirror: MirrorMount  # fresh; the checks open and close it
+    angle_deg: float  # where it can be moved to, or where it is fixed
+    tolerance_deg: float = 0.05  # how near it gets
+    timeout_s: float = 30.0  # within which it is homed, or moved
 
 
 MakeMirror = Callable[[], MirrorUnderTest]

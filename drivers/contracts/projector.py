@@ -20,17 +20,11 @@ from navapp.errors import DeviceLost, UnsupportedControl
 
 @dataclass(frozen=True, slots=True)
 class ProjectorUnderTest:
-    """A control line that was never opened.
+    """A control line that was never opened."""
 
-    Attributes:
-        projector: fresh; the checks open and close it.
-        source: a picture source that it has; None when that is not known.
-        timeout_s: within which any command is finished, lamp included.
-    """
-
-    projector: ProjectorControl
-    source: str | None = None
-    timeout_s: float = 150.0
+    projector: ProjectorControl  # fresh; the checks open and close it
+    source: str | None = None  # a picture source that it has; None when that is not known
+    timeout_s: float = 150.0  # within which any command is finished, lamp included
 
 
 MakeProjector = Callable[[], ProjectorUnderTest]

@@ -10,17 +10,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Unseen:
-    """Something that could not be examined, and why.
+    """Something that could not be examined, and why."""
 
-    Attributes:
-        subject: what it is about, for programs.
-        problem: a sentence without its full stop.
-        remedy: what a person can do.
-    """
-
-    subject: str
-    problem: str
-    remedy: str
+    subject: str  # what it is about, for programs
+    problem: str  # a sentence without its full stop
+    remedy: str  # what a person can do
 
     @classmethod
     def because(cls, error: NavappError) -> "Unseen":

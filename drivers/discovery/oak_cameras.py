@@ -25,17 +25,11 @@ UDEV_REMEDY = (
 
 @dataclass(frozen=True, slots=True)
 class OakCamera:
-    """An OAK camera.
+    """An OAK camera."""
 
-    Attributes:
-        device_id: what `[camera.depthai] device` takes.
-        port: of the USB bus, as DepthAI tells it.
-        is_in_use: it is booted: a session has it, or it has not come to rest yet.
-    """
-
-    device_id: str
-    port: str
-    is_in_use: bool
+    device_id: str  # what `[camera.depthai] device` takes
+    port: str  # of the USB bus, as DepthAI tells it
+    is_in_use: bool  # it is booted: a session has it, or it has not come to rest yet
 
 
 def list_oak_cameras(

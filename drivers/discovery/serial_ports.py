@@ -15,19 +15,12 @@ _NO_CHIP = "0"
 
 @dataclass(frozen=True, slots=True)
 class FoundPort:
-    """A serial port.
+    """A serial port."""
 
-    Attributes:
-        device: its device file, whose number may change.
-        path: what `port` under `[projector]` and `[mirror]` takes: a name that stays.
-        description: of the adapter, for people.
-        usb_serial: serial number of a USB adapter, not of the device behind it; else empty.
-    """
-
-    device: str
-    path: str
-    description: str
-    usb_serial: str
+    device: str  # its device file, whose number may change
+    path: str  # what `port` under `[projector]` and `[mirror]` takes: a name that stays
+    description: str  # of the adapter, for people
+    usb_serial: str  # serial number of a USB adapter, not of the device behind it; else empty
 
 
 def list_serial_ports(links: Path = _LINKS, ttys: Path = _TTYS) -> Listing[FoundPort]:

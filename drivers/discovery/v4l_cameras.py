@@ -13,24 +13,16 @@ from drivers.v4l_names import FoundCamera, V4lNames
 
 @dataclass(frozen=True, slots=True)
 class UsbCamera:
-    """A camera behind V4L2.
+    """A camera behind V4L2."""
 
-    Attributes:
-        node: its device file, whose number changes.
-        path: the name of that file that stays; None where the system gives it none.
-        chosen_by: what `[camera.opencv] left` takes: its serial number where no other camera has
-            the same, else the path of its port; empty when there is neither.
-        serial: as it tells it; empty when it does not.
-        card: its name for people; empty when it could not be asked.
-        formats: empty when it could not be asked.
-    """
-
-    node: Path
-    path: Path | None
+    node: Path  # its device file, whose number changes
+    path: Path | None  # the name of that file that stays; None where the system gives it none
+    # what `[camera.opencv] left` takes: its serial number where no other camera has the same, else
+    # the path of its port; empty when there is neither.
     chosen_by: str
-    serial: str
-    card: str
-    formats: tuple[PixelFormat, ...]
+    serial: str  # as it tells it; empty when it does not
+    card: str  # its name for people; empty when it could not be asked
+    formats: tuple[PixelFormat, ...]  # empty when it could not be asked
 
 
 def list_usb_cameras(names: V4lNames | None = None) -> Listing[UsbCamera]:

@@ -36,32 +36,21 @@ class PictureSize:
 
 @dataclass(frozen=True, slots=True)
 class PixelFormat:
-    """A pixel format and its sizes.
+    """A pixel format and its sizes."""
 
-    Attributes:
-        fourcc: as `[camera.opencv] fourcc` takes it.
-        description: the driver's words.
-        sizes: the camera's; of one that takes any size between two, these two.
-    """
-
-    fourcc: str
-    description: str
+    fourcc: str  # as `[camera.opencv] fourcc` takes it
+    description: str  # the driver's words
+    # the camera's; of one that takes any size between two, these two.
     sizes: tuple[PictureSize, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class VideoDevice:
-    """What a video device says of itself.
+    """What a video device says of itself."""
 
-    Attributes:
-        card: its name for people.
-        is_camera: it gives pictures; a camera's second device does not.
-        formats: in the driver's order.
-    """
-
-    card: str
-    is_camera: bool
-    formats: tuple[PixelFormat, ...]
+    card: str  # its name for people
+    is_camera: bool  # it gives pictures; a camera's second device does not
+    formats: tuple[PixelFormat, ...]  # in the driver's order
 
 
 def ask(node: Path) -> VideoDevice:

@@ -17,17 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardPairs:
-    """The board in the pictures of a folder.
+    """The board in the pictures of a folder."""
 
-    Attributes:
-        seen: pairs that show the board, by their numbers.
-        unseen: those that do not, and in which picture.
-        size: width and height of every picture, px.
-    """
-
-    seen: "list[SeenPair]"
-    unseen: "list[DroppedPair]"
-    size: tuple[int, int]
+    seen: "list[SeenPair]"  # pairs that show the board, by their numbers
+    unseen: "list[DroppedPair]"  # those that do not, and in which picture
+    size: tuple[int, int]  # width and height of every picture, px
 
 
 def read_pairs(folder: str, board: "Board", diagnostics: Diagnostics) -> BoardPairs:

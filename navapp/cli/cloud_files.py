@@ -24,36 +24,22 @@ _LARGEST_COORDINATE = 1e12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneFile:
-    """Points of a scene, in the file's unit.
+    """Points of a scene, in the file's unit."""
 
-    Attributes:
-        points: (N, 3), no two equal.
-        unit: what the file says of it, or None.
-        notes: what was done, in words for people.
-    """
-
-    points: FloatArray
-    unit: str | None
-    notes: tuple[str, ...]
+    points: FloatArray  # (N, 3), no two equal
+    unit: str | None  # what the file says of it, or None
+    notes: tuple[str, ...]  # what was done, in words for people
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelFile:
-    """A model, in the file's unit.
+    """A model, in the file's unit."""
 
-    Attributes:
-        whole: as the file holds it.
-        mesh: mended and thinned, with normals; without faces for a cloud.
-        is_removed: (V,) vertices without a normal.
-        unit: what the file says of it, or None.
-        notes: what was done, in words for people.
-    """
-
-    whole: TriangleMesh
-    mesh: TriangleMesh
-    is_removed: NDArray[np.bool_]
-    unit: str | None
-    notes: tuple[str, ...]
+    whole: TriangleMesh  # as the file holds it
+    mesh: TriangleMesh  # mended and thinned, with normals; without faces for a cloud
+    is_removed: NDArray[np.bool_]  # (V,) vertices without a normal
+    unit: str | None  # what the file says of it, or None
+    notes: tuple[str, ...]  # what was done, in words for people
 
 
 def read_scene(path: str | Path) -> SceneFile:

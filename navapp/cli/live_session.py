@@ -23,19 +23,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveSession:
-    """A session that is about to start.
+    """A session that is about to start."""
 
-    Attributes:
-        configuration: with the command line's words in it.
-        opened: devices, and the simulation when there is one.
-        specification: of the session.
-        board: whose lengths are known, None when none is configured.
-    """
-
-    configuration: "Configuration"
-    opened: "OpenedDevices"
-    specification: "SessionSpecification"
-    board: "Board | None" = None
+    configuration: "Configuration"  # with the command line's words in it
+    opened: "OpenedDevices"  # devices, and the simulation when there is one
+    specification: "SessionSpecification"  # of the session
+    board: "Board | None" = None  # whose lengths are known, None when none is configured
 
 
 def prepare_session(

@@ -24,23 +24,16 @@ _SMALLEST_MM, _LARGEST_MM = 5.0, 5000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegisterInputs:
-    """Scene, model and start of a registration in mm, with the conversion to the files' unit.
+    """Scene, model and start of a registration in mm, with the conversion to the files' unit."""
 
-    Attributes:
-        scene, model: in mm.
-        file: the model as its file holds it, in the files' unit.
-        start: rough `scene_from_model`, mm.
-        factor: mm per unit of the files.
-        warnings: what the user should know, in words.
-        read_ms, prepare_ms: how long it took to read the files, and to make them ready.
-    """
-
+    # scene, model: in mm.
     scene: "Scene"
     model: "RegistrationModel"
-    file: "ModelFile"
-    start: RigidTransform
-    factor: float
-    warnings: tuple[str, ...]
+    file: "ModelFile"  # the model as its file holds it, in the files' unit
+    start: RigidTransform  # rough `scene_from_model`, mm
+    factor: float  # mm per unit of the files
+    warnings: tuple[str, ...]  # what the user should know, in words
+    # read_ms, prepare_ms: how long it took to read the files, and to make them ready.
     read_ms: float
     prepare_ms: float
 

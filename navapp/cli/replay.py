@@ -71,23 +71,16 @@ def add_parser(subparsers: Any) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Replay:
-    """What is replayed, and who operates.
+    """What is replayed, and who operates."""
 
-    Attributes:
-        specification: of the session.
-        operator: gives the commands.
-        executor: runs first registrations.
-        is_as_recorded: commands and results of searches come when they came in the recording.
-        warnings: for a person, before the replay begins.
-        rig_moved: after which frame the recorded session found this rig moved, and how; None when
-            it did not, or another rig is used.
-    """
-
-    specification: "SessionSpecification"
-    operator: "Operator"
-    executor: "Executor"
+    specification: "SessionSpecification"  # of the session
+    operator: "Operator"  # gives the commands
+    executor: "Executor"  # runs first registrations
+    # commands and results of searches come when they came in the recording.
     is_as_recorded: bool = False
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # for a person, before the replay begins
+    # after which frame the recorded session found this rig moved, and how; None when it did not, or
+    # another rig is used.
     rig_moved: "MovedRig | None" = None
 
 

@@ -19,17 +19,11 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoPair:
-    """A pair ready to be matched.
+    """A pair ready to be matched."""
 
-    Attributes:
-        rectified: grey pictures.
-        rectifier: of the rig; None where the pair was taken as it is.
-        rectify_ms: how long that took.
-    """
-
-    rectified: "RectifiedPair"
-    rectifier: "Rectifier | None"
-    rectify_ms: float
+    rectified: "RectifiedPair"  # grey pictures
+    rectifier: "Rectifier | None"  # of the rig; None where the pair was taken as it is
+    rectify_ms: float  # how long that took
 
 
 def read_pair(options: argparse.Namespace) -> StereoPair:

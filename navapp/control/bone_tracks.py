@@ -12,21 +12,13 @@ from navapp.values import FrameTimings, StageSpec, Status, TrackedFrame, Verdict
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidate:
-    """A pose of the stage's bone that waits for the operator's decision.
+    """A pose of the stage's bone that waits for the operator's decision."""
 
-    Attributes:
-        track: where it is now.
-        tracked: the tracker's newest answer for it.
-        is_held: judged as it stands (proposed by hand), not followed.
-        number: it is the n-th ...
-        count: ... of how many.
-    """
-
-    track: TrackState
-    tracked: TrackedFrame
-    is_held: bool = False
-    number: int = 1
-    count: int = 1
+    track: TrackState  # where it is now
+    tracked: TrackedFrame  # the tracker's newest answer for it
+    is_held: bool = False  # judged as it stands (proposed by hand), not followed
+    number: int = 1  # it is the n-th ..
+    count: int = 1  # ... of how many.
 
 
 class BoneTracks:

@@ -16,15 +16,10 @@ _MOTION_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class DeviceReport:
-    """What is known of a device.
+    """What is known of a device."""
 
-    Attributes:
-        line: for the devices panel.
-        reason: why guides must not be shown; None when they may.
-    """
-
-    line: DeviceLine
-    reason: Reason | None = None
+    line: DeviceLine  # for the devices panel
+    reason: Reason | None = None  # why guides must not be shown; None when they may
 
 
 class DeviceHandler(Protocol):

@@ -10,26 +10,17 @@ from navapp.values import FrameTimings, OverlayPicture, StageSpec, TrackedFrame
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
-    """One handled frame.
+    """One handled frame."""
 
-    Attributes:
-        frame: as the camera gave it.
-        state: after the frame.
-        stage: in force.
-        tracked: the active bone's pose and verdict; None when nothing was looked for.
-        picture: what was made for the display.
-        timings: of tracking and overlay; their sum is the processing time.
-        is_navigable: guides are in the picture.
-        others: other bones than the active one, whose turn it was in this very frame.
-    """
-
-    frame: StereoFrame
-    state: SessionState
-    stage: StageSpec
+    frame: StereoFrame  # as the camera gave it
+    state: SessionState  # after the frame
+    stage: StageSpec  # in force
+    # the active bone's pose and verdict; None when nothing was looked for.
     tracked: TrackedFrame | None
-    picture: OverlayPicture
-    timings: FrameTimings
-    is_navigable: bool
+    picture: OverlayPicture  # what was made for the display
+    timings: FrameTimings  # of tracking and overlay; their sum is the processing time
+    is_navigable: bool  # guides are in the picture
+    # other bones than the active one, whose turn it was in this very frame.
     others: Mapping[str, TrackedFrame] = field(default_factory=dict)
 
 

@@ -45,21 +45,14 @@ class Finding(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LengthCheck:
-    """A known length in view, measured with the session's rig.
+    """A known length in view, measured with the session's rig."""
 
-    Attributes:
-        captured_ns: when it was seen last.
-        ratio: measured over true.
-        bound: 95 % bound of the error of `ratio`.
-        n_looks: behind it.
-        finding: OFF: surely wrong by more than may be; WITHIN: at 95 % not; DOUBTFUL: neither;
-            NOT_JUDGED: too few looks, or they scatter as only a board does that is moved about.
-    """
-
-    captured_ns: int
-    ratio: float
-    bound: float
-    n_looks: int
+    captured_ns: int  # when it was seen last
+    ratio: float  # measured over true
+    bound: float  # 95 % bound of the error of `ratio`
+    n_looks: int  # behind it
+    # OFF: surely wrong by more than may be; WITHIN: at 95 % not; DOUBTFUL: neither; NOT_JUDGED: too
+    # few looks, or they scatter as only a board does that is moved about.
     finding: Finding = Finding.NOT_JUDGED
 
     @property
@@ -80,19 +73,12 @@ class LengthCheck:
 
 @dataclass(frozen=True, slots=True)
 class _Pool:
-    """Looks of one showing, taken together.
+    """Looks of one showing, taken together."""
 
-    Attributes:
-        n: so many.
-        ratio: their mean.
-        sigma: standard error of one look, from what the looks know of themselves.
-        scatter: standard deviation of the looks.
-    """
-
-    n: int
-    ratio: float
-    sigma: float
-    scatter: float
+    n: int  # so many
+    ratio: float  # their mean
+    sigma: float  # standard error of one look, from what the looks know of themselves
+    scatter: float  # standard deviation of the looks
 
     @classmethod
     def of(cls, lengths: Sequence[Length]) -> "_Pool":

@@ -169,17 +169,12 @@ class RecordedOperator:
 
 @dataclass(frozen=True, slots=True)
 class RecordedEvents:
-    """What `events.jsonl` of a session says.
+    """What `events.jsonl` of a session says."""
 
-    Attributes:
-        commands: (after which frame, command), without those that were refused.
-        take_overs: before which frames a registration's result was used.
-        is_complete: the recording ran to its end.
-    """
-
+    # (after which frame, command), without those that were refused.
     commands: list[tuple[int, Command]]
-    take_overs: list[int]
-    is_complete: bool
+    take_overs: list[int]  # before which frames a registration's result was used
+    is_complete: bool  # the recording ran to its end
 
     @property
     def rig_moved(self) -> tuple[int, DistrustRig] | None:

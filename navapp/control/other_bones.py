@@ -16,19 +16,14 @@ from navapp.values import Plan, StageSpec, Status, TrackedFrame, Verdict
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """What was last said of a bone.
+    """What was last said of a bone."""
 
-    Attributes:
-        verdict: that.
-        ok_ns: when the newest frame in which it was OK was captured; None when there was none.
-        active: where the stage's bone was in the same frame; None when that was not OK.
-        track_number: of that pose.
-    """
-
-    verdict: Verdict
+    verdict: Verdict  # that
+    # when the newest frame in which it was OK was captured; None when there was none.
     ok_ns: int | None = None
+    # where the stage's bone was in the same frame; None when that was not OK.
     active: RigidTransform | None = None
-    track_number: int = 0
+    track_number: int = 0  # of that pose
 
 
 class OtherBones:

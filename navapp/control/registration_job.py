@@ -11,15 +11,10 @@ from navapp.values import StageSpec, TrackedFrame
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Registration:
-    """What a first registration has found.
+    """What a first registration has found."""
 
-    Attributes:
-        answers: best first, lost ones among them; empty when no start was known.
-        captured_ns: of the frame that was searched.
-    """
-
-    answers: list[TrackedFrame]
-    captured_ns: int
+    answers: list[TrackedFrame]  # best first, lost ones among them; empty when no start was known
+    captured_ns: int  # of the frame that was searched
 
 
 class RegistrationJob:

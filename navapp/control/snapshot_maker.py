@@ -18,27 +18,16 @@ from navapp.values import Plan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SnapshotMaker:
-    """Makes the snapshots of a session and its devices.
+    """Makes the snapshots of a session and its devices."""
 
-    Attributes:
-        session: what is known.
-        camera: in use.
-        display: in use.
-        monitored: projector and mirror.
-        rig: of the camera.
-        rig_watch: that watches it.
-        plan: of the operation.
-        is_recording: the session is kept in a folder.
-    """
-
-    session: Session
-    camera: CameraLink
-    display: DisplayLink
-    monitored: MonitoredDevices
-    rig: StereoRig
-    rig_watch: RigWatch
-    plan: Plan
-    is_recording: bool
+    session: Session  # what is known
+    camera: CameraLink  # in use
+    display: DisplayLink  # in use
+    monitored: MonitoredDevices  # projector and mirror
+    rig: StereoRig  # of the camera
+    rig_watch: RigWatch  # that watches it
+    plan: Plan  # of the operation
+    is_recording: bool  # the session is kept in a folder
 
     def make(self) -> Snapshot:
         """As of now."""

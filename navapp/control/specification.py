@@ -13,31 +13,20 @@ _DEPTH_MM = TrackerSettings().depth_mm
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionSpecification:
-    """Everything that a session is started with, except its devices.
+    """Everything that a session is started with, except its devices."""
 
-    Attributes:
-        rig: of the pictures.
-        plan: of the operation.
-        prior: where the bones may be before a first registration.
-        stage: in force at the start.
-        method: of pose estimation.
-        depth_mm: nearest and farthest surface of the working volume.
-        others: bones that are registered from the prior and followed, too, unasked.
-        overlay_valid_ms: how long a picture may stay on the display without a newer one.
-        mirror_deg: where the mirror stood when the display was calibrated.
-        is_recording: the session is kept in a folder.
-    """
-
-    rig: StereoRig
-    plan: Plan
-    prior: Prior
-    stage: StageSpec = STAGES[0]
-    method: Method = "bimcc"
-    depth_mm: tuple[float, float] = _DEPTH_MM
+    rig: StereoRig  # of the pictures
+    plan: Plan  # of the operation
+    prior: Prior  # where the bones may be before a first registration
+    stage: StageSpec = STAGES[0]  # in force at the start
+    method: Method = "bimcc"  # of pose estimation
+    depth_mm: tuple[float, float] = _DEPTH_MM  # nearest and farthest surface of the working volume
+    # bones that are registered from the prior and followed, too, unasked.
     others: tuple[str, ...] = ()
+    # how long a picture may stay on the display without a newer one.
     overlay_valid_ms: float = 500.0
-    mirror_deg: float = 45.0
-    is_recording: bool = False
+    mirror_deg: float = 45.0  # where the mirror stood when the display was calibrated
+    is_recording: bool = False  # the session is kept in a folder
 
     @property
     def tracker_settings(self) -> TrackerSettings:

@@ -43,25 +43,18 @@ class Propose:
 
 @dataclass(frozen=True, slots=True)
 class Accept:
-    """Take the candidate that the operator has seen; refused when another one is under review.
+    """Take the candidate that the operator has seen; refused when another one is under review."""
 
-    Attributes:
-        candidate_id: as the snapshot tells it; None (of recordings that do not hold it) means
-            whichever is under review.
-    """
-
+    # as the snapshot tells it; None (of recordings that do not hold it) means whichever is under
+    # review.
     candidate_id: int | None
 
 
 @dataclass(frozen=True, slots=True)
 class Reject:
-    """Drop the candidate that the operator has seen; refused when another one is under review.
+    """Drop the candidate that the operator has seen; refused when another one is under review."""
 
-    Attributes:
-        candidate_id: as of `Accept`.
-    """
-
-    candidate_id: int | None
+    candidate_id: int | None  # as of `Accept`
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,20 +122,13 @@ class EventLevel(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened.
+    """Something that happened."""
 
-    Attributes:
-        time_ns: on the session's clock.
-        kind: short name for programs, for example `state`, `stage`, `accept`, `device`.
-        text: one line for people.
-        sequence: the frame after which it happened, -1 before the first.
-    """
-
-    time_ns: int
-    kind: str
-    text: str
+    time_ns: int  # on the session's clock
+    kind: str  # short name for programs, for example `state`, `stage`, `accept`, `device`
+    text: str  # one line for people
     level: EventLevel = EventLevel.INFO
-    sequence: int = -1
+    sequence: int = -1  # the frame after which it happened, -1 before the first
 
 
 class DeviceHealth(Enum):
@@ -167,25 +153,18 @@ class DeviceLine:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """How fast frames are handled; None before there is a figure.
+    """How fast frames are handled; None before there is a figure."""
 
-    Attributes:
-        frames_per_s: over the last seconds.
-        latency_ms: from the capture of the newest frame until its picture was handed to the
-            display; None of frames that wait to be read (docs/conventions.md).
-        fps_history, latency_history_ms: the last values, oldest first, for sparklines.
-        n_frames: handled so far.
-        n_dropped: replaced by newer ones before they were handled.
-        skew_ms: between the two cameras, newest frame.
-    """
-
-    frames_per_s: float | None = None
+    frames_per_s: float | None = None  # over the last seconds
+    # from the capture of the newest frame until its picture was handed to the display; None of
+    # frames that wait to be read (docs/conventions.md).
     latency_ms: float | None = None
+    # fps_history, latency_history_ms: the last values, oldest first, for sparklines.
     fps_history: tuple[float, ...] = ()
     latency_history_ms: tuple[float, ...] = ()
-    n_frames: int = 0
-    n_dropped: int = 0
-    skew_ms: float | None = None
+    n_frames: int = 0  # handled so far
+    n_dropped: int = 0  # replaced by newer ones before they were handled
+    skew_ms: float | None = None  # between the two cameras, newest frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,75 +177,55 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class OtherBone:
-    """Another bone than the stage's that is followed; never drawn.
+    """Another bone than the stage's that is followed; never drawn."""
 
-    Attributes:
-        name: of the bone.
-        verdict: on the newest frame that was its turn, by its own stage's goal; None before one.
-        age_ms: since the newest frame in which it was OK, now; None when there was none.
-    """
-
-    name: str
+    name: str  # of the bone
+    # on the newest frame that was its turn, by its own stage's goal; None before one.
     verdict: Verdict | None = None
+    # since the newest frame in which it was OK, now; None when there was none.
     age_ms: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """All that a client may show; immutable.
-
-    Attributes:
-        state: of the session.
-        stage: in force.
-        stages: all five, in order.
-        reasons: why guides are not shown; empty means navigable.
-        verdict: on the newest pose, None before there is one.
-        left_from_bone: the newest pose, None when there is none.
-        candidate_id: of the pose that waits for the operator's decision: another one for every
-            candidate of a session; None when none waits.
-        is_simulated: the pictures are not of this world.
-        is_recording: the session is kept in a folder.
-        pose_age_ms: of that pose, now.
-        others: the other bones that are followed.
-        preview: (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before
-            the first frame.
-        is_bone_planned: the plan has a model of the stage's bone.
-        device_reasons: what projector and mirror have against guides; nothing at all is shown then.
-        is_camera_silent: no picture has come for longer than the camera's period explains.
-        rig_alarm: why the rig is not believed any more; empty while it is.
-        length_check: the newest look at a known length that says something of the rig, else the
-            newest; None before one.
-        events: the newest, oldest first.
-    """
+    """All that a client may show; immutable."""
 
     time_ns: int
-    state: SessionState
-    stage: StageSpec
-    stages: tuple[StageSpec, ...]
-    reasons: tuple[Reason, ...]
+    state: SessionState  # of the session
+    stage: StageSpec  # in force
+    stages: tuple[StageSpec, ...]  # all five, in order
+    reasons: tuple[Reason, ...]  # why guides are not shown; empty means navigable
     is_blanked: bool = False
-    verdict: Verdict | None = None
-    left_from_bone: RigidTransform | None = None
+    verdict: Verdict | None = None  # on the newest pose, None before there is one
+    left_from_bone: RigidTransform | None = None  # the newest pose, None when there is none
+    # of the pose that waits for the operator's decision: another one for every candidate of a
+    # session; None when none waits.
     candidate_id: int | None = None
-    pose_age_ms: float | None = None
-    others: tuple[OtherBone, ...] = ()
+    pose_age_ms: float | None = None  # of that pose, now
+    others: tuple[OtherBone, ...] = ()  # the other bones that are followed
+    # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
+    # frame.
     preview: NDArray[np.uint8] | None = None
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()
-    events: tuple[Event, ...] = ()
+    events: tuple[Event, ...] = ()  # the newest, oldest first
     progress: Progress | None = None
     rig_name: str = ""
     plan_name: str = ""
     plan_digest: str = ""
     side: str = ""
     sequence: int = -1
-    is_bone_planned: bool = True
+    is_bone_planned: bool = True  # the plan has a model of the stage's bone
+    # no picture has come for longer than the camera's period explains.
     is_camera_silent: bool = False
-    rig_alarm: str = ""
+    rig_alarm: str = ""  # why the rig is not believed any more; empty while it is
+    # the newest look at a known length that says something of the rig, else the newest; None before
+    # one.
     length_check: LengthCheck | None = None
+    # what projector and mirror have against guides; nothing at all is shown then.
     device_reasons: tuple[Reason, ...] = ()
-    is_simulated: bool = False
-    is_recording: bool = False
+    is_simulated: bool = False  # the pictures are not of this world
+    is_recording: bool = False  # the session is kept in a folder
     is_over: bool = False
 
     @property

@@ -20,19 +20,12 @@ _STEPPED_CAPTURE_HZ = 5.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenedCapture:
-    """An opened camera that need not be calibrated yet.
+    """An opened camera that need not be calibrated yet."""
 
-    Attributes:
-        camera: opened.
-        clock: of its frames.
-        reopen: opens it again when it was lost.
-        hand: holds the board in front of simulated cameras, else None.
-    """
-
-    camera: StereoCamera
-    clock: Clock
-    reopen: Callable[[], StereoCamera]
-    hand: Hand | None = None
+    camera: StereoCamera  # opened
+    clock: Clock  # of its frames
+    reopen: Callable[[], StereoCamera]  # opens it again when it was lost
+    hand: Hand | None = None  # holds the board in front of simulated cameras, else None
 
 
 def open_capture(configuration: Configuration, board: Board, *, is_headless: bool) -> OpenedCapture:

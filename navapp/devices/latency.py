@@ -19,16 +19,12 @@ _WIDTH, _HEIGHT = 64, 36
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenedLatency:
-    """A camera and the display in its view; neither need be calibrated.
+    """A camera and the display in its view; neither need be calibrated."""
 
-    Attributes:
-        camera, display: opened.
-        clock: of both.
-    """
-
+    # camera, display: opened.
     camera: StereoCamera
     display: Display
-    clock: Clock
+    clock: Clock  # of both
 
     def close(self) -> None:
         """Both, the display first so that it is dark."""

@@ -24,33 +24,23 @@ from sim_devices.world import World
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
-    """What the simulated room hands to its caller, apart from the devices.
+    """What the simulated room hands to its caller, apart from the devices."""
 
-    Attributes:
-        bones: name -> surface as planned.
-        side: of the knee.
-        targets: `bone/name` -> point, mm, bone coordinates.
-        curves: vessels and nerves beside the femur.
-        drill_entry_mm, drill_direction: where the room's drill enters the femur, and whereto.
-        worn_vertices: of the femur, where its cartilage is worn.
-        nominal_left_from_bone: how the knee was laid on the table; rough starts.
-        approach_axis, approach_half_angle_deg: of the approach cone.
-        oracle: the truth, for evaluation after the run only.
-        set_stage: tells the room which stage is in force.
-    """
-
-    bones: Mapping[str, TriangleMesh]
-    side: Literal["left", "right"]
-    targets: Mapping[str, FloatArray]
-    curves: Mapping[str, FloatArray]
+    bones: Mapping[str, TriangleMesh]  # name -> surface as planned
+    side: Literal["left", "right"]  # of the knee
+    targets: Mapping[str, FloatArray]  # `bone/name` -> point, mm, bone coordinates
+    curves: Mapping[str, FloatArray]  # vessels and nerves beside the femur
+    # drill_entry_mm, drill_direction: where the room's drill enters the femur, and whereto.
     drill_entry_mm: FloatArray
     drill_direction: FloatArray
-    worn_vertices: NDArray[np.int64]
+    worn_vertices: NDArray[np.int64]  # of the femur, where its cartilage is worn
+    # how the knee was laid on the table; rough starts.
     nominal_left_from_bone: Mapping[str, RigidTransform]
+    # approach_axis, approach_half_angle_deg: of the approach cone.
     approach_axis: FloatArray
     approach_half_angle_deg: float
-    oracle: TruthOracle
-    set_stage: Callable[[str], None]
+    oracle: TruthOracle  # the truth, for evaluation after the run only
+    set_stage: Callable[[str], None]  # tells the room which stage is in force
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,18 +14,15 @@ class Camera:
 
     Pixel (0, 0) is the centre of the top-left pixel.
 
-    Attributes:
-        matrix: (3, 3) K, px, without skew.
-        distortion: (n,) OpenCV coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1..s4 [tx ty]]]]; n may
-            be 0, 4, 5, 8, 12 or 14, the tilt (tx, ty) only 0.
-        width, height: of the picture, px.
-
     Raises:
         ValueError: a shape or a value that no camera has.
     """
 
-    matrix: FloatArray
+    matrix: FloatArray  # (3, 3) K, px, without skew
+    # (n,) OpenCV coefficients k1 k2 p1 p2 [k3 [k4 k5 k6 [s1..s4 [tx ty]]]]; n may be 0, 4, 5, 8, 12
+    # or 14, the tilt (tx, ty) only 0.
     distortion: FloatArray
+    # width, height: of the picture, px.
     width: int
     height: int
 

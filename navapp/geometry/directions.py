@@ -11,16 +11,13 @@ from navapp.geometry.transform import FloatArray, read_only, rotation_from_vecto
 class ViewCone:
     """Where the cameras may stand, seen from a body.
 
-    Attributes:
-        axis: (3,) unit, from the body towards the cameras, in its coordinates; None: anywhere.
-        half_angle_deg: around the axis.
-
     Raises:
         ValueError: the axis has no length.
     """
 
+    # (3,) unit, from the body towards the cameras, in its coordinates; None: anywhere.
     axis: FloatArray | None = None
-    half_angle_deg: float = 180.0
+    half_angle_deg: float = 180.0  # around the axis
 
     def __post_init__(self) -> None:
         if self.axis is None:

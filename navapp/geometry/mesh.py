@@ -17,17 +17,13 @@ _LEAST_COSINE = 0.2
 class TriangleMesh:
     """Vertices in mm and triangles seen counter-clockwise from outside.
 
-    Attributes:
-        vertices_mm: (V, 3) float64.
-        faces: (F, 3) int32 indices into the vertices.
-        normals: (V, 3) float64 unit vertex normals, area weighted; computed when not given.
-
     Raises:
         ValueError: wrong shapes, an index out of range, a value that is not finite.
     """
 
-    vertices_mm: FloatArray
-    faces: IntArray
+    vertices_mm: FloatArray  # (V, 3) float64
+    faces: IntArray  # (F, 3) int32 indices into the vertices
+    # (V, 3) float64 unit vertex normals, area weighted; computed when not given.
     normals: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
     def __post_init__(self) -> None:

@@ -14,19 +14,13 @@ class RidgeEdges(NamedTuple):
 
     An outline runs over such edges only: of their two triangles one looks at the eye, the other
     away. Open borders are left out: there the model ends, not the bone.
-
-    Attributes:
-        vertices_mm: (V, 3) of the mesh.
-        edges: (E, 2) vertices.
-        faces: (E, 2) the two triangles.
-        opposite: (E, 2) the third vertex of either.
-        planes: (4, F) unit outward normal n of each triangle, 0 without area, and n.x in mm on it.
     """
 
-    vertices_mm: FloatArray
-    edges: IntArray
-    faces: IntArray
-    opposite: IntArray
+    vertices_mm: FloatArray  # (V, 3) of the mesh
+    edges: IntArray  # (E, 2) vertices
+    faces: IntArray  # (E, 2) the two triangles
+    opposite: IntArray  # (E, 2) the third vertex of either
+    # (4, F) unit outward normal n of each triangle, 0 without area, and n.x in mm on it.
     planes: NDArray[np.float32]
 
 

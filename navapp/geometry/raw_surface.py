@@ -12,19 +12,12 @@ from navapp.geometry.transform import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawSurface:
-    """What a surface file holds, as stored and unchecked: NaN points, faces out of range.
+    """What a surface file holds, as stored and unchecked: NaN points, faces out of range."""
 
-    Attributes:
-        points: (V, 3) coordinates in the file's unit.
-        faces: (F, 3) indices into the points; (0, 3) for a cloud.
-        normals: (V, 3) of any length, or None when the file has none.
-        unit: what the file says of its unit, lower case, or None.
-    """
-
-    points: FloatArray
-    faces: NDArray[np.integer]
-    normals: FloatArray | None = None
-    unit: str | None = None
+    points: FloatArray  # (V, 3) coordinates in the file's unit
+    faces: NDArray[np.integer]  # (F, 3) indices into the points; (0, 3) for a cloud
+    normals: FloatArray | None = None  # (V, 3) of any length, or None when the file has none
+    unit: str | None = None  # what the file says of its unit, lower case, or None
 
 
 class UnusableContentError(ValueError):

@@ -92,18 +92,13 @@ class Rectifier:
 
     Source: Bouguet's method as in OpenCV's `stereoRectify`, zero disparity at infinity.
 
-    Attributes:
-        rig: whose pictures are rectified.
-        interpolation: between pixels.
-        given: R1, R2 (3, 3) and P1, P2 (3, 4) that another program has rectified with, instead of
-            ours.
-
     Raises:
         RigError: the right camera does not stand to the right of the left one.
     """
 
-    rig: StereoRig
-    interpolation: Interpolation = "cubic"
+    rig: StereoRig  # whose pictures are rectified
+    interpolation: Interpolation = "cubic"  # between pixels
+    # R1, R2 (3, 3) and P1, P2 (3, 4) that another program has rectified with, instead of ours.
     given: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
     _solved: tuple[Any, ...] = field(init=False, repr=False)
 

@@ -29,23 +29,17 @@ _TWELFTH = np.float32(1.0 / 12.0)
 
 
 class Places(NamedTuple):
-    """Where to look for the pixels of a picture (h, w) in another one (H, W).
+    """Where to look for the pixels of a picture (h, w) in another one (H, W)."""
 
-    Attributes:
-        columns: (h, w) px.
-        rows: (h, W) px: where the curve along which a row is looked for crosses the other's
-            columns.
-        in_step: (h, blocks of w) whether the pixels of a block of `LANES` lie one column apart, but
-            for one jump at most.
-        in_row: (h, blocks of W) whether a block of `rows` lies between the same two rows.
-        is_inside: (h,) whether the whole curve lies in the other picture.
-    """
-
-    columns: NDArray[np.float32]
+    columns: NDArray[np.float32]  # (h, w) px
+    # (h, W) px: where the curve along which a row is looked for crosses the other's columns.
     rows: NDArray[np.float32]
+    # (h, blocks of w) whether the pixels of a block of `LANES` lie one column apart, but for one
+    # jump at most.
     in_step: NDArray[np.bool_]
+    # (h, blocks of W) whether a block of `rows` lies between the same two rows.
     in_row: NDArray[np.bool_]
-    is_inside: NDArray[np.bool_]
+    is_inside: NDArray[np.bool_]  # (h,) whether the whole curve lies in the other picture
 
 
 @njit(cache=True, nogil=True)

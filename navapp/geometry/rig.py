@@ -13,26 +13,21 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 
 @dataclass(frozen=True, slots=True)
 class RigQuality:
-    """What the calibration that made a rig said of itself.
+    """What the calibration that made a rig said of itself."""
 
-    Attributes:
-        is_accepted: it met its limits.
-        reasons: why not, otherwise empty.
-        uncertainty_mm: predicted 95 % error of a triangulated point in the working volume.
-        made_on, expires_on: days of the calibration and of its end; None when nobody said.
-        figures: what was measured, by name (`rms_px`, `holdout_rms_px`, `coverage_left`, ...).
-        covariance: (n, n) of the solved numbers: fx fy cx cy and the distortion of the left and of
-            the right camera, rotation vector and translation in mm of `right_from_left`.
-        length_unit: mm, or "square" where the board's size was not known: no rig to navigate with.
-    """
-
-    is_accepted: bool
-    reasons: tuple[str, ...] = ()
+    is_accepted: bool  # it met its limits
+    reasons: tuple[str, ...] = ()  # why not, otherwise empty
+    # predicted 95 % error of a triangulated point in the working volume.
     uncertainty_mm: float | None = None
+    # made_on, expires_on: days of the calibration and of its end; None when nobody said.
     made_on: date | None = None
     expires_on: date | None = None
+    # what was measured, by name (`rms_px`, `holdout_rms_px`, `coverage_left`, ...).
     figures: Mapping[str, float] = field(default_factory=dict)
+    # (n, n) of the solved numbers: fx fy cx cy and the distortion of the left and of the right
+    # camera, rotation vector and translation in mm of `right_from_left`.
     covariance: FloatArray | None = field(default=None, compare=False)
+    # mm, or "square" where the board's size was not known: no rig to navigate with.
     length_unit: str = "mm"
 
     def error_mm(self, depth_mm: float) -> float:

@@ -35,20 +35,15 @@ _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attri
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceFile:
-    """A surface or a cloud as a file holds it.
+    """A surface or a cloud as a file holds it."""
 
-    Attributes:
-        mesh: coordinates as stored, in the file's unit; without faces for a cloud. The corners of
-            an STL that are exactly equal are one vertex.
-        has_normals: the normals came with the file or follow from the faces. Otherwise they are 0.
-        unit: what the file says of its unit, lower case ("mm"), or None.
-        n_dropped: points that were not finite; they and their faces were left out.
-    """
-
+    # coordinates as stored, in the file's unit; without faces for a cloud. The corners of an STL
+    # that are exactly equal are one vertex.
     mesh: TriangleMesh
+    # the normals came with the file or follow from the faces. Otherwise they are 0.
     has_normals: bool
-    unit: str | None
-    n_dropped: int
+    unit: str | None  # what the file says of its unit, lower case ("mm"), or None
+    n_dropped: int  # points that were not finite; they and their faces were left out
 
 
 def read_surface_file(path: str | Path) -> SurfaceFile:

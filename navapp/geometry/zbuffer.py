@@ -26,17 +26,12 @@ _SELF_OCCLUSION_MM = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderedView:
-    """Depth and triangle per pixel of a box.
+    """Depth and triangle per pixel of a box."""
 
-    Attributes:
-        depth_mm: (h, w) float32 along the optical axis, NaN where the mesh is not seen.
-        face_index: (h, w) int32, -1 where the mesh is not seen.
-        box: place of the buffer in the picture; it may reach beyond the picture.
-    """
-
+    # (h, w) float32 along the optical axis, NaN where the mesh is not seen.
     depth_mm: NDArray[np.float32]
-    face_index: NDArray[np.int32]
-    box: Box
+    face_index: NDArray[np.int32]  # (h, w) int32, -1 where the mesh is not seen
+    box: Box  # place of the buffer in the picture; it may reach beyond the picture
 
     @property
     def mask(self) -> NDArray[np.bool_]:

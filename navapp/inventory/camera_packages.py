@@ -16,17 +16,11 @@ _LOADING_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class InstalledCamera:
-    """A driver that another package brings.
+    """A driver that another package brings."""
 
-    Attributes:
-        backend: what `[camera] backend` takes.
-        factory: `module:function` that makes the camera.
-        package: name and version of the package.
-    """
-
-    backend: str
-    factory: str
-    package: str
+    backend: str  # what `[camera] backend` takes
+    factory: str  # `module:function` that makes the camera
+    package: str  # name and version of the package
 
 
 def list_installed() -> Listing[InstalledCamera]:

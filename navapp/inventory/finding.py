@@ -14,19 +14,12 @@ class Health(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of one check.
+    """Result of one check."""
 
-    Attributes:
-        name: of it.
-        health: FAILED: the configured session cannot do without it.
-        detail: what was seen.
-        remedy: what to do when it is not OK.
-    """
-
-    name: str
-    health: Health
-    detail: str
-    remedy: str = ""
+    name: str  # of it
+    health: Health  # FAILED: the configured session cannot do without it
+    detail: str  # what was seen
+    remedy: str = ""  # what to do when it is not OK
 
 
 def judge_health(is_fine: bool, is_needed: bool) -> Health:

@@ -30,19 +30,12 @@ _MARGIN_MM = 6.0
 
 @dataclass(frozen=True, slots=True)
 class AspectSettings:
-    """How finely a bone is looked at.
+    """How finely a bone is looked at."""
 
-    Attributes:
-        step_deg: angle between neighbouring views.
-        distance_mm: of the camera from the bone's middle.
-        n_points: of a view, at most.
-        pixel_mm: of the picture that tells what is hidden.
-    """
-
-    step_deg: float = 8.0
-    distance_mm: float = 450.0
-    n_points: int = 220
-    pixel_mm: float = 1.0
+    step_deg: float = 8.0  # angle between neighbouring views
+    distance_mm: float = 450.0  # of the camera from the bone's middle
+    n_points: int = 220  # of a view, at most
+    pixel_mm: float = 1.0  # of the picture that tells what is hidden
 
 
 def build_aspects(

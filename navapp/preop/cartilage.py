@@ -33,18 +33,13 @@ _DIPS_MM, _DIPS_FRACTION = 0.5, 0.02
 
 @dataclass(frozen=True, slots=True)
 class CartilageFigures:
-    """Cartilage of a bone in three numbers, over the vertices that have some.
+    """Cartilage of a bone in three numbers, over the vertices that have some."""
 
-    Attributes:
-        mean_mm, max_mm: thickness.
-        sd_mm: root mean square of its standard deviation.
-        share: of the bone's vertices.
-    """
-
+    # mean_mm, max_mm: thickness.
     mean_mm: float
     max_mm: float
-    sd_mm: float
-    share: float
+    sd_mm: float  # root mean square of its standard deviation
+    share: float  # of the bone's vertices
 
 
 def figures_of(bone: BoneModel) -> CartilageFigures | None:

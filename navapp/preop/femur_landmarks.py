@@ -28,19 +28,12 @@ ACROSS = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Condyles:
-    """A femur's vertices, which of them belong to a condyle, and the plane between the two.
+    """A femur's vertices, which of them belong to a condyle, and the plane between the two."""
 
-    Attributes:
-        vertices_mm: (V, 3) of the bone.
-        is_border: (V,) where its surface was cut.
-        is_condyle: (V,) low enough.
-        notch_x_mm: the plane that parts them.
-    """
-
-    vertices_mm: FloatArray
-    is_border: NDArray[np.bool_]
-    is_condyle: NDArray[np.bool_]
-    notch_x_mm: float
+    vertices_mm: FloatArray  # (V, 3) of the bone
+    is_border: NDArray[np.bool_]  # (V,) where its surface was cut
+    is_condyle: NDArray[np.bool_]  # (V,) low enough
+    notch_x_mm: float  # the plane that parts them
 
     def of_side(self, sign: float) -> NDArray[np.bool_]:
         """(V,) the condyle towards +x or -x."""

@@ -20,24 +20,17 @@ _SPACES = {"LPS": "LPS", "RAS": "RAS", "1": "LPS", "0": "RAS"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Markup:
-    """One markup of a file.
+    """One markup of a file."""
 
-    Attributes:
-        kind: Slicer's type in small letters: `fiducial`, `line`, `curve`, `closedcurve`, `plane`.
-        name: its own, or that of the file.
-        labels: of the points.
-        points_mm: (N, 3) defined points.
-        centre_mm, normal: (3,) of a plane, when the file holds them.
-        size_mm: of a plane along its axes, when the file holds it.
-    """
-
+    # Slicer's type in small letters: `fiducial`, `line`, `curve`, `closedcurve`, `plane`.
     kind: str
-    name: str
-    labels: tuple[str, ...]
-    points_mm: FloatArray
+    name: str  # its own, or that of the file
+    labels: tuple[str, ...]  # of the points
+    points_mm: FloatArray  # (N, 3) defined points
+    # centre_mm, normal: (3,) of a plane, when the file holds them.
     centre_mm: FloatArray | None = None
     normal: FloatArray | None = None
-    size_mm: tuple[float, float] | None = None
+    size_mm: tuple[float, float] | None = None  # of a plane along its axes, when the file holds it
 
 
 def read_markup_file(path: str | Path, warnings: list[str]) -> list[Markup]:

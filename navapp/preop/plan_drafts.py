@@ -20,37 +20,27 @@ _LEAST_LABEL_MM3 = 1000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtSettings:
-    """Settings of a plan from a CT that an operator may override.
+    """Settings of a plan from a CT that an operator may override."""
 
-    Attributes:
-        threshold_hu: what is denser may be bone; the surface does not depend on it.
-        seeds: name -> (3,) LPS point in that bone.
-        region_mm: (x0, x1, y0, y1, z0, z1) LPS box to look at; None for all.
-        side: of the knee; None to be estimated.
-    """
-
+    # what is denser may be bone; the surface does not depend on it.
     threshold_hu: float = DEFAULT_THRESHOLD_HU
+    # name -> (3,) LPS point in that bone.
     seeds: Mapping[str, FloatArray] = field(default_factory=lambda: NO_SEEDS)
+    # (x0, x1, y0, y1, z0, z1) LPS box to look at; None for all.
     region_mm: tuple[float, float, float, float, float, float] | None = None
-    side: Side | None = None
+    side: Side | None = None  # of the knee; None to be estimated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Draft:
-    """Bone models before they become a plan.
+    """Bone models before they become a plan."""
 
-    Attributes:
-        bones: name -> model, those that are followed.
-        origin: facts for people.
-        fibula: which is not followed and tells the side; None where it is not known.
-        side: as the user or the CT's laterality tag says; None to be estimated.
-        slices: bone -> (h, w, 3) BGR, three slices of the volume with the surface's contour.
-    """
-
-    bones: Mapping[str, BoneModel]
-    origin: PlanOrigin
+    bones: Mapping[str, BoneModel]  # name -> model, those that are followed
+    origin: PlanOrigin  # facts for people
+    # which is not followed and tells the side; None where it is not known.
     fibula: TriangleMesh | None = None
-    side: Side | None = None
+    side: Side | None = None  # as the user or the CT's laterality tag says; None to be estimated
+    # bone -> (h, w, 3) BGR, three slices of the volume with the surface's contour.
     slices: Mapping[str, Picture] = field(default_factory=dict)
 
 

@@ -9,29 +9,19 @@ OriginKind = Literal["CT", "labels", "surfaces"]
 
 @dataclass(frozen=True, slots=True)
 class PlanOrigin:
-    """Facts beside the plan's content; nothing that names the patient.
+    """Facts beside the plan's content; nothing that names the patient."""
 
-    Attributes:
-        kind: what it was made from.
-        description: the series' own words, or an empty text.
-        spacing_mm: (i, j, k) of the volume; empty without one.
-        size: voxels (i, j, k).
-        threshold_hu: what is denser was looked at as bone.
-        cortex_hu: density that cortex was found to have.
-        blur_mm: standard deviations of the scanner's blur, in the slices and across.
-        measured: bone -> share of its surface where the density told the edge.
-        warnings: what was assumed, mended or not found.
-    """
-
-    kind: OriginKind = "surfaces"
-    description: str = ""
-    spacing_mm: tuple[float, ...] = ()
-    size: tuple[int, ...] = ()
-    threshold_hu: float | None = None
-    cortex_hu: float | None = None
+    kind: OriginKind = "surfaces"  # what it was made from
+    description: str = ""  # the series' own words, or an empty text
+    spacing_mm: tuple[float, ...] = ()  # (i, j, k) of the volume; empty without one
+    size: tuple[int, ...] = ()  # voxels (i, j, k)
+    threshold_hu: float | None = None  # what is denser was looked at as bone
+    cortex_hu: float | None = None  # density that cortex was found to have
+    # standard deviations of the scanner's blur, in the slices and across.
     blur_mm: tuple[float, ...] = ()
+    # bone -> share of its surface where the density told the edge.
     measured: Mapping[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # what was assumed, mended or not found
 
     @property
     def ct(self) -> dict[str, Any] | None:

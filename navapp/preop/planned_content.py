@@ -13,16 +13,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedContent:
-    """Surgical content, targets and curves (as `Plan` has them) with what was assumed.
-
-    Attributes:
-        absent: centres that are said to be unknown: keys of landmarks.
-    """
+    """Surgical content, targets and curves (as `Plan` has them) with what was assumed."""
 
     content: SurgicalContent = field(default_factory=SurgicalContent)
     targets: Mapping[str, FloatArray] = field(default_factory=dict)
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
-    absent: tuple[str, ...] = ()
+    absent: tuple[str, ...] = ()  # centres that are said to be unknown: keys of landmarks
     warnings: tuple[str, ...] = ()
 
     def union(self, other: "PlannedContent") -> "PlannedContent":

@@ -22,20 +22,14 @@ _TUBERCLE_MM = (25.0, 55.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TibialEnd:
-    """The upper end of a tibia.
+    """The upper end of a tibia."""
 
-    Attributes:
-        vertices_mm, normals: (V, 3).
-        is_border: (V,) where its surface was cut.
-        middle_mm: (2,) x and y of the middle of its rim.
-        middle_sd_mm: how far the slices of the rim disagree on it.
-    """
-
+    # vertices_mm, normals: (V, 3).
     vertices_mm: FloatArray
     normals: FloatArray
-    is_border: NDArray[np.bool_]
-    middle_mm: FloatArray
-    middle_sd_mm: float
+    is_border: NDArray[np.bool_]  # (V,) where its surface was cut
+    middle_mm: FloatArray  # (2,) x and y of the middle of its rim
+    middle_sd_mm: float  # how far the slices of the rim disagree on it
 
     @property
     def below_top_mm(self) -> FloatArray:

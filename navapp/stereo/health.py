@@ -33,39 +33,26 @@ _MEDIAN_TO_MEAN, _MAD_TO_SIGMA = 1.2533, 1.4826
 
 @dataclass(frozen=True, slots=True)
 class PictureHealth:
-    """Light and sharpness of one picture around the bone.
+    """Light and sharpness of one picture around the bone."""
 
-    Attributes:
-        dark_fraction: of pixels too dark to show a bone's texture.
-        saturated_fraction: of pixels that the sensor clipped.
-        detail: rms difference of pixels two rows apart over the mean grey level.
-    """
-
-    dark_fraction: float
-    saturated_fraction: float
-    detail: float
+    dark_fraction: float  # of pixels too dark to show a bone's texture
+    saturated_fraction: float  # of pixels that the sensor clipped
+    detail: float  # rms difference of pixels two rows apart over the mean grey level
 
 
 @dataclass(frozen=True, slots=True)
 class StereoHealth:
-    """What a pair says of its own cameras.
+    """What a pair says of its own cameras."""
 
-    Attributes:
-        left: picture of the left camera.
-        right: of the right one, where it shows the same.
-        row_offset_px: how much lower the right picture shows what the left one shows; NaN when too
-            few points tell, or when it is too far off to be told.
-        row_offset_sigma_px: its standard error.
-        n_points: that told.
-        correlation: median over their windows, of both pictures' grey values; 0 when the rows are
-            further off than is looked for.
-    """
-
-    left: PictureHealth
-    right: PictureHealth
+    left: PictureHealth  # picture of the left camera
+    right: PictureHealth  # of the right one, where it shows the same
+    # how much lower the right picture shows what the left one shows; NaN when too few points tell,
+    # or when it is too far off to be told.
     row_offset_px: float = math.nan
-    row_offset_sigma_px: float = math.nan
-    n_points: int = 0
+    row_offset_sigma_px: float = math.nan  # its standard error
+    n_points: int = 0  # that told
+    # median over their windows, of both pictures' grey values; 0 when the rows are further off than
+    # is looked for.
     correlation: float = math.nan
 
     @property

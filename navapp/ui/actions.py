@@ -27,29 +27,19 @@ _KEY_LABELS = {"space": "SPACE"}
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """One thing the operator can do.
+    """One thing the operator can do."""
 
-    Attributes:
-        name: for programs.
-        key: as Textual names it; single characters stand for themselves.
-        label: one or two words for the footer.
-        description: a sentence for help and palette.
-        is_enabled: whether it makes sense now.
-        command: made from the snapshot; None for what the screen does by itself.
-        slot: place in the footer; actions that share one exclude each other. Empty: not there.
-        needs_width: in the footer of wide terminals only.
-        is_everywhere: works on every screen, also while a question is open and while the session
-            is silent.
-    """
-
-    name: str
-    key: str
-    label: str
-    description: str
-    is_enabled: Callable[[Snapshot], bool]
+    name: str  # for programs
+    key: str  # as Textual names it; single characters stand for themselves
+    label: str  # one or two words for the footer
+    description: str  # a sentence for help and palette
+    is_enabled: Callable[[Snapshot], bool]  # whether it makes sense now
+    # made from the snapshot; None for what the screen does by itself.
     command: Callable[[Snapshot], Command] | None = None
+    # place in the footer; actions that share one exclude each other. Empty: not there.
     slot: str = ""
-    needs_width: bool = False
+    needs_width: bool = False  # in the footer of wide terminals only
+    # works on every screen, also while a question is open and while the session is silent.
     is_everywhere: bool = False
 
     @property

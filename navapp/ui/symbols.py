@@ -9,14 +9,10 @@ class Symbols:
     """A set of characters, each one cell wide; `at_most` may be wider.
 
     Attributes:
-        ok, attention, bad, absent: marks of a status.
         dot, dash, at_most, times: of running text; `dash` joins the stages.
-        bar_full, bar_empty, bar_limit, bar_left, bar_right, bar_over: of gauges.
-        levels: of sparklines, lowest first.
-        ramp: brightness for pictures without half blocks, darkest first; empty where half blocks
-            can be drawn.
     """
 
+    # ok, attention, bad, absent: marks of a status.
     ok: str
     attention: str
     bad: str
@@ -25,13 +21,16 @@ class Symbols:
     dash: str
     at_most: str
     ellipsis: str
+    # bar_full, bar_empty, bar_limit, bar_left, bar_right, bar_over: of gauges.
     bar_full: str
     bar_empty: str
     bar_limit: str
     bar_left: str
     bar_right: str
     bar_over: str
-    levels: str
+    levels: str  # of sparklines, lowest first
+    # brightness for pictures without half blocks, darkest first; empty where half blocks can be
+    # drawn.
     ramp: str = ""
 
     @property

@@ -72,22 +72,14 @@ _WAITING = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """A snapshot with what the client itself knows.
+    """A snapshot with what the client itself knows."""
 
-    Attributes:
-        snapshot: the newest.
-        symbols: that the terminal can draw.
-        start_ns: the session's time that counts as 00:00.
-        is_silent: the session has given nothing new for too long; nothing in the snapshot is
-            believed any more.
-        title: of the application.
-    """
-
-    snapshot: Snapshot
-    symbols: Symbols
-    start_ns: int
+    snapshot: Snapshot  # the newest
+    symbols: Symbols  # that the terminal can draw
+    start_ns: int  # the session's time that counts as 00:00
+    # the session has given nothing new for too long; nothing in the snapshot is believed any more.
     is_silent: bool = False
-    title: str = "navapp"
+    title: str = "navapp"  # of the application
 
     @property
     def is_navigable(self) -> bool:

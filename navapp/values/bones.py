@@ -20,29 +20,23 @@ FOLLOWED_BONES: tuple[str, ...] = get_args(FollowedBone)
 class BoneModel:
     """A bone as planned, in plan coordinates (LPS, mm).
 
-    Attributes:
-        name: `femur`, `tibia`, `patella`.
-        mesh: surface with outward normals.
-        side: of the patient; None when unknown.
-        cartilage_mm: (V,) mean thickness of what the camera sees above the bone.
-        cartilage_sd_mm: (V,) its standard deviation.
-        is_removed: (V,) what is not there to be seen: cut away by a stage, or by the end of a CT.
-        version: counts the changes by stages.
-        surface_sd_mm: standard deviation of the pose error that errors of the surface cause; 0
-            when nothing is known of them.
-
     Raises:
         ValueError: not one value per vertex, or a cartilage or deviation that is negative or not
             finite.
     """
 
-    name: str
-    mesh: TriangleMesh
-    side: Side | None = None
+    name: str  # `femur`, `tibia`, `patella`
+    mesh: TriangleMesh  # surface with outward normals
+    side: Side | None = None  # of the patient; None when unknown
+    # (V,) mean thickness of what the camera sees above the bone.
     cartilage_mm: FloatArray = field(default_factory=lambda: np.empty(0))
+    # (V,) its standard deviation.
     cartilage_sd_mm: FloatArray = field(default_factory=lambda: np.empty(0))
+    # (V,) what is not there to be seen: cut away by a stage, or by the end of a CT.
     is_removed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
-    version: int = 0
+    version: int = 0  # counts the changes by stages
+    # standard deviation of the pose error that errors of the surface cause; 0 when nothing is known
+    # of them.
     surface_sd_mm: float = 0.0
 
     def __post_init__(self) -> None:
@@ -85,22 +79,15 @@ class AspectGraph:
     The points of a view are in an order in which the first n are spread evenly over it, for every
     n: a coarser level of the view is its first points.
 
-    Attributes:
-        bone: name of the bone.
-        directions: (V, 3) unit, from the bone towards the camera, in bone coordinates.
-        starts: (V + 1,) int64; view k has the points starts[k] to starts[k + 1].
-        points_mm: (N, 3) on the edges, in bone coordinates.
-        tangents: (N, 3) unit, along the edge.
-
     Raises:
         ValueError: shapes that do not belong together, or values that are not finite.
     """
 
-    bone: str
-    directions: FloatArray
-    starts: NDArray[np.int64]
-    points_mm: FloatArray
-    tangents: FloatArray
+    bone: str  # name of the bone
+    directions: FloatArray  # (V, 3) unit, from the bone towards the camera, in bone coordinates
+    starts: NDArray[np.int64]  # (V + 1,) int64; view k has the points starts[k] to starts[k + 1]
+    points_mm: FloatArray  # (N, 3) on the edges, in bone coordinates
+    tangents: FloatArray  # (N, 3) unit, along the edge
 
     def __post_init__(self) -> None:
         for name in ("directions", "points_mm", "tangents"):

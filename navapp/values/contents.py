@@ -21,18 +21,12 @@ HIP_CENTRE, ANKLE_CENTRE = "femur/hip_centre", "tibia/ankle_centre"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResectionPlane:
-    """A planned cut.
+    """A planned cut."""
 
-    Attributes:
-        bone: that is cut.
-        point_mm: (3,) middle of the cut.
-        normal: (3,) unit, out of the bone that stays: what lies beyond is removed.
-        extent_mm: width across (the plan's x laid into the plane) and depth, for drawing.
-    """
-
-    bone: str
-    point_mm: FloatArray
-    normal: FloatArray
+    bone: str  # that is cut
+    point_mm: FloatArray  # (3,) middle of the cut
+    normal: FloatArray  # (3,) unit, out of the bone that stays: what lies beyond is removed
+    # width across (the plan's x laid into the plane) and depth, for drawing.
     extent_mm: tuple[float, float] = (80.0, 60.0)
 
     def __post_init__(self) -> None:
@@ -124,17 +118,11 @@ class Part:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RiskStructure:
-    """A vessel or a nerve: a surface, or without one the plan's curve of the same name.
+    """A vessel or a nerve: a surface, or without one the plan's curve of the same name."""
 
-    Attributes:
-        bone: whose motion it follows.
-        safety_mm: nothing sharp comes nearer than this.
-        mesh: its surface.
-    """
-
-    bone: str
-    safety_mm: float
-    mesh: TriangleMesh | None = None
+    bone: str  # whose motion it follows
+    safety_mm: float  # nothing sharp comes nearer than this
+    mesh: TriangleMesh | None = None  # its surface
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.safety_mm) and self.safety_mm >= 0.0):
@@ -144,17 +132,11 @@ class RiskStructure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Landmark:
-    """A point of the anatomy, its standard deviation (one number for all directions) and origin.
+    """A point of the anatomy, its standard deviation (one number for all directions) and origin."""
 
-    Attributes:
-        point_mm: (3,).
-        sd_mm: None when whoever gave it did not say.
-        source: `contents`, `markups`, `surface` (estimated), `simulation`.
-    """
-
-    point_mm: FloatArray
-    sd_mm: float | None
-    source: str
+    point_mm: FloatArray  # (3,)
+    sd_mm: float | None  # None when whoever gave it did not say
+    source: str  # `contents`, `markups`, `surface` (estimated), `simulation`
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point_mm", _point(self.point_mm, "a landmark"))

@@ -23,18 +23,12 @@ class Origin(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisparityMap:
-    """Disparity of the rectified left view inside a box.
+    """Disparity of the rectified left view inside a box."""
 
-    Attributes:
-        disparity_px: (h, w) float32, NaN where unknown.
-        sigma_px: (h, w) float32 standard deviation, NaN where unknown.
-        origin: (h, w) uint8 of `Origin`.
-        x, y: place of the box's first pixel in the rectified picture.
-    """
-
-    disparity_px: NDArray[np.float32]
-    sigma_px: NDArray[np.float32]
-    origin: NDArray[np.uint8]
+    disparity_px: NDArray[np.float32]  # (h, w) float32, NaN where unknown
+    sigma_px: NDArray[np.float32]  # (h, w) float32 standard deviation, NaN where unknown
+    origin: NDArray[np.uint8]  # (h, w) uint8 of `Origin`
+    # x, y: place of the box's first pixel in the rectified picture.
     x: int
     y: int
 
@@ -96,34 +90,21 @@ class DisparityMap:
 
 @dataclass(frozen=True, slots=True)
 class RowCheck:
-    """What the rows of a usable pair say of its rig.
+    """What the rows of a usable pair say of its rig."""
 
-    Attributes:
-        offset_px: how much lower the right picture shows what the left one shows.
-        is_off: surely, and by more than may be wrong.
-    """
-
-    offset_px: float
-    is_off: bool
+    offset_px: float  # how much lower the right picture shows what the left one shows
+    is_off: bool  # surely, and by more than may be wrong
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceCloud:
-    """Points seen by the stereo camera, in the rectified left camera.
+    """Points seen by the stereo camera, in the rectified left camera."""
 
-    Attributes:
-        points_mm: (N, 3).
-        sigma_ray_mm: (N,) standard deviation along the ray through the point.
-        pixels: (N, 2) int32 column and row in the rectified left view.
-        origin: (N,) uint8 of `Origin`.
-        stride_px: distance of neighbouring points in the picture.
-    """
-
-    points_mm: FloatArray
-    sigma_ray_mm: FloatArray
-    pixels: NDArray[np.int32]
-    origin: NDArray[np.uint8]
-    stride_px: int = 1
+    points_mm: FloatArray  # (N, 3)
+    sigma_ray_mm: FloatArray  # (N,) standard deviation along the ray through the point
+    pixels: NDArray[np.int32]  # (N, 2) int32 column and row in the rectified left view
+    origin: NDArray[np.uint8]  # (N,) uint8 of `Origin`
+    stride_px: int = 1  # distance of neighbouring points in the picture
 
     def __len__(self) -> int:
         return len(self.points_mm)

@@ -16,19 +16,14 @@ from navapp.values.digests import add_value
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """The rough start that an operator can give; any part may be absent.
+    """The rough start that an operator can give; any part may be absent."""
 
-    Attributes:
-        left_from_bone: bone name -> rough pose.
-        approach_axis: unit vector in femur coordinates from the bone towards the cameras.
-        approach_half_angle_deg: of the cone around it.
-        box: x, y, width, height in the left picture, px.
-    """
-
+    # bone name -> rough pose.
     left_from_bone: Mapping[str, RigidTransform] = field(default_factory=dict)
+    # unit vector in femur coordinates from the bone towards the cameras.
     approach_axis: FloatArray | None = None
-    approach_half_angle_deg: float = 180.0
-    box: tuple[int, int, int, int] | None = None
+    approach_half_angle_deg: float = 180.0  # of the cone around it
+    box: tuple[int, int, int, int] | None = None  # x, y, width, height in the left picture, px
 
     def starts(self, bone: str) -> bool:
         """Whether it says anything of where a bone is."""
@@ -60,28 +55,23 @@ class StageSpec:
 class Plan:
     """A pre-operative plan.
 
-    Attributes:
-        bones: name -> model.
-        targets: name -> (N, 3) points of that bone, mm, keyed `bone/name`.
-        curves: name -> (N, 3) polylines (vessels, nerves), mm; they move with the bone of the risk
-            structure of the same name, or with the femur.
-        aspects: bone -> its edges from all around, where they were built beforehand; not in the
-            digest, because they follow from the bones.
-        content: what is to be cut, drilled, put in and kept away from.
-        digest: hash of all of it.
-        name: for people.
-
     Raises:
         ValueError: a risk structure has neither a surface nor a curve, a defect names a vertex that
             its bone does not have, or a stage names what the plan does not have.
     """
 
-    bones: Mapping[str, BoneModel]
+    bones: Mapping[str, BoneModel]  # name -> model
+    # name -> (N, 3) points of that bone, mm, keyed `bone/name`.
     targets: Mapping[str, FloatArray] = field(default_factory=dict)
+    # name -> (N, 3) polylines (vessels, nerves), mm; they move with the bone of the risk structure
+    # of the same name, or with the femur.
     curves: Mapping[str, FloatArray] = field(default_factory=dict)
-    digest: str = ""
-    name: str = ""
+    digest: str = ""  # hash of all of it
+    name: str = ""  # for people
+    # what is to be cut, drilled, put in and kept away from.
     content: SurgicalContent = field(default_factory=SurgicalContent)
+    # bone -> its edges from all around, where they were built beforehand; not in the digest,
+    # because they follow from the bones.
     aspects: Mapping[str, AspectGraph] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -101,36 +101,25 @@ CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseEstimate:
-    """A bone's pose and how well the measurement fixes it.
+    """A bone's pose and how well the measurement fixes it."""
 
-    Attributes:
-        camera_from_bone: source the bone's name; target `left_rect` inside the line, `left` (before
-            rectification) when it leaves it.
-        covariance: (6, 6) of the twist (translation mm first, rotation rad second), applied from
-            the left about the mean of the model's vertices.
-        n_points: points that entered.
-        inlier_fraction: their share within three sigma of the surface.
-        rms_mm: weighted rms of the point-to-plane residual of those.
-        expected_rms_mm: what the measurement's own sigma predicts for it.
-        iterations: of the solver.
-        is_converged: the last step was small enough.
-        reasons: what the solver itself has against the result.
-        size_mm: by how much the bone seems larger than the model, at the rms distance of what is
-            seen from its middle; told by the surface alone.
-        size_sigma_mm: standard deviation of that.
-    """
-
+    # source the bone's name; target `left_rect` inside the line, `left` (before rectification) when
+    # it leaves it.
     camera_from_bone: RigidTransform
+    # (6, 6) of the twist (translation mm first, rotation rad second), applied from the left about
+    # the mean of the model's vertices.
     covariance: FloatArray
-    n_points: int
-    inlier_fraction: float
-    rms_mm: float
-    expected_rms_mm: float
-    iterations: int
-    is_converged: bool
-    reasons: tuple[Reason, ...] = ()
+    n_points: int  # points that entered
+    inlier_fraction: float  # their share within three sigma of the surface
+    rms_mm: float  # weighted rms of the point-to-plane residual of those
+    expected_rms_mm: float  # what the measurement's own sigma predicts for it
+    iterations: int  # of the solver
+    is_converged: bool  # the last step was small enough
+    reasons: tuple[Reason, ...] = ()  # what the solver itself has against the result
+    # by how much the bone seems larger than the model, at the rms distance of what is seen from its
+    # middle; told by the surface alone.
     size_mm: float = 0.0
-    size_sigma_mm: float = math.inf
+    size_sigma_mm: float = math.inf  # standard deviation of that
 
     def with_reason(self, reason: Reason) -> "PoseEstimate":
         """The same estimate with one more reason against it."""
@@ -180,25 +169,17 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The judge's answer for one frame.
+    """The judge's answer for one frame."""
 
-    Attributes:
-        status: only OK may be shown.
-        predicted_tre_mm: 95 % bound of the mean error over the stage's targets, or over the visible
-            vertices when the plan names no targets; None without a pose.
-        reasons: why it is not OK.
-        coverage: share of the visible model that was measured and fits.
-        occluded_fraction: share of the visible model that something nearer hides.
-        inlier_fraction: share of the measured, not hidden model pixels that fit.
-        rms_mm, expected_rms_mm: of the residual.
-    """
-
-    status: Status
+    status: Status  # only OK may be shown
+    # 95 % bound of the mean error over the stage's targets, or over the visible vertices when the
+    # plan names no targets; None without a pose.
     predicted_tre_mm: float | None = None
-    reasons: tuple[Reason, ...] = ()
-    coverage: float = 0.0
-    occluded_fraction: float = 0.0
-    inlier_fraction: float = 0.0
+    reasons: tuple[Reason, ...] = ()  # why it is not OK
+    coverage: float = 0.0  # share of the visible model that was measured and fits
+    occluded_fraction: float = 0.0  # share of the visible model that something nearer hides
+    inlier_fraction: float = 0.0  # share of the measured, not hidden model pixels that fit
+    # rms_mm, expected_rms_mm: of the residual.
     rms_mm: float | None = None
     expected_rms_mm: float | None = None
 
@@ -216,21 +197,13 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedFrame:
-    """What the line answers for one frame and one bone.
+    """What the line answers for one frame and one bone."""
 
-    Attributes:
-        bone: its name.
-        estimate: of its pose, None without one.
-        verdict: of the judge.
-        timings: of the line's steps.
-        rows: what the pair says of the rig itself; None when it says nothing.
-    """
-
-    bone: str
-    estimate: PoseEstimate | None
-    verdict: Verdict
-    timings: FrameTimings
-    rows: RowCheck | None = None
+    bone: str  # its name
+    estimate: PoseEstimate | None  # of its pose, None without one
+    verdict: Verdict  # of the judge
+    timings: FrameTimings  # of the line's steps
+    rows: RowCheck | None = None  # what the pair says of the rig itself; None when it says nothing
 
     @property
     def left_from_bone(self) -> RigidTransform | None:

@@ -30,26 +30,20 @@ class ProjectorModel:
     """What differs between models and days.
 
     Attributes:
-        serial: number.
-        ignition_s: until the lamp burns, after one, two and three attempts.
-        n_failing: ignitions that fail; three are a lamp fault.
-        cooling_s: until standby.
-        is_quick: the colon comes when a power command was accepted; otherwise when it was executed.
-        has_events: tells of changes of the lamp.
-        recovery_s: how long an abnormal projector refuses the lamp.
         faults: code of `ERR?`.
-        hours: of the lamp.
     """
 
-    serial: str = "SIM1200123"
+    serial: str = "SIM1200123"  # number
+    # until the lamp burns, after one, two and three attempts.
     ignition_s: tuple[float, float, float] = (40.0, 70.0, 100.0)
-    n_failing: int = 0
-    cooling_s: float = 50.0
+    n_failing: int = 0  # ignitions that fail; three are a lamp fault
+    cooling_s: float = 50.0  # until standby
+    # the colon comes when a power command was accepted; otherwise when it was executed.
     is_quick: bool = False
-    has_events: bool = False
-    recovery_s: float = 130.0
+    has_events: bool = False  # tells of changes of the lamp
+    recovery_s: float = 130.0  # how long an abnormal projector refuses the lamp
     fault: int = 0
-    hours: tuple[int, ...] = (1633,)
+    hours: tuple[int, ...] = (1633,)  # of the lamp
     settings: dict[str, str] = field(
         default_factory=lambda: {
             "SOURCE": "30",

@@ -21,22 +21,15 @@ _TICK_S = 0.02
 
 @dataclass(slots=True)
 class Trouble:
-    """What happens to replies; shares are of all replies, greetings included.
+    """What happens to replies; shares are of all replies, greetings included."""
 
-    Attributes:
-        is_split: every byte travels alone.
-        late_s: replies come later by this.
-        lost, corrupted: share that never arrives, or arrives with a byte changed.
-        cut: share after half of which the connection ends.
-        seed: of the chance.
-    """
-
-    is_split: bool = False
-    late_s: float = 0.0
+    is_split: bool = False  # every byte travels alone
+    late_s: float = 0.0  # replies come later by this
+    # lost, corrupted: share that never arrives, or arrives with a byte changed.
     lost: float = 0.0
     corrupted: float = 0.0
-    cut: float = 0.0
-    seed: int = 1
+    cut: float = 0.0  # share after half of which the connection ends
+    seed: int = 1  # of the chance
     _random: random.Random = field(init=False)
 
     def __post_init__(self) -> None:

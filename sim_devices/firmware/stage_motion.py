@@ -6,40 +6,24 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class StageModel:
-    """What differs between stages.
+    """What differs between stages."""
 
-    Attributes:
-        serial: number.
-        steps_per_turn: microsteps.
-        highest: of the range that begins with 0.
-        speed: microsteps/s.
-        acceleration: microsteps/s^2.
-        unhomed_steps: how far from home it stands when it gets power.
-    """
-
-    serial: int = 990123
-    steps_per_turn: int = 384_000
-    highest: int = 128_000
-    speed: float = 26_000.0
-    acceleration: float = 100_000.0
-    unhomed_steps: float = 21_000.0
+    serial: int = 990123  # number
+    steps_per_turn: int = 384_000  # microsteps
+    highest: int = 128_000  # of the range that begins with 0
+    speed: float = 26_000.0  # microsteps/s
+    acceleration: float = 100_000.0  # microsteps/s^2
+    unhomed_steps: float = 21_000.0  # how far from home it stands when it gets power
 
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """A motion from a place, as a function of time.
+    """A motion from a place, as a function of time."""
 
-    Attributes:
-        start_ns: when it began.
-        start: place then.
-        speed: then, per s.
-        phases: duration s, acceleration per s^2.
-    """
-
-    start_ns: int
-    start: float
-    speed: float
-    phases: tuple[tuple[float, float], ...]
+    start_ns: int  # when it began
+    start: float  # place then
+    speed: float  # then, per s
+    phases: tuple[tuple[float, float], ...]  # duration s, acceleration per s^2
 
     @property
     def end_ns(self) -> int:

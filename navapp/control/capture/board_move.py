@@ -22,17 +22,11 @@ _TURNS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardMove:
-    """From one pose to another.
+    """From one pose to another."""
 
-    Attributes:
-        shift_mm: (3,) of the board's middle, along the left camera's axes.
-        turn_deg: (3,) rotation vector, about the left camera's axes.
-        is_there: little enough is left.
-    """
-
-    shift_mm: FloatArray
-    turn_deg: FloatArray
-    is_there: bool
+    shift_mm: FloatArray  # (3,) of the board's middle, along the left camera's axes
+    turn_deg: FloatArray  # (3,) rotation vector, about the left camera's axes
+    is_there: bool  # little enough is left
 
     def __str__(self) -> str:
         """The three largest parts; directions as seen in the left picture."""

@@ -12,14 +12,10 @@ from navapp.geometry.rectification import luma
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoardView:
-    """What one frame shows of the board.
+    """What one frame shows of the board."""
 
-    Attributes:
-        frame: that shows it.
-        left, right: None where the board is not seen.
-    """
-
-    frame: StereoFrame
+    frame: StereoFrame  # that shows it
+    # left, right: None where the board is not seen.
     left: SeenBoard | None
     right: SeenBoard | None
 

@@ -41,16 +41,10 @@ class PairStore(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class CaptureSettings:
-    """What is asked of a capture.
+    """What is asked of a capture."""
 
-    Attributes:
-        depth_mm: nearest and farthest surface of the working volume.
-        stop_mm: enough when half of that volume has a predicted 95 % error below.
-        fewest_pairs: never enough with fewer.
-        n_pairs: enough with so many, whatever the error; None: the error alone decides.
-    """
-
-    depth_mm: tuple[float, float]
-    stop_mm: float
-    fewest_pairs: int = 8
+    depth_mm: tuple[float, float]  # nearest and farthest surface of the working volume
+    stop_mm: float  # enough when half of that volume has a predicted 95 % error below
+    fewest_pairs: int = 8  # never enough with fewer
+    # enough with so many, whatever the error; None: the error alone decides.
     n_pairs: int | None = None

@@ -37,27 +37,18 @@ _NEARLY_ALL = 0.95
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NextView:
-    """The view that is wanted next, and the rig as far as it is known.
+    """The view that is wanted next, and the rig as far as it is known."""
 
-    Attributes:
-        left_from_board: where the board should be held; None when no view helps.
-        left: camera to measure and draw with: solved, or a guess before.
-        rig: both, once there is one.
-        solved: the bundle; where the next one begins.
-        indices: of the pairs in it.
-        misfits: pairs that do not fit the others; they are left out.
-        bound_mm: predicted 95 % error that half of the working volume stays below.
-        worst_mm: the same for nearly all of it.
-    """
-
+    # where the board should be held; None when no view helps.
     left_from_board: RigidTransform | None
-    left: Camera
-    rig: StereoRig | None = None
-    solved: Bundle | None = None
-    indices: tuple[int, ...] = ()
-    misfits: tuple[DroppedPair, ...] = ()
+    left: Camera  # camera to measure and draw with: solved, or a guess before
+    rig: StereoRig | None = None  # both, once there is one
+    solved: Bundle | None = None  # the bundle; where the next one begins
+    indices: tuple[int, ...] = ()  # of the pairs in it
+    misfits: tuple[DroppedPair, ...] = ()  # pairs that do not fit the others; they are left out
+    # predicted 95 % error that half of the working volume stays below.
     bound_mm: float | None = None
-    worst_mm: float | None = None
+    worst_mm: float | None = None  # the same for nearly all of it
 
 
 def plan_next_view(

@@ -62,74 +62,44 @@ CaptureCommand = Take | DropLast | Another | Finish | Leave | Follow | Nudge
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One condition of the automatic shutter.
+    """One condition of the automatic shutter."""
 
-    Attributes:
-        name: a word.
-        is_met: whether it holds.
-        text: the number behind it, or what to do.
-    """
-
-    name: str
-    is_met: bool
-    text: str = ""
+    name: str  # a word
+    is_met: bool  # whether it holds
+    text: str = ""  # the number behind it, or what to do
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a solve.
+    """What became of a solve."""
 
-    Attributes:
-        is_accepted: the rig meets its limits.
-        sentences: for people.
-    """
-
-    is_accepted: bool
-    sentences: tuple[str, ...]
+    is_accepted: bool  # the rig meets its limits
+    sentences: tuple[str, ...]  # for people
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CaptureSnapshot:
-    """A capture at one moment.
+    """A capture at one moment."""
 
-    Attributes:
-        time_ns: of the newest frame.
-        phase: what it is busy with.
-        camera: its name; a simulated one begins with `sim:`.
-        trouble: what is wrong with it; empty when nothing is.
-        has_hand: the board is held by a simulated hand.
-        is_following: that hand goes where the board is wanted.
-        pictures: left and right, small, BGR, with marks and the outline of the wanted view.
-        n_seen: marks in the left and right picture, of how many.
-        checks: conditions of the automatic shutter.
-        instruction: where the board is wanted, in words.
-        n_kept: pairs.
-        bound_mm: predicted 95 % error in half of the working volume; None before there is a rig.
-        worst_mm: the same in nearly all of it.
-        stop_mm: at which `bound_mm` the capture is enough.
-        is_enough: it has been reached.
-        covered: (2, 6, 8) bool, cells of the left and right picture in which marks were kept.
-        progress: of the solve.
-        events: newest last.
-        outcome: what became of the last solve; None before.
-    """
-
-    time_ns: int
-    phase: CapturePhase
-    camera: str
-    has_hand: bool
-    is_following: bool
+    time_ns: int  # of the newest frame
+    phase: CapturePhase  # what it is busy with
+    camera: str  # its name; a simulated one begins with `sim:`
+    has_hand: bool  # the board is held by a simulated hand
+    is_following: bool  # that hand goes where the board is wanted
+    # left and right, small, BGR, with marks and the outline of the wanted view.
     pictures: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None
-    n_seen: tuple[int, int, int]
-    checks: tuple[Check, ...]
-    instruction: str
-    n_kept: int
+    n_seen: tuple[int, int, int]  # marks in the left and right picture, of how many
+    checks: tuple[Check, ...]  # conditions of the automatic shutter
+    instruction: str  # where the board is wanted, in words
+    n_kept: int  # pairs
+    # predicted 95 % error in half of the working volume; None before there is a rig.
     bound_mm: float | None
-    worst_mm: float | None
-    stop_mm: float
-    is_enough: bool
+    worst_mm: float | None  # the same in nearly all of it
+    stop_mm: float  # at which `bound_mm` the capture is enough
+    is_enough: bool  # it has been reached
+    # (2, 6, 8) bool, cells of the left and right picture in which marks were kept.
     covered: NDArray[np.bool_]
-    progress: Progress | None
-    events: tuple[str, ...]
-    outcome: Outcome | None = None
-    trouble: str = ""
+    progress: Progress | None  # of the solve
+    events: tuple[str, ...]  # newest last
+    outcome: Outcome | None = None  # what became of the last solve; None before
+    trouble: str = ""  # what is wrong with it; empty when nothing is

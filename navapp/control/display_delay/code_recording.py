@@ -28,18 +28,13 @@ _TIMEOUT_S, _LONGEST_SILENCE_NS = 0.5, 5_000_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CodeRecording:
-    """What was shown and what was seen, ms since the first switch.
+    """What was shown and what was seen, ms since the first switch."""
 
-    Attributes:
-        switches: of the display.
-        left, right: of the same pairs.
-        age_ms: from capture to receipt, median; None of a camera that waits to be read.
-    """
-
-    switches: Switches
+    switches: Switches  # of the display
+    # left, right: of the same pairs.
     left: WatchedCells
     right: WatchedCells
-    age_ms: float | None
+    age_ms: float | None  # from capture to receipt, median; None of a camera that waits to be read
 
 
 class _Frames:

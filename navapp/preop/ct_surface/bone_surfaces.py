@@ -36,33 +36,21 @@ _PADDING_VOXELS = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoneSurface:
-    """Surface of one bone from a CT.
+    """Surface of one bone from a CT."""
 
-    Attributes:
-        mesh: LPS mm, closed, normals outward.
-        is_cut: (V,) the flat end where the volume cuts the shaft: no anatomy.
-        is_measured: (V,) the density there told the edge.
-        left_out: share of a label's volume that is in separate pieces.
-    """
-
-    mesh: TriangleMesh
-    is_cut: NDArray[np.bool_]
-    is_measured: NDArray[np.bool_]
-    left_out: float = 0.0
+    mesh: TriangleMesh  # LPS mm, closed, normals outward
+    is_cut: NDArray[np.bool_]  # (V,) the flat end where the volume cuts the shaft: no anatomy
+    is_measured: NDArray[np.bool_]  # (V,) the density there told the edge
+    left_out: float = 0.0  # share of a label's volume that is in separate pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CtSurfaces:
-    """Surfaces of all bones of a CT, with the scanner's estimated blur.
+    """Surfaces of all bones of a CT, with the scanner's estimated blur."""
 
-    Attributes:
-        bones: by name.
-        scan: density of cortex, and blur.
-        pose_sd_mm: standard deviation of the error that the surfaces' own errors cause in a pose.
-    """
-
-    bones: Mapping[str, BoneSurface]
-    scan: Scan
+    bones: Mapping[str, BoneSurface]  # by name
+    scan: Scan  # density of cortex, and blur
+    # standard deviation of the error that the surfaces' own errors cause in a pose.
     pose_sd_mm: float
 
 

@@ -29,19 +29,14 @@ _CHUNK = 4096
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """Densities and blur of one CT.
+    """Densities and blur of one CT."""
 
-    Attributes:
-        cortex_hu: density of the plate.
-        soft_hu: of the tissue around.
-        blur_in_plane_mm, blur_axial_mm: standard deviations along the slices and across.
-        fading_mm: standard deviation of the plate's inner edge, which fades into spongy bone.
-    """
-
-    cortex_hu: float
-    soft_hu: float
+    cortex_hu: float  # density of the plate
+    soft_hu: float  # of the tissue around
+    # blur_in_plane_mm, blur_axial_mm: standard deviations along the slices and across.
     blur_in_plane_mm: float
     blur_axial_mm: float
+    # standard deviation of the plate's inner edge, which fades into spongy bone.
     fading_mm: float = 0.0
 
     def blur_mm(self, axial_fraction: FloatArray) -> FloatArray:
@@ -54,21 +49,14 @@ class Scan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Edges fitted to N profiles.
+    """Edges fitted to N profiles."""
 
-    Attributes:
-        offset_mm: (N,) of the edge along the outward normal.
-        thickness_mm: (N,) of the plate.
-        misfit_hu2: (N,) sum of squares that is left.
-        sharpness: (N,) second derivative of the misfit by the offset, HU2 per mm2: weight.
-        is_at_end: (N,) the best offset is the first or last that was tried.
-    """
-
-    offset_mm: FloatArray
-    thickness_mm: FloatArray
-    misfit_hu2: FloatArray
+    offset_mm: FloatArray  # (N,) of the edge along the outward normal
+    thickness_mm: FloatArray  # (N,) of the plate
+    misfit_hu2: FloatArray  # (N,) sum of squares that is left
+    # (N,) second derivative of the misfit by the offset, HU2 per mm2: weight.
     sharpness: FloatArray
-    is_at_end: np.ndarray
+    is_at_end: np.ndarray  # (N,) the best offset is the first or last that was tried
 
 
 def sample_positions_mm() -> FloatArray:
@@ -101,16 +89,11 @@ def fit_edges(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Model:
-    """Predicted profiles for every tried pair of offset and thickness, offsets first.
+    """Predicted profiles for every tried pair of offset and thickness, offsets first."""
 
-    Attributes:
-        offsets_mm: (m,).
-        plates: (m * t, n + 1) profile of the plate alone.
-        first, second: (m * t, n + 1) orthonormal span of the two levels.
-    """
-
-    offsets_mm: FloatArray
-    plates: FloatArray
+    offsets_mm: FloatArray  # (m,)
+    plates: FloatArray  # (m * t, n + 1) profile of the plate alone
+    # first, second: (m * t, n + 1) orthonormal span of the two levels.
     first: FloatArray
     second: FloatArray
 

@@ -30,14 +30,10 @@ _MOST_WEIGHT = 2.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RefinedSurface:
-    """A surface whose vertices lie on the edge of the cortex.
+    """A surface whose vertices lie on the edge of the cortex."""
 
-    Attributes:
-        mesh: LPS mm.
-        is_measured: (V,) the profile there was explained; elsewhere neighbours say where it is.
-    """
-
-    mesh: TriangleMesh
+    mesh: TriangleMesh  # LPS mm
+    # (V,) the profile there was explained; elsewhere neighbours say where it is.
     is_measured: NDArray[np.bool_]
 
 

@@ -26,32 +26,22 @@ _OTHER_LEG = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """Size and place of one connected part, in LPS mm.
+    """Size and place of one connected part, in LPS mm."""
 
-    Attributes:
-        number: of its voxels.
-        volume_mm3: of its inside.
-        centre_mm: (3,) mean of its voxels.
-        lower_mm, upper_mm: (3,) its box.
-    """
-
-    number: int
-    volume_mm3: float
-    centre_mm: FloatArray
+    number: int  # of its voxels
+    volume_mm3: float  # of its inside
+    centre_mm: FloatArray  # (3,) mean of its voxels
+    # lower_mm, upper_mm: (3,) its box.
     lower_mm: FloatArray
     upper_mm: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class NamedParts:
-    """Bones found: name -> number of the part.
+    """Bones found: name -> number of the part."""
 
-    Attributes:
-        bones: name -> number.
-        has_two_knees: there is another part like the femur, or like the tibia, beside it.
-    """
-
-    bones: Mapping[str, int]
+    bones: Mapping[str, int]  # name -> number
+    # there is another part like the femur, or like the tibia, beside it.
     has_two_knees: bool = False
 
     @property

@@ -29,19 +29,13 @@ _BESIDE_VOXELS, _LEAST_PADDING = 1.5, 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segmentation:
-    """Bones in a CT, cut to the box around them.
+    """Bones in a CT, cut to the box around them."""
 
-    Attributes:
-        ct: the box.
-        bones: (D, H, W) number of the bone that each voxel of the box is part of; 0 for none.
-        names: name -> number; parts without a name are bones as well (a fabella).
-        warnings: what was not found, and what is not whole.
-    """
-
-    ct: CtVolume
+    ct: CtVolume  # the box
+    # (D, H, W) number of the bone that each voxel of the box is part of; 0 for none.
     bones: NDArray[np.uint8]
-    names: Mapping[str, int]
-    warnings: tuple[str, ...] = ()
+    names: Mapping[str, int]  # name -> number; parts without a name are bones as well (a fabella)
+    warnings: tuple[str, ...] = ()  # what was not found, and what is not whole
 
 
 def segment(

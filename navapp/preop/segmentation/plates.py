@@ -16,14 +16,11 @@ _ORDERS = ((2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plates:
-    """Curvature of the density across plates, HU per mm2; 0 outside the solids.
+    """Curvature of the density across plates, HU per mm2; 0 outside the solids."""
 
-    Attributes:
-        ridge: (D, H, W) smallest second derivative: very negative in a plate of cortex.
-        valley: (D, H, W) largest second derivative: large in a gap, and along the foot of a plate.
-    """
-
+    # (D, H, W) smallest second derivative: very negative in a plate of cortex.
     ridge: NDArray[np.float32]
+    # (D, H, W) largest second derivative: large in a gap, and along the foot of a plate.
     valley: NDArray[np.float32]
 
 

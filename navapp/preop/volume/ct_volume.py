@@ -89,19 +89,16 @@ class _Placed:
 class CtVolume(_Placed):
     """A CT in Hounsfield units.
 
-    Attributes:
-        hu: (D, H, W) int16 or float32, axes k, j, i as in SimpleITK's arrays.
-        lps_from_index: (4, 4) float64, maps (i, j, k, 1) to LPS mm; voxel centres at integers.
-            Any invertible affine map: see the base class for what it may hold.
-        spacing_mm: (3,) lengths of one step along i, j, k.
-
     Raises:
         ValueError: wrong shapes or types, or a matrix that cannot be inverted.
     """
 
+    # (D, H, W) int16 or float32, axes k, j, i as in SimpleITK's arrays.
     hu: NDArray[np.int16] | NDArray[np.float32]
+    # (4, 4) float64, maps (i, j, k, 1) to LPS mm; voxel centres at integers. Any invertible affine
+    # map: see the base class for what it may hold.
     lps_from_index: FloatArray
-    spacing_mm: FloatArray
+    spacing_mm: FloatArray  # (3,) lengths of one step along i, j, k
 
     def __post_init__(self) -> None:
         if self.hu.dtype not in (np.dtype(np.int16), np.dtype(np.float32)):
@@ -120,15 +117,12 @@ class CtVolume(_Placed):
 class LabelVolume(_Placed):
     """A ready segmentation: a whole number per voxel, 0 for none.
 
-    Attributes:
-        labels: (D, H, W) of an integer type, axes k, j, i.
-        lps_from_index, spacing_mm: as in `CtVolume`.
-
     Raises:
         ValueError: wrong shapes or types, or a matrix that cannot be inverted.
     """
 
-    labels: NDArray[np.integer[Any]]
+    labels: NDArray[np.integer[Any]]  # (D, H, W) of an integer type, axes k, j, i
+    # lps_from_index, spacing_mm: as in `CtVolume`.
     lps_from_index: FloatArray
     spacing_mm: FloatArray
 

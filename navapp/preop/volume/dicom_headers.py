@@ -29,17 +29,7 @@ _BARE_BEGINNING = b"\x08\x00"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SliceHeader:
-    """What one slice's header says; nothing in it names the patient but `file` and `description`.
-
-    Attributes:
-        position_mm: (3,) LPS, centre of the first pixel.
-        row, column: (3,) directions in which the column index, and the row index, grow.
-        pixel_mm: distances between rows (j), and between columns (i): DICOM's order.
-        rows, columns: of pixels.
-        thickness_mm, tilt_deg: tags; None when absent.
-        padding_hu: smallest and largest value that stands for no measurement, or None.
-        side: "left" or "right" when a laterality tag says so.
-    """
+    """What one slice's header says; only `file` and `description` may name the patient."""
 
     file: Path
     series_uid: str
@@ -47,16 +37,21 @@ class SliceHeader:
     modality: str
     description: str
     image_type: tuple[str, ...]
-    position_mm: FloatArray
+    position_mm: FloatArray  # (3,) LPS, centre of the first pixel
+    # row, column: (3,) directions in which the column index, and the row index, grow.
     row: FloatArray
     column: FloatArray
+    # distances between rows (j), and between columns (i): DICOM's order.
     pixel_mm: tuple[float, float]
+    # rows, columns: of pixels.
     rows: int
     columns: int
+    # thickness_mm, tilt_deg: tags; None when absent.
     thickness_mm: float | None
     tilt_deg: float | None
+    # smallest and largest value that stands for no measurement, or None.
     padding_hu: tuple[float, float] | None
-    side: Side | None
+    side: Side | None  # "left" or "right" when a laterality tag says so
 
     @property
     def normal(self) -> FloatArray:
@@ -67,17 +62,11 @@ class SliceHeader:
 
 @dataclass(frozen=True, slots=True)
 class OtherFile:
-    """A DICOM file that is no slice of a volume, and why.
+    """A DICOM file that is no slice of a volume, and why."""
 
-    Attributes:
-        file: where.
-        series_uid: NO_UID when it is not even known.
-        why: empty for an object that is no picture at all (a report, a directory).
-    """
-
-    file: Path
-    series_uid: str
-    why: str
+    file: Path  # where
+    series_uid: str  # NO_UID when it is not even known
+    why: str  # empty for an object that is no picture at all (a report, a directory)
 
 
 def is_dicom(file: Path) -> bool:

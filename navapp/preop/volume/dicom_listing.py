@@ -15,23 +15,14 @@ _DIRECTORY = "DICOMDIR"
 
 @dataclass(frozen=True, slots=True)
 class SeriesInfo:
-    """One series of a folder.
+    """One series of a folder."""
 
-    Attributes:
-        uid: SeriesInstanceUID, by which it is chosen; "none" where there is none.
-        description: the series' own words, without the patient's identity.
-        modality: "CT" or another.
-        n_slices: files of it.
-        size: pixels along a row and along a column.
-        is_localizer: an overview to plan the scan on, not a volume.
-    """
-
-    uid: str
-    description: str
-    modality: str
-    n_slices: int
-    size: tuple[int, int]
-    is_localizer: bool
+    uid: str  # SeriesInstanceUID, by which it is chosen; "none" where there is none
+    description: str  # the series' own words, without the patient's identity
+    modality: str  # "CT" or another
+    n_slices: int  # files of it
+    size: tuple[int, int]  # pixels along a row and along a column
+    is_localizer: bool  # an overview to plan the scan on, not a volume
 
     def __str__(self) -> str:
         words = self.description or "no description"
@@ -40,21 +31,13 @@ class SeriesInfo:
 
 @dataclass(frozen=True, slots=True)
 class Folder:
-    """All DICOM headers of a folder.
+    """All DICOM headers of a folder."""
 
-    Attributes:
-        shown: the folder's path, fit to be shown.
-        series: slices by series.
-        others: DICOM files that are no slices.
-        n_foreign: files that are not DICOM at all.
-        identity: takes the patient out of a text.
-    """
-
-    shown: str
-    series: dict[str, list[SliceHeader]]
-    others: tuple[OtherFile, ...]
-    n_foreign: int
-    identity: Identity
+    shown: str  # the folder's path, fit to be shown
+    series: dict[str, list[SliceHeader]]  # slices by series
+    others: tuple[OtherFile, ...]  # DICOM files that are no slices
+    n_foreign: int  # files that are not DICOM at all
+    identity: Identity  # takes the patient out of a text
 
     def make_error(self, problem: str, remedy: str) -> InputError:
         """An error about this folder; the problem follows the folder's name."""

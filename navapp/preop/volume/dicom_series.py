@@ -32,23 +32,14 @@ _HasComplained = Callable[[], bool]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DicomVolume:
-    """A series that was read, before its content is judged.
+    """A series that was read, before its content is judged."""
 
-    Attributes:
-        shown: the folder's path, fit to be shown.
-        volume: what it shows.
-        info: the series.
-        thickness_tag_mm: as the tag says; the positions decide.
-        side: by the laterality tag of all slices.
-        warnings: what was mended or is odd.
-    """
-
-    shown: str
-    volume: CtVolume
-    info: SeriesInfo
-    thickness_tag_mm: float | None
-    side: Side | None
-    warnings: tuple[str, ...]
+    shown: str  # the folder's path, fit to be shown
+    volume: CtVolume  # what it shows
+    info: SeriesInfo  # the series
+    thickness_tag_mm: float | None  # as the tag says; the positions decide
+    side: Side | None  # by the laterality tag of all slices
+    warnings: tuple[str, ...]  # what was mended or is odd
 
 
 def read_series(path: Path, series_uid: str | None) -> DicomVolume:

@@ -29,14 +29,10 @@ _MM = {1: 1000.0, 2: 1.0, 3: 0.001}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NiftiHeader:
-    """A NIfTI file's header.
+    """A NIfTI file's header."""
 
-    Attributes:
-        is_whole: every voxel that is promised is there.
-        lps_from_index: (4, 4) the file's affine map (`sform`), or None when it has none.
-    """
-
-    is_whole: bool
+    is_whole: bool  # every voxel that is promised is there
+    # (4, 4) the file's affine map (`sform`), or None when it has none.
     lps_from_index: FloatArray | None
 
 

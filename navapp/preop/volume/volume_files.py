@@ -27,19 +27,12 @@ SUFFIXES = (*_NIFTI, *_NRRD, ".mha", ".mhd")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileVolume:
-    """A volume from a file, its values as stored.
+    """A volume from a file, its values as stored."""
 
-    Attributes:
-        suffix: by which the file was read.
-        values: (D, H, W), axes k, j, i.
-        lps_from_index: (4, 4).
-        warnings: what had to be assumed.
-    """
-
-    suffix: str
-    values: NDArray[Any]
-    lps_from_index: FloatArray
-    warnings: tuple[str, ...]
+    suffix: str  # by which the file was read
+    values: NDArray[Any]  # (D, H, W), axes k, j, i
+    lps_from_index: FloatArray  # (4, 4)
+    warnings: tuple[str, ...]  # what had to be assumed
 
 
 def read_file(path: Path) -> FileVolume:

@@ -14,21 +14,14 @@ from navapp.values import Side
 
 @dataclass(frozen=True, slots=True)
 class CtSource:
-    """What to show of where a CT came from; nothing that names the patient.
+    """What to show of where a CT came from; nothing that names the patient."""
 
-    Attributes:
-        kind: "DICOM", or the file's suffix.
-        description: the series' own words, or an empty text.
-        n_slices: read into the volume.
-        thickness_tag_mm: SliceThickness, which need not be the distance of the slices; or None.
-        side: "left" or "right" by the laterality tag, or None.
-    """
-
-    kind: str
-    description: str
-    n_slices: int
+    kind: str  # "DICOM", or the file's suffix
+    description: str  # the series' own words, or an empty text
+    n_slices: int  # read into the volume
+    # SliceThickness, which need not be the distance of the slices; or None.
     thickness_tag_mm: float | None = None
-    side: Side | None = None
+    side: Side | None = None  # "left" or "right" by the laterality tag, or None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -36,35 +36,27 @@ _MAX_CODE_BITS = 64
 
 @dataclass(frozen=True, slots=True)
 class CensusSettings:
-    """How the matcher works.
+    """How the matcher works."""
 
-    Attributes:
-        radius_x, radius_y: of the census window, px; at most 65 pixels in it.
-        p1: penalty of a step of one disparity between neighbours.
-        p2: penalty of a larger step, divided by 1 + (grey step) / `edge_grey`. Above 63, twice the
-            memory is needed.
-        edge_grey: grey step that halves `p2`.
-        max_difference_px: between the two views, and between neighbours of one patch.
-        min_uniqueness: how much worse than the best, as a share of it, the best disparity that is
-            no neighbour must be.
-        speckle_px: smaller patches of similar disparity are removed.
-        contrast_grey: a window with a smaller range of grey levels (no light, glare) matches
-            everything, so it matches nothing.
-        full_contrast_grey: range of grey levels from which texture no longer lowers the confidence.
-        sigma_px: standard deviation that is claimed for every match.
-    """
-
+    # radius_x, radius_y: of the census window, px; at most 65 pixels in it.
     radius_x: int = 2
     radius_y: int = 2
-    p1: int = 6
+    p1: int = 6  # penalty of a step of one disparity between neighbours
+    # penalty of a larger step, divided by 1 + (grey step) / `edge_grey`. Above 63, twice the memory
+    # is needed.
     p2: int = 40
-    edge_grey: int = 8
-    max_difference_px: float = 1.0
+    edge_grey: int = 8  # grey step that halves `p2`
+    max_difference_px: float = 1.0  # between the two views, and between neighbours of one patch
+    # how much worse than the best, as a share of it, the best disparity that is no neighbour must
+    # be.
     min_uniqueness: float = 0.05
-    speckle_px: int = 60
+    speckle_px: int = 60  # smaller patches of similar disparity are removed
+    # a window with a smaller range of grey levels (no light, glare) matches everything, so it
+    # matches nothing.
     contrast_grey: int = 3
+    # range of grey levels from which texture no longer lowers the confidence.
     full_contrast_grey: int = 16
-    sigma_px: float = 0.2
+    sigma_px: float = 0.2  # standard deviation that is claimed for every match
 
     def __post_init__(self) -> None:
         if min(self.radius_x, self.radius_y) < 0 or not 0 < self.code_bits <= _MAX_CODE_BITS:
@@ -80,39 +72,29 @@ class CensusSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwoViewDisparity:
-    """What one aggregated cost says about both views.
+    """What one aggregated cost says about both views."""
 
-    Attributes:
-        left: over the pair's box; only consistent pixels are matched, nothing is filled.
-        right_px: (h, W) float32 disparity of the right view, whole pixels, NaN unknown; rows of the
-            box. Unchecked: what the right view prefers among the box's pixels.
-        right_x0: right column of `right_px`'s first column.
-        confidence: (h, w) float32, 0 to 1, from uniqueness, texture and the agreement of the views;
-            0 where unmatched.
-        agreement: share of the pixels with contrast that are matched; tiny when the pictures are
-            exchanged, NaN when no pixel of either view has contrast.
-    """
-
+    # over the pair's box; only consistent pixels are matched, nothing is filled.
     left: DisparityMap
+    # (h, W) float32 disparity of the right view, whole pixels, NaN unknown; rows of the box.
+    # Unchecked: what the right view prefers among the box's pixels.
     right_px: NDArray[np.float32]
-    right_x0: int
+    right_x0: int  # right column of `right_px`'s first column
+    # (h, w) float32, 0 to 1, from uniqueness, texture and the agreement of the views; 0 where
+    # unmatched.
     confidence: NDArray[np.float32]
+    # share of the pixels with contrast that are matched; tiny when the pictures are exchanged, NaN
+    # when no pixel of either view has contrast.
     agreement: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """One picture's crop as the matcher sees it.
+    """One picture's crop as the matcher sees it."""
 
-    Attributes:
-        grey: (h, w).
-        codes: (h, bytes, w) of the census.
-        contrast_grey: (h, w) range of grey levels around each pixel.
-    """
-
-    grey: Image
-    codes: NDArray[np.uint8]
-    contrast_grey: NDArray[np.uint8]
+    grey: Image  # (h, w)
+    codes: NDArray[np.uint8]  # (h, bytes, w) of the census
+    contrast_grey: NDArray[np.uint8]  # (h, w) range of grey levels around each pixel
 
 
 def match_census(

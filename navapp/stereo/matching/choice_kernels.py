@@ -38,21 +38,15 @@ _NUMBER_MASK = np.uint32(65535)
 
 
 class Choice(NamedTuple):
-    """Disparities of both views.
+    """Disparities of both views."""
 
-    Attributes:
-        left_px: (h, w), sub-pixel; NaN where the best is the first or last disparity.
-        right_px: (h, W), whole; NaN where no left pixel reaches.
-        uniqueness: (h, w): how much worse the best beyond the neighbours is, 0 to 1.
-        lowest_px: first disparity.
-        n_disparities: number of disparities; more only fill up the lanes.
-    """
-
+    # (h, w), sub-pixel; NaN where the best is the first or last disparity.
     left_px: NDArray[np.float32]
-    right_px: NDArray[np.float32]
+    right_px: NDArray[np.float32]  # (h, W), whole; NaN where no left pixel reaches
+    # (h, w): how much worse the best beyond the neighbours is, 0 to 1.
     uniqueness: NDArray[np.float32]
-    lowest_px: int
-    n_disparities: int
+    lowest_px: int  # first disparity
+    n_disparities: int  # number of disparities; more only fill up the lanes
 
 
 @njit(cache=True, nogil=True, forceinline=True)

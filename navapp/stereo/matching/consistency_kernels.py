@@ -8,23 +8,14 @@ from numpy.typing import NDArray
 
 
 class Evidence(NamedTuple):
-    """What both views say.
+    """What both views say."""
 
-    Attributes:
-        left_px: (h, w) disparity, NaN unknown.
-        right_px: (h, W) disparity, NaN unknown.
-        uniqueness: (h, w) of the left disparity, 0 to 1.
-        left_contrast: (h, w) range of grey levels around a pixel.
-        right_contrast: (h, W).
-        shift: right column of the left column 0 at disparity 0.
-    """
-
-    left_px: NDArray[np.float32]
-    right_px: NDArray[np.float32]
-    uniqueness: NDArray[np.float32]
-    left_contrast: NDArray[np.uint8]
-    right_contrast: NDArray[np.uint8]
-    shift: int
+    left_px: NDArray[np.float32]  # (h, w) disparity, NaN unknown
+    right_px: NDArray[np.float32]  # (h, W) disparity, NaN unknown
+    uniqueness: NDArray[np.float32]  # (h, w) of the left disparity, 0 to 1
+    left_contrast: NDArray[np.uint8]  # (h, w) range of grey levels around a pixel
+    right_contrast: NDArray[np.uint8]  # (h, W)
+    shift: int  # right column of the left column 0 at disparity 0
 
 
 class Demands(NamedTuple):

@@ -24,21 +24,13 @@ _PER_GREY = 16.0
 
 @dataclass(frozen=True, slots=True)
 class GradientSettings:
-    """How the baseline works.
+    """How the baseline works."""
 
-    Attributes:
-        window_px: side of the window, odd.
-        gaussian_sigma_px: of the filter over the disparity; 0 leaves it out.
-        max_difference_px: between the two views.
-        contrast_grey: a window with a smaller range of grey levels matches nothing.
-        sigma_px: standard deviation that is claimed for every match.
-    """
-
-    window_px: int = 11
-    gaussian_sigma_px: float = 1.0
-    max_difference_px: float = 1.0
-    contrast_grey: int = 3
-    sigma_px: float = 0.5
+    window_px: int = 11  # side of the window, odd
+    gaussian_sigma_px: float = 1.0  # of the filter over the disparity; 0 leaves it out
+    max_difference_px: float = 1.0  # between the two views
+    contrast_grey: int = 3  # a window with a smaller range of grey levels matches nothing
+    sigma_px: float = 0.5  # standard deviation that is claimed for every match
 
     def __post_init__(self) -> None:
         if self.window_px < 1 or self.window_px % 2 == 0:

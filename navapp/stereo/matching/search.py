@@ -16,21 +16,15 @@ T = TypeVar("T", bound=np.generic)
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """The search of one box over whole disparities.
+    """The search of one box over whole disparities."""
 
-    Attributes:
-        box: as asked for; may reach beyond the picture.
-        inside: its part inside the picture.
-        lowest: first disparity, px.
-        count: number of disparities. One more than the band needs stands on either side: a best
-            match at the end of the search is no minimum.
-        right: the columns of the right picture that are partners of some pixel; rows of `inside`.
-    """
-
-    box: Box
-    inside: Box
-    lowest: int
+    box: Box  # as asked for; may reach beyond the picture
+    inside: Box  # its part inside the picture
+    lowest: int  # first disparity, px
+    # number of disparities. One more than the band needs stands on either side: a best match at the
+    # end of the search is no minimum.
     count: int
+    # the columns of the right picture that are partners of some pixel; rows of `inside`.
     right: Box
 
     @classmethod
@@ -85,15 +79,10 @@ class Search:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crop:
-    """A box of a picture with a margin around it; the picture's edge is repeated outside.
+    """A box of a picture with a margin around it; the picture's edge is repeated outside."""
 
-    Attributes:
-        values: (h + 2 rows, w + 2 columns).
-        margin_px: columns and rows of the margin.
-    """
-
-    values: NDArray[Any]
-    margin_px: tuple[int, int]
+    values: NDArray[Any]  # (h + 2 rows, w + 2 columns)
+    margin_px: tuple[int, int]  # columns and rows of the margin
 
     @classmethod
     def of(cls, image: NDArray[Any], box: Box, margin_px: tuple[int, int]) -> "Crop":

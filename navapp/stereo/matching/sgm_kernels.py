@@ -43,45 +43,29 @@ _ROW_PATHS = 3
 
 
 class Views(NamedTuple):
-    """What is matched; n is a multiple of `LANES`.
+    """What is matched; n is a multiple of `LANES`."""
 
-    Attributes:
-        left: (h, bytes, w) census codes.
-        mirrored: (h, bytes, n + W + n) codes of the right view, columns from right to left, with a
-            margin: growing disparities are neighbours in memory.
-        grey: (h, w) of the left view; edges in it make jumps cheaper.
-        first_partner: right column of the left column 0 at the first disparity.
-        p1: penalty of a step of one disparity.
-        jumps: (256,) penalty of any other step, by the grey step.
-        no_partner: cost where the partner is outside the right view.
-        outside: (n + W + n,) 255 in the margin, 0 elsewhere.
-        beyond: (n,) 255 for disparities that only fill up the lanes, 0 elsewhere.
-    """
-
-    left: NDArray[np.uint8]
+    left: NDArray[np.uint8]  # (h, bytes, w) census codes
+    # (h, bytes, n + W + n) codes of the right view, columns from right to left, with a margin:
+    # growing disparities are neighbours in memory.
     mirrored: NDArray[np.uint8]
-    grey: NDArray[np.uint8]
-    first_partner: int
-    p1: np.uint8
-    jumps: NDArray[np.uint8]
-    no_partner: np.uint8
-    outside: NDArray[np.uint8]
-    beyond: NDArray[np.uint8]
+    grey: NDArray[np.uint8]  # (h, w) of the left view; edges in it make jumps cheaper
+    first_partner: int  # right column of the left column 0 at the first disparity
+    p1: np.uint8  # penalty of a step of one disparity
+    jumps: NDArray[np.uint8]  # (256,) penalty of any other step, by the grey step
+    no_partner: np.uint8  # cost where the partner is outside the right view
+    outside: NDArray[np.uint8]  # (n + W + n,) 255 in the margin, 0 elsewhere
+    beyond: NDArray[np.uint8]  # (n,) 255 for disparities that only fill up the lanes, 0 elsewhere
 
 
 class Paths(NamedTuple):
-    """Where the paths of one scan stand; made by `new_paths`.
+    """Where the paths of one scan stand; made by `new_paths`."""
 
-    Attributes:
-        costs: (slots, 1 + n + 1) path costs; 255 at either end. Three slots for each pixel of two
-            rows, two for the path from the side, one for paths that start.
-        lowest: (slots,) minimum of each.
-        cost: (n,) matching cost of one pixel.
-    """
-
+    # (slots, 1 + n + 1) path costs; 255 at either end. Three slots for each pixel of two rows, two
+    # for the path from the side, one for paths that start.
     costs: NDArray[np.uint8]
-    lowest: NDArray[np.uint8]
-    cost: NDArray[np.uint8]
+    lowest: NDArray[np.uint8]  # (slots,) minimum of each
+    cost: NDArray[np.uint8]  # (n,) matching cost of one pixel
 
 
 def new_paths(width: int, n: int) -> Paths:

@@ -38,24 +38,18 @@ _SPREAD_STEP = 3
 
 @dataclass(frozen=True, slots=True)
 class FillSettings:
-    """How the fit works.
+    """How the fit works."""
 
-    Attributes:
-        radius_px: columns of support beyond the gap; None: grows with the spread of disparities.
-        max_gap_px: a pixel further from its permitted neighbour stays unknown; None: the width of
-            the map.
-        colour_scale: sum of the three colour differences at which a pixel's weight is 1/e.
-        layer_px: support differs from the permitted neighbour by less than this,
-        layer_growth: and by this more per px of distance.
-        slope_penalty_px2: variance of the support's places at which half of the slope is believed;
-            a slope is dangerous far from where it was fitted.
-    """
-
+    # columns of support beyond the gap; None: grows with the spread of disparities.
     radius_px: int | None = None
+    # a pixel further from its permitted neighbour stays unknown; None: the width of the map.
     max_gap_px: int | None = None
+    # sum of the three colour differences at which a pixel's weight is 1/e.
     colour_scale: float = 18.0
-    layer_px: float = 3.0
-    layer_growth: float = 0.15
+    layer_px: float = 3.0  # support differs from the permitted neighbour by less than this,
+    layer_growth: float = 0.15  # and by this more per px of distance
+    # variance of the support's places at which half of the slope is believed; a slope is dangerous
+    # far from where it was fitted.
     slope_penalty_px2: float = 20.0
 
 

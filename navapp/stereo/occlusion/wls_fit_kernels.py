@@ -26,21 +26,13 @@ _NOTHING = np.float32(1e9)
 
 
 class Scene(NamedTuple):
-    """What is filled.
+    """What is filled."""
 
-    Attributes:
-        disparity: (h, w) px; read where matched.
-        origin: (h, w) of the matches.
-        classes: (h, w) of `occlusion.classify`.
-        picture: (h, w, 1 or 3).
-        confidence: (h, w).
-    """
-
-    disparity: NDArray[np.float32]
-    origin: NDArray[np.uint8]
-    classes: NDArray[np.uint8]
-    picture: NDArray[np.uint8]
-    confidence: NDArray[np.float32]
+    disparity: NDArray[np.float32]  # (h, w) px; read where matched
+    origin: NDArray[np.uint8]  # (h, w) of the matches
+    classes: NDArray[np.uint8]  # (h, w) of `occlusion.classify`
+    picture: NDArray[np.uint8]  # (h, w, 1 or 3)
+    confidence: NDArray[np.float32]  # (h, w)
 
 
 class Rules(NamedTuple):
@@ -58,15 +50,11 @@ class Rules(NamedTuple):
 
 
 class Support(NamedTuple):
-    """The pixels that are asked, in every `stride`-th row.
+    """The pixels that are asked, in every `stride`-th row."""
 
-    Attributes:
-        places: (h / stride, w, 6) ascending in the column, as many as `counts` says.
-        counts: (h / stride, w + 1) how many of them are left of a column.
-    """
-
+    # (h / stride, w, 6) ascending in the column, as many as `counts` says.
     places: NDArray[np.float32]
-    counts: NDArray[np.int32]
+    counts: NDArray[np.int32]  # (h / stride, w + 1) how many of them are left of a column
 
 
 @njit(cache=True, nogil=True)

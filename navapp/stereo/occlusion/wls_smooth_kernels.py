@@ -21,17 +21,11 @@ _REACH = np.float32(0.3)
 
 
 class Lines(NamedTuple):
-    """Columns to smooth.
+    """Columns to smooth."""
 
-    Attributes:
-        values: (n, m) f before, u after; finite everywhere.
-        trust: (n, m) c, above 0.
-        links: (n, m) g between a pixel and the next of its column.
-    """
-
-    values: NDArray[np.float32]
-    trust: NDArray[np.float32]
-    links: NDArray[np.float32]
+    values: NDArray[np.float32]  # (n, m) f before, u after; finite everywhere
+    trust: NDArray[np.float32]  # (n, m) c, above 0
+    links: NDArray[np.float32]  # (n, m) g between a pixel and the next of its column
 
 
 class Measured(NamedTuple):

@@ -36,31 +36,21 @@ _SPECKLE_PX2, _SPECKLE_STEP_PX = 60, 1.0
 
 @dataclass(frozen=True, slots=True)
 class RefineSettings:
-    """How the refinement works.
+    """How the refinement works."""
 
-    Attributes:
-        radius_px: of the square window.
-        n_steps: Gauss-Newton steps, at most.
-        stops_at_rest: no step follows one that moved most windows by no more than they are exact:
-            to find out where a surface is, not to measure it.
-        min_filled: share of a window that must have support.
-        min_correlation: of the two windows after the last step.
-        last_step_px: a larger last step has not settled.
-        max_sigma_px: a window with a larger noise has too little texture.
-        max_roughness_px: a window over which the offsets of the step before differ by more
-            (standard deviation) lies over more than one surface, or over a mismatch.
-        systematic_px: error that the residual does not show; enters the claimed sigma.
-    """
-
-    radius_px: int = 5
-    n_steps: int = 2
+    radius_px: int = 5  # of the square window
+    n_steps: int = 2  # Gauss-Newton steps, at most
+    # no step follows one that moved most windows by no more than they are exact: to find out where
+    # a surface is, not to measure it.
     stops_at_rest: bool = False
-    min_filled: float = 0.6
-    min_correlation: float = 0.6
-    last_step_px: float = 0.1
-    max_sigma_px: float = 0.3
+    min_filled: float = 0.6  # share of a window that must have support
+    min_correlation: float = 0.6  # of the two windows after the last step
+    last_step_px: float = 0.1  # a larger last step has not settled
+    max_sigma_px: float = 0.3  # a window with a larger noise has too little texture
+    # a window over which the offsets of the step before differ by more (standard deviation) lies
+    # over more than one surface, or over a mismatch.
     max_roughness_px: float = np.inf
-    systematic_px: float = 0.1
+    systematic_px: float = 0.1  # error that the residual does not show; enters the claimed sigma
 
 
 # What the residual of a window does not show is less on the model than on a surface that is

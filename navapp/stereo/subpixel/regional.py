@@ -25,21 +25,14 @@ _N_START = 7
 
 @dataclass(frozen=True, slots=True)
 class RegionalSettings:
-    """How the surface is fitted.
+    """How the surface is fitted."""
 
-    Attributes:
-        radius_px: of the square window of a node.
-        node_px: distance of the nodes, at most the radius.
-        thin: every thin-th pixel each way is a sample; divides `node_px`.
-        scales_px: residual that counts a quarter; one for each iteration.
-        min_samples: a node with fewer known samples in its window has no polynomial.
-    """
-
-    radius_px: int = 12
-    node_px: int = 8
-    thin: int = 2
+    radius_px: int = 12  # of the square window of a node
+    node_px: int = 8  # distance of the nodes, at most the radius
+    thin: int = 2  # every thin-th pixel each way is a sample; divides `node_px`
+    # residual that counts a quarter; one for each iteration.
     scales_px: tuple[float, ...] = (3.0, 1.5, 0.7, 0.35)
-    min_samples: int = 20
+    min_samples: int = 20  # a node with fewer known samples in its window has no polynomial
 
     def __post_init__(self) -> None:
         if not 1 <= self.thin <= self.node_px <= self.radius_px or self.node_px % self.thin:

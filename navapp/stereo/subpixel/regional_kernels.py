@@ -24,17 +24,11 @@ _N_STATE = _SCALED + (_N_TERMS + 1) * _N_TERMS
 
 
 class Rules(NamedTuple):
-    """How the fit works.
+    """How the fit works."""
 
-    Attributes:
-        scales_px: residual that counts a quarter, by iteration.
-        ridge: (6,) added to the diagonal for each known sample.
-        min_samples: for a polynomial.
-    """
-
-    scales_px: NDArray[np.float32]
-    ridge: NDArray[np.float32]
-    min_samples: np.float32
+    scales_px: NDArray[np.float32]  # residual that counts a quarter, by iteration
+    ridge: NDArray[np.float32]  # (6,) added to the diagonal for each known sample
+    min_samples: np.float32  # for a polynomial
 
 
 @njit(cache=True, nogil=True)

@@ -23,40 +23,24 @@ from navapp.geometry.float_lane_kernels import (
 
 
 class Samples(NamedTuple):
-    """What is fitted.
+    """What is fitted."""
 
-    Attributes:
-        values: (rows * width,) px.
-        weights: the same size, 0 where nothing is known.
-        width: elements from row to row.
-        stride: elements from place to place between two nodes.
-        spacing: samples from node to node, each way.
-        reach: rows above the first sample.
-        margin: elements before the first sample of each place.
-    """
-
-    values: NDArray[np.float32]
-    weights: NDArray[np.float32]
-    width: int
-    stride: int
-    spacing: int
-    reach: int
-    margin: int
+    values: NDArray[np.float32]  # (rows * width,) px
+    weights: NDArray[np.float32]  # the same size, 0 where nothing is known
+    width: int  # elements from row to row
+    stride: int  # elements from place to place between two nodes
+    spacing: int  # samples from node to node, each way
+    reach: int  # rows above the first sample
+    margin: int  # elements before the first sample of each place
 
 
 class Window(NamedTuple):
-    """What a node sees; element k is the sample k - reach, each way.
+    """What a node sees; element k is the sample k - reach, each way."""
 
-    Attributes:
-        across: (n,) places in a row of the planes, of the first node.
-        offsets: (n,) distance in window radii.
-        taper: (n,) weight by that.
-        start: places in the planes of the samples that the first polynomial is the median of.
-    """
-
-    across: NDArray[np.intp]
-    offsets: NDArray[np.float32]
-    taper: NDArray[np.float32]
+    across: NDArray[np.intp]  # (n,) places in a row of the planes, of the first node
+    offsets: NDArray[np.float32]  # (n,) distance in window radii
+    taper: NDArray[np.float32]  # (n,) weight by that
+    # places in the planes of the samples that the first polynomial is the median of.
     start: NDArray[np.intp]
 
 

@@ -28,28 +28,18 @@ _NOTHING = np.float32(0.0)
 
 
 class Planes(NamedTuple):
-    """Room to work in.
+    """Room to work in."""
 
-    Attributes:
-        pitch: elements from plane to plane, at least the width; multiple of the lanes.
-        wide_pitch: the same in `columns`, which have a margin of one radius on either side.
-        samples: (8 pitch,) what is seen of one row.
-        ring: (2 radius + 1, 12 pitch) flat; the terms of the rows of this block so far, then sums
-            of the rows of the block before, from each to its last.
-        block: (12 pitch,) sums of the rows of this block so far.
-        columns: (12 wide_pitch,) sums over the window's rows.
-        sums: (12 pitch,) sums over windows.
-        solved: (7 pitch,) what follows from them.
-    """
-
-    pitch: int
-    wide_pitch: int
-    samples: NDArray[np.float32]
+    pitch: int  # elements from plane to plane, at least the width; multiple of the lanes
+    wide_pitch: int  # the same in `columns`, which have a margin of one radius on either side
+    samples: NDArray[np.float32]  # (8 pitch,) what is seen of one row
+    # (2 radius + 1, 12 pitch) flat; the terms of the rows of this block so far, then sums of the
+    # rows of the block before, from each to its last.
     ring: NDArray[np.float32]
-    block: NDArray[np.float32]
-    columns: NDArray[np.float32]
-    sums: NDArray[np.float32]
-    solved: NDArray[np.float32]
+    block: NDArray[np.float32]  # (12 pitch,) sums of the rows of this block so far
+    columns: NDArray[np.float32]  # (12 wide_pitch,) sums over the window's rows
+    sums: NDArray[np.float32]  # (12 pitch,) sums over windows
+    solved: NDArray[np.float32]  # (7 pitch,) what follows from them
 
 
 @njit(cache=True, nogil=True)

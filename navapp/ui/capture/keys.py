@@ -21,21 +21,13 @@ _STEP_MM, _TURN_RAD = 20.0, math.radians(6.0)
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One key of the capture and its command.
+    """One key of the capture and its command."""
 
-    Attributes:
-        key: as Textual names it.
-        command: what it submits.
-        label: for the footer; empty: not there by itself.
-        shown: the key for people.
-        is_for_hand: for a simulated board only.
-    """
-
-    key: str
-    command: CaptureCommand
-    label: str = ""
-    shown: str = ""
-    is_for_hand: bool = False
+    key: str  # as Textual names it
+    command: CaptureCommand  # what it submits
+    label: str = ""  # for the footer; empty: not there by itself
+    shown: str = ""  # the key for people
+    is_for_hand: bool = False  # for a simulated board only
 
 
 def _shift(key: str, *shift_mm: float) -> Key:
