@@ -1,4 +1,4 @@
-"""Jobs side by side: on the thread that wants them done, and on one helper beside it."""
+"""Work on two threads: the one that asks, and one helper."""
 
 import threading
 from collections.abc import Callable
@@ -28,10 +28,11 @@ def pool() -> ThreadPoolExecutor:
 
 
 class Job(Generic[_Answer]):
-    """A job that the helper may have begun; who asks for it first does it.
+    """Work that is offered to the helper.
 
-    As a context it is over, or never begun, when its block is left: an error of the block goes
-    before its own, and an answer that nobody asked for is waited for.
+    If the helper has not begun when the answer is asked for, the thread that asks does the work.
+    As a context manager nothing of it runs on when the block is left: the job is waited for, or
+    dropped if the block raises.
     """
 
     def __init__(self, work: Callable[[], _Answer]) -> None:
@@ -72,14 +73,14 @@ class Job(Generic[_Answer]):
             self.drop()
 
 
-def begin_beside(work: Callable[[], _Answer]) -> Job[_Answer]:
+def begin_on_helper(work: Callable[[], _Answer]) -> Job[_Answer]:
     """Begin a job on the helper, if it is free before the answer is asked for."""
     return Job(work)
 
 
 def run_both(first: Callable[[], _Answer], second: Callable[[], _Other]) -> tuple[_Answer, _Other]:
     """Run two jobs side by side and wait for both answers; the first one's error goes before."""
-    with begin_beside(second) as other:
+    with begin_on_helper(second) as other:
         answer = first()
     return answer, other.result()
 

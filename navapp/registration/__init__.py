@@ -6,10 +6,10 @@ from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import find_initial
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
-    Candidate,
+    CoarseFit,
     compute_explained_fraction,
     distinct,
-    find_candidates,
+    find_coarse_fits,
     is_same_pose,
     make_far_starts,
     make_near_starts,
@@ -25,7 +25,7 @@ from navapp.registration.scene import Scene
 
 __all__ = [
     "BimccSettings",
-    "Candidate",
+    "CoarseFit",
     "DepthMap",
     "Outcome",
     "PoseSampler",
@@ -35,7 +35,7 @@ __all__ = [
     "compute_explained_fraction",
     "distinct",
     "estimate_at",
-    "find_candidates",
+    "find_coarse_fits",
     "find_initial",
     "fit_bimcc",
     "fit_pose",

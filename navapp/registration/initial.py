@@ -32,7 +32,7 @@ from navapp.registration.hypotheses import (
 )
 from navapp.registration.initial_kernels import Hypotheses, score_edges, score_surface
 from navapp.registration.model import RegistrationModel
-from navapp.registration.multi_start import ANYWHERE, Candidate, compute_explained_fraction
+from navapp.registration.multi_start import ANYWHERE, CoarseFit, compute_explained_fraction
 from navapp.registration.scene import Scene
 from navapp.values import AspectGraph
 
@@ -71,7 +71,7 @@ def find_initial(
     cone: ViewCone,
     aspects: AspectGraph | None = None,
     on_progress: Callable[[float], None] = lambda fraction: None,
-) -> list[Candidate]:
+) -> list[CoarseFit]:
     """Find a bone in a box without a pose: distinct candidates, best first.
 
     Args:
@@ -139,13 +139,13 @@ def _fit_starts(
     model: RegistrationModel,
     starts: list[RigidTransform],
     on_progress: Callable[[float], None],
-) -> list[Candidate]:
+) -> list[CoarseFit]:
     """What the coarse loop finds from each start, on the scene around it: distinct, best first."""
-    found: list[Candidate | None] = [None] * len(starts)
+    found: list[CoarseFit | None] = [None] * len(starts)
     _ = model.arrays  # made here once, not in both threads
     pixels = geometry.project(scene.points_mm)
 
-    def fit(start: RigidTransform) -> Candidate | None:
+    def fit(start: RigidTransform) -> CoarseFit | None:
         near = _crop_scene(scene, pixels, geometry, start.apply(model.points_mm))
         if len(near) < MIN_POINTS:
             return None
@@ -155,7 +155,7 @@ def _fit_starts(
         judged = replace(near, thinned_to=_JUDGED_POINTS)
         # As a fraction of the whole scene, so that candidates compare.
         explained = compute_explained_fraction(judged, model, pose)
-        return Candidate(pose, explained * len(near) / len(scene))
+        return CoarseFit(pose, explained * len(near) / len(scene))
 
     def run(first: int) -> None:
         for number in range(first, len(starts), 2):

@@ -27,7 +27,7 @@ _NEAR_TILTS, _FAR_TILTS = (15.0, 12), ((15.0, 12), (28.0, 20))
 _FAR_SHIFT_MM = 8.0
 # So many candidates are refined, of those that explain so much of what the best does.
 _N_REFINED, _REFINED_FRACTION = 3, 0.5
-# A different pose that explains as much as this of the best one makes that one a guess.
+# A different pose that explains as much as this of the best one makes that one ambiguous.
 AMBIGUOUS_FRACTION = 0.9
 # For starts that are near, or may be anywhere.
 NEAR = BimccSettings(model_points=1000, max_iterations=35)
@@ -35,7 +35,7 @@ ANYWHERE = BimccSettings(model_points=1000, max_iterations=60, widest_mm=30.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class CoarseFit:
     """Where some start led to, coarsely, and how much of both sides that explains (0 to 1)."""
 
     scene_from_bone: RigidTransform
@@ -54,30 +54,30 @@ class _RankedFit(Protocol):
 AnyFit = TypeVar("AnyFit", bound=_RankedFit)
 
 
-def make_near_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+def make_near_starts(rough: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
     """A rough pose, and tilts of it about a place (3,) in the scene's frame: tried first."""
-    return make_tilted_starts(rough, centre_mm, *_NEAR_TILTS)
+    return make_tilted_starts(rough, place_mm, *_NEAR_TILTS)
 
 
-def make_far_starts(rough: RigidTransform, centre_mm: FloatArray) -> list[RigidTransform]:
+def make_far_starts(rough: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
     """Tilts of a rough pose, and of what it becomes when shifted: tried when the near ones fail."""
-    return make_scattered_starts(rough, centre_mm, _FAR_SHIFT_MM, _FAR_TILTS)
+    return make_scattered_starts(rough, place_mm, _FAR_SHIFT_MM, _FAR_TILTS)
 
 
 def make_tilted_starts(
-    pose: RigidTransform, centre_mm: FloatArray, tilt_deg: float, n_tilts: int
+    pose: RigidTransform, place_mm: FloatArray, tilt_deg: float, n_tilts: int
 ) -> list[RigidTransform]:
     """A pose and tilts of it about a place (3,) in the scene's frame, axes all around."""
     starts = [pose]
     for axis in sphere_spiral(n_tilts):
         twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
-        starts.append(pose.move(twist, centre_mm))
+        starts.append(pose.move(twist, place_mm))
     return starts
 
 
 def make_scattered_starts(
     pose: RigidTransform,
-    centre_mm: FloatArray,
+    place_mm: FloatArray,
     step_mm: float,
     tilts: Sequence[tuple[float, int]],
     *,
@@ -87,7 +87,7 @@ def make_scattered_starts(
 
     Args:
         pose: `scene_from_bone`.
-        centre_mm: (3,) what it is tilted about, in the scene's frame.
+        place_mm: (3,) what it is tilted about, in the scene's frame.
         step_mm: length of the shifts.
         tilts: (angle in degrees, how many) of each kind.
         has_middle: the pose itself, not shifted, is the first.
@@ -95,21 +95,21 @@ def make_scattered_starts(
     axes = np.vstack([np.zeros((1, 3)) if has_middle else np.empty((0, 3)), np.eye(3), -np.eye(3)])
     starts = []
     for shift in step_mm * axes:
-        moved = pose.move(np.concatenate([shift, np.zeros(3)]), centre_mm)
+        moved = pose.move(np.concatenate([shift, np.zeros(3)]), place_mm)
         starts.append(moved)
         for tilt_deg, n_tilts in tilts:
-            starts += make_tilted_starts(moved, centre_mm + shift, tilt_deg, n_tilts)[1:]
+            starts += make_tilted_starts(moved, place_mm + shift, tilt_deg, n_tilts)[1:]
     return starts
 
 
-def find_candidates(
+def find_coarse_fits(
     scene: Scene,
     model: RegistrationModel,
     starts: Sequence[RigidTransform],
     score: Callable[[RigidTransform], float] | None = None,
     on_progress: Callable[[float], None] = lambda fraction: None,
     settings: BimccSettings = NEAR,
-) -> list[Candidate]:
+) -> list[CoarseFit]:
     """Fit coarsely from every start (`scene_from_bone`); distinct answers, best score first.
 
     The score is `compute_explained_fraction` by default. Progress is a fraction; what it raises
@@ -129,7 +129,7 @@ def find_candidates(
     on_progress(1.0)
     poses = distinct([pose for pose in found if pose is not None], model.centre_mm)
     judged = score or (lambda pose: compute_explained_fraction(thinned, model, pose))
-    candidates = [Candidate(pose, judged(pose)) for pose in poses]
+    candidates = [CoarseFit(pose, judged(pose)) for pose in poses]
     return sorted(candidates, key=lambda candidate: candidate.score, reverse=True)
 
 
@@ -158,7 +158,7 @@ def compute_explained_fraction(
     return fraction * coverage(scene, model, scene_from_bone, sigma_mm)
 
 
-def select_poses(candidates: Sequence[Candidate], most: int = _N_REFINED) -> list[RigidTransform]:
+def select_poses(candidates: Sequence[CoarseFit], most: int = _N_REFINED) -> list[RigidTransform]:
     """Of candidates, best first, the poses that are worth a fit on all points."""
     least = _REFINED_FRACTION * max((one.score for one in candidates), default=0.0)
     return [one.scene_from_bone for one in candidates[:most] if one.score >= least]
@@ -177,12 +177,12 @@ def rank_fits(
     if not ranked or scores[order[0]] <= 0.0:
         return ranked
     best = ranked[0].estimate
-    is_guess = Reason.DEGENERATE not in best.reasons and any(
+    is_ambiguous = Reason.DEGENERATE not in best.reasons and any(
         scores[k] >= AMBIGUOUS_FRACTION * scores[order[0]]
         and not is_same_pose(best.camera_from_bone, fits[k].estimate.camera_from_bone, centre_mm)
         for k in order[1:]
     )
-    return [ranked[0].with_reason(Reason.AMBIGUOUS), *ranked[1:]] if is_guess else ranked
+    return [ranked[0].with_reason(Reason.AMBIGUOUS), *ranked[1:]] if is_ambiguous else ranked
 
 
 def distinct(

@@ -17,7 +17,7 @@ from navapp.registration.multi_start import (
     ANYWHERE,
     NEAR,
     compute_explained_fraction,
-    find_candidates,
+    find_coarse_fits,
     make_far_starts,
     make_near_starts,
     make_tilted_starts,
@@ -140,7 +140,7 @@ class _Search:
         """Refine what many starts lead to; progress goes on from the fraction done."""
         scene, model = self._scene, self._model
         told = lambda part: on_progress(done + 0.5 * part * (1.0 - done))  # noqa: E731
-        found = find_candidates(scene, model, starts, on_progress=told, settings=settings)
+        found = find_coarse_fits(scene, model, starts, on_progress=told, settings=settings)
         self._solutions += [solve_bimcc(scene, model, pose) for pose in select_poses(found)]
         poses = [one.estimate.camera_from_bone for one in self._solutions]
         scores = [compute_explained_fraction(scene, model, pose) for pose in poses]

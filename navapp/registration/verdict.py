@@ -47,8 +47,8 @@ class Goal:
 
     targets_mm: FloatArray  # (N, 3) of the stage, in bone coordinates
     tolerance_mm: float  # of the stage: the bound by all that is known must stay below it
-    # The bound by what is seen must stay below this and, in squares, what the plan's own surface
-    # may cost: no better view mends that.
+    # The bound by what is seen must stay below this; what errors of the plan may cost is added in
+    # squares, since no better view mends them.
     view_limit_mm: float = OK_ERROR_MM
 
 
@@ -63,8 +63,8 @@ class Evidence:
     dark_fraction: float = math.nan  # of the darker picture
     saturated_fraction: float = math.nan  # of the brighter picture
     detail_ratio: float = math.nan  # sharper over blurred picture; 0 when light already tells
-    has_lost_rows: bool = False  # the cameras' rows are too far apart to be compared
-    rows_mm: float = 0.0  # error in depth that rows which surely disagree stand for
+    has_lost_rows: bool = False  # too large a vertical disparity to be measured
+    row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
     correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
     kernel_fraction: float = math.nan  # of the widest at rest, for points of unknown noise
     smooth_excess_mm: float = math.nan  # correlated residuals of such points, over what may be
@@ -72,7 +72,7 @@ class Evidence:
     is_rig_accepted: bool = True  # by its calibration
     size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be
     view_mm: float = math.nan  # bound of the error by what is seen
-    plan_mm: float = math.nan  # bound of the error by the plan's own surface
+    plan_mm: float = math.nan  # bound of the error by the plan: its cartilage and surface
     bound_mm: float | None = None  # bound of the error by all that is known; None without a pose
     cartilage_sd_mm: float = math.nan  # rms over the seen surface
     jump_mm: float = math.nan  # of the bone's centre from where it was expected
@@ -163,7 +163,7 @@ RULES = (
     Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",
          lambda e: e.has_lost_rows, 0, None, _HEALTH),
     Rule(Reason.ROWS_DISAGREE, "depth error that the rows' offset stands for, mm",
-         lambda e: e.rows_mm, OK_ERROR_MM, None, CHOSEN),
+         lambda e: e.row_error_mm, OK_ERROR_MM, None, CHOSEN),
     _without_pose(Reason.BONE_LOST, "nothing was found where the bone was expected (yes 1)"),
     _without_pose(Reason.NO_SURFACE, "no surface was measured (yes 1)"),
     _without_pose(Reason.OUT_OF_VIEW, "no part of the model is in view (yes 1)"),
@@ -195,7 +195,7 @@ RULES = (
          lambda e: e.seen.spread_ratio, 1.1, None, CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "kernel that found no noise, over the widest",
          lambda e: e.kernel_fraction, None, 0.95, CHOSEN, doubts_place=True),
-    Rule(Reason.SURFACE_MISFIT, "what residuals share 3 mm apart, over 0.2 mm, mm",
+    Rule(Reason.SURFACE_MISFIT, "correlated residuals 3 mm apart less 0.2 mm, mm",
          lambda e: e.smooth_excess_mm, None, 0, CHOSEN, doubts_place=True),
     Rule(Reason.RIG_NOT_ACCEPTED, "the calibration refused the rig (yes 1)",
          lambda e: not e.is_rig_accepted, 0, None, CHOSEN),
@@ -250,7 +250,7 @@ def decide(evidence: Evidence) -> Verdict:
     )
 
 
-def is_elsewhere(agreement: Agreement) -> bool:
+def is_bone_absent(agreement: Agreement) -> bool:
     """Whether so little of the model agrees that the bone is not there."""
     evidence = Evidence(agreement=agreement)
     return any(rule.status(evidence) is Status.LOST for rule in _OF_AGREEMENT)

@@ -65,15 +65,15 @@ class BimccTracker(Tracker):
         if state.n_lost == 0:
             # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
             frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
-            with self.check_beside(frame) as checks:
+            with self.begin_checks(frame) as checks:
                 # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
                 # turns; check beside the fit; judge.
                 frame = replace(frame, on_measured=checks.check)
                 fits = self.near.find(frame)
                 best = self.judge_fits(frame, checks, fits, goal, frame.start)
                 if is_place_doubted(best.verdict):
-                    searches = state.is_search_due and is_worth_a_search(best)
-                    frame = replace(frame, searches=searches)
+                    may_search_long = state.is_search_due and is_worth_a_search(best)
+                    frame = replace(frame, may_search_long=may_search_long)
                     more = self.buried.find(frame)
                     best = self.judge_fits(
                         frame, checks, more, goal, frame.start, best, keeps_first=True

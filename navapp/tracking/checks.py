@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import Job, begin_beside
+from navapp.geometry.bands import Job, begin_on_helper
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Agreement
@@ -41,11 +41,11 @@ class PairChecks:
         self._begun: tuple[Measurement, Job[PairCheck]] | None = None
 
     def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
-        """The check of a measurement at a pose: the one begun, or a new one, which ends that."""
+        """The check of a measurement at a pose; a check of another measurement is dropped."""
         if self._begun is None or self._begun[0] is not measured:
             self._drop()
             run = partial(_run_check, self._meter, self._pair, self._coarse, measured, pose)
-            self._begun = measured, begin_beside(run)
+            self._begun = measured, begin_on_helper(run)
         return self._begun[1]
 
     def __enter__(self) -> Self:

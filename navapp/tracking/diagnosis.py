@@ -92,7 +92,7 @@ class Diagnosis:
     ) -> Fit | None:
         """Of the fits that a start and tilts of it lead to, the one that explains most."""
         starts = make_near_starts(start, start.apply(self._meter.model.centre_mm))
-        found = self._scorer.find_candidates(measured, starts, lambda _: on_progress(1.0))
+        found = self._scorer.find_coarse_fits(measured, starts, lambda _: on_progress(1.0))
         model = self._meter.model
         fits = [
             Fit(fit_bimcc(measured.scene, model, pose, FREE_FIT), measured)

@@ -63,7 +63,7 @@ class FirstRegistration:
 
         def fit_from(starts: list[RigidTransform], done: float, part: float) -> list[Fit]:
             told = lambda share: report(done + part * share)  # noqa: E731
-            found = select_poses(self._scorer.find_candidates(measured, starts, told))
+            found = select_poses(self._scorer.find_coarse_fits(measured, starts, told))
             return [tracker.near.fit_nearby(frame, measured, pose) for pose in found]
 
         centre_mm = frame.start.apply(tracker.centre_mm)
@@ -98,7 +98,7 @@ class FirstRegistration:
         """In a box, or in the whole view, without a pose to start from."""
         pair = self._tracker.whole_view.rectify(left, right, prior)
         watch.lap("rectify")
-        candidates = self._tracker.whole_view.find_candidates(pair, prior, on_progress)
+        candidates = self._tracker.whole_view.find_coarse_fits(pair, prior, on_progress)
         watch.lap("estimate")
         poses = select_poses(candidates)
         found = [self._fit_candidate(Frame(pair, pose, watch)) for pose in poses]
@@ -115,7 +115,7 @@ class FirstRegistration:
         return max(found, key=self._scorer.score, default=None)
 
     def _judge_distinct(self, frame: Frame, fits: list[Fit], goal: Goal) -> list[TrackedFrame]:
-        """Distinct answers, best first; a guess is called one."""
+        """Distinct answers, best first; the best says so when it is ambiguous."""
         fits = self._scorer.rank(fits)
         kept = distinct([fit.pose for fit in fits], self._tracker.centre_mm)
         judge, meter = self._tracker.judge, self._tracker.meter

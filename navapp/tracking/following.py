@@ -72,8 +72,8 @@ class Follower:
             else:
                 measured = self._meter.measure_on_samples(expected)
                 watch.lap("stereo")
-                is_elsewhere = measured.answered_fraction < least_fraction
-                rested = None if is_elsewhere else fit_pose(measured.scene, model, pose, MODEL_FIT)
+                is_little = measured.matched_fraction < least_fraction
+                rested = None if is_little else fit_pose(measured.scene, model, pose, MODEL_FIT)
             watch.lap("estimate")
             if rested is None:
                 break

@@ -16,9 +16,9 @@ from navapp.values import PoseEstimate, Reason, Stopwatch
 FREE_FIT = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 MODEL_FIT = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 
-# Standard deviation of residuals over the one they claim: the right poses of simulated femurs,
-# which lie in the open, reach so much and no more (tests.bench.correlated_residuals).
-NOISE_RATIO = 0.65
+# Variance of residuals over the one they claim: the right poses of simulated femurs, which lie in
+# the open, reach so much and no more (tests.bench.correlated_residuals).
+NOISE_VARIANCE_RATIO = 0.65**2
 
 OnMeasured = Callable[[Measurement, RigidTransform], object]
 
@@ -34,8 +34,8 @@ class Frame:
     pair: RectifiedPair  # grey pictures, rectified as far around the bone as is looked
     start: RigidTransform  # rectified left camera from bone, expected
     watch: Stopwatch
-    n_lost: int = 0  # frames in which the bone was lost before this one
-    searches: bool = True  # a search that takes as long as many frames is worth it
+    n_lost: int = 0  # frames lost before this one; in odd ones a search goes further off
+    may_search_long: bool = True  # a search that takes as long as many frames is worth it
     # told what is measured on all of the model near `start`, and at which pose.
     on_measured: OnMeasured = ignore
     # told the fraction done of a long search; what it raises stops the search.
@@ -78,7 +78,7 @@ class Fit:
         out. With e the ratio of their variance to the claimed one, and n^2 = `noise_variance_ratio`
         that of the noise, the covariance grows by 1 + e / n^2 (l_free / l_model)^2.
         """
-        excess = max(0.0, self.variance_ratio - NOISE_RATIO**2)
+        excess = max(0.0, self.variance_ratio - NOISE_VARIANCE_RATIO)
         lengths = FREE_CORRELATION_PX / MODEL_CORRELATION_PX
         growth = 1.0 + excess / noise_variance_ratio * lengths**2
         covariance = growth * self.estimate.covariance

@@ -40,7 +40,7 @@ class IcpTracker(Tracker):
         best = self.judge.lost(Reason.BONE_LOST, watch)
         if state.n_lost == 0:
             frame = self.begin(left, right, expected, watch, NEAR_VIEW)
-            with self.check_beside(frame) as checks:
+            with self.begin_checks(frame) as checks:
                 fits = [self._fit(frame, NEAR_BOX)]
                 best = self.judge_fits(frame, checks, fits, goal, predicted, best)
         if best.verdict.status is Status.LOST:

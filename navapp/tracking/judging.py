@@ -19,7 +19,7 @@ from navapp.registration.verdict import (
 from navapp.stereo import StereoHealth
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.checks import PairChecks
-from navapp.tracking.frame import NOISE_RATIO, Fit, Frame
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import PoseEstimate, Reason, RowCheck, Stopwatch, TrackedFrame, Verdict
@@ -72,12 +72,13 @@ class PoseJudge:
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         health, agreement, coarse_px = checks.check(fit.measured, fit.pose).result()
         if agreement is not None:
-            # In the open the noise is what right poses show at most, whatever this one shows; of a
-            # hidden bone the claim stands: what lies flush with it may fit as well.
-            noise_variance_ratio = NOISE_RATIO**2 if agreement.lies_open else 1.0
+            # A bone in the open has the noise that right poses show at most, whatever this pose
+            # shows. A hidden bone has the noise that the measurement claims: something flush with
+            # the bone may fit as well.
+            noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
             fit = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
             fit = fit.with_correlated_residuals(noise_variance_ratio)
-        # On the model it was compared where it was matched, which is where it rests.
+        # A fit on the model was compared by the check; a free one is compared at its pose.
         if agreement is None and np.isfinite(fit.estimate.covariance).all():
             agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
         evidence = self._evidence_of_pair(health, depth_mm)
@@ -109,13 +110,13 @@ class PoseJudge:
         geometry = self._meter.geometry
         offset_px = abs(health.row_offset_px)
         is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
-        rows_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
+        row_error_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
         return Evidence(
             dark_fraction=dark,
             saturated_fraction=saturated,
             detail_ratio=detail_ratio,
             has_lost_rows=health.has_lost_rows,
-            rows_mm=rows_mm if is_sure else 0.0,
+            row_error_mm=row_error_mm if is_sure else 0.0,
             is_rig_accepted=self._is_rig_accepted,
         )
 
@@ -130,7 +131,7 @@ class PoseJudge:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
         is_on_model = fit.measured.view is not None
-        correlated_ratio = fit.variance_ratio / NOISE_RATIO**2 if is_on_model else math.nan
+        correlated_ratio = fit.variance_ratio / NOISE_VARIANCE_RATIO if is_on_model else math.nan
         if not np.isfinite(estimate.covariance).all():
             return replace(known, estimate=estimate, correlated_ratio=correlated_ratio)
         if agreement is None or agreement.n_visible == 0:
@@ -154,7 +155,7 @@ class PoseJudge:
             size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),
             view_mm=view_mm,
             plan_mm=plan_mm,
-            bound_mm=math.hypot(bound_mm, known.rows_mm),
+            bound_mm=math.hypot(bound_mm, known.row_error_mm),
             cartilage_sd_mm=cartilage_mm,
             jump_mm=float(np.linalg.norm(twist[:3])),
             jump_deg=math.degrees(np.linalg.norm(twist[3:])),
@@ -196,7 +197,7 @@ def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> R
     light = (Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE)
     if math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons):
         return None
-    return RowCheck(health.row_offset_px, evidence.rows_mm > OK_ERROR_MM)
+    return RowCheck(health.row_offset_px, evidence.row_error_mm > OK_ERROR_MM)
 
 
 def _rms(values: FloatArray) -> float:

@@ -26,8 +26,8 @@ class TrackState:
     captured_ns: int  # when that was
     velocity: FloatArray  # (6,) twist per second (mm/s, rad/s), left, about the model's centre
     n_lost: int = 0  # frames lost since then
-    # frames in a row whose place was in doubt; lost ones do not count; a glance, or a pair whose
-    # rows disagree, ends the row.
+    # consecutive frames whose place was in doubt: lost ones do not count; a glance, or a vertical
+    # disparity, sets it back to 0.
     n_doubted: int = 0
     # of the bone in the newest picture, and what it looks like; None before the first.
     box: BoxState | None = None
@@ -66,8 +66,8 @@ class TrackState:
         pose = tracked.left_from_bone
         verdict = tracked.verdict
         # What lies far from where it was expected, and fits badly too, is something else.
-        is_elsewhere = Reason.JUMPED in verdict.reasons and is_place_doubted(verdict)
-        if pose is None or verdict.status is Status.LOST or is_elsewhere:
+        is_another_thing = Reason.JUMPED in verdict.reasons and is_place_doubted(verdict)
+        if pose is None or verdict.status is Status.LOST or is_another_thing:
             lost = replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
             return replace(lost, cause=verdict.cause)
         elapsed_ns = captured_ns - self.captured_ns

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import Candidate, find_candidates, rank_fits
-from navapp.registration.verdict import is_elsewhere
+from navapp.registration import CoarseFit, find_coarse_fits, rank_fits
+from navapp.registration.verdict import is_bone_absent
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.frame import Fit, ignore
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
@@ -32,20 +32,20 @@ class FitScorer:
     def is_there(self, fit: Fit) -> bool:
         """Whether so much of the model agrees with what it was fitted to that it may be there."""
         model, geometry = self._meter.model, self._meter.geometry
-        return not is_elsewhere(compare_at(fit.pose, model, fit.measured.disparity, geometry))
+        return not is_bone_absent(compare_at(fit.pose, model, fit.measured.disparity, geometry))
 
     def rank(self, fits: list[Fit]) -> list[Fit]:
         """Fits of candidates, best first, as `rank_fits` does."""
         return rank_fits(fits, [self.score(fit) for fit in fits], self._meter.model.centre_mm)
 
-    def find_candidates(
+    def find_coarse_fits(
         self,
         measured: Measurement,
         starts: Sequence[RigidTransform],
         on_progress: Callable[[float], None] = ignore,
-    ) -> list[Candidate]:
+    ) -> list[CoarseFit]:
         """Distinct poses that starts lead to on a measured surface, by what they explain of it."""
-        return find_candidates(
+        return find_coarse_fits(
             measured.scene,
             self._meter.model,
             starts,

@@ -76,7 +76,7 @@ class Measurement:
 
     disparity: DisparityMap  # over the box
     cloud: SurfaceCloud  # of the measured pixels, thinned
-    answered_fraction: float  # of the pixels that were asked for: the box's, or the model's
+    matched_fraction: float  # of the pixels that were asked for: the box's, or the model's
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
     view: RenderedView | None = None

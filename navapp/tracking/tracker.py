@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from navapp.geometry.bands import begin_beside
+from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -113,7 +113,7 @@ class Tracker(ABC):
         watch = Stopwatch()
         left_from_bone = state.predict(captured_ns, self.centre_mm)
         frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
-        with self.check_beside(frame) as checks:
+        with self.begin_checks(frame) as checks:
             fits = self.find_for_glance(frame)
             best = self.judge_fits(
                 frame, checks, fits, goal, frame.start,
@@ -159,10 +159,10 @@ class Tracker(ABC):
         watch.lap("rectify")
         return Frame(pair, start, watch)
 
-    def check_beside(self, frame: Frame) -> PairChecks:
+    def begin_checks(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""
         # What may hide the bone does not depend on where exactly it is.
-        coarse = begin_beside(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
+        coarse = begin_on_helper(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
         return PairChecks(self.meter, frame.pair, coarse)
 
     def judge_fits(
@@ -208,7 +208,7 @@ class Tracker(ABC):
         """What is wrong for good: as known, or looked for anew in some of the lost frames."""
         is_lost = tracked.verdict.status is Status.LOST
         if not is_lost and state.cause is Reason.PICTURES_SWAPPED:
-            # Swapped pictures show no bone: they are no longer.
+            # The bone is seen again, so the pictures are no longer swapped.
             return None
         is_known = state.cause not in (None, Reason.PICTURES_SWAPPED)
         if not is_lost or is_known or state.n_lost % _FRAMES_BETWEEN_DIAGNOSES != 0:

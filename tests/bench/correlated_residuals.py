@@ -16,7 +16,7 @@ import numpy as np
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.registration.verdict import Evidence, decide
-from navapp.tracking.frame import NOISE_RATIO
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO
 from navapp.values import BoneModel, Reason
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -75,7 +75,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
         fit = parts.find(frame)
         if fit is None or fit.measured.view is None:
             continue
-        noise_variance_ratio = NOISE_RATIO**2 if parts.lies_open(frame, fit) else 1.0
+        noise_variance_ratio = NOISE_VARIANCE_RATIO if parts.lies_open(frame, fit) else 1.0
         shown = parts.with_outline(frame, fit, noise_variance_ratio).with_correlated_residuals(
             noise_variance_ratio
         )
@@ -86,7 +86,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             for one in (fit, shown)
         )
         error_mm = compute_mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
-        evidence = Evidence(correlated_ratio=shown.variance_ratio / NOISE_RATIO**2)
+        evidence = Evidence(correlated_ratio=shown.variance_ratio / NOISE_VARIANCE_RATIO)
         is_misfit = Reason.SURFACE_MISFIT in decide(evidence).reasons
         ratio = shown.variance_ratio**0.5
         yield Answer(ratio, is_misfit, error_mm, *bounds_mm)

@@ -61,7 +61,7 @@ def rounds(
             pose = found.camera_from_bone
             left_mm = np.inf if is_lost else scene.pose.mean_motion_mm(pose, model.hull_mm)
             off_mm = scene.pose.mean_motion_mm(start, model.hull_mm)
-            yield off_mm, measured.answered_fraction, left_mm
+            yield off_mm, measured.matched_fraction, left_mm
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from navapp.geometry.bands import begin_beside, in_row_bands, run_both
+from navapp.geometry.bands import begin_on_helper, in_row_bands, run_both
 
 
 def fails_as(name):
@@ -76,19 +76,19 @@ def test_the_lower_half_begins_at_a_multiple(every, middle):
 
 def test_a_job_beside_runs_on_its_own_and_its_error_is_told():
     meeting = threading.Barrier(2, timeout=20.0)
-    with begin_beside(lambda: (meeting.wait(), threading.current_thread().name)[1]) as job:
+    with begin_on_helper(lambda: (meeting.wait(), threading.current_thread().name)[1]) as job:
         meeting.wait()
         assert job.result() != threading.current_thread().name
-    with pytest.raises(ValueError, match="beside"), begin_beside(fails_as("beside")) as job:
+    with pytest.raises(ValueError, match="beside"), begin_on_helper(fails_as("beside")) as job:
         job.result()
 
 
 def test_a_job_that_the_helper_has_no_time_for_is_done_by_who_asks():
     is_over = threading.Event()
-    with begin_beside(lambda: is_over.wait(20.0)) as busy:
+    with begin_on_helper(lambda: is_over.wait(20.0)) as busy:
         while not busy._begun.running():
             is_over.wait(0.001)
-        with begin_beside(lambda: threading.current_thread().name) as waiting:
+        with begin_on_helper(lambda: threading.current_thread().name) as waiting:
             assert waiting.result() == threading.current_thread().name
         is_over.set()
         assert busy.result()
@@ -96,22 +96,22 @@ def test_a_job_that_the_helper_has_no_time_for_is_done_by_who_asks():
 
 def test_a_job_beside_is_done_once_whoever_does_it():
     done = []
-    with begin_beside(lambda: done.append("outer")) as job:
+    with begin_on_helper(lambda: done.append("outer")) as job:
         pass
     job.result()
 
     def inner():
-        with begin_beside(lambda: done.append("inner")) as one:
+        with begin_on_helper(lambda: done.append("inner")) as one:
             one.result()
         one.result()
 
-    with begin_beside(inner) as outer:
+    with begin_on_helper(inner) as outer:
         outer.result()
     assert done == ["outer", "inner"]
 
 
 def test_an_error_that_nobody_asked_for_is_told_at_the_end():
-    with pytest.raises(ValueError, match="beside"), begin_beside(fails_as("beside")):
+    with pytest.raises(ValueError, match="beside"), begin_on_helper(fails_as("beside")):
         pass
 
 
@@ -129,15 +129,15 @@ def test_a_job_beside_is_over_when_the_block_fails():
         threading.Timer(0.05, let_go.set).start()
         raise ZeroDivisionError
 
-    with pytest.raises(ZeroDivisionError), begin_beside(job):
+    with pytest.raises(ZeroDivisionError), begin_on_helper(job):
         block()
     assert ended == ["job"]
 
 
 def test_a_job_that_has_not_begun_when_the_block_fails_never_runs():
     let_go, done = threading.Event(), []
-    with begin_beside(lambda: let_go.wait(20.0)):
-        with pytest.raises(ZeroDivisionError), begin_beside(lambda: done.append("job")):
+    with begin_on_helper(lambda: let_go.wait(20.0)):
+        with pytest.raises(ZeroDivisionError), begin_on_helper(lambda: done.append("job")):
             raise ZeroDivisionError
         let_go.set()
     run_both(lambda: None, lambda: None)
@@ -149,7 +149,9 @@ def test_halves_of_a_job_beside_do_not_wait_for_others():
     with ExitStack() as stack:
         for _ in range(4):
             stack.enter_context(
-                begin_beside(lambda: run_both(lambda: done.append("a"), lambda: done.append("b")))
+                begin_on_helper(
+                    lambda: run_both(lambda: done.append("a"), lambda: done.append("b"))
+                )
             )
     assert sorted(done) == ["a"] * 4 + ["b"] * 4
 
@@ -159,10 +161,10 @@ def test_the_helper_does_what_it_begins_beside():
 
     def job():
         meeting.wait()
-        with begin_beside(lambda: threading.current_thread().name) as inner:
+        with begin_on_helper(lambda: threading.current_thread().name) as inner:
             return threading.current_thread().name, inner.result()
 
-    with begin_beside(job) as begun:
+    with begin_on_helper(job) as begun:
         meeting.wait()
         name, inner = begun.result()
     assert inner == name != threading.current_thread().name
@@ -170,10 +172,10 @@ def test_the_helper_does_what_it_begins_beside():
 
 def test_an_error_of_what_it_does_itself_is_told_as_well():
     def job():
-        with begin_beside(fails_as("inner")):
+        with begin_on_helper(fails_as("inner")):
             pass
 
-    with pytest.raises(ValueError, match="inner"), begin_beside(job) as outer:
+    with pytest.raises(ValueError, match="inner"), begin_on_helper(job) as outer:
         outer.result()
 
 
@@ -187,10 +189,10 @@ def test_who_asks_while_another_does_the_job_waits_for_its_answer():
         return len(done)
 
     with ExitStack() as stack:
-        held = stack.enter_context(begin_beside(lambda: let_go.wait(20.0)))
+        held = stack.enter_context(begin_on_helper(lambda: let_go.wait(20.0)))
         while not held._begun.running():
             let_go.wait(0.001)
-        job = stack.enter_context(begin_beside(slow))
+        job = stack.enter_context(begin_on_helper(slow))
         answers = []
         askers = [threading.Thread(target=lambda: answers.append(job.result())) for _ in range(2)]
         for asker in askers:
@@ -209,6 +211,6 @@ def test_errors_of_a_dropped_job_are_nobodys():
         begun.set()
         raise ValueError("job")
 
-    job = begin_beside(fails)
+    job = begin_on_helper(fails)
     assert begun.wait(20.0)
     job.drop()

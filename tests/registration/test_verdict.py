@@ -81,7 +81,7 @@ ROWS = (
     Row(Reason.PICTURE_OVEREXPOSED, lambda x: known(saturated_fraction=x), 0.7, None),
     Row(Reason.PICTURES_UNLIKE, lambda x: known(detail_ratio=x), 2.0, None),
     Row(Reason.ROWS_DISAGREE, lambda x: known(has_lost_rows=x > 0), 0, None, 1),
-    Row(Reason.ROWS_DISAGREE, lambda x: known(rows_mm=x), 0.5, None),
+    Row(Reason.ROWS_DISAGREE, lambda x: known(row_error_mm=x), 0.5, None),
     Row(Reason.BONE_LOST, missing(Reason.BONE_LOST), None, 0, 1),
     Row(Reason.NO_SURFACE, missing(Reason.NO_SURFACE), None, 0, 1),
     Row(Reason.OUT_OF_VIEW, missing(Reason.OUT_OF_VIEW), None, 0, 1),
@@ -214,7 +214,7 @@ def test_without_a_pose_the_pair_is_told_first() -> None:
 
 def test_the_bound_is_held_against_the_tolerance_beside_other_reasons() -> None:
     """With what rows cost, which the bound holds."""
-    assert told(known(bound_mm=2.1, rows_mm=1.0)) == (
+    assert told(known(bound_mm=2.1, row_error_mm=1.0)) == (
         Status.DEGRADED,
         (Reason.ROWS_DISAGREE, Reason.TRE_TOO_LARGE),
     )

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from navapp.geometry.bands import begin_beside
+from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.agreement import compare
@@ -100,7 +100,7 @@ def test_a_coarse_map_that_reaches_is_used_and_a_smaller_one_is_made_anew() -> N
     box = MAP.box
     for around, asked in ((box.grow(3), []), (Box(box.x + 1, box.y, 9, 9), [box])):
         meter, known_px = CoarseMeter(), np.full((around.height, around.width), 7.0, np.float32)
-        job = begin_beside(lambda px=known_px, where=around: CoarseMap(px, where))
+        job = begin_on_helper(lambda px=known_px, where=around: CoarseMap(px, where))
         with PairChecks(meter, blank_pair(), job) as checks:
             found = checks.check(measurement(), TRUE).result()
         assert meter.asked == asked

@@ -6,7 +6,7 @@ from calibration.targets.boards import Board
 from calibration.targets.detection import SeenBoard, find_board
 from calibration.targets.seen_pairs import SeenPair
 from drivers.frames import StereoFrame
-from navapp.geometry.bands import begin_beside
+from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rectification import luma
 
 
@@ -28,6 +28,6 @@ class BoardView:
 
 def detect_board(frame: StereoFrame, board: Board) -> BoardView:
     """Find the board in both pictures, at the same time."""
-    with begin_beside(lambda: find_board(luma(frame.right), board)) as right:
+    with begin_on_helper(lambda: find_board(luma(frame.right), board)) as right:
         left = find_board(luma(frame.left), board)
         return BoardView(frame, left, right.result())

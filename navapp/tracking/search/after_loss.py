@@ -36,7 +36,7 @@ class SearchAfterLoss:
             frame.watch.lap("stereo")
         if measured is None or len(measured.cloud) == 0:
             return [self._near.find_freely(frame, WIDE_BOX)]
-        candidates = self._scorer.find_candidates(measured, starts)
+        candidates = self._scorer.find_coarse_fits(measured, starts)
         poses = select_poses(candidates, _N_REFINED) or [frame.start]
         # Far from where it was, a bone may look like itself in several ways.
         fits = [self._near.fit_nearby(frame, measured, pose) for pose in poses]

@@ -81,7 +81,7 @@ class BuriedSearch:
         fit = self._follower.follow(frame, frame.start, skips_samples=True)
         if fit is not None:
             yield fit
-        if not frame.searches:
+        if not frame.may_search_long:
             return
         random = np.random.default_rng(_SEED)
         twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations
@@ -97,7 +97,7 @@ class BuriedSearch:
     def find_around(self, frame: Frame, measured: Measurement) -> Fit | None:
         """The bone around a rough start, from what was measured freely around it.
 
-        The fit says so when it is a guess; None when nothing is matched.
+        The fit says so when it is ambiguous; None when nothing is matched.
         """
         report = frame.on_progress
         depth = DepthMap.of(self._meter.geometry, measured.disparity)
@@ -143,7 +143,7 @@ class BuriedSearch:
         return [fit.pose.move(twist, centre_mm) for twist in twists]
 
     def _select_rest(self, frame: Frame, places: list[Place]) -> Fit | None:
-        """Of all that come to rest, what leaves least; a guess when another leaves as little."""
+        """The fit at rest with the smallest residuals; ambiguous when another's are as small."""
         found = (self._follower.follow(frame, one.fit.pose, skips_samples=True) for one in places)
         fits = [fit for fit in found if fit is not None]
         if not fits:

@@ -72,7 +72,7 @@ class NearSearch:
             return None
         far = self._fit(frame, measured, frame.start, FREE_FIT)
         is_on_model = far.measured.view is not None
-        if is_on_model and far.measured.answered_fraction >= self._settings.sure_fraction:
+        if is_on_model and far.measured.matched_fraction >= self._settings.sure_fraction:
             return far
         return max(far, self.fit_nearby(frame, measured, frame.start), key=self._score)
 
@@ -86,7 +86,7 @@ class NearSearch:
 
     def _is_here(self, fit: Fit, expected: RigidTransform) -> bool:
         """Enough of the model is matched, or what is matched is where it was expected."""
-        matched = fit.measured.answered_fraction
+        matched = fit.measured.matched_fraction
         if matched >= self._settings.sure_fraction:
             return True
         moved_mm = expected.mean_motion_mm(fit.pose, self._meter.model.hull_mm)

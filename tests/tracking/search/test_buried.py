@@ -41,7 +41,7 @@ def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
     frame = off(a, (1.6, -1.2, 1.4, 0.02, -0.02, 0.01))
     *rested, best = a.tracker.buried.find(frame)
     assert error_mm(a, best) < 0.2
-    alone = list(a.tracker.buried.find(replace(frame, searches=False)))
+    alone = list(a.tracker.buried.find(replace(frame, may_search_long=False)))
     assert len(alone) == len(rested)
 
 

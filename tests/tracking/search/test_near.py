@@ -23,7 +23,7 @@ def search_of(
     meter: FakeMeter,
     score: Callable[[Fit], float] | None = None,
 ) -> NearSearch:
-    by_share = score or (lambda fit: fit.measured.answered_fraction)
+    by_share = score or (lambda fit: fit.measured.matched_fraction)
     return NearSearch(meter, by_share, NearSettings())
 
 
