@@ -104,7 +104,7 @@ class Script:
 
 
 class FakeTracker:
-    """Stands for `navapp.tracking.Line`."""
+    """Stands for a `navapp.tracking.Tracker`."""
 
     def __init__(self, script: Script, bone: BoneModel) -> None:
         self.script, self.bone = script, bone
