@@ -34,9 +34,8 @@ _T95 = 2.05
 class Estimate:
     """A time and its standard error."""
 
-    # value_ms, sigma_ms: and its standard error.
     value_ms: float
-    sigma_ms: float
+    sigma_ms: float  # its standard error
 
     @property
     def bound_ms(self) -> float:
@@ -55,8 +54,7 @@ class EyeLag:
     swing: float  # grey values between darkness and light
     area_fraction: float  # of the picture
     explained: float  # share of the area's changes that the code explains
-    # of the frames that saw light where the code says darkness, or the reverse.
-    wrong_fraction: float
+    wrong_fraction: float  # frames that saw light where the code says darkness, or the reverse
     other_peak_fraction: float  # of resampled recordings that another delay fits better
 
 

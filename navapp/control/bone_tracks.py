@@ -17,8 +17,8 @@ class Candidate:
     track: TrackState  # where it is now
     tracked: TrackedFrame  # the tracker's newest answer for it
     is_held: bool = False  # judged as it stands (proposed by hand), not followed
-    number: int = 1  # it is the n-th ..
-    count: int = 1  # ... of how many.
+    number: int = 1  # this is candidate `number` ...
+    count: int = 1  # ... of `count`
 
 
 class BoneTracks:

@@ -18,7 +18,7 @@ from navapp.values import Plan, StageSpec, Status, TrackedFrame, Verdict
 class _Sight:
     """What was last said of a bone."""
 
-    verdict: Verdict  # that
+    verdict: Verdict
     # when the newest frame in which it was OK was captured; None when there was none.
     ok_ns: int | None = None
     # where the stage's bone was in the same frame; None when that was not OK.

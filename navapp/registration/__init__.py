@@ -6,10 +6,10 @@ from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import find_initial
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
-    CoarseFit,
+    ScoredPose,
     compute_explained_fraction,
     distinct,
-    find_coarse_fits,
+    find_poses,
     is_same_pose,
     make_far_starts,
     make_near_starts,
@@ -25,18 +25,18 @@ from navapp.registration.scene import Scene
 
 __all__ = [
     "BimccSettings",
-    "CoarseFit",
     "DepthMap",
     "Outcome",
     "PoseSampler",
     "Registration",
     "RegistrationModel",
     "Scene",
+    "ScoredPose",
     "compute_explained_fraction",
     "distinct",
     "estimate_at",
-    "find_coarse_fits",
     "find_initial",
+    "find_poses",
     "fit_bimcc",
     "fit_pose",
     "is_same_pose",

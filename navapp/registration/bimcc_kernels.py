@@ -63,7 +63,7 @@ class LoopState(NamedTuple):
     # the kernel is as narrow as the noise (coarse), the pose stands still (fine).
     has_finished: bool
     sigma_mm: float  # width of the kernel; 0 when too few points paired
-    n_pairs: int  # the last so many pairs
+    n_pairs: int  # in the last step
 
 
 @njit(cache=True, nogil=True)

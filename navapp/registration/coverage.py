@@ -17,7 +17,7 @@ _REACH_MM = 10.0
 _NEAR_SIGMAS = 1.5
 
 
-def coverage(
+def compute_coverage(
     scene: Scene, model: RegistrationModel, scene_from_bone: RigidTransform, sigma_mm: float
 ) -> float:
     """Fraction of the model points facing the camera that have the scene's surface beneath them.

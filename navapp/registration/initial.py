@@ -32,7 +32,11 @@ from navapp.registration.hypotheses import (
 )
 from navapp.registration.initial_kernels import Hypotheses, score_edges, score_surface
 from navapp.registration.model import RegistrationModel
-from navapp.registration.multi_start import ANYWHERE, CoarseFit, compute_explained_fraction
+from navapp.registration.multi_start import (
+    ANYWHERE_SETTINGS,
+    ScoredPose,
+    compute_explained_fraction,
+)
 from navapp.registration.scene import Scene
 from navapp.values import AspectGraph
 
@@ -71,7 +75,7 @@ def find_initial(
     cone: ViewCone,
     aspects: AspectGraph | None = None,
     on_progress: Callable[[float], None] = lambda fraction: None,
-) -> list[CoarseFit]:
+) -> list[ScoredPose]:
     """Find a bone in a box without a pose: distinct candidates, best first.
 
     Args:
@@ -139,23 +143,25 @@ def _fit_starts(
     model: RegistrationModel,
     starts: list[RigidTransform],
     on_progress: Callable[[float], None],
-) -> list[CoarseFit]:
+) -> list[ScoredPose]:
     """What the coarse loop finds from each start, on the scene around it: distinct, best first."""
-    found: list[CoarseFit | None] = [None] * len(starts)
+    found: list[ScoredPose | None] = [None] * len(starts)
     _ = model.arrays  # made here once, not in both threads
     pixels = geometry.project(scene.points_mm)
 
-    def fit(start: RigidTransform) -> CoarseFit | None:
+    def fit(start: RigidTransform) -> ScoredPose | None:
         near = _crop_scene(scene, pixels, geometry, start.apply(model.points_mm))
         if len(near) < MIN_POINTS:
             return None
-        pose = fit_coarsely(replace(near, thinned_to=_FITTED_POINTS), model, start, ANYWHERE)
+        pose = fit_coarsely(
+            replace(near, thinned_to=_FITTED_POINTS), model, start, ANYWHERE_SETTINGS
+        )
         if pose is None:
             return None
         judged = replace(near, thinned_to=_JUDGED_POINTS)
         # As a fraction of the whole scene, so that candidates compare.
         explained = compute_explained_fraction(judged, model, pose)
-        return CoarseFit(pose, explained * len(near) / len(scene))
+        return ScoredPose(pose, explained * len(near) / len(scene))
 
     def run(first: int) -> None:
         for number in range(first, len(starts), 2):

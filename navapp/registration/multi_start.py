@@ -9,9 +9,9 @@ import numpy as np
 from navapp.geometry.bands import run_both
 from navapp.geometry.directions import sphere_spiral
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
-from navapp.registration.bimcc import fit_coarsely
+from navapp.registration.bimcc import DEFAULT, fit_coarsely
 from navapp.registration.bimcc_kernels import BimccSettings
-from navapp.registration.coverage import coverage
+from navapp.registration.coverage import compute_coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import Pose, make_pairs, measure_pairs, pair_forward
 from navapp.registration.scene import Scene
@@ -30,12 +30,12 @@ _N_REFINED, _REFINED_FRACTION = 3, 0.5
 # A different pose that explains as much as this of the best one makes that one ambiguous.
 AMBIGUOUS_FRACTION = 0.9
 # For starts that are near, or may be anywhere.
-NEAR = BimccSettings(model_points=1000, max_iterations=35)
-ANYWHERE = BimccSettings(model_points=1000, max_iterations=60, widest_mm=30.0)
+NEAR_SETTINGS = BimccSettings(model_points=1000, max_iterations=35)
+ANYWHERE_SETTINGS = BimccSettings(model_points=1000, max_iterations=60, widest_mm=30.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CoarseFit:
+class ScoredPose:
     """Where some start led to, coarsely, and how much of both sides that explains (0 to 1)."""
 
     scene_from_bone: RigidTransform
@@ -102,14 +102,14 @@ def make_scattered_starts(
     return starts
 
 
-def find_coarse_fits(
+def find_poses(
     scene: Scene,
     model: RegistrationModel,
     starts: Sequence[RigidTransform],
     score: Callable[[RigidTransform], float] | None = None,
     on_progress: Callable[[float], None] = lambda fraction: None,
-    settings: BimccSettings = NEAR,
-) -> list[CoarseFit]:
+    settings: BimccSettings = NEAR_SETTINGS,
+) -> list[ScoredPose]:
     """Fit coarsely from every start (`scene_from_bone`); distinct answers, best score first.
 
     The score is `compute_explained_fraction` by default. Progress is a fraction; what it raises
@@ -129,7 +129,7 @@ def find_coarse_fits(
     on_progress(1.0)
     poses = distinct([pose for pose in found if pose is not None], model.centre_mm)
     judged = score or (lambda pose: compute_explained_fraction(thinned, model, pose))
-    candidates = [CoarseFit(pose, judged(pose)) for pose in poses]
+    candidates = [ScoredPose(pose, judged(pose)) for pose in poses]
     return sorted(candidates, key=lambda candidate: candidate.score, reverse=True)
 
 
@@ -143,7 +143,7 @@ def compute_explained_fraction(
     Both under a kernel as wide as the largest noise, so that poses compare. Without a camera there
     is no coverage.
     """
-    settings = BimccSettings()
+    settings = DEFAULT
     sigma_mm = 0.5 * settings.widest_at_rest_mm
     pose = Pose(*scene_from_bone.inverse_parts())
     arrays = scene.arrays
@@ -155,10 +155,10 @@ def compute_explained_fraction(
     fraction = kernels / max(n_asked, 1)
     if scene.camera_mm is None:
         return fraction
-    return fraction * coverage(scene, model, scene_from_bone, sigma_mm)
+    return fraction * compute_coverage(scene, model, scene_from_bone, sigma_mm)
 
 
-def select_poses(candidates: Sequence[CoarseFit], most: int = _N_REFINED) -> list[RigidTransform]:
+def select_poses(candidates: Sequence[ScoredPose], most: int = _N_REFINED) -> list[RigidTransform]:
     """Of candidates, best first, the poses that are worth a fit on all points."""
     least = _REFINED_FRACTION * max((one.score for one in candidates), default=0.0)
     return [one.scene_from_bone for one in candidates[:most] if one.score >= least]

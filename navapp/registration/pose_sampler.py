@@ -18,7 +18,7 @@ from navapp.geometry.bands import in_row_bands
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.model import RegistrationModel
-from navapp.registration.multi_start import CoarseFit, distinct
+from navapp.registration.multi_start import ScoredPose, distinct
 from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
 
 # All settings below are chosen. Always the same draws: the same pictures give the same pose.
@@ -79,7 +79,7 @@ class PoseSampler:
         rough: RigidTransform,
         n: int,
         on_progress: Callable[[float], None] = lambda fraction: None,
-    ) -> list[CoarseFit]:
+    ) -> list[ScoredPose]:
         """At most n distinct poses around a rough one (camera from bone), best first.
 
         `on_progress` is told the fraction done; it may raise to cancel.
@@ -90,7 +90,7 @@ class PoseSampler:
             on_progress(k / (len(_ROUNDS) + 1))
             poses = self._draw(depth, poses, draw, sigma_mm, random)
         on_progress(len(_ROUNDS) / (len(_ROUNDS) + 1))
-        found: list[CoarseFit] = []
+        found: list[ScoredPose] = []
         for n_climbing, draw, sigmas_mm in _CLIMBS:
             starts = distinct(poses, self._centre_mm, n_climbing)
             found = [self._climb(depth, pose, draw, sigmas_mm) for pose in starts]
@@ -130,7 +130,7 @@ class PoseSampler:
 
     def _climb(
         self, depth: DepthMap, start: RigidTransform, draw: Draw, sigmas_mm: tuple[float, ...]
-    ) -> CoarseFit:
+    ) -> ScoredPose:
         """The best pose about a start by cross-entropy: draw, keep the best, draw as they spread.
 
         Source: Rubinstein 1999.
@@ -147,7 +147,7 @@ class PoseSampler:
             best, score = self._find_best(depth, moved, draw, sigma_mm)
             mean = twists[best].mean(axis=0)
             covariance = _WIDENING**2 * np.cov(twists[best].T) + floor
-        return CoarseFit(start.move(mean, centre_mm), score)
+        return ScoredPose(start.move(mean, centre_mm), score)
 
     def _move(
         self, rotations: FloatArray, centres_mm: FloatArray, twists: FloatArray

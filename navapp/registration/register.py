@@ -9,15 +9,15 @@ from typing import Literal
 import numpy as np
 
 from navapp.geometry.transform import RigidTransform
-from navapp.registration.bimcc import MIN_POINTS, Solution, solve_bimcc
+from navapp.registration.bimcc import DEFAULT, MIN_POINTS, Solution, solve_bimcc
 from navapp.registration.bimcc_kernels import BimccSettings
-from navapp.registration.coverage import coverage
+from navapp.registration.coverage import compute_coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
-    ANYWHERE,
-    NEAR,
+    ANYWHERE_SETTINGS,
+    NEAR_SETTINGS,
     compute_explained_fraction,
-    find_coarse_fits,
+    find_poses,
     make_far_starts,
     make_near_starts,
     make_tilted_starts,
@@ -78,7 +78,9 @@ class Registration:
     @property
     def explanations(self) -> tuple[str, ...]:
         """Why it is no registration, in words for people."""
-        return (*(reason.value for reason in self.reasons), *self.details)
+        # What is too small is told by the details: its size is not known to differ.
+        told = (one.value for one in self.reasons if one is not Reason.SIZE_DIFFERS)
+        return (*told, *self.details)
 
 
 def register(
@@ -112,12 +114,12 @@ def register(
         return search.best
     place_mm = start.apply(model.centre_mm)
     if is_global or search.best.is_doubtful:
-        search.try_starts(make_near_starts(start, place_mm), NEAR, on_progress, 0.0)
+        search.try_starts(make_near_starts(start, place_mm), NEAR_SETTINGS, on_progress, (0.0, 0.1))
     if search.best.outcome is Outcome.FAILED:
-        search.try_starts(make_far_starts(start, place_mm), NEAR, on_progress, 0.1)
+        search.try_starts(make_far_starts(start, place_mm), NEAR_SETTINGS, on_progress, (0.1, 0.6))
     if is_global and search.best.is_doubtful:
         starts = _make_starts_all_around(scene, model, start)
-        search.try_starts(starts, ANYWHERE, on_progress, 0.5)
+        search.try_starts(starts, ANYWHERE_SETTINGS, on_progress, (0.6, 1.0))
     on_progress(1.0)
     return search.best
 
@@ -135,12 +137,12 @@ class _Search:
         starts: list[RigidTransform],
         settings: BimccSettings,
         on_progress: Callable[[float], None],
-        done: float,
+        span: tuple[float, float],
     ) -> None:
-        """Refine what many starts lead to; progress goes on from the fraction done."""
+        """Fit to all points what many starts lead to; `span` of the progress is told."""
         scene, model = self._scene, self._model
-        told = lambda part: on_progress(done + 0.5 * part * (1.0 - done))  # noqa: E731
-        found = find_coarse_fits(scene, model, starts, on_progress=told, settings=settings)
+        told = lambda part: on_progress(span[0] + part * (span[1] - span[0]))  # noqa: E731
+        found = find_poses(scene, model, starts, on_progress=told, settings=settings)
         self._solutions += [solve_bimcc(scene, model, pose) for pose in select_poses(found)]
         poses = [one.estimate.camera_from_bone for one in self._solutions]
         scores = [compute_explained_fraction(scene, model, pose) for pose in poses]
@@ -168,7 +170,7 @@ def _judge(
         return Registration(Outcome.FAILED, estimate.reasons, (), estimate, None, None, n_starts)
     seen = None
     if scene.camera_mm is not None:
-        seen = coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
+        seen = compute_coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
     tre_mm = _predict_tre_mm(scene, model, estimate)
     reasons = find_reasons(_gather_evidence(scene, model, solution, seen, tre_mm))
     outcome = Outcome.FAILED
@@ -192,7 +194,6 @@ def _gather_evidence(
     estimate = solution.estimate
     evidence = Evidence(
         estimate=estimate,
-        is_fixed=bool(np.isfinite(estimate.covariance).all()),
         extent_mm=min(_extent_mm(scene), _extent_mm(model)),
         view_mm=np.inf if tre_mm is None else tre_mm,
         plan_mm=0.0,
@@ -200,17 +201,21 @@ def _gather_evidence(
     )
     if seen is not None:
         # Nothing tells what hides the rest.
-        evidence = replace(evidence, agreement=Agreement(1, seen, 0.0, np.nan, np.nan, np.nan))
+        agreement = Agreement(
+            n_visible=0, coverage=seen, hidden_fraction=0.0, behind_fraction=np.nan,
+            inlier_fraction=np.nan, spread_ratio=np.nan,
+        )  # fmt: skip
+        evidence = replace(evidence, agreement=agreement)
     if scene.knows_noise:
         return evidence
-    kernel_fraction = solution.sigma_mm / BimccSettings().widest_at_rest_mm
+    kernel_fraction = solution.sigma_mm / DEFAULT.widest_at_rest_mm
     evidence = replace(evidence, kernel_fraction=kernel_fraction)
     if not _is_little(seen):
         return evidence
     # Where little tells a right pose from a wrong one, residuals must look like noise as well.
     spacing_mm = float(np.median(model.arrays.spacing))
     limit_mm = max(_SMOOTH_MM, _SMOOTH_SPACINGS * spacing_mm)
-    smooth_mm = smooth_part_mm(solution, max(_CELL_MM, spacing_mm))
+    smooth_mm = measure_smooth_part_mm(solution, max(_CELL_MM, spacing_mm))
     return replace(evidence, smooth_excess_mm=smooth_mm - limit_mm)
 
 
@@ -223,7 +228,7 @@ def _is_little(seen: float | None) -> bool:
     return seen is None or seen < _DOUBTFUL_COVERAGE
 
 
-def smooth_part_mm(solution: Solution, cell_mm: float) -> float:
+def measure_smooth_part_mm(solution: Solution, cell_mm: float) -> float:
     """Square root of the covariance of the residuals of neighbouring cells; 0 when it is negative.
 
     Noise is not correlated with the noise beside it; residuals of another shape are. Residuals
@@ -253,7 +258,7 @@ def _predict_tre_mm(scene: Scene, model: RegistrationModel, estimate: PoseEstima
         towards = camera_mm - points_mm
         cosine = np.einsum("ij,ij->i", model.normals, towards) / np.linalg.norm(towards, axis=1)
         points_mm = points_mm[cosine > _LEAST_FACING_COSINE]
-    if len(points_mm) == 0 or not np.isfinite(estimate.covariance).all():
+    if len(points_mm) == 0 or not estimate.is_fixed:
         return None
     some_mm = points_mm[:: max(1, len(points_mm) // _N_TRE_POINTS)]
     return estimate.predict_tre_mm(model.centre_mm, some_mm)

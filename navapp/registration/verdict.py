@@ -2,15 +2,15 @@
 
 `RULES` is the whole of it: what speaks against a pose, from which value on, and where that value
 comes from. What is measured to judge by is `Evidence`. Nothing else adds a reason, but for a cause
-that the diagnosis finds once a bone is lost (`with_cause`).
+that the diagnosis finds once a bone is lost (`TrackedFrame.with_cause`).
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from navapp.geometry.transform import FloatArray
-from navapp.values import PoseEstimate, Reason, Status, TrackedFrame, Verdict
+from navapp.values import PoseEstimate, Reason, Status, Verdict
 
 # What navigation promises of an OK pose, at 95 %, beside what the plan says of its own cartilage.
 OK_ERROR_MM = 0.5
@@ -58,7 +58,6 @@ class Evidence:
 
     missing: Reason | None = None  # why there is no pose to be judged
     estimate: PoseEstimate | None = None  # in the rectified left camera
-    is_fixed: bool = False  # some surface fixes the pose in all directions
     agreement: Agreement | None = None  # of the model at the pose with what was measured
     dark_fraction: float = math.nan  # of the darker picture
     saturated_fraction: float = math.nan  # of the brighter picture
@@ -66,8 +65,8 @@ class Evidence:
     has_lost_rows: bool = False  # too large a vertical disparity to be measured
     row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
     correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
-    kernel_fraction: float = math.nan  # of the widest at rest, for points of unknown noise
-    smooth_excess_mm: float = math.nan  # correlated residuals of such points, over what may be
+    kernel_fraction: float = math.nan  # kernel at the end over the widest, if no noise is known
+    smooth_excess_mm: float = math.nan  # correlated residuals less what may be, if none is known
     extent_mm: float = math.nan  # longest side of the scene or of the model, the smaller one's
     is_rig_accepted: bool = True  # by its calibration
     size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be
@@ -86,7 +85,7 @@ class Evidence:
     @property
     def n_loose(self) -> int:
         """1 when a direction is free, 2 when the points fix no pose at all."""
-        is_loose = self.estimate is not None and not self.is_fixed
+        is_loose = self.estimate is not None and not self.estimate.is_fixed
         if is_loose and not self.says(Reason.TOO_FEW_POINTS):
             return 2
         return int(self.says(Reason.DEGENERATE))
@@ -126,7 +125,7 @@ class Rule:
 
     reason: Reason
     quantity: str  # what is looked at, for people
-    measure: Callable[[Evidence], float]  # it, of the evidence; NaN is no reason
+    measure: Callable[[Evidence], float]  # the quantity in the evidence; NaN is no reason
     degraded: float | None  # beyond this the pose is not shown; None is never
     lost: float | None  # beyond this it is not there
     source: str  # of the limits: a command that measures them, or "chosen"
@@ -259,20 +258,3 @@ def is_bone_absent(agreement: Agreement) -> bool:
 def is_place_doubted(verdict: Verdict) -> bool:
     """Whether something speaks against a pose's place; always when it is lost."""
     return verdict.status is Status.LOST or not _AGAINST_PLACE.isdisjoint(verdict.reasons)
-
-
-def is_worth_a_search(tracked: TrackedFrame) -> bool:
-    """Whether the place is in doubt, and a search could find one that is not.
-
-    While the cameras' rows disagree no answer can be OK: only a lost bone has something to gain.
-    """
-    is_lost = tracked.verdict.status is Status.LOST
-    return is_place_doubted(tracked.verdict) and (is_lost or not tracked.rows_disagree)
-
-
-def with_cause(tracked: TrackedFrame, cause: Reason | None) -> TrackedFrame:
-    """An answer with the cause of its failure in front; an OK has none."""
-    if cause is None or tracked.verdict.status is Status.OK:
-        return tracked
-    others = tuple(reason for reason in tracked.verdict.reasons if reason is not cause)
-    return replace(tracked, verdict=replace(tracked.verdict, reasons=(cause, *others)))

@@ -9,14 +9,12 @@ from dataclasses import replace
 
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import RigidTransform
-from navapp.registration.verdict import Goal, is_place_doubted, is_worth_a_search, with_cause
-from navapp.tracking.checks import PairChecks
+from navapp.registration.verdict import Goal, is_place_doubted
 from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.motion import TrackState
+from navapp.tracking.motion import TrackState, is_worth_a_search
 from navapp.tracking.search.after_loss import SearchAfterLoss
 from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.near import NearSearch
@@ -70,19 +68,23 @@ class BimccTracker(Tracker):
                 # turns; check beside the fit; judge.
                 frame = replace(frame, on_measured=checks.check)
                 fits = self.near.find(frame)
-                best = self.judge_fits(frame, checks, fits, goal, frame.start)
+                best = self.judge_fits(frame, fits, goal, frame.start, checks=checks)
                 if is_place_doubted(best.verdict):
                     may_search_long = state.is_search_due and is_worth_a_search(best)
                     frame = replace(frame, may_search_long=may_search_long)
                     more = self.buried.find(frame)
                     best = self.judge_fits(
-                        frame, checks, more, goal, frame.start, best, keeps_first=True
+                        frame, more, goal, frame.start, best, checks, keeps_first=True
                     )
         if best is None or best.verdict.status is Status.LOST:
             state = replace(state, box=self.boxes.follow(state.box, left))
-            best = self._search_again(left, right, left_from_bone, state, goal, watch, best)
-        if best.verdict.status is not Status.OK:
-            best = with_cause(best, self.find_cause(left, right, left_from_bone, state, best))
+            # Search where the box lies, and where the bone was expected.
+            best = self.search_places(
+                left, right, self.boxes.starts(left_from_bone, state.box), self.after_loss.find,
+                goal, self.rectify_pose(left_from_bone),
+                best or self.judge.lost(Reason.BONE_LOST, watch), watch, state.n_lost,
+            )  # fmt: skip
+        best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
 
@@ -100,28 +102,3 @@ class BimccTracker(Tracker):
     ) -> list[TrackedFrame]:
         """Find the bone from a rough pose, a box or a cone: distinct candidates, best first."""
         return FirstRegistration(self).register(left, right, prior, goal, on_progress)
-
-    def _search_again(
-        self,
-        left: Image,
-        right: Image,
-        left_from_bone: RigidTransform,
-        state: TrackState,
-        goal: Goal,
-        watch: Stopwatch,
-        best: TrackedFrame | None,
-    ) -> TrackedFrame:
-        """The best answer of searches where the box lies and where the bone was expected."""
-        best = best or self.judge.lost(Reason.BONE_LOST, watch)
-        predicted = self.rectify_pose(left_from_bone)
-        for number, place in enumerate(self.boxes.starts(left_from_bone, state.box)):
-            frame = self.begin(left, right, place, watch)
-            # Further off only around the first place.
-            frame = replace(frame, n_lost=0 if number else state.n_lost)
-            checks = PairChecks(self.meter, frame.pair)
-            best = self.judge_fits(
-                frame, checks, self.after_loss.find(frame), goal, predicted, best
-            )
-            if best.verdict.status is Status.OK:
-                break
-        return best

@@ -14,7 +14,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import fit_bimcc, make_near_starts, select_poses
 from navapp.registration.multi_start import AMBIGUOUS_FRACTION
 from navapp.stereo import are_swapped
-from navapp.tracking.frame import FREE_FIT, Fit, ignore
+from navapp.tracking.frame import FREE_SETTINGS, Fit, ignore
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import WIDE_VIEW, Measurement, SurfaceMeter
 from navapp.values import DisparityMap, Reason, Status, TrackedFrame
@@ -38,7 +38,7 @@ class Diagnosis:
         failed: TrackedFrame,
         on_progress: Callable[[float], None] = ignore,
     ) -> Reason | None:
-        """Why a first registration failed, when it is one of these.
+        """Why a first registration failed: swapped pictures, another side's or another surface.
 
         Args:
             left: picture of the left camera.
@@ -92,10 +92,10 @@ class Diagnosis:
     ) -> Fit | None:
         """Of the fits that a start and tilts of it lead to, the one that explains most."""
         starts = make_near_starts(start, start.apply(self._meter.model.centre_mm))
-        found = self._scorer.find_coarse_fits(measured, starts, lambda _: on_progress(1.0))
+        found = self._scorer.find_poses(measured, starts, lambda _: on_progress(1.0))
         model = self._meter.model
         fits = [
-            Fit(fit_bimcc(measured.scene, model, pose, FREE_FIT), measured)
+            Fit(fit_bimcc(measured.scene, model, pose, FREE_SETTINGS), measured)
             for pose in select_poses(found)
         ]
         return max(fits, key=self._scorer.score, default=None)

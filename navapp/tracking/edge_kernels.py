@@ -91,7 +91,7 @@ def measure_missing_fraction(profile: NDArray[np.float64]) -> float:
 
 
 @njit(cache=True, nogil=True)
-def find_steps(picture: NDArray[np.uint8], rim: Rim) -> NDArray[np.float64]:
+def measure_edge_offsets(picture: NDArray[np.uint8], rim: Rim) -> NDArray[np.float64]:
     """(N,) px from each point of a rim to its picture's edge along the normal; NaN without one."""
     wide, flank = np.empty(2 * _HALF + 1), np.empty(2 * _FLANK + 1)
     offset = np.full(rim.pixel.shape[0], np.nan)

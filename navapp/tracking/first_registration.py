@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
-from navapp.registration.verdict import Goal, with_cause
-from navapp.tracking.checks import PairChecks
+from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
@@ -51,7 +50,7 @@ class FirstRegistration:
             return answers
         around = None if start is None else tracker.rectify_pose(start)
         cause = tracker.diagnosis.explain_failure(left, right, around, answers[0], on_progress)
-        return [with_cause(answer, cause) for answer in answers]
+        return [answer.with_cause(cause) for answer in answers]
 
     def _register_around(self, frame: Frame, goal: Goal) -> list[TrackedFrame]:
         """Around a rough pose: near starts, far ones, partly buried, until one gives an OK."""
@@ -63,7 +62,7 @@ class FirstRegistration:
 
         def fit_from(starts: list[RigidTransform], done: float, part: float) -> list[Fit]:
             told = lambda share: report(done + part * share)  # noqa: E731
-            found = select_poses(self._scorer.find_coarse_fits(measured, starts, told))
+            found = select_poses(self._scorer.find_poses(measured, starts, told))
             return [tracker.near.fit_nearby(frame, measured, pose) for pose in found]
 
         centre_mm = frame.start.apply(tracker.centre_mm)
@@ -83,8 +82,7 @@ class FirstRegistration:
         done, report = _NEAR_PART + _FAR_PART, frame.on_progress
         frame = replace(frame, on_progress=lambda part: report(done + (1.0 - done) * part))
         fit = self._tracker.buried.find_around(frame, measured)
-        checks = PairChecks(self._tracker.meter, frame.pair)
-        return self._tracker.judge.judge(frame, checks, fit, goal)
+        return self._tracker.judge.judge(frame, fit, goal)
 
     def _register_anywhere(
         self,
@@ -98,7 +96,7 @@ class FirstRegistration:
         """In a box, or in the whole view, without a pose to start from."""
         pair = self._tracker.whole_view.rectify(left, right, prior)
         watch.lap("rectify")
-        candidates = self._tracker.whole_view.find_coarse_fits(pair, prior, on_progress)
+        candidates = self._tracker.whole_view.find_poses(pair, prior, on_progress)
         watch.lap("estimate")
         poses = select_poses(candidates)
         found = [self._fit_candidate(Frame(pair, pose, watch)) for pose in poses]
@@ -118,13 +116,8 @@ class FirstRegistration:
         """Distinct answers, best first; the best says so when it is ambiguous."""
         fits = self._scorer.rank(fits)
         kept = distinct([fit.pose for fit in fits], self._tracker.centre_mm)
-        judge, meter = self._tracker.judge, self._tracker.meter
         # Checks of its own for each: several may have been fitted to one free measurement.
-        return [
-            judge.judge(frame, PairChecks(meter, frame.pair), fit, goal)
-            for fit in fits
-            if fit.pose in kept
-        ]
+        return [self._tracker.judge.judge(frame, fit, goal) for fit in fits if fit.pose in kept]
 
 
 def _is_ok(answers: list[TrackedFrame]) -> bool:

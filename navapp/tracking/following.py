@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import fit_bimcc, fit_pose
-from navapp.tracking.frame import MODEL_FIT, Fit, Frame, OnMeasured, ignore
+from navapp.tracking.frame import MODEL_SETTINGS, Fit, Frame, OnMeasured, ignore
 from navapp.tracking.surface_meter import NEAR_BOX, SurfaceMeter
 from navapp.values import Reason
 
@@ -13,9 +13,9 @@ from navapp.values import Reason
 class RestSettings:
     """When a pose rests on the model; all chosen, reach in `tests.bench.follower_reach`."""
 
-    max_sampled: int = 3  # so often only samples of the model are matched, at most .
-    near_mm: float = 0.2  # ... until a fit moves the bone by less.
-    max_rounds: int = 6  # matchings, of samples or of everything, at most
+    max_sampled: int = 3  # rounds on samples of the model, at most
+    near_mm: float = 0.2  # a move of less ends the sampling
+    max_rounds: int = 6  # rounds of matching and fitting, at most
     rest_mm: float = 0.05  # after a move of less, the bone rests
 
 
@@ -65,7 +65,7 @@ class Follower:
                 measured = self._meter.measure_on_model(expected)
                 watch.lap("stereo")
                 on_measured(measured, pose)
-                estimate = fit_bimcc(measured.scene, model, pose, MODEL_FIT)
+                estimate = fit_bimcc(measured.scene, model, pose, MODEL_SETTINGS)
                 has_enough = Reason.TOO_FEW_POINTS not in estimate.reasons
                 fit = Fit(estimate, measured) if has_enough else fit
                 rested = estimate.camera_from_bone if has_enough else None
@@ -73,7 +73,9 @@ class Follower:
                 measured = self._meter.measure_on_samples(expected)
                 watch.lap("stereo")
                 is_little = measured.matched_fraction < least_fraction
-                rested = None if is_little else fit_pose(measured.scene, model, pose, MODEL_FIT)
+                rested = (
+                    None if is_little else fit_pose(measured.scene, model, pose, MODEL_SETTINGS)
+                )
             watch.lap("estimate")
             if rested is None:
                 break

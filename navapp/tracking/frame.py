@@ -13,8 +13,8 @@ from navapp.values import PoseEstimate, Reason, Stopwatch
 # Kernels of the fits: points that were measured freely know their noise, but not all of their
 # errors; on the model a kernel as narrow as the noise costs little, and keeps out tissue that lies
 # flush with the bone. All chosen.
-FREE_FIT = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
-MODEL_FIT = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
+FREE_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
+MODEL_SETTINGS = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 
 # Variance of residuals over the one they claim: the right poses of simulated femurs, which lie in
 # the open, reach so much and no more (tests.bench.correlated_residuals).
@@ -24,7 +24,7 @@ OnMeasured = Callable[[Measurement, RigidTransform], object]
 
 
 def ignore(*_: object) -> None:
-    """Of a listener that nobody needs."""
+    """Does nothing: the default of callbacks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +61,7 @@ class Fit:
         Estimated for all residuals from those inside the kernel.
         """
         claimed_mm = max(self.estimate.expected_rms_mm, 1e-9)
-        kernel_mm = max(MODEL_FIT.narrowest_mm, MODEL_FIT.n_sigmas * claimed_mm)
+        kernel_mm = max(MODEL_SETTINGS.narrowest_mm, MODEL_SETTINGS.n_sigmas * claimed_mm)
         squares_mm2 = self.estimate.rms_mm**2
         return float(noise_under_kernel_mm2(squares_mm2, 1.0, kernel_mm)) / claimed_mm**2
 

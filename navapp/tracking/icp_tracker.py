@@ -9,9 +9,8 @@ from dataclasses import replace
 
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.registration import solve_icp
-from navapp.registration.verdict import Goal, with_cause
+from navapp.registration.verdict import Goal
 from navapp.stereo import match_baseline
-from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, Margins
@@ -42,17 +41,16 @@ class IcpTracker(Tracker):
             frame = self.begin(left, right, expected, watch, NEAR_VIEW)
             with self.begin_checks(frame) as checks:
                 fits = [self._fit(frame, NEAR_BOX)]
-                best = self.judge_fits(frame, checks, fits, goal, predicted, best)
+                best = self.judge_fits(frame, fits, goal, predicted, best, checks)
         if best.verdict.status is Status.LOST:
-            for place in self.boxes.starts(expected, box):
-                frame = self.begin(left, right, place, watch)
-                checks = PairChecks(self.meter, frame.pair)
-                fits = [self._fit(frame, WIDE_BOX)]
-                best = self.judge_fits(frame, checks, fits, goal, predicted, best)
-                if best.verdict.status is Status.OK:
-                    break
-        best = with_cause(best, self.find_cause(left, right, left_from_bone, state, best))
+            places = self.boxes.starts(expected, box)
+            best = self.search_places(left, right, places, self._find, goal, predicted, best, watch)
+        best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
         return self.update(best, replace(state, box=box), left, captured_ns, watch)
+
+    def _find(self, frame: Frame) -> list[Fit | None]:
+        """The one fit around the start, with room."""
+        return [self._fit(frame, WIDE_BOX)]
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """The one fit around the start."""
@@ -74,7 +72,7 @@ class IcpTracker(Tracker):
         fit = self._fit(frame, WIDE_BOX)
         if fit is None or len(fit.measured.cloud) == 0:
             return [self.judge.lost(Reason.NO_SURFACE, frame.watch)]
-        return [self.judge.judge(frame, PairChecks(self.meter, frame.pair), fit, goal)]
+        return [self.judge.judge(frame, fit, goal)]
 
     def _fit(self, frame: Frame, margins: Margins) -> Fit | None:
         """The fit to what is matched around the start (equation 1); None out of view."""

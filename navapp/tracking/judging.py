@@ -52,24 +52,25 @@ class PoseJudge:
     def judge(
         self,
         frame: Frame,
-        checks: PairChecks,
         fit: Fit | None,
         goal: Goal,
         predicted: RigidTransform | None = None,
+        checks: PairChecks | None = None,
     ) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
 
         Args:
             frame: that it was fitted in.
-            checks: of that frame's pair.
             fit: None out of view.
             goal: of the stage.
             predicted: rectified left camera from bone, as the motion lets expect.
+            checks: of that frame's pair, begun; made here without.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, frame.watch)
         model, geometry = self._meter.model, self._meter.geometry
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
+        checks = checks or PairChecks(self._meter, frame.pair)
         health, agreement, coarse_px = checks.check(fit.measured, fit.pose).result()
         if agreement is not None:
             # A bone in the open has the noise that right poses show at most, whatever this pose
@@ -79,7 +80,7 @@ class PoseJudge:
             fit = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
             fit = fit.with_correlated_residuals(noise_variance_ratio)
         # A fit on the model was compared by the check; a free one is compared at its pose.
-        if agreement is None and np.isfinite(fit.estimate.covariance).all():
+        if agreement is None and fit.estimate.is_fixed:
             agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
         evidence = self._evidence_of_pair(health, depth_mm)
         evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
@@ -132,7 +133,7 @@ class PoseJudge:
         model, estimate = self._meter.model, fit.estimate
         is_on_model = fit.measured.view is not None
         correlated_ratio = fit.variance_ratio / NOISE_VARIANCE_RATIO if is_on_model else math.nan
-        if not np.isfinite(estimate.covariance).all():
+        if not estimate.is_fixed:
             return replace(known, estimate=estimate, correlated_ratio=correlated_ratio)
         if agreement is None or agreement.n_visible == 0:
             return replace(known, missing=Reason.OUT_OF_VIEW)
@@ -149,7 +150,6 @@ class PoseJudge:
         return replace(
             known,
             estimate=estimate,
-            is_fixed=True,
             agreement=agreement,
             correlated_ratio=correlated_ratio,
             size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration.verdict import is_place_doubted, is_worth_a_search
+from navapp.registration.verdict import is_place_doubted
 from navapp.tracking.box.tracker import BoxState
 from navapp.values import Reason, Status, TrackedFrame
 
@@ -76,3 +76,12 @@ class TrackState:
             velocity = self.left_from_bone.twist_to(pose, centre_mm) / (elapsed_ns / 1e9)
         n_doubted = self.n_doubted + 1 if is_worth_a_search(tracked) else 0
         return TrackState(pose, captured_ns, velocity, 0, n_doubted, self.box, verdict.cause)
+
+
+def is_worth_a_search(tracked: TrackedFrame) -> bool:
+    """Whether the place is in doubt, and a search could find one that is not.
+
+    While the cameras' rows disagree no answer can be OK: only a lost bone has something to gain.
+    """
+    is_lost = tracked.verdict.status is Status.LOST
+    return is_place_doubted(tracked.verdict) and (is_lost or not tracked.rows_disagree)

@@ -20,8 +20,8 @@ from navapp.geometry.zbuffer import RenderedView
 from navapp.geometry.zbuffer_kernels import find_known_range
 from navapp.registration.information import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
-from navapp.tracking.edge_kernels import find_steps
-from navapp.tracking.frame import MODEL_FIT, Fit
+from navapp.tracking.edge_kernels import measure_edge_offsets
+from navapp.tracking.frame import MODEL_SETTINGS, Fit
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim, warp_depth
 from navapp.tracking.surface_meter import MODEL_CORRELATION_PX
 from navapp.values import DisparityMap, Origin
@@ -65,11 +65,11 @@ class OutlineMeter:
             noise_variance_ratio: variance of the surface's noise over the one it claims.
         """
         estimate, view = fit.estimate, fit.measured.view
-        if view is None or not np.isfinite(estimate.covariance).all():
+        if view is None or not estimate.is_fixed:
             return fit
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
-        joined = join(estimate, MODEL_FIT.n_sigmas, block, centre_mm, noise_variance_ratio)
+        joined = join(estimate, MODEL_SETTINGS.n_sigmas, block, centre_mm, noise_variance_ratio)
         return replace(fit, estimate=joined)
 
     def block(
@@ -96,7 +96,7 @@ class OutlineMeter:
         ) -> tuple[FloatArray, ...]:
             rim = find_rim(self.ridges, rotation, translation_mm, eye)
             rim = thin_rim(_only(rim, is_outline(rim, depth_mm, first_column, view.box.y)))
-            offset_px = find_steps(picture, rim)
+            offset_px = measure_edge_offsets(picture, rim)
             is_found = np.isfinite(offset_px)
             rim, offset_px = _only(rim, is_found), offset_px[is_found]
             is_free = self._is_free(rim, view.box, measured, coarse_px)

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import CoarseFit, find_coarse_fits, rank_fits
+from navapp.registration import ScoredPose, find_poses, rank_fits
 from navapp.registration.verdict import is_bone_absent
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.frame import Fit, ignore
@@ -20,8 +18,7 @@ class FitScorer:
 
     def score(self, fit: Fit) -> float:
         """How much of the model a fit explains, 0 to 1; 0 without a covariance."""
-        is_fixed = np.isfinite(fit.estimate.covariance).all()
-        return self.explain(fit.pose, fit.measured) if is_fixed else 0.0
+        return self.explain(fit.pose, fit.measured) if fit.estimate.is_fixed else 0.0
 
     def explain(self, pose: RigidTransform, measured: Measurement) -> float:
         """How much of the model, at a pose in the rectified left camera, a measurement explains."""
@@ -38,14 +35,14 @@ class FitScorer:
         """Fits of candidates, best first, as `rank_fits` does."""
         return rank_fits(fits, [self.score(fit) for fit in fits], self._meter.model.centre_mm)
 
-    def find_coarse_fits(
+    def find_poses(
         self,
         measured: Measurement,
         starts: Sequence[RigidTransform],
         on_progress: Callable[[float], None] = ignore,
-    ) -> list[CoarseFit]:
+    ) -> list[ScoredPose]:
         """Distinct poses that starts lead to on a measured surface, by what they explain of it."""
-        return find_coarse_fits(
+        return find_poses(
             measured.scene,
             self._meter.model,
             starts,

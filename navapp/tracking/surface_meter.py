@@ -201,7 +201,7 @@ class SurfaceMeter:
         """
         found = refine_on_model(expected.pair, expected.support_px)
         is_expected = np.isfinite(expected.support_px)
-        cloud = self._cloud(without_gap_rims(found, is_expected))
+        cloud = self._cloud(remove_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
         answered = found.matched_fraction * found.origin.size / n_expected
         return Measurement(found, cloud, answered, MODEL_CORRELATION_PX, expected.view)
@@ -241,7 +241,7 @@ class SurfaceMeter:
         return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
 
 
-def without_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
+def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
     """Without the rims of large gaps in what is expected (h, w), unless that leaves too little."""
     import cv2
 

@@ -12,11 +12,11 @@ from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import RegistrationModel, estimate_at
-from navapp.registration.verdict import Goal, is_place_doubted, with_cause
+from navapp.registration.verdict import Goal, is_place_doubted
 from navapp.tracking.box.tracker import BoxTracker
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
-from navapp.tracking.frame import FREE_FIT, Fit, Frame, ignore
+from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
 from navapp.tracking.scoring import FitScorer
@@ -116,10 +116,10 @@ class Tracker(ABC):
         with self.begin_checks(frame) as checks:
             fits = self.find_for_glance(frame)
             best = self.judge_fits(
-                frame, checks, fits, goal, frame.start,
+                frame, fits, goal, frame.start, checks=checks,
                 is_enough=lambda verdict: not is_place_doubted(verdict),
             )  # fmt: skip
-        tracked, after = self.update(with_cause(best, state.cause), state, left, captured_ns, watch)
+        tracked, after = self.update(best.with_cause(state.cause), state, left, captured_ns, watch)
         # A doubt that nothing was searched for puts off no search.
         return tracked, replace(after, n_doubted=0)
 
@@ -136,10 +136,9 @@ class Tracker(ABC):
         frame.watch.lap("stereo")
         if measured is None:
             return self.judge.lost(Reason.OUT_OF_VIEW, frame.watch)
-        fit = Fit(estimate_at(measured.scene, self.model, frame.start, FREE_FIT), measured)
+        fit = Fit(estimate_at(measured.scene, self.model, frame.start, FREE_SETTINGS), measured)
         frame.watch.lap("estimate")
-        checks = PairChecks(self.meter, frame.pair)
-        return self.judge.judge(frame, checks, fit, replace(goal, view_limit_mm=math.inf))
+        return self.judge.judge(frame, fit, replace(goal, view_limit_mm=math.inf))
 
     def rectify_pose(self, left_from_bone: RigidTransform) -> RigidTransform:
         """A pose in the rectified left camera."""
@@ -168,11 +167,11 @@ class Tracker(ABC):
     def judge_fits(
         self,
         frame: Frame,
-        checks: PairChecks,
         fits: Iterable[Fit | None],
         goal: Goal,
         predicted: RigidTransform,
         best: TrackedFrame | None = None,
+        checks: PairChecks | None = None,
         keeps_first: bool = False,
         is_enough: Callable[[Verdict], bool] = lambda verdict: verdict.status is Status.OK,
     ) -> TrackedFrame:
@@ -180,22 +179,47 @@ class Tracker(ABC):
 
         Args:
             frame: that they are fitted in.
-            checks: of the frame.
             fits: None is a bone out of view.
             goal: of the stage.
             predicted: pose in the rectified left camera that the motion lets expect.
             best: answer so far; without one, and without fits, the bone is lost.
+            checks: of the frame, begun; made for these fits without.
             keeps_first: of equal answers the first stands; by default the last, which knows more.
             is_enough: no further fit is asked for.
         """
         is_better = operator.lt if keeps_first else operator.le
+        checks = checks or PairChecks(self.meter, frame.pair)
         for fit in fits:
-            answer = self.judge.judge(frame, checks, fit, goal, predicted)
+            answer = self.judge.judge(frame, fit, goal, predicted, checks)
             if best is None or is_better(answer.verdict.order, best.verdict.order):
                 best = answer
             if is_enough(answer.verdict):
                 break
         return best or self.judge.lost(Reason.BONE_LOST, frame.watch)
+
+    def search_places(
+        self,
+        left: Image,
+        right: Image,
+        places: Iterable[RigidTransform],
+        find: Callable[[Frame], Iterable[Fit | None]],
+        goal: Goal,
+        predicted: RigidTransform,
+        best: TrackedFrame,
+        watch: Stopwatch,
+        n_lost: int = 0,
+    ) -> TrackedFrame:
+        """The best of an answer and of searches around places (left camera from bone), until an OK.
+
+        Only around the first place a search goes further off, as `n_lost` asks for.
+        """
+        for number, place in enumerate(places):
+            frame = self.begin(left, right, place, watch)
+            frame = replace(frame, n_lost=0 if number else n_lost)
+            best = self.judge_fits(frame, find(frame), goal, predicted, best)
+            if best.verdict.status is Status.OK:
+                break
+        return best
 
     def find_cause(
         self,

@@ -121,6 +121,11 @@ class PoseEstimate:
     size_mm: float = 0.0
     size_sigma_mm: float = math.inf  # standard deviation of that
 
+    @property
+    def is_fixed(self) -> bool:
+        """Whether the measurement fixes the pose in all directions."""
+        return bool(np.isfinite(self.covariance).all())
+
     def with_reason(self, reason: Reason) -> "PoseEstimate":
         """The same estimate with one more reason against it."""
         return replace(self, reasons=(*self.reasons, reason))
@@ -190,7 +195,7 @@ class Verdict:
 
     @property
     def order(self) -> tuple[int, bool, float]:
-        """Verdicts in this order: by status; of equals no guess, then what explains more."""
+        """Better verdicts first: by status, then not ambiguous, then by coverage."""
         rank = list(Status).index(self.status)
         return rank, Reason.AMBIGUOUS in self.reasons, -self.coverage
 
@@ -209,6 +214,13 @@ class TrackedFrame:
     def left_from_bone(self) -> RigidTransform | None:
         """The pose, when there is one."""
         return None if self.estimate is None else self.estimate.camera_from_bone
+
+    def with_cause(self, cause: Reason | None) -> "TrackedFrame":
+        """The same answer with the cause of its failure in front; an OK has none."""
+        if cause is None or self.verdict.status is Status.OK:
+            return self
+        others = tuple(reason for reason in self.verdict.reasons if reason is not cause)
+        return replace(self, verdict=replace(self.verdict, reasons=(cause, *others)))
 
     @property
     def rows_disagree(self) -> bool:

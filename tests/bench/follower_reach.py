@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from navapp.registration import fit_bimcc
-from navapp.tracking.frame import MODEL_FIT
+from navapp.tracking.frame import MODEL_SETTINGS
 from navapp.tracking.surface_meter import NEAR_BOX
 from navapp.values import BoneModel, Reason
 from tests.bench.bone_scenes import Sequence, disturbed, simulated_sequence
@@ -56,7 +56,7 @@ def rounds(
             expected = meter.render(scene.pair, start, NEAR_BOX)
             assert expected is not None
             measured = meter.measure_on_samples(expected)
-            found = fit_bimcc(measured.scene, model, start, MODEL_FIT)
+            found = fit_bimcc(measured.scene, model, start, MODEL_SETTINGS)
             is_lost = Reason.TOO_FEW_POINTS in found.reasons
             pose = found.camera_from_bone
             left_mm = np.inf if is_lost else scene.pose.mean_motion_mm(pose, model.hull_mm)

@@ -37,7 +37,7 @@ class TrackerParts(BimccTracker):
 
     def verdict(self, frame: Frame, fit: Fit) -> Verdict:
         """What is said of a fit, by what is seen alone."""
-        return self.judge.judge(frame, self._checks(frame), fit, GOAL).verdict
+        return self.judge.judge(frame, fit, GOAL).verdict
 
     def coarse_px(self, frame: Frame, fit: Fit) -> NDArray[np.float32] | None:
         """(h, w) coarse disparity of whatever lies in a fit's box; None out of view or depth."""

@@ -6,7 +6,7 @@ from navapp.registration import (
     Scene,
     compute_explained_fraction,
     distinct,
-    find_coarse_fits,
+    find_poses,
     is_same_pose,
     make_tilted_starts,
 )
@@ -63,7 +63,7 @@ def minus_error(pose: RigidTransform) -> float:
 def test_candidates_are_distinct_and_the_best_comes_first() -> None:
     centre = TRUE.apply(MODEL.centre_mm)
     starts = [disturbed(MODEL, 60.0, 5.0, 3), *make_tilted_starts(TRUE, centre, 10.0, 5)]
-    found = find_coarse_fits(SCENE, MODEL, starts, minus_error)
+    found = find_poses(SCENE, MODEL, starts, minus_error)
     scores = [candidate.score for candidate in found]
     assert scores == sorted(scores, reverse=True)
     assert scores == [minus_error(candidate.scene_from_bone) for candidate in found]
@@ -75,22 +75,22 @@ def test_candidates_are_distinct_and_the_best_comes_first() -> None:
 def test_what_a_pose_explains_finds_the_right_one_among_the_candidates() -> None:
     centre = SCENE.points_mm.mean(axis=0)
     starts = make_tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre, 35.0, 14)
-    found = find_coarse_fits(seen_scene(900, 0.3, 1, 600), MODEL, starts)
+    found = find_poses(seen_scene(900, 0.3, 1, 600), MODEL, starts)
     assert mean_error_mm(found[0].scene_from_bone, BONE) < 1.0
     assert all(0.0 <= candidate.score <= 1.0 for candidate in found)
 
 
 def test_a_start_that_pairs_with_nothing_gives_no_candidate() -> None:
     far = TRUE.move([300.0, 0, 0, 0, 0, 0], TRUE.translation_mm)
-    assert find_coarse_fits(SCENE, MODEL, [far]) == []
-    assert find_coarse_fits(SCENE, MODEL, []) == []
+    assert find_poses(SCENE, MODEL, [far]) == []
+    assert find_poses(SCENE, MODEL, []) == []
 
 
 def test_two_runs_on_two_threads_are_equal_to_the_last_bit() -> None:
     starts = make_tilted_starts(
         disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0), 35.0, 14
     )
-    runs = [find_coarse_fits(seen_scene(900, 0.3, 2, 600), MODEL, starts) for _ in range(2)]
+    runs = [find_poses(seen_scene(900, 0.3, 2, 600), MODEL, starts) for _ in range(2)]
     assert len(runs[0]) == len(runs[1]) > 0
     for a, b in zip(*runs, strict=True):
         assert np.array_equal(a.scene_from_bone.matrix, b.scene_from_bone.matrix)
@@ -116,7 +116,7 @@ def test_a_pose_explains_the_share_of_the_scene_that_lies_on_it() -> None:
 
 def test_progress_grows_to_one() -> None:
     told: list[float] = []
-    find_coarse_fits(SCENE, MODEL, [TRUE] * 4, minus_error, told.append)
+    find_poses(SCENE, MODEL, [TRUE] * 4, minus_error, told.append)
     assert told == [0.0, 0.5, 1.0]
 
 
@@ -132,5 +132,5 @@ def test_progress_may_stop_the_search() -> None:
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        find_coarse_fits(SCENE, MODEL, [TRUE] * 10, minus_error, stop)
+        find_poses(SCENE, MODEL, [TRUE] * 10, minus_error, stop)
     assert len(told) == 2

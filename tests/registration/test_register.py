@@ -9,8 +9,8 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import Outcome, RegistrationModel, Scene, point_to_point, register
 from navapp.registration.bimcc import solution_at
-from navapp.registration.multi_start import CoarseFit
-from navapp.registration.register import smooth_part_mm
+from navapp.registration.multi_start import ScoredPose
+from navapp.registration.register import measure_smooth_part_mm
 from navapp.values import BoneModel, Reason
 from tests.registration.shapes import (
     TRUE,
@@ -64,11 +64,11 @@ def test_the_search_everywhere_finds_a_bone_that_is_turned_away(seed: int) -> No
     assert found.n_starts == 1 + 13 + 231 + 71
 
 
-def only_candidates(monkeypatch: pytest.MonkeyPatch, *candidates: CoarseFit) -> None:
+def only_candidates(monkeypatch: pytest.MonkeyPatch, *candidates: ScoredPose) -> None:
     """Let every search lead to these, best first."""
     # The package's own `register` is the function.
     module = import_module("navapp.registration.register")
-    monkeypatch.setattr(module, "find_coarse_fits", lambda *args, **more: list(candidates))
+    monkeypatch.setattr(module, "find_poses", lambda *args, **more: list(candidates))
 
 
 def elsewhere(seed: int) -> RigidTransform:
@@ -80,15 +80,15 @@ def test_candidates_that_explain_nearly_as_much_get_their_chance(
     score: float, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The coarse approach may rank the right one third; what explains little costs no time."""
-    wrong = CoarseFit(elsewhere(1), 1.0), CoarseFit(elsewhere(2), 0.9)
-    only_candidates(monkeypatch, *wrong, CoarseFit(TRUE, score))
+    wrong = ScoredPose(elsewhere(1), 1.0), ScoredPose(elsewhere(2), 0.9)
+    only_candidates(monkeypatch, *wrong, ScoredPose(TRUE, score))
     found = register(seen_scene(900, 0.3), MODEL, elsewhere(3))
     assert (found.outcome is Outcome.CONVERGED) == is_found
     assert (mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25) == is_found
 
 
 def test_a_search_that_leads_elsewhere_takes_nothing_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    only_candidates(monkeypatch, CoarseFit(elsewhere(1), 1.0))
+    only_candidates(monkeypatch, ScoredPose(elsewhere(1), 1.0))
     found = register(seen_scene(900, 0.3), MODEL, disturbed(MODEL, 4.0, 3.0, 1), is_global=True)
     assert found.outcome is Outcome.CONVERGED
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.2
@@ -200,10 +200,10 @@ def test_the_smooth_part_is_the_rms_of_a_wave_beneath_the_noise(wave_mm: float) 
     wave = wave_mm * np.sin(2.0 * np.pi * points[:, 0] / 30.0)
     solution = solution_at(seen_scene(900, 0.3), MODEL, TRUE)
     residual = wave + rng.normal(0.0, 0.3, 4000)
-    found = smooth_part_mm(replace(solution, points_mm=points, residual_mm=residual), 3.0)
+    found = measure_smooth_part_mm(replace(solution, points_mm=points, residual_mm=residual), 3.0)
     assert found == pytest.approx(wave_mm / np.sqrt(2.0), abs=0.07)
     none = replace(solution, points_mm=points[:0], residual_mm=residual[:0])
-    assert smooth_part_mm(none, 3.0) == 0.0
+    assert measure_smooth_part_mm(none, 3.0) == 0.0
 
 
 def test_a_fit_that_runs_out_of_steps_is_no_registration(monkeypatch: pytest.MonkeyPatch) -> None:

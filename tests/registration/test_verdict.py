@@ -15,9 +15,8 @@ from navapp.registration.verdict import (
     Evidence,
     Rule,
     decide,
-    is_elsewhere,
+    is_bone_absent,
     is_place_doubted,
-    with_cause,
 )
 from navapp.tracking import Goal
 from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
@@ -26,11 +25,12 @@ from navapp.values.verdicts import CAUSES
 DOCS = Path(__file__).parents[2] / "docs" / "registration.md"
 POSE = RigidTransform.identity("left_rect", "femur")
 ESTIMATE = PoseEstimate(POSE, np.eye(6), 2000, 0.95, 0.1, 0.1, 5, True)
+LOOSE = replace(ESTIMATE, covariance=np.diag([np.inf] * 6)).with_reason(Reason.DEGENERATE)
 AGREEMENT = Agreement(5000, 0.9, 0.0, 0.0, 0.95, 0.8)
 GOAL = Goal(np.empty((0, 3)), 2.0)
 # Nothing speaks against it.
 FINE = Evidence(
-    None, ESTIMATE, True, AGREEMENT,
+    None, ESTIMATE, AGREEMENT,
     dark_fraction=0.1, saturated_fraction=0.1, detail_ratio=1.1, correlated_ratio=1.0,
     size_excess_mm=-0.4, view_mm=0.3, plan_mm=0.0, bound_mm=0.4, cartilage_sd_mm=0.0,
     jump_mm=1.0, jump_deg=1.0, goal=GOAL,
@@ -58,7 +58,7 @@ def degenerate(value: float) -> Evidence:
     if value <= 0:
         return FINE
     free = ESTIMATE.with_reason(Reason.DEGENERATE)
-    return known(estimate=free) if value <= 1 else Evidence(estimate=free)
+    return known(estimate=free) if value <= 1 else Evidence(estimate=LOOSE)
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ def test_at_the_limit_itself_nothing_is_said_yet(row: Row, rule: Rule) -> None:
 
 def test_what_is_not_known_is_no_reason_and_no_pose_is_ok() -> None:
     assert decide(Evidence()) == Verdict(Status.LOST)
-    fixed_by_nothing = replace(FINE, is_fixed=False, agreement=None)
+    fixed_by_nothing = replace(FINE, estimate=LOOSE, agreement=None)
     assert decide(fixed_by_nothing).status is Status.LOST
     assert Reason.DEGENERATE in decide(fixed_by_nothing).reasons
 
@@ -242,8 +242,8 @@ def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
         ({"spread_ratio": 9.0}, False),
     ],
 )
-def test_a_bone_that_agrees_too_little_is_elsewhere(changes, expected: bool) -> None:
-    assert is_elsewhere(replace(AGREEMENT, **changes)) is expected
+def test_a_bone_that_agrees_too_little_is_bone_absent(changes, expected: bool) -> None:
+    assert is_bone_absent(replace(AGREEMENT, **changes)) is expected
 
 
 @pytest.mark.parametrize("reason", sorted(REASONS, key=lambda one: one.name))
@@ -264,14 +264,14 @@ def test_some_reasons_speak_against_the_place(reason: Reason) -> None:
 def test_the_cause_comes_first_and_once_and_an_ok_has_none() -> None:
     verdict = Verdict(Status.LOST, None, (Reason.TOO_FEW_POINTS,))
     lost = TrackedFrame("femur", None, verdict, FrameTimings())
-    assert with_cause(lost, None) is lost
-    named = with_cause(lost, Reason.PICTURES_SWAPPED)
+    assert lost.with_cause(None) is lost
+    named = lost.with_cause(Reason.PICTURES_SWAPPED)
     assert named.verdict.reasons == (Reason.PICTURES_SWAPPED, Reason.TOO_FEW_POINTS)
-    again = with_cause(named, Reason.PICTURES_SWAPPED)
+    again = named.with_cause(Reason.PICTURES_SWAPPED)
     assert again.verdict.reasons == named.verdict.reasons
     assert (verdict.cause, named.verdict.cause) == (None, Reason.PICTURES_SWAPPED)
     fine = replace(lost, verdict=Verdict(Status.OK, 0.1))
-    assert with_cause(fine, Reason.OTHER_SIDE) is fine
+    assert fine.with_cause(Reason.OTHER_SIDE) is fine
 
 
 def limit_of(rule: Rule, limit: float | None) -> str:

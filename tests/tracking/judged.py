@@ -73,4 +73,4 @@ def judged(
     fit = Fit(estimate, Measurement(measured, cloud, 1.0, FREE_CORRELATION_PX))
     frame = Frame(None, estimate.camera_from_bone, Stopwatch())
     checks = Told(PairCheck(health, None, None))
-    return judge.judge(frame, checks, fit, goal or Goal(NO_TARGETS, 3.0), predicted)
+    return judge.judge(frame, fit, goal or Goal(NO_TARGETS, 3.0), predicted, checks=checks)

@@ -126,13 +126,12 @@ class FakeMeter:
 class Listening:
     """A meter that notes which matchings it was asked for."""
 
-    NAMES = ("measure_freely", "measure_on_model", "measure_on_samples")
-
-    def __init__(self, meter) -> None:
+    def __init__(self, meter, *names: str) -> None:
         self.meter, self.asked, self.given = meter, [], []
+        self.names = names or ("measure_freely", "measure_on_model", "measure_on_samples")
 
     def __getattr__(self, name: str):
-        if name in self.NAMES:
+        if name in self.names:
             self.asked.append(name)
             return lambda *given: self.given.append(given) or getattr(self.meter, name)(*given)
         return getattr(self.meter, name)

@@ -5,8 +5,8 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from navapp.tracking.edge_kernels import (
-    find_steps,
     find_strongest_edge,
+    measure_edge_offsets,
     measure_missing_fraction,
     sample_across,
 )
@@ -40,31 +40,31 @@ def test_an_edge_is_found_where_it_is(angle_deg: float, largest_px: float) -> No
     offsets_px = np.arange(-1.5, 1.51, 0.25)
     pictures = [picture(angle_deg, offset_px) for offset_px in offsets_px]
     rim = rim_at(angle_deg)
-    found = np.array([find_steps(seen, rim)[0] for seen in pictures])
+    found = np.array([measure_edge_offsets(seen, rim)[0] for seen in pictures])
     assert np.abs(found - offsets_px).max() < largest_px
     assert abs((found - offsets_px).mean()) < 0.02
 
 
 def test_an_edge_that_is_not_dark_enough_is_none() -> None:
-    assert np.isnan(find_steps(picture(0.0, 0.0, 180.0, 80.0), rim_at(0.0))[0])
+    assert np.isnan(measure_edge_offsets(picture(0.0, 0.0, 180.0, 80.0), rim_at(0.0))[0])
 
 
 def test_dark_inside_is_none() -> None:
-    assert np.isnan(find_steps(picture(0.0, 0.0, 20.0, 180.0), rim_at(0.0))[0])
+    assert np.isnan(measure_edge_offsets(picture(0.0, 0.0, 20.0, 180.0), rim_at(0.0))[0])
 
 
 def test_a_stronger_edge_nearby_forbids_the_weaker_one() -> None:
     seen = picture(0.0, 0.0, 100.0, 25.0).astype(int)
     seen[:, 36:] = 255
-    assert np.isnan(find_steps(seen.astype(np.uint8), rim_at(0.0))[0])
+    assert np.isnan(measure_edge_offsets(seen.astype(np.uint8), rim_at(0.0))[0])
 
 
 def test_nothing_is_found_in_noise_or_out_of_view() -> None:
     noise = np.random.default_rng(1).integers(0, 255, (SIZE, SIZE)).astype(np.uint8)
     rims = [rim_at(0.0, x, y) for x in np.arange(20.0, 44.0, 2.0) for y in (20.0, 31.0, 42.0)]
-    found = np.concatenate([find_steps(noise, rim) for rim in rims])
+    found = np.concatenate([measure_edge_offsets(noise, rim) for rim in rims])
     assert np.isnan(found).all()
-    assert np.isnan(find_steps(picture(0.0, 0.0), rim_at(0.0, 3.0))[0])
+    assert np.isnan(measure_edge_offsets(picture(0.0, 0.0), rim_at(0.0, 3.0))[0])
 
 
 def test_samples_and_levels_are_those_of_the_reference() -> None:

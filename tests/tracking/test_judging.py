@@ -11,7 +11,7 @@ from navapp.registration import RegistrationModel, estimate_at, fit_bimcc
 from navapp.registration.verdict import OK_ERROR_MM
 from navapp.tracking import Goal
 from navapp.tracking.agreement import compare_at
-from navapp.tracking.frame import FREE_FIT
+from navapp.tracking.frame import FREE_SETTINGS
 from navapp.tracking.judging import PoseJudge
 from navapp.values import (
     BoneModel,
@@ -30,7 +30,7 @@ from tests.tracking.rooms import measured_map
 
 
 def estimate_on(measured: DisparityMap = MAP, model=MODEL, pose=TRUE) -> PoseEstimate:
-    return estimate_at(scene_of(measured), model, pose, FREE_FIT)
+    return estimate_at(scene_of(measured), model, pose, FREE_SETTINGS)
 
 
 def verdict_on(
@@ -68,7 +68,7 @@ def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeS
     """The other side's, and one of another size."""
     mesh = make_knee(spec).bones["femur"]
     other = RegistrationModel(BoneModel("femur", mesh, spec.side))
-    fitted = fit_bimcc(scene_of(MAP), other, TRUE, FREE_FIT)
+    fitted = fit_bimcc(scene_of(MAP), other, TRUE, FREE_SETTINGS)
     verdict = verdict_on(fitted.camera_from_bone, model=other)
     assert verdict.status is not Status.OK
     assert {Reason.SURFACE_MISFIT, Reason.OUTLIERS} & set(verdict.reasons)
@@ -77,7 +77,7 @@ def test_a_femur_of_another_kind_is_not_ok_however_well_it_is_fitted(spec: KneeS
 def test_another_bone_is_lost() -> None:
     mesh = make_knee(KneeSpec(1)).bones["tibia"]
     other = RegistrationModel(BoneModel("femur", mesh, "right"))
-    fitted = fit_bimcc(scene_of(MAP), other, TRUE, FREE_FIT)
+    fitted = fit_bimcc(scene_of(MAP), other, TRUE, FREE_SETTINGS)
     assert verdict_on(fitted.camera_from_bone, model=other).status is Status.LOST
 
 
@@ -237,7 +237,7 @@ def test_the_right_bone_has_the_right_size_and_a_larger_one_has_not() -> None:
     for size, reasons in ((1.0, False), (0.95, True)):
         scaled = mesh.centroid_mm + size * (mesh.vertices_mm - mesh.centroid_mm)
         model = RegistrationModel(replace(BONE, mesh=replace(mesh, vertices_mm=scaled)))
-        fitted = fit_bimcc(scene_of(MAP), model, TRUE, FREE_FIT)
+        fitted = fit_bimcc(scene_of(MAP), model, TRUE, FREE_SETTINGS)
         verdict = verdict_on(fitted.camera_from_bone, model=model)
         assert (Reason.SIZE_DIFFERS in verdict.reasons) == reasons
 

@@ -10,7 +10,7 @@ from navapp.tracking import Goal, TrackState
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairChecks
-from navapp.tracking.frame import FREE_FIT, Fit, Frame
+from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW
 from navapp.values import Reason, Status, Stopwatch, TrackedFrame
@@ -55,7 +55,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     estimate = tracker.assess(frame.left, frame.right, truth, GOAL).estimate
     begun = tracker.begin(frame.left, frame.right, truth, Stopwatch(), WIDE_VIEW)
     measured = tracker.meter.measure_freely(begun.pair, begun.start, NEAR_BOX)
-    inside = estimate_at(measured.scene, tracker.model, begun.start, FREE_FIT)
+    inside = estimate_at(measured.scene, tracker.model, begun.start, FREE_SETTINGS)
     turn = np.kron(np.eye(2), tracker.meter.geometry.rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15
@@ -71,8 +71,9 @@ def test_a_claim_is_believed_less_while_the_bone_lies_open(
     frame, checks, fit = found_at_the_truth(a)
     targets_mm = a.tracker.centre_mm + 30.0 * np.eye(3)
     told = judge_with(SurfaceAlone()).judge(
-        frame, altered(checks, fit, hidden_fraction=hidden_fraction), fit, Goal(targets_mm, 2.0)
-    )
+        frame, fit, Goal(targets_mm, 2.0),
+        checks=altered(checks, fit, hidden_fraction=hidden_fraction),
+    )  # fmt: skip
     claimed_mm = fit.estimate.predict_tre_mm(a.tracker.centre_mm, targets_mm)
     assert told.verdict.predicted_tre_mm == pytest.approx(noise * claimed_mm, rel=1e-6)
 
@@ -82,10 +83,10 @@ def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it
     frame, checks, fit = found_at_the_truth(a)
     as_matched = altered(checks, fit, coverage=0.77)
     judge = judge_with(SurfaceAlone())
-    assert judge.judge(frame, as_matched, fit, GOAL).verdict.coverage == 0.77
+    assert judge.judge(frame, fit, GOAL, checks=as_matched).verdict.coverage == 0.77
     check = as_matched.check(fit.measured, fit.pose).result()
     free = replace(fit, measured=replace(fit.measured, view=None))
-    answer = judge.judge(frame, Told(check._replace(agreement=None)), free, GOAL)
+    answer = judge.judge(frame, free, GOAL, checks=Told(check._replace(agreement=None)))
     there = compare_at(
         fit.pose, a.tracker.model, fit.measured.disparity, a.tracker.meter.geometry, check.coarse_px
     )
@@ -100,7 +101,7 @@ def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> N
     on_model = replace(fit, estimate=rough)
     free = replace(on_model, measured=replace(fit.measured, view=None))
     for one, is_misfit in ((fit, False), (on_model, True), (free, False)):
-        verdict = judge_with(SurfaceAlone()).judge(frame, checks, one, GOAL).verdict
+        verdict = judge_with(SurfaceAlone()).judge(frame, one, GOAL, checks=checks).verdict
         assert (Reason.SURFACE_MISFIT in verdict.reasons) == is_misfit
         assert verdict.status is not Status.LOST
 
@@ -108,7 +109,7 @@ def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> N
 def test_out_of_view_there_is_nothing_to_judge() -> None:
     a = room()
     frame, checks, _ = found_at_the_truth(a)
-    answer = judge_with(SurfaceAlone()).judge(frame, checks, None, GOAL)
+    answer = judge_with(SurfaceAlone()).judge(frame, None, GOAL, checks=checks)
     assert answer.verdict.status is Status.LOST
     assert answer.verdict.reasons == (Reason.OUT_OF_VIEW,)
     assert answer.estimate is None

@@ -11,7 +11,7 @@ from navapp.registration import estimate_at
 from navapp.stereo import PictureHealth, StereoHealth
 from navapp.tracking import Goal, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.tracking.frame import FREE_FIT
+from navapp.tracking.frame import FREE_SETTINGS
 from navapp.values import Reason, RowCheck, Status
 from tests.registration.shapes import GEOMETRY, TRUE
 from tests.tracking.judged import GOOD_PICTURE as GOOD
@@ -25,7 +25,7 @@ LIMIT_PX = 0.5 * GEOMETRY.focal_px * GEOMETRY.baseline_mm / DEPTH_MM**2
 
 def judged_right(health: StereoHealth, tolerance_mm: float = 9.0):
     """Of a right pose, in a pair of that health."""
-    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, FREE_FIT)
+    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, FREE_SETTINGS)
     return judged(estimate, goal=Goal(NO_TARGETS, tolerance_mm), health=health)
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.registration.verdict import is_worth_a_search, with_cause
 from navapp.tracking import TrackState
 from navapp.tracking.box.picture_box import PictureBox
 from navapp.tracking.box.tracker import BoxState
+from navapp.tracking.motion import is_worth_a_search
 from navapp.values import (
     FrameTimings,
     PoseEstimate,
@@ -152,7 +152,7 @@ def test_what_is_wrong_for_good_is_remembered_until_a_frame_is_ok() -> None:
     for number, status in enumerate((Status.DEGRADED, Status.LOST), start=1):
         found = frame(START, status)
         found = replace(found, verdict=Verdict(status, 0.2, (Reason.SURFACE_MISFIT,)))
-        state = state.update(with_cause(found, state.cause), number * PERIOD_NS, CENTRE)
+        state = state.update(found.with_cause(state.cause), number * PERIOD_NS, CENTRE)
         assert state.cause is Reason.OTHER_SIDE
     assert state.update(frame(START), 3 * PERIOD_NS, CENTRE).cause is None
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.registration import CoarseFit, rank_fits, select_poses
+from navapp.registration import ScoredPose, rank_fits, select_poses
 from navapp.tracking.frame import Fit
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
@@ -57,6 +57,6 @@ def test_a_pose_that_nothing_fixes_explains_nothing() -> None:
 
 @pytest.mark.parametrize(("most", "expected"), [(1, 1), (3, 2)])
 def test_only_what_explains_enough_beside_the_best_is_refined(most: int, expected: int) -> None:
-    found = [CoarseFit(TRUE, score) for score in (0.8, 0.5, 0.3)]
+    found = [ScoredPose(TRUE, score) for score in (0.8, 0.5, 0.3)]
     assert len(select_poses(found, most)) == expected
     assert select_poses([], most) == []

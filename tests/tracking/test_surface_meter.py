@@ -3,7 +3,7 @@
 import numpy as np
 
 from navapp.geometry.box import Box
-from navapp.tracking.surface_meter import CoarseMap, without_gap_rims
+from navapp.tracking.surface_meter import CoarseMap, remove_gap_rims
 from navapp.values import DisparityMap
 
 SHAPE = (80, 120)
@@ -25,7 +25,7 @@ def gap_of(height: int, width: int) -> np.ndarray:
 
 def test_the_rim_of_a_large_gap_is_not_trusted() -> None:
     found = found_beside(gap_of(25, 30))
-    trusted = without_gap_rims(found, EVERYWHERE)
+    trusted = remove_gap_rims(found, EVERYWHERE)
     expected = np.ones(SHAPE, dtype=bool)
     expected[27:58, 37:73] = False
     np.testing.assert_array_equal(trusted.origin > 0, expected)
@@ -36,20 +36,20 @@ def test_the_rim_of_a_large_gap_is_not_trusted() -> None:
 
 def test_around_a_small_gap_everything_is_trusted() -> None:
     found = found_beside(gap_of(15, 20))
-    np.testing.assert_array_equal(without_gap_rims(found, EVERYWHERE).origin, found.origin)
+    np.testing.assert_array_equal(remove_gap_rims(found, EVERYWHERE).origin, found.origin)
 
 
 def test_beside_the_model_is_no_gap() -> None:
     gap = gap_of(25, 30)
     found = found_beside(gap)
-    np.testing.assert_array_equal(without_gap_rims(found, ~gap).origin, found.origin)
+    np.testing.assert_array_equal(remove_gap_rims(found, ~gap).origin, found.origin)
 
 
 def test_where_too_little_would_be_left_all_of_it_is_trusted() -> None:
     stripes = np.zeros(SHAPE, dtype=bool)
     stripes[:, 3:] = np.arange(3, SHAPE[1]) % 8 > 0
     found = found_beside(stripes)
-    np.testing.assert_array_equal(without_gap_rims(found, EVERYWHERE).origin, found.origin)
+    np.testing.assert_array_equal(remove_gap_rims(found, EVERYWHERE).origin, found.origin)
 
 
 def test_a_coarse_map_tells_of_a_box_inside_it() -> None:

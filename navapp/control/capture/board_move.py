@@ -26,7 +26,7 @@ class BoardMove:
 
     shift_mm: FloatArray  # (3,) of the board's middle, along the left camera's axes
     turn_deg: FloatArray  # (3,) rotation vector, about the left camera's axes
-    is_there: bool  # little enough is left
+    is_there: bool  # the move that is left is small enough
 
     def __str__(self) -> str:
         """The three largest parts; directions as seen in the left picture."""

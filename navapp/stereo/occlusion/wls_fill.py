@@ -46,8 +46,8 @@ class FillSettings:
     max_gap_px: int | None = None
     # sum of the three colour differences at which a pixel's weight is 1/e.
     colour_scale: float = 18.0
-    layer_px: float = 3.0  # support differs from the permitted neighbour by less than this,
-    layer_growth: float = 0.15  # and by this more per px of distance
+    layer_px: float = 3.0  # support differs from the permitted neighbour by less than this ...
+    layer_growth: float = 0.15  # ... and this per px of distance
     # variance of the support's places at which half of the slope is believed; a slope is dangerous
     # far from where it was fitted.
     slope_penalty_px2: float = 20.0

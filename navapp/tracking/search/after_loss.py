@@ -29,21 +29,21 @@ class SearchAfterLoss:
 
     def find(self, frame: Frame) -> list[Fit | None]:
         """Around the start; or in every other lost frame further off. None out of view."""
-        starts = starts_after_loss(frame.start, self._meter.model.centre_mm, frame.n_lost)
+        starts = make_starts_after_loss(frame.start, self._meter.model.centre_mm, frame.n_lost)
         measured = None
         if starts:
             measured = self._meter.measure_freely(frame.pair, frame.start, WIDE_VIEW)
             frame.watch.lap("stereo")
         if measured is None or len(measured.cloud) == 0:
             return [self._near.find_freely(frame, WIDE_BOX)]
-        candidates = self._scorer.find_coarse_fits(measured, starts)
+        candidates = self._scorer.find_poses(measured, starts)
         poses = select_poses(candidates, _N_REFINED) or [frame.start]
         # Far from where it was, a bone may look like itself in several ways.
         fits = [self._near.fit_nearby(frame, measured, pose) for pose in poses]
         return [self._scorer.rank(fits)[0]]
 
 
-def starts_after_loss(
+def make_starts_after_loss(
     last: RigidTransform, centre_mm: FloatArray, n_lost: int
 ) -> list[RigidTransform]:
     """Starts further off than the last pose; none in every other frame.

@@ -1,26 +1,20 @@
 """The bone near an expected pose: matched on the model itself, or measured freely around it."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings, fit_bimcc
 from navapp.tracking.following import Follower
-from navapp.tracking.frame import FREE_FIT, Fit, Frame
+from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame
 from navapp.tracking.surface_meter import NEAR_BOX, Margins, Measurement, SurfaceMeter
 
-_NEARBY_FIT = FREE_FIT._replace(widest_mm=3.0)
+_NEARBY_SETTINGS = FREE_SETTINGS._replace(widest_mm=3.0)
 
 
-@dataclass(frozen=True, slots=True)
-class NearSettings:
-    """How the bone is located around an expected pose; all chosen."""
-
-    # Of the model's pixels: with so many matched, the bone is where it was expected; ...
-    sure_fraction: float = 0.45
-    # ... with so many something may hide the rest: if the fit also moved it by no more than this;
-    least_fraction: float = 0.3
-    stay_mm: float = 0.7
+# All chosen. When so much of the model is matched, the bone is where it was expected.
+SURE_FRACTION = 0.45
+# When so much is, something may hide the rest: it is there if the fit moved it by at most STAY_MM.
+LEAST_FRACTION, STAY_MM = 0.3, 0.7
 
 
 class NearSearch:
@@ -29,16 +23,10 @@ class NearSearch:
     Args:
         meter: of the bone's surface.
         score: how much of the model a fit explains; decides between two.
-        settings: of the search.
     """
 
-    def __init__(
-        self,
-        meter: SurfaceMeter,
-        score: Callable[[Fit], float],
-        settings: NearSettings | None = None,
-    ) -> None:
-        self._meter, self._score, self._settings = meter, score, settings or NearSettings()
+    def __init__(self, meter: SurfaceMeter, score: Callable[[Fit], float]) -> None:
+        self._meter, self._score = meter, score
         self._follower = Follower(meter)
 
     def find(self, frame: Frame) -> list[Fit | None]:
@@ -48,8 +36,9 @@ class NearSearch:
         bone is elsewhere, or it is half hidden or moved, the surface is measured freely as well,
         and what explains more of the model stands.
         """
-        least, on_measured = self._settings.least_fraction, frame.on_measured
-        stayed = self._follower.follow(frame, frame.start, least, on_measured=on_measured)
+        stayed = self._follower.follow(
+            frame, frame.start, LEAST_FRACTION, on_measured=frame.on_measured
+        )
         if stayed is not None and self._is_here(stayed, frame.start):
             return [stayed]
         found = self.find_freely(frame, NEAR_BOX)
@@ -58,9 +47,8 @@ class NearSearch:
 
     def find_on_model(self, frame: Frame) -> Iterator[Fit]:
         """Fits on the model alone: from samples of it first, then from all of it at once."""
-        least = self._settings.least_fraction
-        for skips_samples in (False, True):
-            fit = self._follower.follow(frame, frame.start, least, skips_samples=skips_samples)
+        for skips in (False, True):
+            fit = self._follower.follow(frame, frame.start, LEAST_FRACTION, skips_samples=skips)
             if fit is not None:
                 yield fit
 
@@ -70,9 +58,9 @@ class NearSearch:
         frame.watch.lap("stereo")
         if measured is None:
             return None
-        far = self._fit(frame, measured, frame.start, FREE_FIT)
+        far = self._fit(frame, measured, frame.start, FREE_SETTINGS)
         is_on_model = far.measured.view is not None
-        if is_on_model and far.measured.matched_fraction >= self._settings.sure_fraction:
+        if is_on_model and far.measured.matched_fraction >= SURE_FRACTION:
             return far
         return max(far, self.fit_nearby(frame, measured, frame.start), key=self._score)
 
@@ -82,15 +70,15 @@ class NearSearch:
         Nearby, because half of what is measured freely may be a hand: a fit that may look far ends
         on it even from the truth.
         """
-        return self._fit(frame, measured, pose, _NEARBY_FIT)
+        return self._fit(frame, measured, pose, _NEARBY_SETTINGS)
 
     def _is_here(self, fit: Fit, expected: RigidTransform) -> bool:
         """Enough of the model is matched, or what is matched is where it was expected."""
         matched = fit.measured.matched_fraction
-        if matched >= self._settings.sure_fraction:
+        if matched >= SURE_FRACTION:
             return True
         moved_mm = expected.mean_motion_mm(fit.pose, self._meter.model.hull_mm)
-        return matched >= self._settings.least_fraction and moved_mm <= self._settings.stay_mm
+        return matched >= LEAST_FRACTION and moved_mm <= STAY_MM
 
     def _fit(
         self, frame: Frame, measured: Measurement, start: RigidTransform, settings: BimccSettings

@@ -7,7 +7,7 @@ import numpy as np
 from navapp.geometry.box import Box
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.rectification import Image, RectifiedPair, luma
-from navapp.registration import CoarseFit, Scene, find_initial
+from navapp.registration import Scene, ScoredPose, find_initial
 from navapp.stereo import match_surface
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, SurfaceMeter
 from navapp.values import AspectGraph, Prior
@@ -33,9 +33,9 @@ class WholeViewSearch:
         """Both pictures; the box of the pair is the prior's, or the whole view without one."""
         return self._meter.rectifier.rectify(luma(left), luma(right), self._box(prior))
 
-    def find_coarse_fits(
+    def find_poses(
         self, pair: RectifiedPair, prior: Prior, on_progress: Callable[[float], None]
-    ) -> list[CoarseFit]:
+    ) -> list[ScoredPose]:
         """Where the bone may be: rectified left camera from bone, best first.
 
         `on_progress` is told the fraction done; it may raise to cancel.

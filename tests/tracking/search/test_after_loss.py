@@ -5,7 +5,7 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotation_from_vector
 from navapp.tracking.frame import Frame
-from navapp.tracking.search.after_loss import SearchAfterLoss, starts_after_loss
+from navapp.tracking.search.after_loss import SearchAfterLoss, make_starts_after_loss
 from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import Stopwatch
 
@@ -20,18 +20,18 @@ def far_mm(start: RigidTransform) -> float:
 
 
 def cycle() -> list[list[RigidTransform]]:
-    return [starts_after_loss(LAST, CENTRE, n_lost) for n_lost in range(1, 21, 2)]
+    return [make_starts_after_loss(LAST, CENTRE, n_lost) for n_lost in range(1, 21, 2)]
 
 
 def test_the_first_and_every_other_frame_looks_where_it_was() -> None:
-    assert all(starts_after_loss(LAST, CENTRE, n_lost) == [] for n_lost in range(0, 40, 2))
-    assert all(starts_after_loss(LAST, CENTRE, n_lost) for n_lost in range(1, 40, 2))
+    assert all(make_starts_after_loss(LAST, CENTRE, n_lost) == [] for n_lost in range(0, 40, 2))
+    assert all(make_starts_after_loss(LAST, CENTRE, n_lost) for n_lost in range(1, 40, 2))
 
 
 def test_every_start_has_its_turn_and_then_again() -> None:
     seen = {start.matrix.round(9).tobytes() for part in cycle() for start in part}
     assert len(seen) == sum(len(part) for part in cycle())
-    again = starts_after_loss(LAST, CENTRE, 21)
+    again = make_starts_after_loss(LAST, CENTRE, 21)
     for one, other in zip(cycle()[0], again, strict=True):
         np.testing.assert_array_equal(one.matrix, other.matrix)
 

@@ -9,7 +9,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer
-from navapp.tracking.search.near import NearSearch, NearSettings
+from navapp.tracking.search.near import LEAST_FRACTION, STAY_MM, SURE_FRACTION, NearSearch
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_BOX, Margins
 from navapp.values import Reason, Stopwatch
 from tests.registration.shapes import TRUE
@@ -24,7 +24,7 @@ def search_of(
     score: Callable[[Fit], float] | None = None,
 ) -> NearSearch:
     by_share = score or (lambda fit: fit.measured.matched_fraction)
-    return NearSearch(meter, by_share, NearSettings())
+    return NearSearch(meter, by_share)
 
 
 def find(search: NearSearch, start: RigidTransform | Frame) -> Fit | None:
@@ -105,20 +105,19 @@ def test_the_better_of_staying_and_searching_wins(sign: float, is_search: bool) 
 
 
 def test_a_bone_half_hidden_where_it_was_expected_is_not_searched() -> None:
-    settings = NearSettings()
     meter = FakeMeter()
-    meter.share = 0.5 * (settings.least_fraction + settings.sure_fraction)
-    near = moved((0.0, 0.0, 0.5 * settings.stay_mm), (0.0,) * 3)
+    meter.share = 0.5 * (LEAST_FRACTION + SURE_FRACTION)
+    near = moved((0.0, 0.0, 0.5 * STAY_MM), (0.0,) * 3)
     assert error_mm(find(search_of(meter), near).pose) < 0.05
     assert "freely" not in meter.asked
     # The same share after a longer way is not believed.
-    find(search_of(meter), moved((0.0, 0.0, 1.8 * settings.stay_mm), (0.0,) * 3))
+    find(search_of(meter), moved((0.0, 0.0, 1.8 * STAY_MM), (0.0,) * 3))
     assert "freely" in meter.asked
 
 
 def test_too_small_an_answer_is_not_followed() -> None:
     meter = FakeMeter()
-    meter.share = NearSettings().least_fraction - 0.01
+    meter.share = LEAST_FRACTION - 0.01
     find(search_of(meter), TRUE)
     assert meter.asked.index("freely") <= 1
 
@@ -141,7 +140,7 @@ def test_a_rest_is_looked_for_on_the_model_and_never_freely() -> None:
     assert error_mm(sampled.pose) < 0.05
     assert error_mm(whole.pose) < 0.05
     assert "freely" not in meter.asked
-    meter.share = NearSettings().least_fraction - 0.01
+    meter.share = LEAST_FRACTION - 0.01
     assert len(list(search_of(meter).find_on_model(frame_at(TRUE)))) == 1
     meter.is_in_view = False
     assert list(search_of(meter).find_on_model(frame_at(TRUE))) == []
