@@ -76,7 +76,7 @@ def find_initial(
     aspects: AspectGraph | None = None,
     on_progress: Callable[[float], None] = lambda fraction: None,
 ) -> list[ScoredPose]:
-    """Find a bone in a box without a pose: distinct candidates, best first.
+    """Find a bone in a box without a pose: distinct poses, best first.
 
     Args:
         pair: grey pictures; the bone is looked for in its box.
@@ -159,7 +159,7 @@ def _fit_starts(
         if pose is None:
             return None
         judged = replace(near, thinned_to=_JUDGED_POINTS)
-        # As a fraction of the whole scene, so that candidates compare.
+        # As a fraction of the whole scene, so that poses compare.
         explained = compute_explained_fraction(judged, model, pose)
         return ScoredPose(pose, explained * len(near) / len(scene))
 

@@ -1,4 +1,4 @@
-"""Many starts, one answer: starts, coarse approaches, distinct candidates, their ranking."""
+"""Many starts, one answer: starts, coarse fits, distinct poses, their ranking."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,14 +18,14 @@ from navapp.registration.scene import Scene
 from navapp.registration.step_kernels import weigh
 from navapp.values import PoseEstimate, Reason
 
-# All chosen; the starts for rough poses 15 deg and 20 mm off (tests.bench.registration).
+# All chosen; the starts for rough poses 15 deg and 20 mm off.
 # Poses nearer than this are the same answer.
 _SAME_MM, _SAME_DEG = 2.0, 2.0
 _COARSE_POINTS = 400
 # Tilts (deg, how many) of a rough pose, nearby; then also of what it becomes when shifted.
 _NEAR_TILTS, _FAR_TILTS = (15.0, 12), ((15.0, 12), (28.0, 20))
 _FAR_SHIFT_MM = 8.0
-# So many candidates are refined, of those that explain so much of what the best does.
+# So many poses are fitted to all points, of those that explain so much of what the best does.
 _N_REFINED, _REFINED_FRACTION = 3, 0.5
 # A different pose that explains as much as this of the best one makes that one ambiguous.
 AMBIGUOUS_FRACTION = 0.9
@@ -36,7 +36,7 @@ ANYWHERE_SETTINGS = BimccSettings(model_points=1000, max_iterations=60, widest_m
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScoredPose:
-    """Where some start led to, coarsely, and how much of both sides that explains (0 to 1)."""
+    """A pose that a search found, and how much it explains; scores compare within one search."""
 
     scene_from_bone: RigidTransform
     score: float
@@ -129,8 +129,8 @@ def find_poses(
     on_progress(1.0)
     poses = distinct([pose for pose in found if pose is not None], model.centre_mm)
     judged = score or (lambda pose: compute_explained_fraction(thinned, model, pose))
-    candidates = [ScoredPose(pose, judged(pose)) for pose in poses]
-    return sorted(candidates, key=lambda candidate: candidate.score, reverse=True)
+    scored = [ScoredPose(pose, judged(pose)) for pose in poses]
+    return sorted(scored, key=lambda one: one.score, reverse=True)
 
 
 def compute_explained_fraction(
@@ -158,16 +158,16 @@ def compute_explained_fraction(
     return fraction * compute_coverage(scene, model, scene_from_bone, sigma_mm)
 
 
-def select_poses(candidates: Sequence[ScoredPose], most: int = _N_REFINED) -> list[RigidTransform]:
-    """Of candidates, best first, the poses that are worth a fit on all points."""
-    least = _REFINED_FRACTION * max((one.score for one in candidates), default=0.0)
-    return [one.scene_from_bone for one in candidates[:most] if one.score >= least]
+def select_poses(scored: Sequence[ScoredPose], most: int = _N_REFINED) -> list[RigidTransform]:
+    """Of poses, best first, those that are worth a fit to all points."""
+    least = _REFINED_FRACTION * max((one.score for one in scored), default=0.0)
+    return [one.scene_from_bone for one in scored[:most] if one.score >= least]
 
 
 def rank_fits(
     fits: Sequence[AnyFit], scores: Sequence[float], centre_mm: FloatArray
 ) -> list[AnyFit]:
-    """Fits of candidates, best score first; the best is AMBIGUOUS if another one scores as much.
+    """Fits, best score first; the best is AMBIGUOUS if a different one scores nearly as much.
 
     Along a free direction every pose does, and the fit says so already. `centre_mm` (3,) is the
     model's, in the bone's frame.

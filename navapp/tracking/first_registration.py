@@ -96,16 +96,16 @@ class FirstRegistration:
         """In a box, or in the whole view, without a pose to start from."""
         pair = self._tracker.whole_view.rectify(left, right, prior)
         watch.lap("rectify")
-        candidates = self._tracker.whole_view.find_poses(pair, prior, on_progress)
+        scored = self._tracker.whole_view.find_poses(pair, prior, on_progress)
         watch.lap("estimate")
-        poses = select_poses(candidates)
-        found = [self._fit_candidate(Frame(pair, pose, watch)) for pose in poses]
+        poses = select_poses(scored)
+        found = [self._fit_pose(Frame(pair, pose, watch)) for pose in poses]
         fits = [fit for fit in found if fit is not None]
         if not fits:
             return [self._tracker.judge.lost(Reason.NO_SURFACE, watch)]
         return self._judge_distinct(Frame(pair, poses[0], watch), fits, goal)
 
-    def _fit_candidate(self, frame: Frame) -> Fit | None:
+    def _fit_pose(self, frame: Frame) -> Fit | None:
         """What explains more: the model matched where it is expected, or what lies around it."""
         near = self._tracker.near
         fits = (*near.find(frame), near.find_freely(frame, WIDE_BOX))

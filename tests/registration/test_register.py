@@ -370,6 +370,16 @@ def test_the_caller_may_stop_the_search() -> None:
         register(seen_scene(900, 0.3), MODEL, TRUE, is_global=True, on_progress=stop)
 
 
+def test_progress_only_grows() -> None:
+    """Also where every round of starts is tried."""
+    told: list[float] = []
+    scene = Scene(np.random.default_rng(1).uniform(-60.0, 60.0, (300, 3)))
+    register(scene, MODEL, TRUE, is_global=True, on_progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert max(np.diff(told)) < 0.2
+
+
 def test_the_error_is_predicted_over_what_faces_the_camera() -> None:
     scene = seen_scene(900, 0.3)
     found = register(scene, MODEL, TRUE)

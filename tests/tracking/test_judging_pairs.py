@@ -130,7 +130,7 @@ class Asked:
         self.searches: list[bool] = []
 
     def find(self, frame):
-        self.searches.append(frame.searches)
+        self.searches.append(frame.may_search_long)
         return iter(())
 
 

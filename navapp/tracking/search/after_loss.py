@@ -36,8 +36,8 @@ class SearchAfterLoss:
             frame.watch.lap("stereo")
         if measured is None or len(measured.cloud) == 0:
             return [self._near.find_freely(frame, WIDE_BOX)]
-        candidates = self._scorer.find_poses(measured, starts)
-        poses = select_poses(candidates, _N_REFINED) or [frame.start]
+        scored = self._scorer.find_poses(measured, starts)
+        poses = select_poses(scored, _N_REFINED) or [frame.start]
         # Far from where it was, a bone may look like itself in several ways.
         fits = [self._near.fit_nearby(frame, measured, pose) for pose in poses]
         return [self._scorer.rank(fits)[0]]
