@@ -84,7 +84,8 @@ class BimccTracker(Tracker):
                 goal, self.rectify_pose(left_from_bone),
                 best or self.judge.lost(Reason.BONE_LOST, watch), watch, state.n_lost,
             )  # fmt: skip
-        best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
+        if best.verdict.status is not Status.OK:
+            best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
 

@@ -61,21 +61,17 @@ class Follower:
             expected = expected or self._meter.render(frame.pair, pose, NEAR_BOX)
             if expected is None:
                 break
+            measure = self._meter.measure_on_model if is_near else self._meter.measure_on_samples
+            measured = measure(expected)
+            watch.lap("stereo")
+            rested = None
             if is_near:
-                measured = self._meter.measure_on_model(expected)
-                watch.lap("stereo")
                 on_measured(measured, pose)
                 estimate = fit_bimcc(measured.scene, model, pose, MODEL_SETTINGS)
-                has_enough = Reason.TOO_FEW_POINTS not in estimate.reasons
-                fit = Fit(estimate, measured) if has_enough else fit
-                rested = estimate.camera_from_bone if has_enough else None
-            else:
-                measured = self._meter.measure_on_samples(expected)
-                watch.lap("stereo")
-                is_little = measured.matched_fraction < least_fraction
-                rested = (
-                    None if is_little else fit_pose(measured.scene, model, pose, MODEL_SETTINGS)
-                )
+                if Reason.TOO_FEW_POINTS not in estimate.reasons:
+                    fit, rested = Fit(estimate, measured), estimate.camera_from_bone
+            elif measured.matched_fraction >= least_fraction:
+                rested = fit_pose(measured.scene, model, pose, MODEL_SETTINGS)
             watch.lap("estimate")
             if rested is None:
                 break
