@@ -145,7 +145,7 @@ def vary_hypotheses(
     here = views.directions[some.view_index[some.orientation]]
     varied, view = np.nonzero(here @ views.directions.T >= np.cos(np.radians(step_deg)))
     tilts = [turn_between(views.directions[k], here[h]) for h, k in zip(varied, view, strict=True)]
-    tilted = some.rotation[some.orientation[varied]] @ np.array(tilts)
+    tilted = some.rotation[some.orientation[varied]] @ np.array(tilts).reshape(-1, 3, 3)
     varied, view = np.repeat(varied, len(turns)), np.repeat(view, len(turns))
     places = len(sides_mm) * varied[:, None] + np.arange(len(sides_mm))
     positions_mm = (some.position_mm[some.place][:, None] + sides_mm).reshape(-1, 3)

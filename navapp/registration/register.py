@@ -94,8 +94,8 @@ def register(
 ) -> Registration:
     """Register a model to a scene, judge the answer, and try more starts when it is doubtful.
 
-    Near starts when the answer is in doubt, far ones when it still fails, as a tracker's first
-    registration does. The paper's methods are for comparison: from the start alone.
+    Near starts first, then far ones, as a tracker's first registration does. The paper's methods
+    are for comparison: from the start alone.
 
     Args:
         scene: what was measured.
@@ -115,7 +115,7 @@ def register(
     place_mm = start.apply(model.centre_mm)
     if is_global or search.best.is_doubtful:
         search.try_starts(make_near_starts(start, place_mm), NEAR_SETTINGS, on_progress, (0.0, 0.1))
-    if search.best.outcome is Outcome.FAILED:
+    if search.best.is_doubtful:
         search.try_starts(make_far_starts(start, place_mm), NEAR_SETTINGS, on_progress, (0.1, 0.6))
     if is_global and search.best.is_doubtful:
         starts = _make_starts_all_around(scene, model, start)
@@ -207,7 +207,7 @@ def _gather_evidence(
         )  # fmt: skip
         evidence = replace(evidence, agreement=agreement)
     if scene.knows_noise:
-        return evidence
+        return replace(evidence, rms_ratio=estimate.rms_mm / estimate.expected_rms_mm)
     kernel_fraction = solution.sigma_mm / DEFAULT.widest_at_rest_mm
     evidence = replace(evidence, kernel_fraction=kernel_fraction)
     if not _is_little(seen):

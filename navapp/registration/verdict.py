@@ -64,6 +64,7 @@ class Evidence:
     detail_ratio: float = math.nan  # sharper over blurred picture; 0 when light already tells
     has_lost_rows: bool = False  # too large a vertical disparity to be measured
     row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
+    rms_ratio: float = math.nan  # rms of the fit's residuals over the one predicted
     correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
     kernel_fraction: float = math.nan  # kernel at the end over the widest, if no noise is known
     smooth_excess_mm: float = math.nan  # correlated residuals less what may be, if none is known
@@ -94,13 +95,6 @@ class Evidence:
     def seen(self) -> Agreement:
         """The agreement; NaN without one."""
         return _UNKNOWN if self.agreement is None else self.agreement
-
-    @property
-    def rms_ratio(self) -> float:
-        """Rms of the residual over what its sigma predicts."""
-        if self.estimate is None:
-            return math.nan
-        return self.estimate.rms_mm / self.estimate.expected_rms_mm
 
     @property
     def view_excess_mm(self) -> float:

@@ -19,6 +19,7 @@ from navapp.registration.verdict import (
 from navapp.stereo import StereoHealth
 from navapp.tracking.agreement import compare_at
 from navapp.tracking.checks import PairChecks
+from navapp.tracking.following import RestSettings
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
@@ -29,6 +30,8 @@ from navapp.values import PoseEstimate, Reason, RowCheck, Stopwatch, TrackedFram
 # (docs/accuracy.md).
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
+# A model that the outline moved by no more looks as it was matched; a follower allows as much.
+_SAME_VIEW_MM = RestSettings().near_mm
 # About so many targets are used for the predicted error; for time alone.
 _MOST_TARGETS = 200
 
@@ -77,9 +80,11 @@ class PoseJudge:
             # shows. A hidden bone has the noise that the measurement claims: something flush with
             # the bone may fit as well.
             noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
-            fit = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
-            fit = fit.with_correlated_residuals(noise_variance_ratio)
-        # A fit on the model was compared by the check; a free one is compared at its pose.
+            joined = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
+            if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
+                agreement = None
+            fit = joined.with_correlated_residuals(noise_variance_ratio)
+        # A fit on the model was compared where it was matched; others are compared at their pose.
         if agreement is None and fit.estimate.is_fixed:
             agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
         evidence = self._evidence_of_pair(health, depth_mm)
@@ -151,6 +156,7 @@ class PoseJudge:
             known,
             estimate=estimate,
             agreement=agreement,
+            rms_ratio=estimate.rms_mm / estimate.expected_rms_mm,
             correlated_ratio=correlated_ratio,
             size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),
             view_mm=view_mm,

@@ -41,7 +41,7 @@ def test_the_pose_is_found_from_far_through_clutter(seed: int) -> None:
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
     assert found.coverage is not None
     assert 0.85 < found.coverage <= 1.0
-    assert found.n_starts in (1, 14)
+    assert found.n_starts in (1, 14, 245)
 
 
 def test_a_good_start_is_the_only_one() -> None:
@@ -110,7 +110,7 @@ def test_what_is_seen_in_part_is_tried_from_other_starts_too() -> None:
     for scene in (Scene(half, EYE), Scene(points)):
         found = register(scene, MODEL, start)
         assert found.outcome is Outcome.CONVERGED
-        assert found.n_starts == 14
+        assert found.n_starts == 14 + 231
         assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.35
 
 
@@ -224,6 +224,25 @@ def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
         "scene", "egg", rotation_from_vector((np.pi / 2.0, 0.0, 0.0)), (0.0, 0.0, 0.0)
     )
     found = register(scene, RegistrationModel(BoneModel("egg", egg)), quarter, is_global=True)
+    assert found.outcome is Outcome.FAILED
+    assert Reason.AMBIGUOUS in found.reasons
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_shape_that_repeats_itself_every_45_degrees_is_a_guess(seed: int) -> None:
+    """The twins lie beyond the near starts, and nobody knows where the camera stood."""
+    ball = ball_mesh(1.0, 3000)
+    x, y, z = ball.vertices_mm.T
+    petals = 0.15 * np.cos(8.0 * np.arctan2(y, x)) * np.hypot(x, y) ** 8
+    radius_mm = 25.0 * (1.0 + petals) * (1.0 + 0.15 * z)
+    flower = TriangleMesh(radius_mm[:, None] * ball.vertices_mm, ball.faces)
+    rng = np.random.default_rng(seed)
+    turn = rotation_from_vector(rng.normal(size=3))
+    true = RigidTransform.from_parts("scene", "flower", turn, (10.0, -20.0, 300.0))
+    some_mm = flower.vertices_mm[rng.choice(len(x), 900, replace=False)]
+    scene = Scene(true.apply(some_mm) + rng.normal(0.0, 0.2, some_mm.shape))
+    start = true.move((1.0, 1.0, 0.0, 0.02, 0.0, 0.0), true.translation_mm)
+    found = register(scene, RegistrationModel(BoneModel("flower", flower)), start)
     assert found.outcome is Outcome.FAILED
     assert Reason.AMBIGUOUS in found.reasons
 

@@ -49,11 +49,16 @@ def altered(checks: PairChecks, fit: Fit, **changes) -> Told:
 
 
 class SurfaceAlone:
-    """Stands for the meter of the outline: finds none."""
+    """Stands for the meter of the outline: finds none, or one that shifts the pose."""
 
-    def join(self, pair, fit: Fit, coarse_px, noise_variance_ratio: float = 1.0) -> Fit:
+    def __init__(self, shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
+        self._twist = (*shift_mm, 0.0, 0.0, 0.0)
+
+    def join(self, pair, fit: Fit, coarse_px, noise_variance_ratio: float) -> Fit:
         covariance = noise_variance_ratio * fit.estimate.covariance
-        return replace(fit, estimate=replace(fit.estimate, covariance=covariance))
+        pose = fit.pose.move(self._twist, fit.pose.translation_mm)
+        estimate = replace(fit.estimate, covariance=covariance, camera_from_bone=pose)
+        return replace(fit, estimate=estimate)
 
 
 def judged(

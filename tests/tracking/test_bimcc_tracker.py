@@ -285,3 +285,16 @@ def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_po
     ]
     FirstRegistration(tracker)._judge_distinct(view, fits, GOAL)
     assert {id(pose) for _, pose, *_ in meter.given} == {id(fit.pose) for fit in fits}
+
+
+def test_a_lost_pose_places_no_box() -> None:
+    """The judge tells the pose of a lost bone as well."""
+    a = room()
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    found, before = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    lost = replace(found, verdict=replace(found.verdict, status=Status.LOST))
+    _, after = a.tracker.update(lost, before, a.frames[2].left, 66_000_000, Stopwatch())
+    assert after.box is before.box
+    _, after = a.tracker.update(found, before, a.frames[2].left, 66_000_000, Stopwatch())
+    assert after.box is not before.box

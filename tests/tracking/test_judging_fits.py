@@ -93,6 +93,18 @@ def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it
     assert answer.verdict.coverage == there.coverage != 0.77
 
 
+@pytest.mark.parametrize(("moved_mm", "is_as_matched"), [(0.15, True), (0.25, False)])
+def test_a_model_that_the_outline_moved_is_compared_anew(
+    moved_mm: float, is_as_matched: bool
+) -> None:
+    a = room()
+    frame, checks, fit = found_at_the_truth(a)
+    outline = SurfaceAlone(shift_mm=(moved_mm, 0.0, 0.0))
+    as_matched = altered(checks, fit, coverage=0.77)
+    found = judge_with(outline).judge(frame, fit, GOAL, checks=as_matched).verdict
+    assert (found.coverage == 0.77) == is_as_matched
+
+
 def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> None:
     """Errors of a free measurement go together anyway."""
     a = room()
