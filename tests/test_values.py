@@ -310,5 +310,5 @@ def test_verdicts_have_an_order() -> None:
     more = dataclasses.replace(degraded, coverage=0.5)
     guess = dataclasses.replace(degraded, reasons=(Reason.AMBIGUOUS,), coverage=0.9)
     good, lost = Verdict(Status.OK, 0.3, coverage=0.3), Verdict(Status.LOST, None)
-    found = sorted([lost, guess, degraded, more, good], key=lambda one: one.order)
+    found = sorted([lost, guess, degraded, more, good], key=lambda one: one.rank)
     assert found == [good, more, degraded, guess, lost]

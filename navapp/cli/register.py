@@ -133,7 +133,7 @@ def _content(
     estimate = answer.estimate
     pose = work.pose(estimate.camera_from_bone)
     has_pose = answer.outcome is not Outcome.FAILED
-    fixes_all = has_pose and estimate.is_fixed
+    fixes_all = has_pose and estimate.has_finite_covariance
     n_fit = estimate.inlier_fraction * estimate.n_points
     return {
         "units": {"length": options.units, "angle": "deg"},

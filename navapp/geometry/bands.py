@@ -54,7 +54,7 @@ class Job(Generic[_Answer]):
             return self._taken[0]
 
     @property
-    def is_over(self) -> bool:
+    def is_fetched(self) -> bool:
         """The answer was asked for and is there."""
         return bool(self._taken)
 

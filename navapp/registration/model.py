@@ -47,22 +47,22 @@ class RegistrationModel:
         self.centre_mm: FloatArray = bone.mesh.centroid_mm
 
     @cached_property
-    def drawn_mesh(self) -> TriangleMesh:
+    def rendered_mesh(self) -> TriangleMesh:
         """`seen_mesh` in fewer triangles where it has many: what is rendered."""
         return drawn(self.seen_mesh)
 
     @cached_property
     def is_closed(self) -> bool:
         """What is rendered has no border and looks outward."""
-        mesh = self.drawn_mesh
+        mesh = self.rendered_mesh
         has_border = open_border(len(mesh.vertices_mm), mesh.faces).any()
         return not has_border and mesh.volume_mm3() > 0.0
 
     @cached_property
-    def drawn_face_sigma_mm(self) -> FloatArray:
+    def rendered_face_sigma_mm(self) -> FloatArray:
         """(F,) `sigma_mm` of the triangles that are rendered."""
-        _, nearest = cKDTree(self.points_mm).query(self.drawn_mesh.vertices_mm, workers=2)
-        mean_mm: FloatArray = self.sigma_mm[nearest][self.drawn_mesh.faces].mean(axis=1)
+        _, nearest = cKDTree(self.points_mm).query(self.rendered_mesh.vertices_mm, workers=2)
+        mean_mm: FloatArray = self.sigma_mm[nearest][self.rendered_mesh.faces].mean(axis=1)
         return mean_mm
 
     @cached_property

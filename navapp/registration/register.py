@@ -39,7 +39,7 @@ _DOUBTFUL_COVERAGE = 0.85
 _SMOOTH_MM, _SMOOTH_SPACINGS = 0.2, 0.05
 _CELL_MM, _APART_CELLS = 3.0, (0.8, 1.6)
 # A pose that is no better known than this is not known; no stage asks for more.
-_GOAL = Goal(np.empty((0, 3)), tolerance_mm=np.inf, view_limit_mm=2.0)
+_GOAL = Goal(np.empty((0, 3)), tolerance_mm=np.inf, seen_limit_mm=2.0)
 _LEAST_FACING_COSINE, _N_TRE_POINTS = 0.2, 200
 # Tilts that leave no orientation far from a start: angles, and how many of each.
 _RINGS_DEG, _N_RING_TILTS = (35.0, 70.0, 105.0, 140.0, 175.0), 14
@@ -195,7 +195,7 @@ def _gather_evidence(
     evidence = Evidence(
         estimate=estimate,
         extent_mm=min(_extent_mm(scene), _extent_mm(model)),
-        view_mm=np.inf if tre_mm is None else tre_mm,
+        seen_error_mm=np.inf if tre_mm is None else tre_mm,
         plan_mm=0.0,
         goal=_GOAL,
     )
@@ -258,7 +258,7 @@ def _predict_tre_mm(scene: Scene, model: RegistrationModel, estimate: PoseEstima
         towards = camera_mm - points_mm
         cosine = np.einsum("ij,ij->i", model.normals, towards) / np.linalg.norm(towards, axis=1)
         points_mm = points_mm[cosine > _LEAST_FACING_COSINE]
-    if len(points_mm) == 0 or not estimate.is_fixed:
+    if len(points_mm) == 0 or not estimate.has_finite_covariance:
         return None
     some_mm = points_mm[:: max(1, len(points_mm) // _N_TRE_POINTS)]
     return estimate.predict_tre_mm(model.centre_mm, some_mm)

@@ -49,7 +49,7 @@ class Goal:
     tolerance_mm: float  # of the stage: the bound by all that is known must stay below it
     # The bound by what is seen must stay below this; what errors of the plan may cost is added in
     # squares, since no better view mends them.
-    view_limit_mm: float = OK_ERROR_MM
+    seen_limit_mm: float = OK_ERROR_MM
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +71,7 @@ class Evidence:
     extent_mm: float = math.nan  # longest side of the scene or of the model, the smaller one's
     is_rig_accepted: bool = True  # by its calibration
     size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be
-    view_mm: float = math.nan  # bound of the error by what is seen
+    seen_error_mm: float = math.nan  # bound of the error by what is seen
     plan_mm: float = math.nan  # bound of the error by the plan: its cartilage and surface
     bound_mm: float | None = None  # bound of the error by all that is known; None without a pose
     cartilage_sd_mm: float = math.nan  # rms over the seen surface
@@ -86,7 +86,7 @@ class Evidence:
     @property
     def n_loose(self) -> int:
         """1 when a direction is free, 2 when the points fix no pose at all."""
-        is_loose = self.estimate is not None and not self.estimate.is_fixed
+        is_loose = self.estimate is not None and not self.estimate.has_finite_covariance
         if is_loose and not self.says(Reason.TOO_FEW_POINTS):
             return 2
         return int(self.says(Reason.DEGENERATE))
@@ -97,10 +97,10 @@ class Evidence:
         return _UNKNOWN if self.agreement is None else self.agreement
 
     @property
-    def view_excess_mm(self) -> float:
+    def seen_excess_mm(self) -> float:
         """By which what is seen fixes the pose too loosely."""
-        limit_mm = math.nan if self.goal is None else self.goal.view_limit_mm
-        return self.view_mm - math.hypot(limit_mm, self.plan_mm)
+        limit_mm = math.nan if self.goal is None else self.goal.seen_limit_mm
+        return self.seen_error_mm - math.hypot(limit_mm, self.plan_mm)
 
     @property
     def tolerance_excess_mm(self) -> float:
@@ -197,7 +197,7 @@ RULES = (
     Rule(Reason.SIZE_DIFFERS, "size beyond 3 sigma and 0.5 mm from the model's, mm",
          lambda e: e.size_excess_mm, 0, None, CHOSEN),
     Rule(Reason.POSE_UNCERTAIN, "95 % bound by what is seen, over 0.5 mm and the plan's, mm",
-         lambda e: e.view_excess_mm, 0, None, CHOSEN),
+         lambda e: e.seen_excess_mm, 0, None, CHOSEN),
     Rule(Reason.CARTILAGE_UNCERTAIN, "rms deviation of the cartilage, mm",
          lambda e: e.cartilage_sd_mm, 0.45, None,
          "chosen; compared in tests.bench.cartilage"),

@@ -52,7 +52,7 @@ def compare(
     if coarse_px is None:
         coarse_px = np.full(shape, np.nan, dtype=np.float32)
     classes, deviation, sigma, n_visible, n_agreeing = classify_pixels(
-        view.depth_mm, view.face_index, model.drawn_face_sigma_mm, measured.disparity_px,
+        view.depth_mm, view.face_index, model.rendered_face_sigma_mm, measured.disparity_px,
         measured.sigma_px, is_matched, coarse_px, geometry.focal_px * geometry.baseline_mm,
     )  # fmt: skip
     if n_visible == 0:
@@ -85,7 +85,7 @@ def compare_at(
 ) -> Agreement:
     """As `compare`, of the model rendered at a pose (rectified left camera from bone)."""
     view = render_rectified(
-        model.drawn_mesh, pose, geometry, measured.box, is_closed=model.is_closed
+        model.rendered_mesh, pose, geometry, measured.box, is_closed=model.is_closed
     )
     return compare(view, model, measured, geometry, coarse_px)
 

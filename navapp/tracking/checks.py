@@ -53,11 +53,11 @@ class PairChecks:
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         self._drop()
-        if self._coarse is not None and not self._coarse.is_over:
-            self._coarse.__exit__(kind, *rest)
+        if self._coarse is not None and not self._coarse.is_fetched:
+            self._coarse.drop()
 
     def _drop(self) -> None:
-        if self._begun is not None and not self._begun[1].is_over:
+        if self._begun is not None and not self._begun[1].is_fetched:
             self._begun[1].drop()
 
 
@@ -69,7 +69,7 @@ def _run_check(
     measured: Measurement,
     pose: RigidTransform,
 ) -> PairCheck:
-    found, view = measured.disparity, measured.view
+    found, view = measured.disparity, measured.rendered
     depth_mm = float(pose.apply(meter.model.centre_mm)[2])
     health = measure_health(pair, found, meter.geometry.disparity_px(depth_mm))
     coarse = None if coarse_job is None else coarse_job.result()

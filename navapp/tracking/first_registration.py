@@ -73,7 +73,7 @@ class FirstRegistration:
             answers = self._judge_distinct(frame, fits, goal)
         if not _is_ok(answers):
             buried = self._judge_buried(frame, measured, goal)
-            answers = sorted([buried, *answers], key=lambda one: one.verdict.order)
+            answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
         report(1.0)
         return answers
 

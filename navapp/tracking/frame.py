@@ -16,8 +16,8 @@ from navapp.values import PoseEstimate, Reason, Stopwatch
 FREE_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 MODEL_SETTINGS = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 
-# Variance of residuals over the one they claim: the right poses of simulated femurs, which lie in
-# the open, reach so much and no more (tests.bench.correlated_residuals).
+# Variance of residuals over the one that the matcher claims: correct poses of simulated femurs,
+# which lie in the open, show at most so much (tests.bench.correlated_residuals).
 NOISE_VARIANCE_RATIO = 0.65**2
 
 OnMeasured = Callable[[Measurement, RigidTransform], object]

@@ -76,16 +76,15 @@ class PoseJudge:
         checks = checks or PairChecks(self._meter, frame.pair)
         health, agreement, coarse_px = checks.check(fit.measured, fit.pose).result()
         if agreement is not None:
-            # A bone in the open has the noise that right poses show at most, whatever this pose
-            # shows. A hidden bone has the noise that the measurement claims: something flush with
-            # the bone may fit as well.
+            # For a bone in the open, noise is taken as large as correct poses show at most. For a
+            # hidden one it is taken as claimed: something flush with the bone may fit as well.
             noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
             joined = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
         # A fit on the model was compared where it was matched; others are compared at their pose.
-        if agreement is None and fit.estimate.is_fixed:
+        if agreement is None and fit.estimate.has_finite_covariance:
             agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
         evidence = self._evidence_of_pair(health, depth_mm)
         evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
@@ -110,9 +109,9 @@ class PoseJudge:
         if max(dark, saturated) <= UNUSABLE_FRACTION:
             least, most = sorted(one.detail for one in both)
             detail_ratio = most / least if least > 0.0 else math.inf if most > 0.0 else 0.0
-        # Rows tell of turns about the baseline, which alone cost little. But what turned a camera
-        # about it turned it as far about others, and a turn that moves a picture sideways by v px
-        # moves the measured depth by z^2 / (f B) v.
+        # A vertical disparity of v px shows that a camera was turned about the baseline. That costs
+        # little, but it was probably turned as far about other axes, and a turn that moves a
+        # picture sideways by v px moves the measured depth by z^2 / (f B) v.
         geometry = self._meter.geometry
         offset_px = abs(health.row_offset_px)
         is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
@@ -136,17 +135,17 @@ class PoseJudge:
     ) -> Evidence:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
-        is_on_model = fit.measured.view is not None
+        is_on_model = fit.measured.rendered is not None
         correlated_ratio = fit.variance_ratio / NOISE_VARIANCE_RATIO if is_on_model else math.nan
-        if not estimate.is_fixed:
+        if not estimate.has_finite_covariance:
             return replace(known, estimate=estimate, correlated_ratio=correlated_ratio)
         if agreement is None or agreement.n_visible == 0:
             return replace(known, missing=Reason.OUT_OF_VIEW)
         is_seen = model.bone.mesh.visible_vertices(estimate.camera_from_bone)
         cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
         plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_mm, model.bone.surface_sd_mm)
-        view_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
-        bound_mm = math.hypot(view_mm, plan_mm, self._error_of_rig_mm(estimate))
+        seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
+        bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate))
         # Errors of a cartilage's thickness that go together look like another size.
         size_sigma_mm = math.hypot(estimate.size_sigma_mm, plan_mm)
         twist = np.zeros(6)
@@ -159,7 +158,7 @@ class PoseJudge:
             rms_ratio=estimate.rms_mm / estimate.expected_rms_mm,
             correlated_ratio=correlated_ratio,
             size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),
-            view_mm=view_mm,
+            seen_error_mm=seen_error_mm,
             plan_mm=plan_mm,
             bound_mm=math.hypot(bound_mm, known.row_error_mm),
             cartilage_sd_mm=cartilage_mm,

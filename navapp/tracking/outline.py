@@ -64,8 +64,8 @@ class OutlineMeter:
             coarse_px: (h, w) coarse disparity of whatever lies in its box.
             noise_variance_ratio: variance of the surface's noise over the one it claims.
         """
-        estimate, view = fit.estimate, fit.measured.view
-        if view is None or not estimate.is_fixed:
+        estimate, view = fit.estimate, fit.measured.rendered
+        if view is None or not estimate.has_finite_covariance:
             return fit
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)

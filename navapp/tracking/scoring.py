@@ -18,7 +18,7 @@ class FitScorer:
 
     def score(self, fit: Fit) -> float:
         """How much of the model a fit explains, 0 to 1; 0 without a covariance."""
-        return self.explain(fit.pose, fit.measured) if fit.estimate.is_fixed else 0.0
+        return self.explain(fit.pose, fit.measured) if fit.estimate.has_finite_covariance else 0.0
 
     def explain(self, pose: RigidTransform, measured: Measurement) -> float:
         """How much of the model, at a pose in the rectified left camera, a measurement explains."""

@@ -79,7 +79,7 @@ class Measurement:
     matched_fraction: float  # of the pixels that were asked for: the box's, or the model's
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
-    view: RenderedView | None = None
+    rendered: RenderedView | None = None
 
     @property
     def scene(self) -> Scene:
@@ -188,7 +188,7 @@ class SurfaceMeter:
             return None
         model = self.model
         view = render_rectified(
-            model.drawn_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
+            model.rendered_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
         )
         support_px = self.geometry.disparity_map_px(view.depth_mm)
         return Expected(replace(pair, box=region[0]), support_px, view)
@@ -221,7 +221,7 @@ class SurfaceMeter:
         return Measurement(found, cloud, answered, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
-        """About as many points as the line wants."""
+        """About `max_points` of the measured ones."""
         n_matched = found.matched_fraction * found.origin.size
         stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
         return found.reproject(self.geometry, stride_px)

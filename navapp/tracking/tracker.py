@@ -138,7 +138,7 @@ class Tracker(ABC):
             return self.judge.lost(Reason.OUT_OF_VIEW, frame.watch)
         fit = Fit(estimate_at(measured.scene, self.model, frame.start, FREE_SETTINGS), measured)
         frame.watch.lap("estimate")
-        return self.judge.judge(frame, fit, replace(goal, view_limit_mm=math.inf))
+        return self.judge.judge(frame, fit, replace(goal, seen_limit_mm=math.inf))
 
     def rectify_pose(self, left_from_bone: RigidTransform) -> RigidTransform:
         """A pose in the rectified left camera."""
@@ -184,14 +184,14 @@ class Tracker(ABC):
             predicted: pose in the rectified left camera that the motion lets expect.
             best: answer so far; without one, and without fits, the bone is lost.
             checks: of the frame, begun; made for these fits without.
-            keeps_first: of equal answers the first stands; by default the last, which knows more.
+            keeps_first: of equally good answers the first is kept; by default the last.
             is_enough: no further fit is asked for.
         """
         is_better = operator.lt if keeps_first else operator.le
         checks = checks or PairChecks(self.meter, frame.pair)
         for fit in fits:
             answer = self.judge.judge(frame, fit, goal, predicted, checks)
-            if best is None or is_better(answer.verdict.order, best.verdict.order):
+            if best is None or is_better(answer.verdict.rank, best.verdict.rank):
                 best = answer
             if is_enough(answer.verdict):
                 break

@@ -1,4 +1,4 @@
-"""What flows between the steps of the line: plain values, no behaviour beyond small derivations.
+"""What flows between the steps: plain values, no behaviour beyond small derivations.
 
 Lengths are mm; a pose is `left_from_<bone>`: the left camera before rectification, OpenCV axes.
 """

@@ -103,8 +103,8 @@ CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 class PoseEstimate:
     """A bone's pose and how well the measurement fixes it."""
 
-    # source the bone's name; target `left_rect` inside the line, `left` (before rectification) when
-    # it leaves it.
+    # source the bone's name; target `left_rect` inside a tracker, `left` (before rectification)
+    # outside of it.
     camera_from_bone: RigidTransform
     # (6, 6) of the twist (translation mm first, rotation rad second), applied from the left about
     # the mean of the model's vertices.
@@ -122,7 +122,7 @@ class PoseEstimate:
     size_sigma_mm: float = math.inf  # standard deviation of that
 
     @property
-    def is_fixed(self) -> bool:
+    def has_finite_covariance(self) -> bool:
         """Whether the measurement fixes the pose in all directions."""
         return bool(np.isfinite(self.covariance).all())
 
@@ -194,20 +194,19 @@ class Verdict:
         return next((reason for reason in self.reasons if reason in CAUSES), None)
 
     @property
-    def order(self) -> tuple[int, bool, float]:
-        """Better verdicts first: by status, then not ambiguous, then by coverage."""
-        rank = list(Status).index(self.status)
-        return rank, Reason.AMBIGUOUS in self.reasons, -self.coverage
+    def rank(self) -> tuple[int, bool, float]:
+        """Smaller is better: by status, then not ambiguous, then by coverage."""
+        return list(Status).index(self.status), Reason.AMBIGUOUS in self.reasons, -self.coverage
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedFrame:
-    """What the line answers for one frame and one bone."""
+    """What a tracker answers for one frame and one bone."""
 
     bone: str  # its name
     estimate: PoseEstimate | None  # of its pose, None without one
     verdict: Verdict  # of the judge
-    timings: FrameTimings  # of the line's steps
+    timings: FrameTimings  # of the tracker's steps
     rows: RowCheck | None = None  # what the pair says of the rig itself; None when it says nothing
 
     @property

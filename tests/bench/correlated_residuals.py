@@ -73,7 +73,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
         # One pair of pictures, rectified around the truth, for every start.
         frame = replace(near, start=true.move(off, true.apply(parts.centre_mm)))
         fit = parts.find(frame)
-        if fit is None or fit.measured.view is None:
+        if fit is None or fit.measured.rendered is None:
             continue
         noise_variance_ratio = NOISE_VARIANCE_RATIO if parts.lies_open(frame, fit) else 1.0
         shown = parts.with_outline(frame, fit, noise_variance_ratio).with_correlated_residuals(

@@ -147,7 +147,7 @@ def located(case: Case, parts: TrackerParts, seed: int) -> tuple[Frame, Fit | No
     start = true.move(off, true.apply(parts.centre_mm))
     frame = parts.frame(taken.left, taken.right, start)
     fit = parts.find(frame)
-    return frame, None if fit is None or fit.measured.view is None else fit
+    return frame, None if fit is None or fit.measured.rendered is None else fit
 
 
 def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
@@ -156,7 +156,7 @@ def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
     if fit is None:
         return
     measured, coarse_px = fit.measured, parts.coarse_px(frame, fit)
-    block = parts.outline.block(frame.pair, fit.pose, measured.view, measured.disparity, coarse_px)
+    block = parts.outline.block(frame.pair, fit.pose, measured.rendered, measured.disparity, coarse_px)
     weight = 1.0 / block.n_sharing
     if weight.sum() >= FEWEST:
         yield float(weight[block.find_near(fit.estimate.covariance)].sum() / weight.sum())

@@ -32,7 +32,7 @@ GOAL = Goal(np.empty((0, 3)), 2.0)
 FINE = Evidence(
     None, ESTIMATE, AGREEMENT,
     dark_fraction=0.1, saturated_fraction=0.1, detail_ratio=1.1, correlated_ratio=1.0,
-    size_excess_mm=-0.4, view_mm=0.3, plan_mm=0.0, bound_mm=0.4, cartilage_sd_mm=0.0,
+    size_excess_mm=-0.4, seen_error_mm=0.3, plan_mm=0.0, bound_mm=0.4, cartilage_sd_mm=0.0,
     jump_mm=1.0, jump_deg=1.0, goal=GOAL,
 )  # fmt: skip
 
@@ -102,7 +102,7 @@ ROWS = (
     Row(Reason.RIG_NOT_ACCEPTED, lambda x: known(is_rig_accepted=x <= 0), 0, None, 1),
     Row(Reason.SIZE_DIFFERS, lambda x: known(extent_mm=x), None, 5.0, -1e-6),
     Row(Reason.SIZE_DIFFERS, lambda x: known(size_excess_mm=x), 0, None),
-    Row(Reason.POSE_UNCERTAIN, lambda x: known(view_mm=x + 0.5), 0, None),
+    Row(Reason.POSE_UNCERTAIN, lambda x: known(seen_error_mm=x + 0.5), 0, None),
     Row(Reason.CARTILAGE_UNCERTAIN, lambda x: known(cartilage_sd_mm=x), 0.45, None),
     Row(Reason.TRE_TOO_LARGE, lambda x: known(bound_mm=x + 2.0), 0, None),
     Row(Reason.JUMPED, lambda x: known(jump_mm=x), 12.0, None),
@@ -222,10 +222,13 @@ def test_the_bound_is_held_against_the_tolerance_beside_other_reasons() -> None:
 
 def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
     """In squares."""
-    assert told(known(view_mm=0.9)) == (Status.DEGRADED, (Reason.POSE_UNCERTAIN,))
-    assert told(known(view_mm=0.9, plan_mm=0.76)) == (Status.OK, ())
-    assert told(known(view_mm=0.9, goal=replace(GOAL, view_limit_mm=np.inf))) == (Status.OK, ())
-    assert GOAL.view_limit_mm == OK_ERROR_MM == 0.5
+    assert told(known(seen_error_mm=0.9)) == (Status.DEGRADED, (Reason.POSE_UNCERTAIN,))
+    assert told(known(seen_error_mm=0.9, plan_mm=0.76)) == (Status.OK, ())
+    assert told(known(seen_error_mm=0.9, goal=replace(GOAL, seen_limit_mm=np.inf))) == (
+        Status.OK,
+        (),
+    )
+    assert GOAL.seen_limit_mm == OK_ERROR_MM == 0.5
 
 
 @pytest.mark.parametrize(

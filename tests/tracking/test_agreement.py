@@ -25,7 +25,7 @@ BONE = femur()
 MODEL = RegistrationModel(BONE)
 MAP = measured_map(BONE)
 HEIGHT, WIDTH = MAP.disparity_px.shape
-VIEW = render_rectified(MODEL.drawn_mesh, TRUE, GEOMETRY, MAP.box)
+VIEW = render_rectified(MODEL.rendered_mesh, TRUE, GEOMETRY, MAP.box)
 EXPECTED_PX = GEOMETRY.disparity_map_px(VIEW.depth_mm)
 SEEN = VIEW.mask
 
@@ -159,7 +159,7 @@ def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
         coarse_px = (EXPECTED_PX + rng.normal(0.0, 3.0, shape)).astype(np.float32)
         coarse_px[rng.random(shape) < 0.2] = np.nan
     scale_px_mm = GEOMETRY.focal_px * GEOMETRY.baseline_mm
-    face_sigma_mm = rng.uniform(0.05, 0.6, len(MODEL.drawn_mesh.faces))
+    face_sigma_mm = rng.uniform(0.05, 0.6, len(MODEL.rendered_mesh.faces))
     classes, deviation, sigma, n_visible, n_agreeing = classify_pixels(
         VIEW.depth_mm, VIEW.face_index, face_sigma_mm, noisy.disparity_px, noisy.sigma_px,
         noisy.origin == Origin.MATCHED, coarse_px, scale_px_mm,

@@ -23,7 +23,7 @@ NO_CLOUD = SurfaceCloud(
 
 def measurement(*, is_on_model: bool = False) -> Measurement:
     model = femur_for_registration()
-    view = render_rectified(model.drawn_mesh, TRUE, GEOMETRY, MAP.box) if is_on_model else None
+    view = render_rectified(model.rendered_mesh, TRUE, GEOMETRY, MAP.box) if is_on_model else None
     return Measurement(MAP, NO_CLOUD, 0.0, 11.0, view)
 
 
@@ -114,7 +114,7 @@ def test_only_what_was_measured_on_the_model_is_compared_with_it() -> None:
         assert checks.check(free, TRUE).result().agreement is None
         found = checks.check(on_model, TRUE).result()
     model = femur_for_registration()
-    assert found.agreement == compare(on_model.view, model, MAP, GEOMETRY, found.coarse_px)
+    assert found.agreement == compare(on_model.rendered, model, MAP, GEOMETRY, found.coarse_px)
     assert found.agreement.coverage > 0.9
 
 

@@ -153,7 +153,7 @@ def test_a_view_that_fixes_the_pose_too_loosely_is_degraded_whatever_the_toleran
     assert verdict.status is Status.DEGRADED
     assert verdict.reasons == (Reason.POSE_UNCERTAIN,)
     assert verdict.predicted_tre_mm > OK_ERROR_MM
-    goal = Goal(NO_TARGETS, 99.0, view_limit_mm=1.01 * verdict.predicted_tre_mm)
+    goal = Goal(NO_TARGETS, 99.0, seen_limit_mm=1.01 * verdict.predicted_tre_mm)
     assert judged(estimate_on(measured), measured, goal).verdict.status is Status.OK
 
 

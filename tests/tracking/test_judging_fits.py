@@ -85,7 +85,7 @@ def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it
     judge = judge_with(SurfaceAlone())
     assert judge.judge(frame, fit, GOAL, checks=as_matched).verdict.coverage == 0.77
     check = as_matched.check(fit.measured, fit.pose).result()
-    free = replace(fit, measured=replace(fit.measured, view=None))
+    free = replace(fit, measured=replace(fit.measured, rendered=None))
     answer = judge.judge(frame, free, GOAL, checks=Told(check._replace(agreement=None)))
     there = compare_at(
         fit.pose, a.tracker.model, fit.measured.disparity, a.tracker.meter.geometry, check.coarse_px
@@ -111,7 +111,7 @@ def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> N
     frame, checks, fit = found_at_the_truth(a)
     rough = replace(fit.estimate, rms_mm=0.95 * fit.estimate.expected_rms_mm)
     on_model = replace(fit, estimate=rough)
-    free = replace(on_model, measured=replace(fit.measured, view=None))
+    free = replace(on_model, measured=replace(fit.measured, rendered=None))
     for one, is_misfit in ((fit, False), (on_model, True), (free, False)):
         verdict = judge_with(SurfaceAlone()).judge(frame, one, GOAL, checks=checks).verdict
         assert (Reason.SURFACE_MISFIT in verdict.reasons) == is_misfit

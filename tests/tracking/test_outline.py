@@ -68,7 +68,7 @@ def fit_at(pose: RigidTransform, is_measured: bool = True) -> Fit:
 
 
 def block_at(fit: Fit, coarse_px: np.ndarray | None = None):
-    view = fit.measured.view
+    view = fit.measured.rendered
     return meter().block(pair(), fit.pose, view, fit.measured.disparity, coarse_px)
 
 
@@ -107,9 +107,9 @@ def test_joined_with_a_vague_surface_the_pose_is_drawn_to_the_truth() -> None:
 def test_without_bone_inside_or_with_something_nearer_beside_nothing_counts() -> None:
     fit = fit_at(TRUE)
     assert len(block_at(fit_at(TRUE, is_measured=False)).residual) == 0
-    near = np.full(fit.measured.view.mask.shape, 400.0, dtype=np.float32)
+    near = np.full(fit.measured.rendered.mask.shape, 400.0, dtype=np.float32)
     assert len(block_at(fit, near).residual) == 0
-    far = np.full(fit.measured.view.mask.shape, 100.0, dtype=np.float32)
+    far = np.full(fit.measured.rendered.mask.shape, 100.0, dtype=np.float32)
     assert len(block_at(fit, far).residual) == len(block_at(fit).residual)
 
 
@@ -122,7 +122,7 @@ def test_dark_pictures_leave_the_fit_alone() -> None:
 
 def test_a_free_fit_and_one_without_covariance_stay() -> None:
     fit = fit_at(OFF)
-    free = replace(fit, measured=replace(fit.measured, view=None))
+    free = replace(fit, measured=replace(fit.measured, rendered=None))
     assert meter().join(pair(), free, None) is free
     endless = replace(fit.estimate, covariance=np.diag([np.inf] * 6))
     loose = replace(fit, estimate=endless)
@@ -134,7 +134,7 @@ def test_cartilage_that_is_not_known_well_weighs_less() -> None:
     bone = replace(femur(), cartilage_sd_mm=np.full(len(femur().mesh.vertices_mm), 0.5))
     unsure = OutlineMeter(type(femur_for_registration())(bone), GEOMETRY)
     fit = fit_at(TRUE)
-    found = unsure.block(pair(), TRUE, fit.measured.view, fit.measured.disparity)
+    found = unsure.block(pair(), TRUE, fit.measured.rendered, fit.measured.disparity)
     assert found.variance.min() > 5.0 * block.variance.max()
 
 
@@ -143,6 +143,6 @@ def test_each_picture_tells_something_of_its_own(eye: int) -> None:
     blank = np.zeros_like(pair().left)
     one = replace(pair(), right=blank) if eye == 0 else replace(pair(), left=blank)
     fit = fit_at(TRUE)
-    found = meter().block(one, TRUE, fit.measured.view, fit.measured.disparity)
+    found = meter().block(one, TRUE, fit.measured.rendered, fit.measured.disparity)
     both = block_at(fit)
     assert 0.3 * len(both.residual) < len(found.residual) < 0.7 * len(both.residual)

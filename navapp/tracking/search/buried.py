@@ -116,7 +116,7 @@ class BuriedSearch:
         places = []
         for start in starts:
             fit = self._stepper.follow(frame, start, skips_samples=True)
-            if fit is not None and fit.estimate.is_fixed:
+            if fit is not None and fit.estimate.has_finite_covariance:
                 depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
                 score = self._sampler.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
                 places.append(Place(fit, score))

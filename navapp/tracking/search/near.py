@@ -59,7 +59,7 @@ class NearSearch:
         if measured is None:
             return None
         far = self._fit(frame, measured, frame.start, FREE_SETTINGS)
-        is_on_model = far.measured.view is not None
+        is_on_model = far.measured.rendered is not None
         if is_on_model and far.measured.matched_fraction >= SURE_FRACTION:
             return far
         return max(far, self.fit_nearby(frame, measured, frame.start), key=self._score)

@@ -66,6 +66,6 @@ def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search() -> None:
     far_off = true.move((0.0, 60.0, 0.0, 1.5, 0.0, 0.0), true.apply(tracker.centre_mm))
     answers = tracker.register(frame.left, frame.right, Prior({"femur": far_off}), GOAL)
     assert asked.frames
-    orders = [one.verdict.order for one in answers]
+    orders = [one.verdict.rank for one in answers]
     assert orders == sorted(orders)
     assert all(one.verdict.status is not Status.OK for one in answers)
