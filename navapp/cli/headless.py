@@ -71,7 +71,7 @@ def check_start(prior: Prior, bone: str) -> None:
     Raises:
         PriorError: nothing is known of where the bone is.
     """
-    if not prior.starts(bone):
+    if not prior.has_start(bone):
         raise PriorError(
             f"nothing is known of where the {bone} is",
             remedy="give --prior FILE with camera_from_model"

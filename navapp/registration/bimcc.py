@@ -166,7 +166,7 @@ class _Fit:
         return coarse.iterations + fine.iterations, fine.has_finished
 
     def run_coarse(self) -> LoopState:
-        """Thinned, both ways; forward only when the start is near, not at all when it is there."""
+        """The coarse loop, on thinned points; forward pairs only when the start is near."""
         arrays, model, settings = self._scene.arrays, self._model.arrays, self._settings
         sigma_mm = choose_first_sigma_mm(arrays, model, self._pose, self._pairs, settings)
         if sigma_mm <= settings.narrowest_mm:

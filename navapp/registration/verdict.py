@@ -66,8 +66,8 @@ class Evidence:
     row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
     rms_ratio: float = math.nan  # rms of the fit's residuals over the one predicted
     correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
-    kernel_fraction: float = math.nan  # kernel at the end over the widest, if no noise is known
-    smooth_excess_mm: float = math.nan  # correlated residuals less what may be, if none is known
+    kernel_fraction: float = math.nan  # kernel at the end over the widest; of unknown noise
+    smooth_excess_mm: float = math.nan  # correlated residuals less what may be; of unknown noise
     extent_mm: float = math.nan  # longest side of the scene or of the model, the smaller one's
     is_rig_accepted: bool = True  # by its calibration
     size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be

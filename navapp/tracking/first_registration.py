@@ -41,7 +41,7 @@ class FirstRegistration:
         if start is not None:
             frame = replace(tracker.begin(left, right, start, watch), on_progress=on_progress)
             answers = self._register_around(frame, goal)
-        elif prior.starts(bone):
+        elif prior.has_start(bone):
             answers = self._register_anywhere(left, right, prior, goal, on_progress, watch)
             start = answers[0].left_from_bone
         else:

@@ -83,7 +83,8 @@ class PoseJudge:
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
-        # A fit on the model was compared where it was matched; others are compared at their pose.
+        # The check has compared a fit on the model where it was matched. Free fits, and those that
+        # the outline moved, are compared at their pose.
         if agreement is None and fit.estimate.has_finite_covariance:
             agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
         evidence = self._evidence_of_pair(health, depth_mm)

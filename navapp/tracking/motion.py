@@ -26,8 +26,8 @@ class TrackState:
     captured_ns: int  # when that was
     velocity: FloatArray  # (6,) twist per second (mm/s, rad/s), left, about the model's centre
     n_lost: int = 0  # frames lost since then
-    # consecutive frames in doubt, without lost ones; 0 after a glance, and after a frame in which a
-    # search could gain nothing
+    # consecutive frames in doubt; a lost frame leaves the count alone, a glance or a frame in which
+    # a search could gain nothing sets it to 0
     n_doubted: int = 0
     # of the bone in the newest picture, and what it looks like; None before the first.
     box: BoxState | None = None

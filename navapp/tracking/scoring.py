@@ -32,7 +32,7 @@ class FitScorer:
         return not is_bone_absent(compare_at(fit.pose, model, fit.measured.disparity, geometry))
 
     def rank(self, fits: list[Fit]) -> list[Fit]:
-        """Fits of candidates, best first, as `rank_fits` does."""
+        """Fits, best first; the best one says so when it is ambiguous (`rank_fits`)."""
         return rank_fits(fits, [self.score(fit) for fit in fits], self._meter.model.centre_mm)
 
     def find_poses(

@@ -120,7 +120,7 @@ class Tracker(ABC):
                 is_enough=lambda verdict: not is_place_doubted(verdict),
             )  # fmt: skip
         tracked, after = self.update(best.with_cause(state.cause), state, left, captured_ns, watch)
-        # A doubt that nothing was searched for puts off no search.
+        # Nothing was searched for, so the next search is due at once.
         return tracked, replace(after, n_doubted=0)
 
     def assess(

@@ -25,7 +25,7 @@ class Prior:
     approach_half_angle_deg: float = 180.0  # of the cone around it
     box: tuple[int, int, int, int] | None = None  # x, y, width, height in the left picture, px
 
-    def starts(self, bone: str) -> bool:
+    def has_start(self, bone: str) -> bool:
         """Whether it says anything of where a bone is."""
         return (
             bone in self.left_from_bone or self.box is not None or self.axis_for(bone) is not None

@@ -156,7 +156,9 @@ def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
     if fit is None:
         return
     measured, coarse_px = fit.measured, parts.coarse_px(frame, fit)
-    block = parts.outline.block(frame.pair, fit.pose, measured.rendered, measured.disparity, coarse_px)
+    block = parts.outline.block(
+        frame.pair, fit.pose, measured.rendered, measured.disparity, coarse_px
+    )
     weight = 1.0 / block.n_sharing
     if weight.sum() >= FEWEST:
         yield float(weight[block.find_near(fit.estimate.covariance)].sum() / weight.sum())
