@@ -59,7 +59,7 @@ class Job(Generic[_Answer]):
         return bool(self._taken)
 
     def drop(self) -> None:
-        """Nobody wants the answer: never begun, or waited for, and its errors are nobody's."""
+        """The answer is not wanted: never begun, or waited for; its errors are not raised."""
         if self._begun is not None and not self._begun.cancel():
             self._begun.exception()
 

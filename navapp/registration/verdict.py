@@ -37,7 +37,7 @@ class Agreement:
 
     @property
     def lies_open(self) -> bool:
-        """More of the bone is seen where it should be than something hides."""
+        """More of the bone is measured and agrees than something nearer hides."""
         return self.coverage > self.hidden_fraction
 
 
@@ -66,8 +66,10 @@ class Evidence:
     row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
     rms_ratio: float = math.nan  # rms of the fit's residuals over the one predicted
     correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
-    kernel_fraction: float = math.nan  # kernel at the end over the widest; of unknown noise
-    smooth_excess_mm: float = math.nan  # correlated residuals less what may be; of unknown noise
+    # Of points that do not know their noise (clouds; never in a tracker): width of the kernel at
+    # the end over the widest, and correlated residuals less what a right pose leaves.
+    kernel_fraction: float = math.nan
+    smooth_excess_mm: float = math.nan
     extent_mm: float = math.nan  # longest side of the scene or of the model, the smaller one's
     is_rig_accepted: bool = True  # by its calibration
     size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be
@@ -186,7 +188,7 @@ RULES = (
          lambda e: e.rms_ratio, 1.25, 2.0, _PARTLY_CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "spread of all differences over the claimed sigma",
          lambda e: e.seen.spread_ratio, 1.1, None, CHOSEN, doubts_place=True),
-    Rule(Reason.SURFACE_MISFIT, "kernel that found no noise, over the widest",
+    Rule(Reason.SURFACE_MISFIT, "width of the kernel at the end over the widest",
          lambda e: e.kernel_fraction, None, 0.95, CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "correlated residuals 3 mm apart less 0.2 mm, mm",
          lambda e: e.smooth_excess_mm, None, 0, CHOSEN, doubts_place=True),

@@ -75,8 +75,8 @@ class Fit:
         Noise is correlated over a matching window, l_model. Tissue that rises from the bone, or a
         model that lies half a millimetre off, leaves residuals that are correlated over
         centimetres, as errors of a free measurement are, l_free: no number of points averages them
-        out. With e the ratio of their variance to the claimed one, and n^2 = `noise_variance_ratio`
-        that of the noise, the covariance grows by 1 + e / n^2 (l_free / l_model)^2.
+        out. With e = `variance_ratio` - `NOISE_VARIANCE_RATIO`, where that is positive, and
+        n^2 = `noise_variance_ratio`, the covariance grows by 1 + e / n^2 (l_free / l_model)^2.
         """
         excess = max(0.0, self.variance_ratio - NOISE_VARIANCE_RATIO)
         lengths = FREE_CORRELATION_PX / MODEL_CORRELATION_PX

@@ -25,9 +25,8 @@ from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import PoseEstimate, Reason, RowCheck, Stopwatch, TrackedFrame, Verdict
 
-# All chosen. Errors of a cartilage's thickness are correlated over much of a bone: no number of
-# points averages them out, and the pose takes up to so many of their standard deviations
-# (docs/accuracy.md).
+# All chosen. Errors of a cartilage's thickness are correlated over much of a bone. Points do not
+# average them out: the pose may be off by so many of their standard deviations (docs/accuracy.md).
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
 # A model that the outline moved by no more looks as it was matched; a follower allows as much.
@@ -143,8 +142,8 @@ class PoseJudge:
         if agreement is None or agreement.n_visible == 0:
             return replace(known, missing=Reason.OUT_OF_VIEW)
         is_seen = model.bone.mesh.visible_vertices(estimate.camera_from_bone)
-        cartilage_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
-        plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_mm, model.bone.surface_sd_mm)
+        cartilage_sd_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
+        plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_sd_mm, model.bone.surface_sd_mm)
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
         bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate))
         # Errors of a cartilage's thickness that go together look like another size.
@@ -162,7 +161,7 @@ class PoseJudge:
             seen_error_mm=seen_error_mm,
             plan_mm=plan_mm,
             bound_mm=math.hypot(bound_mm, known.row_error_mm),
-            cartilage_sd_mm=cartilage_mm,
+            cartilage_sd_mm=cartilage_sd_mm,
             jump_mm=float(np.linalg.norm(twist[:3])),
             jump_deg=math.degrees(np.linalg.norm(twist[3:])),
             goal=goal,
