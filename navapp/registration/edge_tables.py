@@ -31,7 +31,7 @@ def make_edge_tables(
     """
     box = pair.box
     first = max(int(box.x - largest_disparity_px), 0)
-    seen_right = Box(first, box.y, box.x + box.width - first, box.y + box.height)
+    seen_right = Box(first, box.y, box.x + box.width - first, box.height)
     return EdgeTables(
         _compute_responses(pair.left, box, scale, reach_px),
         _compute_responses(pair.right, seen_right, scale, reach_px),

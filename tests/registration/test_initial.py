@@ -280,6 +280,23 @@ def test_smaller_pictures_keep_their_places() -> None:
     )
 
 
+@pytest.mark.parametrize("beside", ["above", "below"])
+def test_what_is_flat_is_learned_in_the_box_of_each_picture(beside: str) -> None:
+    """Strong gradients above or below the box must not raise what counts as flat inside it."""
+    rng = np.random.default_rng(3)
+    given = rng.integers(90, 110, (240, 320), dtype=np.uint8)
+    box = Box(160, 80, 120, 80)
+    rough = given.copy()
+    rows = slice(0, 60) if beside == "above" else slice(180, 240)
+    rough[rows] = rng.integers(0, 255, rough[rows].shape, dtype=np.uint8)
+    left, right = (
+        make_edge_tables(RectifiedPair(given, picture, GEOMETRY, box), 1, 1, 40.0)
+        for picture in (given, rough)
+    )
+    inside = np.s_[box.y : box.y + box.height, box.x - 40 : box.x + box.width]
+    np.testing.assert_array_equal(left.right[inside], right.right[inside])
+
+
 def test_a_bone_is_found_in_its_box() -> None:
     pair, scene = seen()
     pixels = GEOMETRY.project(scene.points_mm)
