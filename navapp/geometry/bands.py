@@ -1,13 +1,14 @@
 """Work on two threads: the one that asks, and one helper."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Generic, Self, TypeVar
 
 _Answer = TypeVar("_Answer")
 _Other = TypeVar("_Other")
+_Item = TypeVar("_Item")
 Rows = tuple[int, int]
 
 _lock = threading.Lock()
@@ -83,6 +84,26 @@ def run_both(first: Callable[[], _Answer], second: Callable[[], _Other]) -> tupl
     with begin_on_helper(second) as other:
         answer = first()
     return answer, other.result()
+
+
+def map_both(
+    job: Callable[[_Item], _Answer], items: Sequence[_Item], on_progress: Callable[[float], None]
+) -> list[_Answer]:
+    """The answers for all items, in order; either thread does every second one.
+
+    The asking thread tells the fraction done before each of its items; what that raises stops both.
+    """
+    found: dict[int, _Answer] = {}
+
+    def run(first: int) -> None:
+        for number in range(first, len(items), 2):
+            if first == 0:
+                on_progress(number / len(items))
+            found[number] = job(items[number])
+
+    run_both(partial(run, 0), partial(run, 1))
+    on_progress(1.0)
+    return [found[number] for number in range(len(items))]
 
 
 def in_row_bands(

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import in_row_bands, run_both
+from navapp.geometry.bands import in_row_bands, map_both
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -145,7 +145,6 @@ def _fit_starts(
     on_progress: Callable[[float], None],
 ) -> list[ScoredPose]:
     """What the coarse loop finds from each start, on the scene around it: distinct, best first."""
-    found: list[ScoredPose | None] = [None] * len(starts)
     _ = model.arrays  # made here once, not in both threads
     pixels = geometry.project(scene.points_mm)
 
@@ -163,14 +162,7 @@ def _fit_starts(
         explained = compute_explained_fraction(judged, model, pose)
         return ScoredPose(pose, explained * len(near) / len(scene))
 
-    def run(first: int) -> None:
-        for number in range(first, len(starts), 2):
-            if first == 0:
-                on_progress(_REFINED + (1.0 - _REFINED) * (number / len(starts)))
-            found[number] = fit(starts[number])
-
-    run_both(lambda: run(0), lambda: run(1))
-    on_progress(1.0)
+    found = map_both(fit, starts, lambda done: on_progress(_REFINED + (1.0 - _REFINED) * done))
     ranked = sorted((one for one in found if one is not None), key=lambda one: -one.score)
     poses = [one.scene_from_bone for one in ranked]
     rotations = np.array([pose.rotation for pose in poses])

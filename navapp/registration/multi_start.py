@@ -6,7 +6,7 @@ from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
-from navapp.geometry.bands import run_both
+from navapp.geometry.bands import map_both
 from navapp.geometry.directions import sphere_spiral
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
 from navapp.registration.bimcc import DEFAULT, fit_coarsely
@@ -117,16 +117,9 @@ def find_poses(
     """
     thinned = replace(scene, thinned_to=_COARSE_POINTS)
     _ = thinned.grid, model.arrays  # made here once, not in both threads
-    found: list[RigidTransform | None] = [None] * len(starts)
-
-    def run(first: int) -> None:
-        for number in range(first, len(starts), 2):
-            if first == 0:
-                on_progress(number / len(starts))
-            found[number] = fit_coarsely(thinned, model, starts[number], settings)
-
-    run_both(lambda: run(0), lambda: run(1))
-    on_progress(1.0)
+    found = map_both(
+        lambda start: fit_coarsely(thinned, model, start, settings), starts, on_progress
+    )
     poses = distinct([pose for pose in found if pose is not None], model.centre_mm)
     judged = score or (lambda pose: compute_explained_fraction(thinned, model, pose))
     scored = [ScoredPose(pose, judged(pose)) for pose in poses]

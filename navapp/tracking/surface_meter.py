@@ -203,8 +203,8 @@ class SurfaceMeter:
         is_expected = np.isfinite(expected.support_px)
         cloud = self._cloud(remove_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
-        answered = found.matched_fraction * found.origin.size / n_expected
-        return Measurement(found, cloud, answered, MODEL_CORRELATION_PX, expected.view)
+        matched_fraction = found.n_matched / n_expected
+        return Measurement(found, cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view)
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
         """As `measure_on_model` at every sixth pixel each way, in more steps: it sees further.
@@ -215,15 +215,14 @@ class SurfaceMeter:
         thin = refine_samples(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
         asked = support_px[::_SAMPLES_PX, ::_SAMPLES_PX]
         n_asked = max(int(np.count_nonzero(np.isfinite(asked))), 1)
-        answered = int(np.count_nonzero(thin.origin)) / n_asked
+        matched_fraction = int(np.count_nonzero(thin.origin)) / n_asked
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = found.reproject(self.geometry, _SAMPLES_PX)
-        return Measurement(found, cloud, answered, MODEL_CORRELATION_PX, expected.view)
+        return Measurement(found, cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About `max_points` of the measured ones."""
-        n_matched = found.matched_fraction * found.origin.size
-        stride_px = max(1, round((n_matched / self._max_points) ** 0.5))
+        stride_px = max(1, round((found.n_matched / self._max_points) ** 0.5))
         return found.reproject(self.geometry, stride_px)
 
     def _region(

@@ -39,10 +39,14 @@ class DisparityMap:
         return Box(self.x, self.y, width, height)
 
     @property
+    def n_matched(self) -> int:
+        """How many pixels have a measured disparity."""
+        return int(np.count_nonzero(self.origin == Origin.MATCHED))
+
+    @property
     def matched_fraction(self) -> float:
-        """Share of pixels with a measured disparity."""
-        n_matched = np.count_nonzero(self.origin == Origin.MATCHED)
-        return float(n_matched / self.origin.size) if self.origin.size else 0.0
+        """Fraction of pixels with a measured disparity."""
+        return self.n_matched / self.origin.size if self.origin.size else 0.0
 
     def reproject(
         self,

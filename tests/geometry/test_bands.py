@@ -6,7 +6,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from navapp.geometry.bands import begin_on_helper, in_row_bands, run_both
+from navapp.geometry.bands import begin_on_helper, in_row_bands, map_both, run_both
 
 
 def fails_as(name):
@@ -214,3 +214,24 @@ def test_errors_of_a_dropped_job_are_nobodys():
     job = begin_on_helper(fails)
     assert begun.wait(20.0)
     job.drop()
+
+
+def test_both_threads_map_items_in_order_and_tell_how_far_they_are():
+    threads, told = set(), []
+
+    def square(number):
+        threads.add(threading.get_ident())
+        time.sleep(0.01)
+        return number * number
+
+    assert map_both(square, range(7), told.append) == [n * n for n in range(7)]
+    assert len(threads) == 2
+    assert told == [0.0, 2 / 7, 4 / 7, 6 / 7, 1.0]
+    assert map_both(square, [], told.append) == []
+
+
+def test_what_progress_raises_stops_the_map():
+    done = []
+    with pytest.raises(ZeroDivisionError):
+        map_both(done.append, range(1000), lambda fraction: 1 / 0)
+    assert 0 not in done

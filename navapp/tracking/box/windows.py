@@ -30,7 +30,8 @@ def compute_similarity(one: Descriptors, others: Descriptors) -> float:
     """
     correlation = np.maximum((one[..., :-2] * others[..., :-2]).sum(axis=2), 0.0)
     mean, deviation = np.moveaxis(one[..., -2:] - others[..., -2:], 2, 0)
-    # What each part says is tried on all: (n, parts that say it, parts).
+    # How much brighter one part has become is tried on all: (n, parts that say it, parts). Contrast
+    # grows with brightness, so deviations are held against the same.
     is_same = np.abs(mean[:, None] - mean[:, :, None]) < _SAME_MEAN
     is_same &= np.abs(deviation[:, None] - mean[:, :, None]) < _SAME_DEVIATION
     return float((is_same * correlation[:, None]).mean(axis=2).max())

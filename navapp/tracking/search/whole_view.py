@@ -46,8 +46,7 @@ class WholeViewSearch:
         near_mm, far_mm = self._meter.depth_mm
         band_px = (geometry.disparity_px(far_mm), geometry.disparity_px(near_mm))
         found = match_surface(pair, band_px, fills=False).disparity
-        n_matched = found.matched_fraction * found.origin.size
-        stride_px = max(1, int(np.ceil((n_matched / _MOST_POINTS) ** 0.5)))
+        stride_px = max(1, int(np.ceil((found.n_matched / _MOST_POINTS) ** 0.5)))
         scene = Scene.from_stereo(found.reproject(geometry, stride_px), FREE_CORRELATION_PX)
         axis = prior.axis_for(model.bone.name)
         cone = ViewCone() if axis is None else ViewCone(axis, prior.approach_half_angle_deg)
