@@ -12,7 +12,6 @@ from navapp.errors import RigError
 from navapp.geometry.bands import in_row_bands, run_both
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
-from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -209,14 +208,6 @@ class Rectifier:
         """Where the rectified pixels lie in the left and in the right picture."""
         left_x, left_y, right_x, right_y = self.maps
         return find_places(left_x, left_y), find_places(right_x, right_y)
-
-
-def undistort(picture: Image, camera: Camera, interpolation: Interpolation = "cubic") -> Image:
-    """The picture (H, W) or (H, W, 3) as the same camera without distortion sees it; else 0."""
-    columns, rows = lens_maps(camera, np.eye(3), camera.matrix)
-    if interpolation == "bilinear":
-        return bilinear(picture, columns, rows, Box(0, 0, camera.width, camera.height).slices)
-    return resample(picture, find_places(columns, rows))
 
 
 def _solve(rig: StereoRig) -> tuple[Any, Any, Any, Any]:

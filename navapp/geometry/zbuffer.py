@@ -20,9 +20,6 @@ from navapp.geometry.zbuffer_kernels import (
     render_rows,
 )
 
-# A vertex hidden by less than this is still the surface itself, seen at a grazing angle.
-_SELF_OCCLUSION_MM = 1.0
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RenderedView:
@@ -38,13 +35,6 @@ class RenderedView:
         """(h, w) pixels where the mesh is seen."""
         seen: NDArray[np.bool_] = self.face_index >= 0
         return seen
-
-    def silhouette(self) -> NDArray[np.bool_]:
-        """(h, w) seen pixels with an unseen 4-neighbour."""
-        seen = np.pad(self.mask, 1)
-        inner = seen[:-2, 1:-1] & seen[2:, 1:-1] & seen[1:-1, :-2] & seen[1:-1, 2:]
-        edge: NDArray[np.bool_] = self.mask & ~inner
-        return edge
 
 
 def render(
@@ -101,13 +91,6 @@ def render_rectified(
     return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
 
 
-def project_box(
-    mesh: TriangleMesh, rectified_from_mesh: RigidTransform, geometry: RectifiedGeometry
-) -> Box | None:
-    """Box around the mesh in the rectified left view, clipped; None when it is out of view."""
-    return bounds_of(mesh.vertices_mm, rectified_from_mesh, geometry)[0]
-
-
 def bounds_of(
     points_mm: FloatArray, rectified_from_points: RigidTransform, geometry: RectifiedGeometry
 ) -> tuple[Box | None, tuple[float, float]]:
@@ -125,28 +108,6 @@ def bounds_of(
     around = Box(x, y, math.ceil(u1) - x + 1, math.ceil(v1) - y + 1)
     clipped = around.clip(geometry.width, geometry.height)
     return None if clipped.is_empty else clipped, (near_mm, far_mm)
-
-
-def unhidden_vertices(
-    mesh: TriangleMesh,
-    rectified_from_mesh: RigidTransform,
-    geometry: RectifiedGeometry,
-    view: RenderedView,
-) -> NDArray[np.bool_]:
-    """(V,) vertices that the view shows: inside its box and not behind another part of the mesh."""
-    points_mm = rectified_from_mesh.apply(mesh.vertices_mm)
-    pixels = geometry.project(points_mm)
-    finite = np.isfinite(pixels).all(axis=1)
-    column = np.full(len(pixels), -1)
-    row = np.full(len(pixels), -1)
-    # Rounding by floor(u + 0.5): pixel centres lie at integers.
-    column[finite] = np.floor(pixels[finite, 0] + 0.5).astype(int) - view.box.x
-    row[finite] = np.floor(pixels[finite, 1] + 0.5).astype(int) - view.box.y
-    inside = (column >= 0) & (column < view.box.width) & (row >= 0) & (row < view.box.height)
-    shown = np.zeros(len(pixels), dtype=bool)
-    surface_mm = view.depth_mm[row[inside], column[inside]]
-    shown[inside] = points_mm[inside, 2] <= surface_mm + _SELF_OCCLUSION_MM
-    return shown
 
 
 def _raster(

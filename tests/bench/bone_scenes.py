@@ -12,12 +12,12 @@ from scipy.spatial import cKDTree
 from navapp.geometry import RectifiedPair, Rectifier, RigidTransform, TriangleMesh, read_rig
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.zbuffer import project_box
 from navapp.values import DisparityMap
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
 from tests.knees import femur_of
+from tests.views import project_box
 
 SEQUENCES = ("registration", "patient", "instrument")
 _ERODED_PX = 6

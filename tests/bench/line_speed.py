@@ -29,7 +29,6 @@ from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.geometry.zbuffer import project_box
 from navapp.overlay.layers import Scene, draw_bone
 from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, TrackState, make_tracker
@@ -41,6 +40,7 @@ from tests.bench.occlusion_speed import use_threads
 from tests.bench.registration_peers import open3d_plane
 from tests.bench.stereo_speed import peer_chain
 from tests.knees import SimulatedKnee
+from tests.views import project_box
 
 _GOAL = Goal(np.empty((0, 3)), 2.0)
 _DISPARITIES, _POINTS = 96, 3000

@@ -6,11 +6,20 @@ import cv2
 import numpy as np
 import pytest
 
-from navapp.geometry.bilinear import bilinear
+from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Rectifier, undistort
+from navapp.geometry.camera import Camera
+from navapp.geometry.rectification import Rectifier, find_places, resample
 from navapp.geometry.rig_files import read_rig
 from tests.geometry.shapes import STRONG, camera, toed_in_rig
+
+
+def undistort(picture: np.ndarray, lens: Camera, interpolation: Interpolation) -> np.ndarray:
+    """The picture as the same camera without distortion sees it; else 0."""
+    columns, rows = lens_maps(lens, np.eye(3), lens.matrix)
+    if interpolation == "bilinear":
+        return bilinear(picture, columns, rows, Box(0, 0, lens.width, lens.height).slices)
+    return resample(picture, find_places(columns, rows))
 
 
 def test_a_value_is_the_weighted_mean_of_its_four_pixels() -> None:

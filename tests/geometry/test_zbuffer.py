@@ -6,12 +6,7 @@ from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.geometry.zbuffer import (
-    project_box,
-    render,
-    render_rectified,
-    unhidden_vertices,
-)
+from navapp.geometry.zbuffer import render, render_rectified
 from navapp.geometry.zbuffer_kernels import (
     bounds_of_points,
     find_known_range,
@@ -21,6 +16,7 @@ from navapp.geometry.zbuffer_kernels import (
 )
 from tests.geometry.shapes import STRONG, camera, cube, sphere
 from tests.reference import zbuffer_reference
+from tests.views import find_silhouette, find_unhidden_vertices, project_box
 
 IDENTITY = RigidTransform.identity("left_rect", "bone")
 GEOMETRY = RectifiedGeometry(
@@ -161,14 +157,14 @@ def test_the_silhouette_is_the_rim():
     expected[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1] = True
     np.testing.assert_array_equal(view.mask, expected)
     expected[rows.min() + 1 : rows.max(), columns.min() + 1 : columns.max()] = False
-    np.testing.assert_array_equal(view.silhouette(), expected)
+    np.testing.assert_array_equal(find_silhouette(view), expected)
 
 
 def test_vertices_behind_the_body_are_hidden():
     ball = sphere(30.0, 24)
     placed = pose()
     view = seen(ball, placed)
-    shown = unhidden_vertices(ball, placed, GEOMETRY, view)
+    shown = find_unhidden_vertices(ball, placed, GEOMETRY, view)
     towards = np.einsum("ij,ij->i", placed.rotate(ball.normals), placed.apply(ball.vertices_mm))
     towards /= np.linalg.norm(placed.apply(ball.vertices_mm), axis=1)
     assert shown[towards < -0.6].all()
@@ -180,9 +176,9 @@ def test_vertices_behind_another_part_are_hidden():
     both = TriangleMesh(
         np.vstack([near.vertices_mm, far.vertices_mm]), np.vstack([near.faces, far.faces + 4])
     )
-    shown = unhidden_vertices(both, IDENTITY, GEOMETRY, seen(both))
+    shown = find_unhidden_vertices(both, IDENTITY, GEOMETRY, seen(both))
     assert not shown[4:].any()
-    assert unhidden_vertices(far, IDENTITY, GEOMETRY, seen(far)).any()
+    assert find_unhidden_vertices(far, IDENTITY, GEOMETRY, seen(far)).any()
 
 
 @pytest.mark.parametrize(("gap_mm", "is_shown"), [(0.5, True), (1.5, False)])
@@ -191,18 +187,18 @@ def test_vertices_hidden_by_less_than_a_millimetre_are_still_shown(gap_mm, is_sh
     both = TriangleMesh(
         np.vstack([near.vertices_mm, far.vertices_mm]), np.vstack([near.faces, far.faces + 4])
     )
-    shown = unhidden_vertices(both, IDENTITY, GEOMETRY, seen(both))
+    shown = find_unhidden_vertices(both, IDENTITY, GEOMETRY, seen(both))
     assert (shown[4:] == is_shown).all()
 
 
 def test_vertices_outside_the_box_or_behind_the_camera_are_not_shown():
     aside = square(300.0, 5.0, (500.0, 0.0))
-    assert not unhidden_vertices(aside, IDENTITY, GEOMETRY, seen(aside)).any()
+    assert not find_unhidden_vertices(aside, IDENTITY, GEOMETRY, seen(aside)).any()
     behind = square(-300.0)
-    assert not unhidden_vertices(behind, IDENTITY, GEOMETRY, seen(behind)).any()
+    assert not find_unhidden_vertices(behind, IDENTITY, GEOMETRY, seen(behind)).any()
     small = Box(0, 0, 20, 20)
     view = seen(square(300.0), box=small)
-    assert not unhidden_vertices(square(300.0), IDENTITY, GEOMETRY, view).any()
+    assert not find_unhidden_vertices(square(300.0), IDENTITY, GEOMETRY, view).any()
 
 
 def test_a_box_is_a_window_of_the_whole():
@@ -233,7 +229,7 @@ def test_what_is_not_in_view_is_not_seen(mesh):
     view = seen(mesh)
     assert not view.mask.any()
     assert np.isnan(view.depth_mm).all()
-    assert not view.silhouette().any()
+    assert not find_silhouette(view).any()
 
 
 def test_a_triangle_that_crosses_the_camera_plane_is_left_out():
@@ -245,7 +241,7 @@ def test_a_triangle_that_crosses_the_camera_plane_is_left_out():
 def test_an_empty_box_gives_an_empty_view(box):
     view = seen(square(300.0), box=box)
     assert view.mask.size == 0
-    assert not unhidden_vertices(square(300.0), IDENTITY, GEOMETRY, view).any()
+    assert not find_unhidden_vertices(square(300.0), IDENTITY, GEOMETRY, view).any()
 
 
 def test_vertices_close_before_the_camera_do_no_harm():

@@ -16,6 +16,7 @@ from navapp.overlay.tint_kernels import compute_face_tints, tint_pixels
 from navapp.values import BoneModel, Defect, Plan, RiskStructure, SurgicalContent
 from tests.geometry.shapes import sphere
 from tests.overlay.scenes import BEHIND, CAMERA, HEIGHT, MESH, POSE, TARGET, WIDTH, scene, video
+from tests.views import find_silhouette
 
 
 def black() -> np.ndarray:
@@ -36,7 +37,7 @@ def test_the_outline_runs_where_the_model_ends() -> None:
     image = video()
     LAYERS["bone"](image, scene("bone"))
     view = render(MESH, POSE, CAMERA)
-    drawn, edge = is_colour(image, GUIDE_COLOUR), view.silhouette()
+    drawn, edge = is_colour(image, GUIDE_COLOUR), find_silhouette(view)
     assert drawn[edge].mean() > 0.99
     assert not (drawn & ~grown(edge, 2)).any()
 
@@ -65,7 +66,7 @@ def test_every_pixel_is_tinted_once() -> None:
     tint_pixels(expected, view.face_index, share, GUIDE_COLOUR)
     LAYERS["bone"](image, drawn)
     found = image[box.y : box.y + box.height, box.x : box.x + box.width]
-    inner = view.mask & ~grown(view.silhouette(), 3)
+    inner = view.mask & ~grown(find_silhouette(view), 3)
     assert inner.mean() > 0.3
     np.testing.assert_array_equal(found[inner], expected[inner])
 

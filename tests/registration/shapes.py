@@ -7,10 +7,11 @@ import numpy as np
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import project_box, render_rectified, unhidden_vertices
+from navapp.geometry.zbuffer import render_rectified
 from navapp.registration import RegistrationModel, Scene
 from navapp.values import BoneModel, Origin, SurfaceCloud
 from sim_devices.anatomy import KneeSpec, make_knee
+from tests.views import find_unhidden_vertices, project_box
 
 TRUE = RigidTransform.from_parts(
     "left_rect",
@@ -39,7 +40,7 @@ def seen_vertices(bone: BoneModel, pose: RigidTransform = TRUE) -> np.ndarray:
     """Indices of the vertices that the left camera sees."""
     box = project_box(bone.mesh, pose, GEOMETRY)
     view = render_rectified(bone.mesh, pose, GEOMETRY, box)
-    shown = unhidden_vertices(bone.mesh, pose, GEOMETRY, view)
+    shown = find_unhidden_vertices(bone.mesh, pose, GEOMETRY, view)
     return np.flatnonzero(shown & bone.mesh.visible_vertices(pose))
 
 

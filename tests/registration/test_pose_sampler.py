@@ -3,7 +3,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from navapp.geometry.zbuffer import project_box, render_rectified
+from navapp.geometry.zbuffer import render_rectified
 from navapp.registration import DepthMap, PoseSampler, is_same_pose
 from navapp.registration.depth_map import Optics
 from navapp.registration.pose_sampler import order_evenly
@@ -11,6 +11,7 @@ from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
 from navapp.values import DisparityMap, Origin
 from tests.reference import pose_sampler_reference as reference
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
+from tests.views import project_box
 
 CENTRE_MM = femur().mesh.centroid_mm
 

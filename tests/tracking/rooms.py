@@ -10,7 +10,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import project_box, render_rectified
+from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking import Goal
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, DisparityMap, Origin, Prior
@@ -20,6 +20,7 @@ from sim_devices.truth import TruthOracle
 from sim_devices.world import World
 from tests.knees import SimulatedKnee
 from tests.registration.shapes import GEOMETRY, TRUE
+from tests.views import project_box
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
 

@@ -10,12 +10,13 @@ from scipy.ndimage import gaussian_filter
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import project_box, render_rectified
+from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.frame import Fit
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import Measurement
 from navapp.values import DisparityMap, Origin, PoseEstimate, SurfaceCloud
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
+from tests.views import project_box
 
 FINE = 4
 SIGMAS = np.array([0.1, 0.1, 0.1, 0.002, 0.002, 0.002])

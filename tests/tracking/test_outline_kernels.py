@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh_edges import ridge_edges
-from navapp.geometry.zbuffer import project_box, render_rectified
+from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.outline_kernels import (
     Eye,
     Rim,
@@ -18,6 +18,7 @@ from navapp.tracking.outline_kernels import (
 from tests.geometry.shapes import sphere
 from tests.reference import outline_reference as reference
 from tests.registration.shapes import GEOMETRY, TRUE, femur
+from tests.views import find_silhouette, project_box
 
 LEFT = Eye(0.0, GEOMETRY.focal_px, GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
 RIGHT = LEFT._replace(x_mm=GEOMETRY.baseline_mm)
@@ -76,7 +77,7 @@ def test_what_is_seen_of_the_rim_is_that_of_the_reference() -> None:
 def test_the_seen_rim_runs_along_the_silhouette() -> None:
     rim, view = rim_of(LEFT), left_view()
     seen = rim.pixel[is_outline(rim, view.depth_mm, view.box.x, view.box.y)]
-    rows, columns = np.nonzero(view.silhouette())
+    rows, columns = np.nonzero(find_silhouette(view))
     border = np.column_stack([columns + view.box.x, rows + view.box.y])
     apart = np.linalg.norm(border[:, None] - seen[None], axis=2).min(axis=1)
     assert np.quantile(apart, 0.9) < 4.0

@@ -99,7 +99,7 @@ def refine_on_model(pair: RectifiedPair, support_px: NDArray[np.float32]) -> Dis
     """
     found = without_specks(refine(pair, support_px, MODEL_REFINEMENT))
     n_expected = np.count_nonzero(np.isfinite(support_px))
-    if found.matched_fraction * support_px.size < _LEAST_CONFIRMED * n_expected:
+    if found.n_matched < _LEAST_CONFIRMED * n_expected:
         return found.only(np.zeros(support_px.shape, dtype=np.bool_))
     return found
 
