@@ -39,6 +39,7 @@ from navapp.registration.multi_start import (
 )
 from navapp.registration.scene import Scene
 from navapp.values import AspectGraph
+from navapp.values.progress import tell_part
 
 
 class Level(NamedTuple):
@@ -162,7 +163,7 @@ def _fit_starts(
         explained = compute_explained_fraction(judged, model, pose)
         return ScoredPose(pose, explained * len(near) / len(scene))
 
-    found = map_both(fit, starts, lambda done: on_progress(_REFINED + (1.0 - _REFINED) * done))
+    found = map_both(fit, starts, tell_part(on_progress, _REFINED, 1.0))
     ranked = sorted((one for one in found if one is not None), key=lambda one: -one.score)
     poses = [one.scene_from_bone for one in ranked]
     rotations = np.array([pose.rotation for pose in poses])

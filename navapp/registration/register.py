@@ -1,6 +1,5 @@
 """One registration from start to verdict: what `navapp register` answers."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import chain
@@ -28,6 +27,7 @@ from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.scene import Scene
 from navapp.registration.verdict import Agreement, Evidence, Goal, find_reasons
 from navapp.values import PoseEstimate, Reason
+from navapp.values.progress import Progress, tell_part
 
 Method = Literal["bimcc", "bimcc-literal", "icp"]
 
@@ -90,7 +90,7 @@ def register(
     method: Method = "bimcc",
     *,
     is_global: bool = False,
-    on_progress: Callable[[float], None] = lambda fraction: None,
+    on_progress: Progress = lambda fraction: None,
 ) -> Registration:
     """Register a model to a scene, judge the answer, and try more starts when it is doubtful.
 
@@ -114,12 +114,14 @@ def register(
         return search.best
     place_mm = start.apply(model.centre_mm)
     if is_global or search.best.is_doubtful:
-        search.try_starts(make_near_starts(start, place_mm), NEAR_SETTINGS, on_progress, (0.0, 0.1))
+        told = tell_part(on_progress, 0.0, 0.1)
+        search.try_starts(make_near_starts(start, place_mm), NEAR_SETTINGS, told)
     if search.best.is_doubtful:
-        search.try_starts(make_far_starts(start, place_mm), NEAR_SETTINGS, on_progress, (0.1, 0.6))
+        told = tell_part(on_progress, 0.1, 0.6)
+        search.try_starts(make_far_starts(start, place_mm), NEAR_SETTINGS, told)
     if is_global and search.best.is_doubtful:
         starts = _make_starts_all_around(scene, model, start)
-        search.try_starts(starts, ANYWHERE_SETTINGS, on_progress, (0.6, 1.0))
+        search.try_starts(starts, ANYWHERE_SETTINGS, tell_part(on_progress, 0.6, 1.0))
     on_progress(1.0)
     return search.best
 
@@ -133,16 +135,11 @@ class _Search:
         self.best = _judge(scene, model, self._solutions[0], 1)
 
     def try_starts(
-        self,
-        starts: list[RigidTransform],
-        settings: BimccSettings,
-        on_progress: Callable[[float], None],
-        span: tuple[float, float],
+        self, starts: list[RigidTransform], settings: BimccSettings, on_progress: Progress
     ) -> None:
-        """Fit to all points what many starts lead to; `span` of the progress is told."""
+        """Fit to all points what many starts lead to."""
         scene, model = self._scene, self._model
-        told = lambda part: on_progress(span[0] + part * (span[1] - span[0]))  # noqa: E731
-        found = find_poses(scene, model, starts, on_progress=told, settings=settings)
+        found = find_poses(scene, model, starts, on_progress=on_progress, settings=settings)
         self._solutions += [solve_bimcc(scene, model, pose) for pose in select_poses(found)]
         poses = [one.estimate.camera_from_bone for one in self._solutions]
         scores = [compute_explained_fraction(scene, model, pose) for pose in poses]

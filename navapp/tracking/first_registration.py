@@ -11,6 +11,7 @@ from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
+from navapp.values.progress import tell_part
 
 if TYPE_CHECKING:
     from navapp.tracking.bimcc_tracker import BimccTracker
@@ -54,14 +55,14 @@ class FirstRegistration:
 
     def _register_around(self, frame: Frame, goal: Goal) -> list[TrackedFrame]:
         """Around a rough pose: near starts, far ones, partly buried, until one gives an OK."""
-        tracker, report = self._tracker, frame.on_progress
+        tracker = self._tracker
         measured = tracker.meter.measure_freely(frame.pair, frame.start, WIDE_BOX)
         frame.watch.lap("stereo")
         if measured is None or len(measured.cloud) == 0:
             return [tracker.judge.lost(Reason.NO_SURFACE, frame.watch)]
 
         def fit_from(starts: list[RigidTransform], done: float, part: float) -> list[Fit]:
-            told = lambda share: report(done + part * share)  # noqa: E731
+            told = tell_part(frame.on_progress, done, done + part)
             found = select_poses(self._scorer.find_poses(measured, starts, told))
             return [tracker.near.fit_nearby(frame, measured, pose) for pose in found]
 
@@ -74,13 +75,13 @@ class FirstRegistration:
         if not _is_ok(answers):
             buried = self._judge_buried(frame, measured, goal)
             answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
-        report(1.0)
+        frame.on_progress(1.0)
         return answers
 
     def _judge_buried(self, frame: Frame, measured: Measurement, goal: Goal) -> TrackedFrame:
         """The answer of the search for a bone that tissue continues."""
-        done, report = _NEAR_PART + _FAR_PART, frame.on_progress
-        frame = replace(frame, on_progress=lambda part: report(done + (1.0 - done) * part))
+        told = tell_part(frame.on_progress, _NEAR_PART + _FAR_PART, 1.0)
+        frame = replace(frame, on_progress=told)
         fit = self._tracker.buried.find_around(frame, measured)
         return self._tracker.judge.judge(frame, fit, goal)
 

@@ -17,6 +17,7 @@ from navapp.registration import DepthMap, PoseSampler, rank_fits
 from navapp.tracking.following import Follower, RestSettings
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values.progress import tell_part
 
 # All chosen; compared in tests.bench.buried_bone. The same pictures give the same draws.
 _SEED = 20
@@ -99,15 +100,14 @@ class BuriedSearch:
 
         The fit says so when it is ambiguous; None when nothing is matched.
         """
-        report = frame.on_progress
+        begin = tell_part(frame.on_progress, 0.0, _SEARCH_FRACTION)
+        go_on = tell_part(frame.on_progress, _SEARCH_FRACTION, 1.0)
         depth = DepthMap.of(self._meter.geometry, measured.disparity)
-        found = self._sampler.search(
-            depth, frame.start, _N_PLACES, lambda done: report(_SEARCH_FRACTION * done)
-        )
+        found = self._sampler.search(depth, frame.start, _N_PLACES, begin)
         places = self._step_from(frame, [one.scene_from_bone for one in found])
         random = np.random.default_rng(_SEED)
         for number, one in enumerate(_ROUNDS):
-            report(_SEARCH_FRACTION + (1.0 - _SEARCH_FRACTION) * number / len(_ROUNDS))
+            go_on(number / len(_ROUNDS))
             places = self._improve(frame, places, one, random)
         return self._select_rest(frame, places)
 
