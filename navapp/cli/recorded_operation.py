@@ -20,7 +20,7 @@ def find_moved_rig(session: RecordedSession | None, options: argparse.Namespace)
 
 
 def choose_operator(
-    session: RecordedSession | None, options: argparse.Namespace
+    session: RecordedSession | None, options: argparse.Namespace, follows_refused: bool
 ) -> tuple[Operator, Executor]:
     """The recorded operator, so that the same poses come out, or one that only follows.
 
@@ -28,9 +28,10 @@ def choose_operator(
     """
     is_changed = bool(
         options.prior or options.bone or options.also or options.method or options.start
-    )
+        or options.follow_refused
+    )  # fmt: skip
     if session is None or is_changed or options.order != "forward":
-        plain = ReplayOperator(each_frame=options.order == "each")
+        plain = ReplayOperator(each_frame=options.order == "each", follows_refused=follows_refused)
         moved = find_moved_rig(session, options)
         if moved is None or options.order == "pingpong":
             return plain, InlineExecutor()

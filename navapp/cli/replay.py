@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
+from navapp.cli.methods import add_method
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,7 +42,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--plan", metavar="P", help="plan folder (a session brings its own)")
     parser.add_argument("--rig", metavar="R", help="rig file (a session brings its own)")
     parser.add_argument("--prior", metavar="FILE", help="rough start: pose, cone, box (JSON)")
-    parser.add_argument("--method", choices=("bimcc", "icp"), help="icp is the paper's baseline")
+    add_method(parser)
+    parser.add_argument(
+        "--follow-refused",
+        action="store_true",
+        help="carry on poses that the judge refuses, to measure them; they stay refused",
+    )
     parser.add_argument(
         "--bone", metavar="NAME", help="bone to follow (default: the first stage's)"
     )
@@ -184,8 +190,8 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
     plan = read_plan(plan_path)
     first, others = _stages(options, plan, stage)
-    operator, executor = choose_operator(session, options)
     method = options.method or (None if session is None else session.method)
+    is_recorded_so = session is not None and session.follows_refused
     specification = specify_session(
         configuration,
         read_rig(rig_path),
@@ -194,8 +200,10 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         first,
         is_live=False,
         method=method,
+        follows_refused=options.follow_refused or is_recorded_so or None,
         others=others,
     )
+    operator, executor = choose_operator(session, options, specification.follows_refused)
     return _Replay(
         specification,
         operator,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
 from navapp.cli.live_session import LiveSession, make_controller, prepare_session
+from navapp.cli.methods import add_method
 from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--headless", action="store_true", help="no screen; a scripted operator")
     parser.add_argument("--frames", type=int, metavar="N", help="end after N frames")
     parser.add_argument("--stage", metavar="S", help="stage to start in, name or number")
+    add_method(parser)
     parser.add_argument("--record", metavar="DIR", help="record the session into a new folder")
     parser.add_argument("--operator", metavar="SCRIPT.toml", help="the scripted operator's script")
     parser.add_argument(
@@ -66,6 +68,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 def _with_options(configuration: "Configuration", options: argparse.Namespace) -> "Configuration":
     """The configuration with the command line's words in it."""
     camera, plan, recording = configuration.camera, configuration.plan, configuration.recording
+    tracking = configuration.tracking
     if options.rig:
         camera = camera.model_copy(update={"rig": options.rig})
     if options.plan:
@@ -74,7 +77,11 @@ def _with_options(configuration: "Configuration", options: argparse.Namespace) -
         plan = plan.model_copy(update={"prior": options.prior})
     if options.record:
         recording = recording.model_copy(update={"folder": options.record})
-    return configuration.model_copy(update={"camera": camera, "plan": plan, "recording": recording})
+    if options.method:
+        tracking = tracking.model_copy(update={"method": options.method})
+    return configuration.model_copy(
+        update={"camera": camera, "plan": plan, "recording": recording, "tracking": tracking}
+    )
 
 
 def _script(path: str | None) -> "tuple[ScriptStep, ...]":

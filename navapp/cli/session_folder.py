@@ -32,6 +32,7 @@ class RecordedSession:
     plan_path: Path
     prior_path: Path
     method: Method
+    follows_refused: bool
     first_stage: str
     events: RecordedEvents
 
@@ -57,6 +58,7 @@ def start_recording(
         "rig_id": rig.rig_id,
         "plan_hash": plan.digest,
         "method": specification.method,
+        "follow_refused": specification.follows_refused,
         "first_stage": specification.stage.name,
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
@@ -111,6 +113,7 @@ def read_session(folder: str | Path) -> RecordedSession:
         folder / _PLAN,
         folder / _PRIOR,
         _parse_method(method, folder),
+        content.get("follow_refused") is True,
         first_stage,
         read_events(events_path),
     )

@@ -135,7 +135,7 @@ def _match(pair: StereoPair, options: argparse.Namespace) -> "StereoAnswer":
     band = find_band(pair, options)
     try:
         if options.matcher == "gradient":
-            return match_baseline(pair.rectified, band)
+            return match_baseline(pair.rectified, band, fills=fills)
         if options.rig is None:
             return match_scene(pair.rectified, band, fills=fills)
         # Of a rig's pictures lengths are taken: what is far from anything measured stays unknown.

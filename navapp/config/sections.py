@@ -115,8 +115,10 @@ class PlanSection(Section):
 class TrackingSection(Section):
     """Tracking of the bones."""
 
-    method: Literal["bimcc", "icp"] = "bimcc"
-    """icp is the paper's baseline."""
+    method: Literal["bimcc", "paper", "icp"] = "bimcc"
+    """paper is the paper's proposal, icp its state of the art: both to compare with."""
+    follow_refused: bool = False
+    """Carry on poses that the judge refuses, to measure them; they stay refused, without guides."""
 
 
 class CalibrationSection(Section):

@@ -62,13 +62,16 @@ class BoneTracks:
         return stage.bone in self._tracks
 
     def offer(self, registration: Registration) -> None:
-        """Put the answers of a registration under review, all but the lost ones."""
+        """Put the answers of a registration under review: all but the lost ones.
+
+        Where refused poses are followed, those that are lost too, so that they can be measured.
+        """
         self.drop_candidates()
         self._n_reviewed += 1
         found = [
             (answer, answer.left_from_bone)
             for answer in registration.answers
-            if answer.verdict.status is not Status.LOST
+            if answer.verdict.status is not Status.LOST or self._trackers.follows_refused
         ]
         self._candidates = [
             Candidate(

@@ -44,10 +44,14 @@ class Operator(Protocol):
 
 
 class ReplayOperator:
-    """Registers, accepts what the judge does not call lost, and registers again when asked to."""
+    """Registers, accepts what the judge does not call lost, and registers again when asked to.
 
-    def __init__(self, *, each_frame: bool = False) -> None:
-        self._each_frame = each_frame
+    What it calls lost is rejected, or with `follows_refused` left under review: followed, and never
+    accepted.
+    """
+
+    def __init__(self, *, each_frame: bool = False, follows_refused: bool = False) -> None:
+        self._each_frame, self._follows_refused = each_frame, follows_refused
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
         """Register when nothing is known, accept what is under review."""
@@ -57,6 +61,8 @@ class ReplayOperator:
             return [Register()]
         if snapshot.state is SessionState.REVIEW:
             is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
+            if is_lost and self._follows_refused:
+                return []
             return [(Reject if is_lost else Accept)(snapshot.candidate_id)]
         return []
 

@@ -7,7 +7,7 @@ from navapp.control.states import SessionState, Snapshot
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import compose_video
 from navapp.overlay.layers import Scene
-from navapp.values import Plan
+from navapp.values import Plan, Status
 
 Image = NDArray[np.uint8]
 
@@ -32,6 +32,8 @@ def banner(snapshot: Snapshot) -> str:
         bound_mm = snapshot.verdict.predicted_tre_mm
         error = "" if bound_mm is None else f" - error <= {bound_mm:.2f} mm"
         return f"{stage} - NAVIGATING{error}"
+    if snapshot.is_candidate and _is_lost(snapshot):
+        return f"{stage} - CANDIDATE refused by the judge"
     if snapshot.is_candidate:
         return f"{stage} - CANDIDATE, not accepted"
     why = snapshot.reasons[0].value if snapshot.reasons else ""
@@ -40,13 +42,18 @@ def banner(snapshot: Snapshot) -> str:
 
 def _scene(snapshot: Snapshot, rig: StereoRig, plan: Plan) -> Scene | None:
     """What may be drawn; None for no guides."""
-    is_candidate = snapshot.state is SessionState.REVIEW and not snapshot.is_blanked
+    is_reviewed = snapshot.state is SessionState.REVIEW and not snapshot.is_blanked
+    is_candidate = is_reviewed and not _is_lost(snapshot)
     bone = plan.bones.get(snapshot.stage.bone)
     if bone is None or snapshot.left_from_bone is None:
         return None
     if not (snapshot.is_navigable or is_candidate):
         return None
     return Scene(plan, snapshot.stage, bone.mesh, snapshot.left_from_bone, rig.left, is_candidate)
+
+
+def _is_lost(snapshot: Snapshot) -> bool:
+    return snapshot.verdict is None or snapshot.verdict.status is Status.LOST
 
 
 def fit_to_display(image: Image, width: int, height: int) -> Image:

@@ -20,6 +20,7 @@ class SessionSpecification:
     prior: Prior  # where the bones may be before a first registration
     stage: StageSpec = STAGES[0]  # in force at the start
     method: Method = "bimcc"  # of pose estimation
+    follows_refused: bool = False  # poses that the judge refuses are carried on, to be measured
     depth_mm: tuple[float, float] = _DEPTH_MM  # nearest and farthest surface of the working volume
     # bones that are registered from the prior and followed, too, unasked.
     others: tuple[str, ...] = ()
@@ -31,7 +32,7 @@ class SessionSpecification:
     @property
     def tracker_settings(self) -> TrackerSettings:
         """Of all trackers of the session."""
-        return TrackerSettings(self.method, depth_mm=self.depth_mm)
+        return TrackerSettings(self.method, self.follows_refused, self.depth_mm)
 
 
 def specify_session(
@@ -43,6 +44,7 @@ def specify_session(
     *,
     is_live: bool,
     method: Method | None = None,
+    follows_refused: bool | None = None,
     others: tuple[str, ...] = (),
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
@@ -56,6 +58,7 @@ def specify_session(
         is_live: the display shows pictures as late as it was measured, and the session may be
             recorded; neither is true of a replay.
         method: of pose estimation; None: the configured one.
+        follows_refused: poses that the judge refuses are carried on; None: as configured.
         others: bones that are registered and followed unasked.
     """
     display = configuration.display
@@ -65,6 +68,7 @@ def specify_session(
         prior,
         stage,
         method or configuration.tracking.method,
+        configuration.tracking.follow_refused if follows_refused is None else follows_refused,
         configuration.camera.depth_mm,
         others,
         display.withdrawn_ms if is_live else display.valid_ms,

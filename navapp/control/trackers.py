@@ -49,9 +49,16 @@ class Trackers:
             known = self._with_aspects.get(bone) or self._trackers.get(bone)
         if known is not None:
             return known
-        made = self._make(bone, None)
+        # The production chain needs no views to follow a bone; those of the paper do.
+        is_ours = self._settings.method == "bimcc"
+        made = self._make(bone, None if is_ours else self._plan.aspects.get(bone))
         with self._lock:
             return self._with_aspects.get(bone) or self._trackers.setdefault(bone, made)
+
+    @property
+    def follows_refused(self) -> bool:
+        """Whether poses that the judge refuses are carried on."""
+        return self._settings.follows_refused
 
     def goal(self, stage: StageSpec) -> Goal:
         """What the poses of a stage's bone are judged by."""

@@ -21,9 +21,14 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
         scene: what to draw; None draws no guide.
         banner: one line at the top, for example why there are no guides.
         mark: further words for the corner, for example that the devices are simulated.
+
+    Raises:
+        ValueError: a picture of another size than the scene's camera takes.
     """
     image = np.repeat(left[:, :, None], 3, axis=2) if left.ndim == 2 else left.copy()
     if scene is not None:
+        if image.shape[:2] != (scene.camera.height, scene.camera.width):
+            raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
         for name in scene.stage.layers:
             layer = LAYERS.get(name)
             if layer is not None:

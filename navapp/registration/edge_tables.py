@@ -5,10 +5,13 @@ Source: the paper's equation 3, with a gate: a gradient that is too weak to have
 are spread over some pixels: Hinterstoisser et al., PAMI 2012.
 """
 
+from functools import partial
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import run_both
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.registration.depth_map import scale_optics
@@ -32,11 +35,11 @@ def make_edge_tables(
     box = pair.box
     first = max(int(box.x - largest_disparity_px), 0)
     seen_right = Box(first, box.y, box.x + box.width - first, box.height)
-    return EdgeTables(
-        _compute_responses(pair.left, box, scale, reach_px),
-        _compute_responses(pair.right, seen_right, scale, reach_px),
-        scale_optics(pair.geometry, scale),
+    left, right = run_both(
+        partial(_compute_responses, pair.left, box, scale, reach_px),
+        partial(_compute_responses, pair.right, seen_right, scale, reach_px),
     )
+    return EdgeTables(left, right, scale_optics(pair.geometry, scale))
 
 
 def _compute_responses(picture: Image, box: Box, scale: int, reach_px: int) -> NDArray[np.uint8]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.directions import ViewCone, make_view_rotation, turn_between
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.geometry.transform import FloatArray, rotation_from_vector
+from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 from navapp.registration.depth_map import DepthMap, scale_optics
 from navapp.registration.initial_kernels import Hypotheses, ViewEdges
 from navapp.registration.model import RegistrationModel
@@ -38,11 +38,7 @@ def make_views(model: RegistrationModel, cone: ViewCone, aspects: AspectGraph | 
     if aspects is None:
         directions, edges = cone.directions(_VIEW_STEP_DEG), None
     else:
-        directions = np.asarray(aspects.directions)
-        # Copies: a read-only array is another type to a kernel.
-        edges = ViewEdges(
-            np.array(aspects.starts), np.array(aspects.points_mm), np.array(aspects.tangents)
-        )
+        directions, edges = np.asarray(aspects.directions), take_edges(aspects)
     rng = np.random.default_rng(len(directions))
     can_pair = model.arrays.can_pair
     surface, anchors = [], []
@@ -53,6 +49,14 @@ def make_views(model: RegistrationModel, cone: ViewCone, aspects: AspectGraph | 
         surface.append(model.points_mm[rng.choice(shown, _N_SURFACE_POINTS)])
         anchors.append(_find_anchors(model.points_mm[shown], direction))
     return Views(directions, np.array(surface), np.array(anchors), edges)
+
+
+def take_edges(aspects: AspectGraph) -> ViewEdges:
+    """The edges of all views, as the kernels read them."""
+    # Copies: a read-only array is another type to a kernel.
+    return ViewEdges(
+        np.array(aspects.starts), np.array(aspects.points_mm), np.array(aspects.tangents)
+    )
 
 
 def _find_anchors(shown_mm: FloatArray, direction: FloatArray) -> FloatArray:
@@ -126,6 +130,25 @@ def spread_hypotheses(
         np.repeat(views.anchors_mm[chosen].reshape(-1, 3), len(rolls), axis=0),
         _turn_towards(places_mm),
         places_mm,
+    )
+
+
+def place_hypothesis(views: Views, pose: RigidTransform, anchor_mm: FloatArray) -> Hypotheses:
+    """The one hypothesis of a pose (camera from bone), with the view that is nearest to it.
+
+    `anchor_mm` (3,) is the point of the bone that stays in place when the hypothesis is varied.
+    """
+    position_mm = pose.apply(anchor_mm)
+    towards_camera = -pose.rotation.T @ position_mm
+    turn = _turn_towards(position_mm[None])
+    return Hypotheses(
+        np.zeros(1, dtype=np.int32),
+        np.zeros(1, dtype=np.int32),
+        np.array([np.argmax(views.directions @ towards_camera)], dtype=np.int32),
+        turn.transpose(0, 2, 1) @ pose.rotation,
+        anchor_mm[None],
+        turn,
+        position_mm[None],
     )
 
 

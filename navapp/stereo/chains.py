@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.coarse import LEAST_AGREEMENT, Evidence, clip_box, coarse_surface
 from navapp.stereo.matching.census_sgm import CensusSettings, match_census
-from navapp.stereo.matching.gradient import GradientSettings, match_gradient, smooth_known
+from navapp.stereo.matching.gradient import match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.stereo.occlusion.wls_smooth import smooth_wls
@@ -28,6 +28,9 @@ _NOT_CONFIRMED = (
 )
 
 _WIDE_SEARCH_PX = 160
+
+# Of the paper's Gaussian filter over the disparity, px; chosen.
+_GAUSSIAN_SIGMA_PX = 1.0
 
 # A claimed sigma below this says no more.
 _BEST_SIGMA_PX = np.float32(0.1)
@@ -122,19 +125,35 @@ def match_on_support(
     return _answer(pair, left, evidence, fill, watch, np.isfinite(support_px))
 
 
-def match_baseline(pair: RectifiedPair, band_px: tuple[float, float]) -> StereoAnswer:
-    """The paper's state of the art: gradient magnitudes, winner takes all, Gaussian; no fill."""
+def match_baseline(
+    pair: RectifiedPair, band_px: tuple[float, float], *, fills: bool = False
+) -> StereoAnswer:
+    """As the paper does: gradient magnitudes, winner takes all, Gaussian filter.
+
+    Filled, it is the paper's proposal (section 3.2): occlusions by weighted least squares before
+    the filter. Without, it is its state of the art (section 3.1). Arguments as for `match_scene`.
+    """
     watch = Stopwatch()
     pair = clip_box(pair)
-    matched = match_gradient(pair, band_px)
+    found = match_gradient(pair, band_px)
+    matched_fraction = found.left.matched_fraction
     # Matches of chance stand alone.
-    in_patches = without_specks(matched).matched_fraction
-    if matched.matched_fraction == 0.0:
+    in_patches = without_specks(found.left).matched_fraction
+    if matched_fraction == 0.0:
         return _nothing(pair, _NO_CONTRAST, watch)
-    if in_patches < _LEAST_IN_PATCHES * matched.matched_fraction:
+    if in_patches < _LEAST_IN_PATCHES * matched_fraction:
         return _nothing(pair, _DISAGREEMENT, watch)
-    watch.lap("stereo")
-    return StereoAnswer(matched, matched, (), watch.timings)
+    evidence = Evidence(found.right_px, found.right_x0, found.confidence)
+    answer = _answer(pair, found.left, evidence, FillSettings() if fills else None, watch)
+    smooth = _filter_gaussian(answer.disparity)
+    watch.lap("fill" if fills else "stereo")
+    return replace(answer, disparity=smooth, timings=watch.timings)
+
+
+def _filter_gaussian(disparity: DisparityMap) -> DisparityMap:
+    """The paper's noise filter, over the known pixels."""
+    smooth_px = smooth_known(disparity.disparity_px, _GAUSSIAN_SIGMA_PX)
+    return replace(disparity, disparity_px=smooth_px)
 
 
 def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) -> StereoAnswer:
@@ -152,8 +171,7 @@ def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) ->
     if smoothing == "wls":
         after = smooth_wls(before, _box_of(pair), _by_sigma(before))
     else:
-        smooth_px = smooth_known(before.disparity_px, GradientSettings().gaussian_sigma_px)
-        after = replace(before, disparity_px=smooth_px)
+        after = _filter_gaussian(before)
     watch.lap("fill")
     fill_ms = answer.timings.fill_ms + watch.timings.fill_ms
     return replace(answer, disparity=after, timings=replace(answer.timings, fill_ms=fill_ms))

@@ -38,7 +38,8 @@ _MOST_TARGETS = 200
 class PoseJudge:
     """Judges fits of one bone under one rig.
 
-    Without the `quality` that its calibration tells of itself, the rig is taken as it is.
+    Without the `quality` that its calibration tells of itself, the rig is taken as it is. A pose of
+    which nothing can be said is withheld, unless the judge `tells_refused` ones.
     """
 
     def __init__(
@@ -46,7 +47,10 @@ class PoseJudge:
         meter: SurfaceMeter,
         quality: RigQuality | None = None,
         outline: OutlineMeter | None = None,
+        *,
+        tells_refused: bool = False,
     ) -> None:
+        self._tells_refused = tells_refused
         self._meter, self._quality = meter, quality
         self._is_rig_accepted = quality is None or quality.is_accepted
         self._outline = outline or OutlineMeter(meter.model, meter.geometry)
@@ -90,7 +94,8 @@ class PoseJudge:
         evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
         verdict = decide(evidence)
         frame.watch.lap("judge")
-        estimate = None if verdict.predicted_tre_mm is None else self._unrectify(fit.estimate)
+        is_told = verdict.predicted_tre_mm is not None or self._tells_refused
+        estimate = self._unrectify(fit.estimate) if is_told else None
         rows = _check_rows(health, evidence, verdict)
         return TrackedFrame(model.bone.name, estimate, verdict, frame.watch.timings, rows)
 

@@ -1,10 +1,25 @@
 """The trackers by the names of their methods."""
 
 from navapp.geometry.rig import StereoRig
+from navapp.registration.register import Method as RegisterMethod
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.icp_tracker import IcpTracker
-from navapp.tracking.tracker import Tracker, TrackerSettings
+from navapp.tracking.paper_tracker import PaperTracker
+from navapp.tracking.tracker import Method, Tracker, TrackerSettings
 from navapp.values import AspectGraph, BoneModel
+
+_TRACKERS: dict[Method, type[BimccTracker | IcpTracker]] = {
+    "bimcc": BimccTracker,
+    "paper": PaperTracker,
+    "icp": IcpTracker,
+}
+
+# The registration that each of them makes in a frame, as `navapp register` calls it.
+REGISTER_METHODS: dict[Method, RegisterMethod] = {
+    "bimcc": "bimcc",
+    "paper": "bimcc-literal",
+    "icp": "icp",
+}
 
 
 def make_tracker(
@@ -13,8 +28,6 @@ def make_tracker(
     settings: TrackerSettings | None = None,
     aspects: AspectGraph | None = None,
 ) -> Tracker:
-    """The tracker of `settings.method`; see `BimccTracker` for the arguments."""
+    """The tracker of `settings.method`; see there for what it takes the aspects."""
     settings = settings or TrackerSettings()
-    if settings.method == "icp":
-        return IcpTracker(rig, bone, settings)
-    return BimccTracker(rig, bone, settings, aspects)
+    return _TRACKERS[settings.method](rig, bone, settings, aspects)

@@ -60,14 +60,23 @@ class TrackState:
         return replace(self, left_from_bone=moved @ self.left_from_bone, velocity=np.zeros(6))
 
     def update(
-        self, tracked: TrackedFrame, captured_ns: int, centre_mm: FloatArray
+        self,
+        tracked: TrackedFrame,
+        captured_ns: int,
+        centre_mm: FloatArray,
+        *,
+        follows_refused: bool = False,
     ) -> "TrackState":
-        """After a frame; the pose stays when the bone was lost or something else was found."""
+        """After a frame; the pose stays when the bone was lost or something else was found.
+
+        With `follows_refused` whatever pose there is is followed.
+        """
         pose = tracked.left_from_bone
         verdict = tracked.verdict
         # What lies far from where it was expected, and fits badly too, is something else.
         is_another_thing = Reason.JUMPED in verdict.reasons and is_place_doubted(verdict)
-        if pose is None or verdict.status is Status.LOST or is_another_thing:
+        is_refused = verdict.status is Status.LOST or is_another_thing
+        if pose is None or (is_refused and not follows_refused):
             lost = replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
             return replace(lost, cause=verdict.cause)
         elapsed_ns = captured_ns - self.captured_ns

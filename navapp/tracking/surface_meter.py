@@ -4,7 +4,6 @@ Four kinds: on the model at a pose, exact and near; on samples of it; freely, wh
 coarsely, to tell what lies where.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -25,7 +24,7 @@ from navapp.stereo import (
     refine_on_model,
     refine_samples,
 )
-from navapp.values import DisparityMap, SurfaceCloud
+from navapp.values import DisparityMap, Origin, SurfaceCloud
 
 # All chosen but where a source stands beside it.
 # Errors of a free measurement are correlated over smooth bone, and over tissue that lies flush with
@@ -41,14 +40,6 @@ _MIXED_PX = 3
 _LEAST_UNMIXED_FRACTION = 0.5
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
-
-# Matches a pair's box within a band of disparities (px).
-Matcher = Callable[[RectifiedPair, tuple[float, float]], DisparityMap]
-
-
-def match_smooth_surface(pair: RectifiedPair, band_px: tuple[float, float]) -> DisparityMap:
-    """Without a pose: census and semi-global matching, refined on a smooth support."""
-    return match_surface(pair, band_px, fills=False).disparity
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,33 +129,55 @@ class SurfaceMeter:
         self, left: Image, right: Image, around: RigidTransform, margins: Margins
     ) -> RectifiedPair:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
-        box, band_px = self._region(around, margins) or (None, None)
+        box, band_px = self.find_region(around, margins) or (None, None)
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
 
     def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None
     ) -> tuple[RectifiedPair, tuple[float, float]]:
         """Both pictures around a pose, and the disparities there; the whole view without one."""
-        region = None if around is None else self._region(around, _AROUND)
+        region = None if around is None else self.find_region(around, _AROUND)
         near_mm, far_mm = self.depth_mm
         everything = None, (self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm))
         box, band_px = region or everything
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True), band_px
 
+    def find_region(
+        self, pose: RigidTransform, margins: Margins
+    ) -> tuple[Box, tuple[float, float]] | None:
+        """Box and disparity band around the model at a pose; None out of view or out of depth."""
+        box, (nearest_mm, farthest_mm) = self._bounds(pose)
+        if box is None:
+            return None
+        near = max(nearest_mm - margins.band_mm, self.depth_mm[0])
+        far = min(farthest_mm + margins.band_mm, self.depth_mm[1])
+        if near >= far:
+            return None
+        grown = box.grow(margins.box_px).clip(self.geometry.width, self.geometry.height)
+        return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
+
     def measure_freely(
-        self,
-        pair: RectifiedPair,
-        pose: RigidTransform,
-        margins: Margins,
-        match: Matcher = match_smooth_surface,
+        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
     ) -> Measurement | None:
         """Whatever surface is in the box and depth band around a pose; None out of view."""
-        region = self._region(pose, margins)
+        region = self.find_region(pose, margins)
         if region is None:
             return None
         box, band_px = region
-        found = match(replace(pair, box=box), band_px)
+        found = match_surface(replace(pair, box=box), band_px, fills=False).disparity
         return Measurement(found, self._cloud(found), found.matched_fraction, FREE_CORRELATION_PX)
+
+    def take_surface(self, found: DisparityMap, n_points: int) -> Measurement:
+        """A free measurement from a map that was matched elsewhere: filled pixels count as well.
+
+        Its cloud has so many points, spread evenly; all known pixels when they are fewer.
+        """
+        n_known = int(np.count_nonzero(found.origin))
+        stride_px = max(1, int((0.9 * n_known / n_points) ** 0.5))
+        cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
+        if len(cloud) > n_points:
+            cloud = cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
+        return Measurement(found, cloud, found.matched_fraction, FREE_CORRELATION_PX)
 
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
@@ -173,7 +186,7 @@ class SurfaceMeter:
 
         The box is of the rectified left view; without one it is around the bone, with some room.
         """
-        region = self._region(pose, _AROUND)
+        region = self.find_region(pose, _AROUND)
         if region is None:
             return None
         around = box or region[0]
@@ -183,7 +196,7 @@ class SurfaceMeter:
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
     ) -> Expected | None:
         """What is to be seen of the model at a pose; None out of view."""
-        region = self._region(pose, margins)
+        region = self.find_region(pose, margins)
         if region is None:
             return None
         model = self.model
@@ -224,20 +237,6 @@ class SurfaceMeter:
         """About `max_points` of the measured ones."""
         stride_px = max(1, round((found.n_matched / self._max_points) ** 0.5))
         return found.reproject(self.geometry, stride_px)
-
-    def _region(
-        self, pose: RigidTransform, margins: Margins
-    ) -> tuple[Box, tuple[float, float]] | None:
-        """Box and disparity band around the model at a pose; None out of view or out of depth."""
-        box, (nearest_mm, farthest_mm) = self._bounds(pose)
-        if box is None:
-            return None
-        near = max(nearest_mm - margins.band_mm, self.depth_mm[0])
-        far = min(farthest_mm + margins.band_mm, self.depth_mm[1])
-        if near >= far:
-            return None
-        grown = box.grow(margins.box_px).clip(self.geometry.width, self.geometry.height)
-        return grown, (self.geometry.disparity_px(far), self.geometry.disparity_px(near))
 
 
 def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:

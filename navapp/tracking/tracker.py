@@ -23,7 +23,7 @@ from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 
-Method = Literal["bimcc", "icp"]
+Method = Literal["bimcc", "paper", "icp"]
 
 # So often, in lost frames, it is asked whether the pictures are swapped; chosen.
 _FRAMES_BETWEEN_DIAGNOSES = 10
@@ -33,7 +33,10 @@ _FRAMES_BETWEEN_DIAGNOSES = 10
 class TrackerSettings:
     """How a tracker works; chosen."""
 
-    method: Method = "bimcc"  # `bimcc` is the production chain, `icp` the paper's baseline
+    # `bimcc` is the production chain; `paper` is the paper's proposal, `icp` its state of the art.
+    method: Method = "bimcc"
+    # A pose that the judge refuses is carried on too, to be measured; it stays refused.
+    follows_refused: bool = False
     # nearest and farthest surface that the rig is used for.
     depth_mm: tuple[float, float] = (300.0, 700.0)
     max_points: int = 2500  # about so many measured points enter a fit
@@ -68,7 +71,8 @@ class Tracker(ABC):
         self.model = RegistrationModel(bone)
         depth_mm, max_points = self.settings.depth_mm, self.settings.max_points
         self.meter = SurfaceMeter(rig, self.model, depth_mm, max_points)
-        self.judge = judge or PoseJudge(self.meter, rig.quality)
+        keeps = self.settings.follows_refused
+        self.judge = judge or PoseJudge(self.meter, rig.quality, tells_refused=keeps)
         self.boxes = BoxTracker(rig, self.model)
         self.scorer = FitScorer(self.meter)
         self.diagnosis = diagnosis or Diagnosis(self.meter, self.scorer)
@@ -230,7 +234,7 @@ class Tracker(ABC):
         tracked: TrackedFrame,
     ) -> Reason | None:
         """What is wrong for good: as known, or looked for anew in some of the lost frames."""
-        is_lost = tracked.verdict.status is Status.LOST
+        is_lost = tracked.verdict.status is Status.LOST and not self.settings.follows_refused
         if not is_lost and state.cause is Reason.PICTURES_SWAPPED:
             # The bone is seen again, so the pictures are no longer swapped.
             return None
@@ -248,7 +252,8 @@ class Tracker(ABC):
         watch: Stopwatch,
     ) -> tuple[TrackedFrame, TrackState]:
         """The answer with its times, and the state after it."""
-        after = state.update(tracked, captured_ns, self.centre_mm)
+        carries = self.settings.follows_refused
+        after = state.update(tracked, captured_ns, self.centre_mm, follows_refused=carries)
         # What is not followed does not place the box either.
         box = self.boxes.place(state.box, left, tracked) if after.n_lost == 0 else state.box
         return replace(tracked, timings=watch.timings), replace(after, box=box)

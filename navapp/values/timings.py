@@ -1,7 +1,7 @@
 """How long the parts of a frame take."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 Part = Literal["rectify", "stereo", "fill", "estimate", "judge"]
@@ -41,6 +41,13 @@ class Stopwatch:
         name = f"{part}_ms"
         self._parts_ms[name] = self._parts_ms.get(name, 0.0) + (now_ns - self._lap_began_ns) / 1e6
         self._lap_began_ns = now_ns
+
+    def add(self, timings: FrameTimings) -> None:
+        """End a lap whose parts were timed on their own, and begin the next one."""
+        for name, part_ms in asdict(timings).items():
+            if part_ms:
+                self._parts_ms[name] = self._parts_ms.get(name, 0.0) + part_ms
+        self._lap_began_ns = time.perf_counter_ns()
 
     @property
     def timings(self) -> FrameTimings:

@@ -1,7 +1,7 @@
 """Accuracy on recorded operations with truth, printed as the tables of docs/accuracy.md.
 
-usage: python -m tests.bench.recorded_accuracy [FOLDER] [--method bimcc|icp] [--bone femur|tibia]
-                                               [--only NAME] [--order ORDER ...] [--frames]
+usage: python -m tests.bench.recorded_accuracy [FOLDER] [--bone femur|tibia] [--only NAME]
+                                               [--order ORDER ...] [--frames]
 
 FOLDER (default: NAVAPP_DATA) holds `phantom_*` folders with surfaces, rig.yml and sequences that
 have prior.json and truth.json. Each sequence is replayed as it is, as one loop of 120 frames there
@@ -56,10 +56,10 @@ def main() -> int:
         surface = phantom / f"{options.bone}.ply"
         with tempfile.TemporaryDirectory() as plan:
             run(["--quiet", "plan", "--surface", f"{options.bone}={surface}", "--out", plan])
-            for sequence in _sequences(phantom, options.only):
+            for sequence in find_sequences(phantom, options.only):
                 for order in _orders(sequence, options.order):
-                    frames = replayed(phantom, sequence, plan, order, options)
-                    scored = list(_scored(frames, sequence, options.bone, surface))
+                    frames = replayed(phantom, sequence, plan, order, options.bone)
+                    scored = list(score_frames(frames, sequence, options.bone, surface))
                     print(_row(f"{phantom.name}/{sequence.name}", order, scored), flush=True)
                     if options.frames:
                         _print_frames(scored)
@@ -71,7 +71,6 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "folder", nargs="?", default=os.environ.get("NAVAPP_DATA", "../shared/data")
     )
-    parser.add_argument("--method", choices=("bimcc", "icp"), default="bimcc")
     parser.add_argument("--bone", choices=("femur", "tibia"), default="femur")
     parser.add_argument("--only", default="", help="sequences whose name contains this")
     parser.add_argument("--order", choices=ORDERS, nargs="+", default=list(ORDERS))
@@ -79,7 +78,7 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _sequences(phantom: Path, only: str) -> list[Path]:
+def find_sequences(phantom: Path, only: str) -> list[Path]:
     found = [truth.parent for truth in sorted(phantom.glob("*/truth.json"))]
     return [
         folder
@@ -93,24 +92,25 @@ def _orders(sequence: Path, asked: list[str]) -> list[str]:
 
 
 def replayed(
-    phantom: Path, sequence: Path, plan: str, order: str, options: argparse.Namespace
+    phantom: Path, sequence: Path, plan: str, order: str, bone: str, *words: str
 ) -> list[dict[str, Any]]:
-    """Frames of `navapp replay`, started from the sequence's prior only."""
+    """Frames of `navapp replay` with further words, started from the sequence's prior only."""
     with tempfile.TemporaryDirectory() as folder:
         poses = f"{folder}/poses.json"
         command = [
             "--quiet", "replay", str(sequence), "--rig", str(phantom / "rig.yml"), "--plan", plan,
-            "--prior", str(sequence / "prior.json"), "--order", order, "--method", options.method,
-            "--bone", options.bone, "--json", poses,
+            "--prior", str(sequence / "prior.json"), "--order", order, "--bone", bone,
+            "--json", poses, *words,
         ]  # fmt: skip
         run(command + (["--frames", str(_LOOP_FRAMES)] if order == "pingpong" else []))
         frames: list[dict[str, Any]] = json.loads(Path(poses).read_text())["frames"]
         return frames
 
 
-def _scored(
+def score_frames(
     frames: list[dict[str, Any]], sequence: Path, bone_name: str, surface: Path
 ) -> Iterator[Scored]:
+    """Replayed frames beside the sequence's truth."""
     bone = BoneModel(bone_name, read_ply(surface)[0])
     content = json.loads((sequence / "truth.json").read_text())
     truth = {

@@ -20,21 +20,21 @@ def session(*, is_moved: bool = True) -> RecordedSession:
     commands = [(0, Register()), (1, Accept(None)), *([(AFTER, FOUND)] if is_moved else [])]
     here = Path()
     return RecordedSession(
-        here, here, here, "bimcc", "opening", RecordedEvents(commands, [1], True)
+        here, here, here, "bimcc", False, "opening", RecordedEvents(commands, [1], True)
     )
 
 
 def options(**given) -> argparse.Namespace:
     plain = {
         "rig": None, "prior": None, "bone": None, "also": [], "method": None, "start": 0,
-        "order": "forward",
+        "order": "forward", "follow_refused": False,
     }  # fmt: skip
     return argparse.Namespace(**(plain | given))
 
 
 def states(recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
     """Of 20 frames; the numbers of the pictures begin where the replay does."""
-    operator, executor = choose_operator(recorded, given)
+    operator, executor = choose_operator(recorded, given, given.follow_refused)
     bench = Bench(executor=executor, camera=FakeCamera(None, 20))
     bench.camera._sequence, bench.camera._n_frames = given.start, given.start + 20
     run_headless(bench.controller, operator)
@@ -46,7 +46,7 @@ def states(recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
     "changed",
     [
         {}, {"prior": "p"}, {"bone": "femur"}, {"also": ["tibia"]}, {"method": "icp"},
-        {"order": "each"}, {"start": 2},
+        {"order": "each"}, {"start": 2}, {"follow_refused": True},
     ],
     ids=str,
 )  # fmt: skip
@@ -66,7 +66,7 @@ def test_a_replay_that_starts_after_it_shows_nothing_at_all() -> None:
 def test_another_rig_is_not_the_one_that_moved() -> None:
     for given in (options(rig="r.yml"), options(rig="r.yml", method="icp")):
         assert find_moved_rig(session(), given) is None
-        operator, executor = choose_operator(session(), given)
+        operator, executor = choose_operator(session(), given, given.follow_refused)
         bench = Bench(executor=executor, camera=FakeCamera(None, 20))
         run_headless(bench.controller, operator)
         assert bench.results[-1].state.value == "navigating"

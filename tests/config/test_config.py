@@ -89,7 +89,7 @@ CHANGED: dict[str, Any] = {
     "plan": {"path": 'plans\\p "1"', "prior": "prior.json"},
     "stereo": {},
     "registration": {},
-    "tracking": {"method": "icp"},
+    "tracking": {"method": "paper", "follow_refused": True},
     "calibration": {
         "stop_capture_mm": 0.2,
         "accept_mm": 0.5,

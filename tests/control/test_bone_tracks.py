@@ -6,7 +6,7 @@ from navapp.control.bone_tracks import BoneTracks
 from navapp.control.registration_job import Registration
 from navapp.control.stages import STAGES
 from navapp.tracking import Goal
-from navapp.values import Status
+from navapp.values import Reason, Status
 from tests.control.fakes import LOST, FakeTracker, Script, a_frame, a_pose, answer
 
 OPENING = STAGES[0]
@@ -25,6 +25,7 @@ def tracks(script: Script) -> BoneTracks:
             tracker=lambda bone: tracker,
             goal=lambda stage: Goal(None, stage.tolerance_mm),
             register=lambda stage, frame: script.found,
+            follows_refused=False,
         )
     )
 
@@ -42,6 +43,13 @@ def test_lost_answers_are_no_candidates(tracks: BoneTracks) -> None:
     tracks.reject()
     assert tracks.candidate is None
     assert offered(tracks, LOST).candidate is None
+
+
+def test_where_refused_poses_are_followed_lost_answers_are_reviewed(script: Script) -> None:
+    refused = answer(Status.LOST, Reason.COVERAGE_LOW)
+    tracks = BoneTracks(SimpleNamespace(follows_refused=True))
+    assert offered(tracks, refused).candidate.tracked is refused
+    assert offered(tracks, answer(Status.LOST, has_pose=False)).candidate is None
 
 
 def test_an_accepted_candidate_is_the_bones_track(tracks: BoneTracks, script: Script) -> None:

@@ -114,6 +114,20 @@ def test_a_replays_operator_rejects_a_lost_candidate(bench: Bench) -> None:
     assert ReplayOperator().commands(bench.snapshot) == [Reject(1)]
 
 
+def test_a_lost_candidate_is_left_under_review_where_refused_poses_are_followed(
+    bench: Bench,
+) -> None:
+    bench.frames(1)
+    bench.do(Register())
+    bench.script.tracked = LOST
+    bench.frames(2)
+    operator = ReplayOperator(follows_refused=True)
+    assert operator.commands(bench.snapshot) == []
+    bench.script.tracked = answer()
+    bench.frames(2)
+    assert kinds(operator.commands(bench.snapshot)) == ["Accept"]
+
+
 def test_each_frame_can_be_registered_on_its_own(bench: Bench) -> None:
     given = commands_of(bench, ReplayOperator(each_frame=True))
     assert set(kinds(given)) == {"Register"}

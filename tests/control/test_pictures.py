@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 
-from navapp.control.pictures import banner, fit_to_display
+from navapp.control.pictures import banner, compose, fit_to_display
 from navapp.control.states import Register
-from tests.control.fakes import Bench
+from navapp.overlay import compose_video
+from navapp.values import Reason, Status
+from tests.control.fakes import Bench, a_plan, a_pose, a_rig, answer
 
 
 def picture(height: int, width: int) -> np.ndarray:
@@ -43,3 +45,22 @@ def test_the_banner_says_what_the_picture_is() -> None:
     bench.accept()
     bench.frames(1)
     assert banner(bench.snapshot) == "1 opening - NAVIGATING - error <= 0.80 mm"
+
+
+def test_of_a_refused_candidate_nothing_is_drawn() -> None:
+    bench = Bench()
+    bench.frames(1)
+    bench.do(Register())
+    camera = a_rig().left
+    left = np.full((camera.height, camera.width, 3), 60, np.uint8)
+    drawn = []
+    for status in (Status.DEGRADED, Status.LOST):
+        bench.script.tracked = answer(status, Reason.OUTLIERS, pose=a_pose())
+        bench.frames(2)
+        snapshot = bench.snapshot
+        picture = compose(left, snapshot, a_rig(), a_plan(), "")
+        plain = compose_video(left, None, banner(snapshot))
+        drawn.append(bool((picture != plain).any()))
+        assert snapshot.left_from_bone is not None
+    assert drawn == [True, False]
+    assert banner(snapshot) == "1 opening - CANDIDATE refused by the judge"

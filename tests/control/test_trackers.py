@@ -69,6 +69,16 @@ def test_a_search_without_a_pose_makes_a_tracker_with_aspects_that_stays(maker: 
     assert known.tracker("femur").has_aspects
 
 
+@pytest.mark.parametrize("method", ["paper", "icp"])
+def test_the_papers_chains_follow_with_the_views_of_the_plan(maker: Maker, method) -> None:
+    plan = replace(a_plan(), aspects={"femur": SomeAspects()})
+    settings = TrackerSettings(method, follows_refused=True)
+    known = Trackers(a_rig(), plan, FROM_ABOVE, settings, maker)
+    assert known.tracker("femur").has_aspects
+    assert not known.tracker("tibia").has_aspects
+    assert known.follows_refused
+
+
 @pytest.mark.parametrize("prior", [Prior(), Prior({"femur": a_pose()})])
 def test_a_search_from_a_pose_or_a_box_needs_no_aspects(maker: Maker, prior: Prior) -> None:
     known = trackers(maker, prior)

@@ -77,3 +77,23 @@ def test_most_frames_of_a_recorded_operation_get_a_pose(
     assert len(errors_mm) >= 0.9 * len(frames)
     assert max(errors_mm) < WORST_OK_MM
     assert len(list(overlay.glob("overlay_*.jpg"))) == len(frames)
+
+
+@pytest.mark.data
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["paper", "icp"])
+def test_the_papers_chains_are_followed_and_never_accepted_as_ok(
+    data: Path, plan_of: Callable[[str], Path], tmp_path: Path, method: str
+) -> None:
+    root, poses = data / "phantom_a", tmp_path / "poses.json"
+    run([
+        "--quiet", "replay", str(root / "patient"), "--rig", str(root / "rig.yml"),
+        "--plan", str(plan_of("phantom_a")), "--prior", str(root / "patient" / "prior.json"),
+        "--method", method, "--follow-refused", "--frames", "5", "--json", str(poses),
+    ])  # fmt: skip
+    frames = json.loads(poses.read_text(encoding="utf-8"))["frames"]
+    assert len(frames) == 5
+    for frame in frames:
+        assert frame["camera_from_model"] is not None
+        assert frame["status"] != "OK"
+        assert (frame["timing_ms"]["fill"] > 0.0) is (method == "paper")

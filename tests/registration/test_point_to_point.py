@@ -13,7 +13,7 @@ from navapp.registration import (
     solve_bimcc_literal,
     solve_icp,
 )
-from navapp.registration.point_to_point import kabsch
+from navapp.registration.point_to_point import kabsch, prolong_step
 from navapp.values import BoneModel, Reason
 from tests.reference.bimcc_reference import bidirectional_pairs
 from tests.registration.shapes import (
@@ -143,8 +143,9 @@ def test_the_literal_variant_is_weighted_kabsch_on_both_ways_under_a_narrowing_k
         a, b = SAMPLES[point], BLOB.points_mm[vertex]
         distance = np.linalg.norm(a - pose.apply(b), axis=1)
         sigma_mm = np.clip(min(1.5 * np.median(distance), 0.9 * sigma_mm), 1.2, 12.0)
-        pose = kabsch(a, b, np.exp(-0.5 * (distance / sigma_mm) ** 2), pose)
-    assert apart_mm(found.camera_from_bone, pose) < 1e-6
+        solved = kabsch(a, b, np.exp(-0.5 * (distance / sigma_mm) ** 2), pose)
+        pose = prolong_step(pose, solved, BLOB.centre_mm)
+    assert apart_mm(found.camera_from_bone, pose) < 1e-3
     assert apart_mm(start, pose) > 1.0
 
 
@@ -154,9 +155,11 @@ def test_plain_icp_is_kabsch_on_the_nearest_vertices() -> None:
     pose = start
     for _ in range(found.iterations):
         _, vertex = cKDTree(BLOB.points_mm).query(pose.inverse().apply(SAMPLES))
-        pose = kabsch(SAMPLES, BLOB.points_mm[vertex], np.ones(len(SAMPLES)), pose)
+        solved = kabsch(SAMPLES, BLOB.points_mm[vertex], np.ones(len(SAMPLES)), pose)
+        pose = prolong_step(pose, solved, BLOB.centre_mm)
     # The model's own look-up may end beside the nearest vertex, never by much.
-    assert apart_mm(found.camera_from_bone, pose) < 0.01
+    assert apart_mm(found.camera_from_bone, pose) < 0.15
+    assert apart_mm(start, pose) > 1.0
 
 
 @pytest.mark.parametrize("solve", [solve_icp, solve_bimcc_literal])
@@ -172,8 +175,8 @@ def test_forward_and_inverse_runs_agree(solve) -> None:
     assert backward.is_converged
     assert backward.camera_from_bone.name == "femur_from_scene"
     assert apart_mm(start, truth) > 0.5
-    assert apart_mm(forward.camera_from_bone, backward.camera_from_bone.inverse()) < 1e-6
-    assert apart_mm(forward.camera_from_bone, truth) < 1e-6
+    assert apart_mm(forward.camera_from_bone, backward.camera_from_bone.inverse()) < 2e-3
+    assert apart_mm(forward.camera_from_bone, truth) < 2e-3
 
 
 @pytest.mark.parametrize("solve", [solve_icp, solve_bimcc_literal])

@@ -1,16 +1,22 @@
-"""The paper's baseline as a tracker."""
+"""The paper's chains as trackers."""
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 
-from navapp.registration import solve_icp
-from navapp.tracking import TrackerSettings, TrackState, make_tracker
+from navapp.registration import solve_bimcc_literal, solve_icp
+from navapp.registration.register import Method as RegisterMethod
+from navapp.tracking import Method, TrackerSettings, TrackState, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.tracking.icp_tracker import IcpTracker, match_gradients
+from navapp.tracking.contour import ContourRefiner
+from navapp.tracking.icp_tracker import IcpTracker
+from navapp.tracking.methods import REGISTER_METHODS
+from navapp.tracking.outline import OutlineMeter
+from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, WIDE_VIEW
-from navapp.values import Prior, Reason, Status, Stopwatch
+from navapp.values import Origin, Prior, Reason, Status, Stopwatch
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, room
 
@@ -28,30 +34,86 @@ def test_a_tracker_is_made_by_the_name_of_its_method() -> None:
     made = make_tracker(a.rig, bone, TrackerSettings("icp", max_points=900))
     assert type(made) is IcpTracker
     assert made.settings.max_points == 900
+    assert type(make_tracker(a.rig, bone, TrackerSettings("paper"))) is PaperTracker
 
 
-def test_one_matching_and_one_fit_make_an_answer() -> None:
+def test_the_methods_of_a_session_are_those_of_a_registration() -> None:
+    """One table, which knows them all."""
+    assert set(REGISTER_METHODS) == set(get_args(Method))
+    assert set(REGISTER_METHODS.values()) == set(get_args(RegisterMethod))
+
+
+@pytest.mark.parametrize("kind", [IcpTracker, PaperTracker])
+def test_one_fit_to_so_many_points_makes_an_answer(kind) -> None:
     """At a glance around the pose, at a first registration with more room."""
     a = room()
     frame, truth = a.frames[0], a.truth(a.frames[0])
     start = truth.move((0.5, -0.5, 1.0, 0.01, 0.0, 0.0), truth.apply(a.tracker.centre_mm))
     for margins, view in ((NEAR_BOX, NEAR_VIEW), (WIDE_BOX, WIDE_VIEW)):
-        icp = tracker()
-        icp.meter = meter = Listening(icp.meter)
-        given = (frame.left, frame.right)
+        made = kind(a.rig, a.tracker.model.bone)
+        begun = made.begin(frame.left, frame.right, start, Stopwatch(), view)
+        fit = made.find_fit(begun, margins)
+        assert len(fit.measured.cloud) == (3000 if kind is IcpTracker else 6000)
         if margins is NEAR_BOX:
-            tracked, _ = icp.glance(*given, 0, TrackState.at_rest(start, 0), GOAL)
+            state = TrackState.at_rest(start, 0)
+            tracked, _ = made.glance(frame.left, frame.right, 0, state, GOAL)
         else:
-            (tracked,) = icp.register(*given, Prior({"femur": start}), GOAL)
-        assert meter.asked == ["measure_freely"]
-        assert meter.given[0][2:] == (margins, match_gradients)
-        begun = icp.begin(*given, start, Stopwatch(), view)
-        measured = a.tracker.meter.measure_freely(begun.pair, begun.start, margins, match_gradients)
-        expected = solve_icp(measured.scene, icp.model, begun.start).estimate.camera_from_bone
-        left_from_rectified = icp.meter.geometry.rectified_from_left.inverse()
-        np.testing.assert_array_equal(
-            tracked.left_from_bone.matrix, (left_from_rectified @ expected).matrix
-        )
+            (tracked,) = made.register(frame.left, frame.right, Prior({"femur": start}), GOAL)
+        left_from_rectified = made.meter.geometry.rectified_from_left.inverse()
+        found = left_from_rectified @ fit.pose
+        np.testing.assert_array_equal(tracked.left_from_bone.matrix, found.matrix)
+
+
+def test_each_chain_takes_its_own_steps() -> None:
+    """Section 3.1: matched pixels, plain ICP, contour; section 3.2: filled ones, BiMCC-ICP."""
+    a = room()
+    frame, truth = a.frames[0], a.truth(a.frames[0])
+    bone = a.tracker.model.bone
+    for kind, solve in (
+        (IcpTracker, solve_icp),
+        (PaperTracker, solve_bimcc_literal),
+    ):
+        made = kind(a.rig, bone)
+        begun = made.begin(frame.left, frame.right, truth, Stopwatch(), NEAR_VIEW)
+        fit = made.find_fit(begun, NEAR_BOX)
+        solved = solve(fit.measured.scene, made.model, begun.start, 3000).estimate
+        contour = ContourRefiner(made.model, OutlineMeter(made.model, made.meter.geometry))
+        disparity = fit.measured.disparity
+        expected = solved.camera_from_bone
+        if kind is IcpTracker:
+            expected = contour.refine(begun.pair, expected, disparity)
+        np.testing.assert_array_equal(fit.pose.matrix, expected.matrix)
+        filled = {Origin.FILLED_BORDER, Origin.FILLED_INTERIOR, Origin.MISMATCH_FILLED}
+        has_filled = bool(filled & set(np.unique(fit.measured.cloud.origin)))
+        assert has_filled is (kind is PaperTracker)
+        assert (begun.watch.timings.fill_ms > 0.0) is (kind is PaperTracker)
+        assert begun.watch.timings.stereo_ms > 0.0
+
+
+def test_the_papers_proposal_finds_what_its_state_of_the_art_does_not() -> None:
+    a = room()
+    frame, truth = a.frames[0], a.truth(a.frames[0])
+    start = truth.move((1.0, -1.0, 1.0, 0.02, 0.0, 0.01), truth.apply(a.tracker.centre_mm))
+    errors = []
+    for kind in (PaperTracker, IcpTracker):
+        made = kind(a.rig, a.tracker.model.bone, TrackerSettings(follows_refused=True))
+        (found,) = made.register(frame.left, frame.right, Prior({"femur": start}), GOAL)
+        errors.append(a.error_mm(found.left_from_bone, frame))
+        assert found.verdict.status is not Status.OK
+    assert errors[0] < 1.5
+    assert errors[1] > 2.0 * errors[0]
+
+
+def test_a_refused_pose_is_followed_when_that_is_asked_for() -> None:
+    a = room()
+    frame, truth = a.frames[0], a.truth(a.frames[0])
+    for follows in (False, True):
+        made = IcpTracker(a.rig, a.tracker.model.bone, TrackerSettings("icp", follows))
+        state = TrackState.at_rest(truth, frame.captured_ns - 66_000_000)
+        tracked, after = made.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        assert tracked.verdict.status is Status.LOST
+        assert after.n_lost == (0 if follows else 1)
+        assert (after.left_from_bone is tracked.left_from_bone) is follows
 
 
 def test_pictures_without_content_are_lost() -> None:
@@ -91,15 +153,14 @@ def test_a_first_registration_needs_a_pose() -> None:
 def test_it_is_lost_where_it_was_and_looks_no_further_off() -> None:
     """In every lost frame: the pose and the place of the box are all that it starts from."""
     a, icp = room(), tracker()
-    frame, meter = a.frames[0], Listening(icp.meter)
+    frame, meter = a.frames[0], Listening(icp.meter, "find_region")
     icp.meter = meter
     for n_lost in range(4):
         state = replace(TrackState.at_rest(a.truth(frame), frame.captured_ns), n_lost=n_lost)
         meter.given.clear()
         icp.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
-        margins = [given[2] for given in meter.given]
-        assert margins[-1] == WIDE_BOX
-        assert len(margins) == (2 if n_lost == 0 else 1)
+        margins = [given[1] for given in meter.given if given[1] in (NEAR_BOX, WIDE_BOX)]
+        assert margins[-1] == (WIDE_BOX if n_lost else NEAR_BOX)
 
 
 def test_it_follows_the_box() -> None:

@@ -80,6 +80,17 @@ def test_a_loss_keeps_the_pose_and_forgets_the_velocity(lost: TrackedFrame) -> N
     assert not state.velocity.any()
 
 
+def test_a_refused_pose_is_followed_only_when_that_is_asked_for() -> None:
+    refused = frame(moved(START, STEP), Status.LOST)
+    state = TrackState.at_rest(START, 0)
+    after = state.update(refused, PERIOD_NS, CENTRE, follows_refused=True)
+    assert after.left_from_bone is refused.left_from_bone
+    assert after.n_lost == 0
+    np.testing.assert_allclose(after.velocity * PERIOD_NS / 1e9, STEP, atol=1e-9)
+    without = state.update(frame(None, Status.LOST), PERIOD_NS, CENTRE, follows_refused=True)
+    assert (without.left_from_bone, without.n_lost) == (START, 1)
+
+
 def test_the_box_stays_through_poses_and_losses() -> None:
     box = BoxState(np.zeros((2, 2), np.uint8), PictureBox(0.0, 0.0, 1.0, 1.0))
     state = replace(TrackState.at_rest(START, 0), box=box)

@@ -1,8 +1,8 @@
 """The paper's state of the art, kept for comparison: sum of gradient magnitudes over a window.
 
 Algorithm 1 of its state-of-the-art section: cost (equation 2), aggregation, winner takes all
-(equation 3), left-right check, Gaussian filter. Disparities are whole pixels; only the filter puts
-them in between.
+(equation 3), left-right check. Disparities are whole pixels; only the Gaussian filter that the
+paper puts behind them, `smooth_known`, moves them in between.
 """
 
 from dataclasses import dataclass
@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.stereo.matching.census_sgm import make_matched_map
+from navapp.stereo.matching.census_sgm import TwoViewDisparity, make_matched_map
 from navapp.stereo.matching.consistency import at_partner, view_difference_px
 from navapp.stereo.matching.gradient_kernels import match_rows
 from navapp.stereo.matching.search import Crop, Search
-from navapp.values import DisparityMap
 
 _PER_GREY = 16.0
 
@@ -27,7 +26,6 @@ class GradientSettings:
     """How the baseline works."""
 
     window_px: int = 11  # side of the window, odd
-    gaussian_sigma_px: float = 1.0  # of the filter over the disparity; 0 leaves it out
     max_difference_px: float = 1.0  # between the two views
     contrast_grey: int = 3  # a window with a smaller range of grey levels matches nothing
     sigma_px: float = 0.5  # standard deviation that is claimed for every match
@@ -39,7 +37,7 @@ class GradientSettings:
 
 def match_gradient(
     pair: RectifiedPair, band_px: tuple[float, float], settings: GradientSettings | None = None
-) -> DisparityMap:
+) -> TwoViewDisparity:
     """Match the box of a rectified pair as the paper's state of the art does.
 
     Args:
@@ -48,7 +46,8 @@ def match_gradient(
         settings: of the baseline.
 
     Returns:
-        The map over `pair.box`; inconsistent pixels are unknown, nothing is filled.
+        Both views over `pair.box`; inconsistent pixels of the left one are unknown, nothing is
+        filled or filtered. Every match is as confident as another.
 
     Raises:
         ValueError: pictures that are not grey or differ in size, a band that is none or of more
@@ -59,13 +58,24 @@ def match_gradient(
     """
     settings = settings or GradientSettings()
     search = Search.plan(pair, band_px)
-    if search.is_empty:
-        shape = (search.inside.height, search.inside.width)
-        return make_matched_map(search, np.full(shape, np.nan, dtype=np.float32), settings.sigma_px)
-    left_px, right_px, shift = _winners(pair, search, settings)
+    box, inside = search.box, search.inside
+    left_px = np.full((inside.height, inside.width), np.nan, dtype=np.float32)
+    right_px = np.full((box.height, search.right.width), np.nan, dtype=np.float32)
+    if not search.is_empty:
+        top = inside.y - box.y
+        left_px, right_px[top : top + inside.height] = _match_both(pair, search, settings)
+    left = make_matched_map(search, left_px, settings.sigma_px)
+    is_matched = left.origin.astype(np.float32)
+    return TwoViewDisparity(left, right_px, search.right.x, is_matched, left.matched_fraction)
+
+
+def _match_both(
+    pair: RectifiedPair, search: Search, settings: GradientSettings
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Disparity of the left view's inside, checked, and of the right view."""
+    left_px, right_px = _winners(pair, search, settings)
     # Left-right consistency check: the right view's winners come from the same cost.
-    difference = view_difference_px(left_px, right_px, shift)
-    is_matched = difference <= settings.max_difference_px
+    is_matched = view_difference_px(left_px, right_px, search.shift) <= settings.max_difference_px
     radius = settings.window_px // 2
     left_spread, right_spread = (
         Crop.of(image, box, (radius, radius)).contrast_grey()
@@ -73,9 +83,7 @@ def match_gradient(
     )
     partner_spread = at_partner(right_spread, left_px, search.shift, np.uint8(0))
     is_matched &= np.minimum(left_spread, partner_spread) >= settings.contrast_grey
-    matched_px = np.where(is_matched, left_px, np.float32(np.nan))
-    smooth = smooth_known(matched_px, settings.gaussian_sigma_px)
-    return make_matched_map(search, smooth, settings.sigma_px)
+    return np.where(is_matched, left_px, np.float32(np.nan)), right_px
 
 
 def smooth_known(values: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
@@ -100,16 +108,28 @@ def magnitude(image: Image) -> NDArray[np.int32]:
     return np.asarray(np.rint(_PER_GREY * np.sqrt(gx * gx + gy * gy)), dtype=np.int32)
 
 
+def _magnitude_around(image: Image, box: Box, radius: int) -> NDArray[np.int32]:
+    """As `magnitude`, in a box and so far around it; 0 elsewhere."""
+    height, width = image.shape
+    # A pixel more: the outermost slopes of a part are one-sided.
+    part = box.grow(radius + 1).clip(width, height).slices
+    found = np.zeros(image.shape, dtype=np.int32)
+    found[part] = magnitude(image[part])
+    return found
+
+
 def _winners(
     pair: RectifiedPair, search: Search, settings: GradientSettings
-) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
-    """Disparity of the left view, of the right view, and the shift between their columns."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Winners of the left view's inside and of the right view, unchecked; NaN where none."""
     inside, n = search.inside, search.count
     radius = settings.window_px // 2
     first = inside.x - (search.lowest + n - 1)
     reached = Box(first, inside.y, inside.width + n - 1, inside.height)
-    left = Crop.of(magnitude(pair.left), inside, (radius, radius)).values
-    right = Crop.of(magnitude(pair.right), reached, (radius, radius)).values
+    left, right = (
+        Crop.of(_magnitude_around(picture, box, radius), box, (radius, radius)).values
+        for picture, box in ((pair.left, inside), (pair.right, reached))
+    )
     mirrored = np.ascontiguousarray(right[:, ::-1])
     left_best = np.empty((inside.height, inside.width), dtype=np.int32)
     right_best = np.empty((reached.height, reached.width), dtype=np.int32)
@@ -126,6 +146,7 @@ def _winners(
     # The best at the end of the search is no minimum.
     is_minimum = (left_best > 0) & (left_best < n - 1)
     left_px = np.where(is_minimum, left_best + search.lowest, np.nan).astype(np.float32)
-    right_best = right_best[:, ::-1]
+    # Columns of `reached` that lie outside the picture have no winners.
+    right_best = right_best[:, ::-1][:, search.right.x - first :][:, : search.right.width]
     right_px = np.where(right_best >= 0, right_best + search.lowest, np.nan).astype(np.float32)
-    return left_px, right_px, inside.x - first
+    return left_px, right_px

@@ -46,7 +46,7 @@ def test_the_magnitude_is_that_of_the_slope() -> None:
 
 @pytest.mark.parametrize("band", [(10.0, 30.0), (19.0, 21.0), (-8.0, 25.0), (19.6, 60.0)])
 def test_a_constant_shift_is_found_wherever_the_band_begins(band) -> None:
-    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER), band)
+    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER), band).left
     assert found.matched_fraction > 0.98
     matched = found.disparity_px[found.origin == Origin.MATCHED]
     assert np.percentile(np.abs(matched - 20.0), 99) < 0.05
@@ -57,19 +57,19 @@ def test_a_slant_is_followed_in_whole_pixels_that_the_filter_smooths() -> None:
     truth = np.broadcast_to(25.0 + 0.06 * np.arange(WIDTH), (HEIGHT, WIDTH)).copy()
     pair = shifted_pair(truth, INNER)
     inside = truth[INNER.y : INNER.y + INNER.height, INNER.x : INNER.x + INNER.width]
-    raw = match_gradient(pair, (15.0, 60.0), GradientSettings(gaussian_sigma_px=0.0))
-    smooth = match_gradient(pair, (15.0, 60.0))
-    known = np.isfinite(raw.disparity_px)
-    assert (raw.disparity_px[known] == np.rint(raw.disparity_px[known])).all()
-    assert (np.isfinite(smooth.disparity_px) == known).all()
+    raw_px = match_gradient(pair, (15.0, 60.0)).left.disparity_px
+    smooth_px = smooth_known(raw_px, 1.0)
+    known = np.isfinite(raw_px)
+    assert (raw_px[known] == np.rint(raw_px[known])).all()
+    assert (np.isfinite(smooth_px) == known).all()
     assert known.mean() > 0.9
-    rms = [np.sqrt(np.nanmean((m.disparity_px - inside) ** 2)) for m in (raw, smooth)]
+    rms = [np.sqrt(np.nanmean((found - inside) ** 2)) for found in (raw_px, smooth_px)]
     assert rms[1] < rms[0] < 0.5
 
 
 def test_partners_outside_the_picture_are_never_matched() -> None:
     whole = Box(-10, -5, WIDTH + 30, HEIGHT + 10)
-    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 30.0), whole), (10.0, 50.0))
+    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 30.0), whole), (10.0, 50.0)).left
     assert found.disparity_px.shape == (whole.height, whole.width)
     is_matched = found.origin == Origin.MATCHED
     columns = np.arange(whole.x, whole.x + whole.width)
@@ -86,7 +86,7 @@ def test_a_picture_without_contrast_matches_nowhere(grey, dark) -> None:
     for name in ("left", "right"):
         if dark in (name, "both"):
             getattr(pair, name)[:] = grey
-    assert match_gradient(pair, (10.0, 40.0)).matched_fraction == 0.0
+    assert match_gradient(pair, (10.0, 40.0)).left.matched_fraction == 0.0
 
 
 def test_the_filter_keeps_unknown_pixels_unknown_and_gives_them_no_weight() -> None:
@@ -101,7 +101,7 @@ def test_the_filter_keeps_unknown_pixels_unknown_and_gives_them_no_weight() -> N
 
 @pytest.mark.parametrize("box", [Box(10, 10, 0, 20), Box(WIDTH + 5, 0, 40, 20)])
 def test_a_box_without_pixels_gives_an_unknown_map(box) -> None:
-    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), box), (10.0, 40.0))
+    found = match_gradient(shifted_pair(np.full((HEIGHT, WIDTH), 20.0), box), (10.0, 40.0)).left
     assert found.disparity_px.shape == (box.height, box.width)
     assert found.matched_fraction == 0.0
 
@@ -123,7 +123,7 @@ def test_the_baseline_on_a_real_scene_is_what_the_paper_builds_on(data) -> None:
     truth = cv2.imread(str(folder / "disp2.png"), 0) / 4.0
     height, width = left.shape
     pair = RectifiedPair(left, right, geometry(width, height), Box(0, 0, width, height))
-    found = match_gradient(pair, (0.0, 63.0), GradientSettings(window_px=9))
+    found = match_gradient(pair, (0.0, 63.0), GradientSettings(window_px=9)).left
     is_known = (truth > 0.0) & np.isfinite(found.disparity_px)
     assert is_known.sum() > 0.8 * (truth > 0.0).sum()
     assert (np.abs(found.disparity_px - truth)[is_known] > 1.0).mean() < 0.12
