@@ -44,7 +44,11 @@ def add_parser(subparsers: Any) -> None:
         default="production",
         help="gradient is the paper's baseline",
     )
-    parser.add_argument("--fill", choices=("none", "wls"), default="wls", help="of occlusions")
+    parser.add_argument(
+        "--fill",
+        choices=("none", "wls"),
+        help="of occlusions (wls; with --matcher gradient none: with wls it is the proposal's)",
+    )
     parser.add_argument(
         "--smooth",
         choices=("none", "gaussian", "wls"),
@@ -124,7 +128,8 @@ def _match(pair: StereoPair, options: argparse.Namespace) -> "StereoAnswer":
         match_surface,
     )
 
-    fills = options.fill == "wls"
+    is_baseline = options.matcher == "gradient"
+    fills = options.fill == "wls" or (options.fill is None and not is_baseline)
     if options.model:
         return match_on_support(
             pair.rectified,
@@ -134,7 +139,7 @@ def _match(pair: StereoPair, options: argparse.Namespace) -> "StereoAnswer":
         )
     band = find_band(pair, options)
     try:
-        if options.matcher == "gradient":
+        if is_baseline:
             return match_baseline(pair.rectified, band, fills=fills)
         if options.rig is None:
             return match_scene(pair.rectified, band, fills=fills)

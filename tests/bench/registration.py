@@ -1,7 +1,7 @@
 """Registration of bones in clutter: success, error and time, beside Open3D and small_gicp.
 
 usage: python -m tests.bench.registration [FOLDER] [--seeds N] [--vertices N] [--from DEG MM]
-                                           [--no-peers] [--lists]
+                                           [--no-peers] [--only NAME] [--lists]
        python -m tests.bench.registration [FOLDER] --speed
 
 Every method is given the same clouds and the same start; a peer's row is its best setting. With
@@ -113,17 +113,12 @@ def main() -> None:
     for turn, shift in [options.start] if options.start else _STARTS:
         print(f"from {turn:g} deg / {shift:g} mm")
         for name, method in _own().items():
-            if name in _SLOW and options.seeds > 10:
-                _print(name, _run(bones, method, turn, shift, 10))
-            else:
+            if options.only in name:
                 _print(name, _run(bones, method, turn, shift, options.seeds))
         for family, settings in families.items():
             _best(family, settings, bones, turn, shift, options.seeds)
             if options.lists and turn >= 25.0:
                 _lists(family, settings, bones, turn, shift, options.seeds)
-
-
-_SLOW = ("bimcc-literal", "icp")
 
 
 def _options() -> argparse.Namespace:
@@ -136,6 +131,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--from", dest="start", type=float, nargs=2, metavar=("DEG", "MM"), help="this start only"
     )
+    parser.add_argument("--only", default="", help="of navapp's methods those with this name")
     parser.add_argument("--speed", action="store_true", help="time only")
     parser.add_argument("--no-peers", action="store_true")
     parser.add_argument(

@@ -125,6 +125,22 @@ def test_a_rectified_pair_needs_no_rig(small, tmp_path: Path) -> None:
     assert np.nanmedian(inner) == pytest.approx(7.0, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("words", "is_filled"),
+    [
+        ([], True), (["--fill", "none"], False), (["--matcher", "gradient"], False),
+        (["--matcher", "gradient", "--fill", "wls"], True),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_occlusions_are_filled_but_for_the_baseline(words, is_filled, small, tmp_path) -> None:
+    said = tmp_path / "said.json"
+    options = ["--quiet", "stereo", *small, "--disparities", "16", *words, "--json", str(said)]
+    assert run(options) == 0
+    found = json.loads(said.read_text(encoding="utf-8"))
+    assert (found["filled_border"] + found["filled_interior"] > 0) is is_filled
+
+
 @pytest.mark.parametrize("matcher", ["gradient", "production"])
 def test_black_pictures_give_nothing_and_say_so(matcher: str, tmp_path: Path, capsys) -> None:
     black = str(tmp_path / "b.png")
