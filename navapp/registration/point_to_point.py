@@ -82,6 +82,14 @@ def solve_sums(sums: PairSums, frames: RigidTransform) -> RigidTransform:
     return RigidTransform.from_parts(frames.target, frames.source, rotation, a0 - rotation @ b0)
 
 
+def prolong_step(
+    pose: RigidTransform, solved: RigidTransform, centre_mm: FloatArray
+) -> RigidTransform:
+    """A little beyond the solved pose, seen from the pose before, about a point of the bone."""
+    twist = pose.twist_to(solved, centre_mm)
+    return pose.move(_RELAXATION * twist, pose.apply(centre_mm))
+
+
 class _Pairing(NamedTuple):
     """What pairs, and which part of it."""
 
@@ -90,14 +98,6 @@ class _Pairing(NamedTuple):
     # every n-th scene point pairs forward, every n-th model point backward; 0: none.
     forward: int
     backward: int
-
-
-def prolong_step(
-    pose: RigidTransform, solved: RigidTransform, centre_mm: FloatArray
-) -> RigidTransform:
-    """A little beyond the solved pose, seen from the pose before, about a point of the bone."""
-    twist = pose.twist_to(solved, centre_mm)
-    return pose.move(_RELAXATION * twist, pose.apply(centre_mm))
 
 
 def _iterate(

@@ -123,7 +123,8 @@ class IcpTracker(Tracker):
         found = solve_icp(measured.scene, self.model, start, self.n_points).estimate
         pose = self._contour.refine(frame.pair, found.camera_from_bone, measured.disparity)
         refined = estimate_at(measured.scene, self.model, pose)
-        return replace(refined, iterations=found.iterations, reasons=found.reasons)
+        reasons = tuple(dict.fromkeys((*found.reasons, *refined.reasons)))
+        return replace(refined, iterations=found.iterations, reasons=reasons)
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """The one fit around the start."""
