@@ -186,7 +186,8 @@ def test_any_place_and_orientation_of_the_world_gives_the_same_pose(solve) -> No
     here = solve(Scene(scene), BLOB, start).estimate
     there = solve(Scene(world.apply(scene)), BLOB, world @ start).estimate
     back = world.inverse() @ there.camera_from_bone
-    assert apart_mm(here.camera_from_bone, back) < 1e-3
+    # A step of 2e-3 mm counts as standing still, and a turned grid may change a partner.
+    assert apart_mm(here.camera_from_bone, back) < 2e-3
 
 
 @pytest.mark.parametrize("solve", [solve_icp, solve_bimcc_literal])

@@ -100,8 +100,8 @@ def test_the_papers_proposal_finds_what_its_state_of_the_art_does_not() -> None:
         (found,) = made.register(frame.left, frame.right, Prior({"femur": start}), GOAL)
         errors.append(a.error_mm(found.left_from_bone, frame))
         assert found.verdict.status is not Status.OK
-    assert errors[0] < 1.5
-    assert errors[1] > 2.0 * errors[0]
+    assert errors[0] < 2.5
+    assert errors[1] > 5.0 * errors[0]
 
 
 def test_a_refused_pose_is_followed_when_that_is_asked_for() -> None:
