@@ -6,10 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.mesh_edges import open_border
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn
-from navapp.geometry.transform import FloatArray
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, find_vertices
 from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.values import BoneModel
@@ -57,6 +60,14 @@ class RegistrationModel:
         mesh = self.rendered_mesh
         has_border = open_border(len(mesh.vertices_mm), mesh.faces).any()
         return not has_border and mesh.volume_mm3() > 0.0
+
+    def render(
+        self, camera_from_bone: RigidTransform, geometry: RectifiedGeometry, box: Box
+    ) -> RenderedView:
+        """The bone at a pose in the rectified left camera, in a box of its picture."""
+        return render_rectified(
+            self.rendered_mesh, camera_from_bone, geometry, box, is_closed=self.is_closed
+        )
 
     @cached_property
     def rendered_face_sigma_mm(self) -> FloatArray:

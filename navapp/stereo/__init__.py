@@ -8,7 +8,7 @@ from navapp.stereo.chains import (
     match_surface,
     smoothed,
 )
-from navapp.stereo.coarse import are_swapped, match_coarsely
+from navapp.stereo.coarse import CoarseMap, are_swapped, match_coarsely
 from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
 from navapp.stereo.subpixel.refine import (
     MODEL_REFINEMENT,
@@ -17,14 +17,17 @@ from navapp.stereo.subpixel.refine import (
     refine_on_model,
     refine_samples,
 )
+from navapp.stereo.surroundings import fill_surroundings
 
 __all__ = [
     "MODEL_REFINEMENT",
+    "CoarseMap",
     "PictureHealth",
     "RefineSettings",
     "StereoAnswer",
     "StereoHealth",
     "are_swapped",
+    "fill_surroundings",
     "match_baseline",
     "match_coarsely",
     "match_on_support",

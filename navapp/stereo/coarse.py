@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.geometry.masks import where
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.stereo.matching.census_sgm import CensusSettings, match_census
+from navapp.stereo.matching.census_sgm import CensusSettings, TwoViewDisparity, match_census
 from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 
 T = TypeVar("T", bound=np.generic)
@@ -24,7 +24,7 @@ T = TypeVar("T", bound=np.generic)
 # round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
 LEAST_AGREEMENT, _MOST_AGREE = 0.15, 0.5
 # At half resolution a larger window holds two sides of a crest or a rim.
-_SURFACE_CENSUS = CensusSettings(radius_x=3, radius_y=2, p1=5, p2=30)
+SURFACE_CENSUS = CensusSettings(radius_x=3, radius_y=2, p1=5, p2=30)
 # So few are soon matched as they are; at half resolution too little of the picture is left.
 _FEW_CELLS = 3_000_000
 _COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.5, 0.75, 0.4))
@@ -69,14 +69,14 @@ def _is_wide(pair: RectifiedPair, band_px: tuple[float, float]) -> bool:
 
 
 def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
-    found = match_census(pair, band_px, _SURFACE_CENSUS)
+    found = match_census(pair, band_px, SURFACE_CENSUS)
     evidence = Evidence(found.right_px, found.right_x0, found.confidence)
     return CoarseSurface(smooth_steps(found.left.disparity_px), evidence, found.agreement)
 
 
 def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
     low, high = band_px
-    found = match_census(halve(pair, band_px), (low / 2.0, high / 2.0), _SURFACE_CENSUS)
+    found = match_census(halve(pair, band_px), (low / 2.0, high / 2.0), SURFACE_CENSUS)
     surface_px = double_disparity(smooth_steps(found.left.disparity_px), pair.box)
     right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
     right_px = np.float32(2.0) * double(found.right_px, right)
@@ -84,26 +84,55 @@ def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> Coarse
     return CoarseSurface(surface_px, evidence, found.agreement)
 
 
-def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> NDArray[np.float32]:
-    """What lies where, to about a pixel: for what hides a surface, not for measuring it.
+@dataclass(frozen=True, slots=True, eq=False)
+class CoarseMatch:
+    """The matches behind a coarse map, at the resolution they were made in."""
+
+    pair: RectifiedPair  # whole or halved
+    found: TwoViewDisparity
+    # band_px, nearest_px: disparities that were searched, and of what may stand before them.
+    band_px: tuple[float, float]
+    nearest_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoarseMap:
+    """What lies where in a box, to about a pixel: to tell what hides a surface, not to measure."""
+
+    disparity_px: NDArray[np.float32]  # (h, w) over the box, calm, NaN where unknown
+    box: Box  # of the rectified left view
+    matched: CoarseMatch | None = None  # what it was made of; None when the pictures disagree
+
+    def over(self, box: Box) -> NDArray[np.float32] | None:
+        """(h, w) of a box inside this one; None when it reaches beyond."""
+        row, column = box.y - self.box.y, box.x - self.box.x
+        part = self.disparity_px[max(row, 0) :, max(column, 0) :][: box.height, : box.width]
+        return part if min(row, column) >= 0 and part.shape == (box.height, box.width) else None
+
+
+def match_coarsely(
+    pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float | None = None
+) -> CoarseMap:
+    """What lies where, to about a pixel; all is unknown when the pictures hardly agree.
 
     Args:
         pair: rectified grey pictures; the part of `pair.box` inside them is matched.
         band_px: smallest and largest disparity expected.
-
-    Returns:
-        (h, w) disparity over the part of `pair.box` inside the pictures, NaN where unknown; all
-        unknown when the pictures hardly agree.
+        nearest_px: disparity of the nearest thing that may stand before the band.
     """
     pair = clip_box(pair)
+    nearest_px = max(nearest_px or 0.0, band_px[1])
     is_half = _is_wide(pair, band_px)
-    small = halve(pair, band_px) if is_half else pair
-    band_px = (band_px[0] / 2.0, band_px[1] / 2.0) if is_half else band_px
-    found = match_census(small, band_px, _SURFACE_CENSUS)
+    small = halve(pair, (band_px[0], nearest_px)) if is_half else pair
+    if is_half:
+        band_px, nearest_px = (band_px[0] / 2.0, band_px[1] / 2.0), nearest_px / 2.0
+    found = match_census(small, band_px, SURFACE_CENSUS)
     if not found.agreement >= LEAST_AGREEMENT:
-        return np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
+        unknown = np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
+        return CoarseMap(unknown, pair.box)
     surface_px = calm(found.left.disparity_px)
-    return double_disparity(surface_px, pair.box) if is_half else surface_px
+    surface_px = double_disparity(surface_px, pair.box) if is_half else surface_px
+    return CoarseMap(surface_px, pair.box, CoarseMatch(small, found, band_px, nearest_px))
 
 
 def are_swapped(

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.masks import mark_large
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import RenderedView, render_rectified
+from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
 from navapp.registration.verdict import Agreement
 from navapp.tracking.agreement_kernels import (
@@ -74,20 +73,6 @@ def compare(
         n_agreeing / n_open if n_open else 0.0,
         _spread_ratio(deviation[sparse][is_asked], sigma[sparse][is_asked]),
     )
-
-
-def compare_at(
-    pose: RigidTransform,
-    model: RegistrationModel,
-    measured: DisparityMap,
-    geometry: RectifiedGeometry,
-    coarse_px: NDArray[np.float32] | None = None,
-) -> Agreement:
-    """As `compare`, of the model rendered at a pose (rectified left camera from bone)."""
-    view = render_rectified(
-        model.rendered_mesh, pose, geometry, measured.box, is_closed=model.is_closed
-    )
-    return compare(view, model, measured, geometry, coarse_px)
 
 
 def _spread_ratio(deviation_px: NDArray[np.float32], sigma_px: NDArray[np.float32]) -> float:

@@ -10,9 +10,9 @@ from navapp.geometry.bands import Job, begin_on_helper
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Agreement
-from navapp.stereo import StereoHealth, measure_health
+from navapp.stereo import CoarseMap, StereoHealth, measure_health
 from navapp.tracking.agreement import compare
-from navapp.tracking.surface_meter import CoarseMap, Measurement, SurfaceMeter
+from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 
 
 class PairCheck(NamedTuple):
@@ -20,8 +20,9 @@ class PairCheck(NamedTuple):
 
     health: StereoHealth  # of its pair of pictures
     agreement: Agreement | None  # of the model where it was matched; None of a free measurement
-    # (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
-    coarse_px: NDArray[np.float32] | None
+    # whatever lies in its box, and perhaps around it; None out of view or depth.
+    coarse: CoarseMap | None
+    coarse_px: NDArray[np.float32] | None  # (h, w) of its box
 
 
 class PairChecks:
@@ -80,4 +81,4 @@ def _run_check(
     agreement = (
         None if view is None else compare(view, meter.model, found, meter.geometry, coarse_px)
     )
-    return PairCheck(health, agreement, coarse_px)
+    return PairCheck(health, agreement, coarse, coarse_px)

@@ -8,7 +8,6 @@ import numpy as np
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import render_rectified
 from navapp.registration import RegistrationModel
 from navapp.tracking.outline import OutlineMeter
 from navapp.values import DisparityMap
@@ -41,9 +40,7 @@ class ContourRefiner:
         model = self._model
         arm = np.repeat((1.0, _ARM_MM), 3)
         for _ in range(_ROUNDS):
-            view = render_rectified(
-                model.rendered_mesh, pose, pair.geometry, measured.box, is_closed=model.is_closed
-            )
+            view = model.render(pose, pair.geometry, measured.box)
             block = self._outline.block(pair, pose, view, measured)
             if len(block.residual) < _FEWEST:
                 break

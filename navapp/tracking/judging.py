@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.verdict import (
     OK_ERROR_MM,
     UNUSABLE_FRACTION,
@@ -17,9 +20,10 @@ from navapp.registration.verdict import (
     decide,
 )
 from navapp.stereo import StereoHealth
-from navapp.tracking.agreement import compare_at
-from navapp.tracking.checks import PairChecks
+from navapp.tracking.agreement import compare
+from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.following import RestSettings
+from navapp.tracking.foreground import fill_in_time, find_foreground
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
@@ -74,30 +78,53 @@ class PoseJudge:
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, frame.watch)
-        model, geometry = self._meter.model, self._meter.geometry
-        depth_mm = float(fit.pose.apply(model.centre_mm)[2])
+        model = self._meter.model
         checks = checks or PairChecks(self._meter, frame.pair)
-        health, agreement, coarse_px = checks.check(fit.measured, fit.pose).result()
+        check = checks.check(fit.measured, fit.pose).result()
+        depth_mm = float(fit.pose.apply(model.centre_mm)[2])
+        with begin_on_helper(partial(fill_in_time, check.coarse)) as filling:
+            fit, view, agreement = self._settle(frame, fit, check)
+            evidence = self._evidence_of_pair(check.health, depth_mm)
+            evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
+            verdict = decide(evidence)
+        surroundings, fill_ms = filling.result()
+        is_told = verdict.predicted_tre_mm is not None or self._tells_refused
+        foreground = None
+        if is_told and surroundings is not None and view is not None:
+            disparity = fit.measured.disparity
+            surroundings = surroundings.overlay(disparity)
+            foreground = find_foreground(surroundings, view, self._meter.geometry)
+        frame.watch.add_fill_beside(fill_ms)
+        frame.watch.lap("judge")
+        estimate = self._unrectify(fit.estimate) if is_told else None
+        rows = _check_rows(check.health, evidence, verdict)
+        return TrackedFrame(
+            model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
+        )
+
+    def _settle(
+        self, frame: Frame, fit: Fit, check: PairCheck
+    ) -> tuple[Fit, RenderedView | None, Agreement | None]:
+        """The fit joined with the outline, the model seen there, and how far it agrees.
+
+        The check has compared a fit on the model where it was matched. Free fits, and those that
+        the outline moved, are compared at their pose.
+        """
+        model, measured, agreement = self._meter.model, fit.measured, check.agreement
+        view = measured.rendered
         if agreement is not None:
             # For a bone in the open, noise is taken as large as correct poses show at most. For a
             # hidden one it is taken as claimed: something flush with the bone may fit as well.
             noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
-            joined = self._outline.join(frame.pair, fit, coarse_px, noise_variance_ratio)
+            joined = self._outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
-        # The check has compared a fit on the model where it was matched. Free fits, and those that
-        # the outline moved, are compared at their pose.
         if agreement is None and fit.estimate.has_finite_covariance:
-            agreement = compare_at(fit.pose, model, fit.measured.disparity, geometry, coarse_px)
-        evidence = self._evidence_of_pair(health, depth_mm)
-        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
-        verdict = decide(evidence)
-        frame.watch.lap("judge")
-        is_told = verdict.predicted_tre_mm is not None or self._tells_refused
-        estimate = self._unrectify(fit.estimate) if is_told else None
-        rows = _check_rows(health, evidence, verdict)
-        return TrackedFrame(model.bone.name, estimate, verdict, frame.watch.timings, rows)
+            geometry, disparity = self._meter.geometry, measured.disparity
+            view = model.render(fit.pose, geometry, disparity.box)
+            agreement = compare(view, model, disparity, geometry, check.coarse_px)
+        return fit, view, agreement
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
         """The answer when there is no fit to judge."""

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import ScoredPose, find_poses, rank_fits
-from navapp.registration.verdict import is_bone_absent
-from navapp.tracking.agreement import compare_at
+from navapp.registration.verdict import Agreement, is_bone_absent
+from navapp.tracking.agreement import compare
 from navapp.tracking.frame import Fit, ignore
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 
@@ -22,14 +22,12 @@ class FitScorer:
 
     def explain(self, pose: RigidTransform, measured: Measurement) -> float:
         """How much of the model, at a pose in the rectified left camera, a measurement explains."""
-        model, geometry = self._meter.model, self._meter.geometry
-        found = compare_at(pose, model, measured.disparity, geometry)
+        found = self._compare(pose, measured)
         return found.coverage * found.inlier_fraction
 
     def is_there(self, fit: Fit) -> bool:
         """Whether so much of the model agrees with what it was fitted to that it may be there."""
-        model, geometry = self._meter.model, self._meter.geometry
-        return not is_bone_absent(compare_at(fit.pose, model, fit.measured.disparity, geometry))
+        return not is_bone_absent(self._compare(fit.pose, fit.measured))
 
     def rank(self, fits: list[Fit]) -> list[Fit]:
         """Fits, best first; the best one says so when it is ambiguous (`rank_fits`)."""
@@ -49,3 +47,8 @@ class FitScorer:
             lambda pose: self.explain(pose, measured),
             on_progress,
         )
+
+    def _compare(self, pose: RigidTransform, measured: Measurement) -> Agreement:
+        model, geometry = self._meter.model, self._meter.geometry
+        view = model.render(pose, geometry, measured.disparity.box)
+        return compare(view, model, measured.disparity, geometry)

@@ -15,10 +15,11 @@ from navapp.geometry.masks import large_regions
 from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
+from navapp.geometry.zbuffer import RenderedView, bounds_of
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     MODEL_REFINEMENT,
+    CoarseMap,
     match_coarsely,
     match_surface,
     refine_on_model,
@@ -87,20 +88,6 @@ class Expected:
     view: RenderedView  # the model in that box
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CoarseMap:
-    """What lies where, to about a pixel."""
-
-    disparity_px: NDArray[np.float32]  # (h, w) over the box, NaN where unknown
-    box: Box  # of the rectified left view
-
-    def over(self, box: Box) -> NDArray[np.float32] | None:
-        """(h, w) of a box inside this one; None when it reaches beyond."""
-        row, column = box.y - self.box.y, box.x - self.box.x
-        part = self.disparity_px[max(row, 0) :, max(column, 0) :][: box.height, : box.width]
-        return part if min(row, column) >= 0 and part.shape == (box.height, box.width) else None
-
-
 class SurfaceMeter:
     """Measures the surface of one bone under one rig.
 
@@ -121,6 +108,7 @@ class SurfaceMeter:
         self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
         self.rectifier = Rectifier(rig)
         self.geometry = self.rectifier.geometry
+        self._nearest_px = self.geometry.disparity_px(depth_mm[0])
         # Several steps ask for the same few poses. No method: it would keep the meter alive.
         bounds = partial(bounds_of, model.hull_mm, geometry=self.geometry)
         self._bounds = lru_cache(_KEPT_BOUNDS)(bounds)
@@ -130,6 +118,9 @@ class SurfaceMeter:
     ) -> RectifiedPair:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         box, band_px = self.find_region(around, margins) or (None, None)
+        if band_px is not None:
+            # What stands before the band is looked for too.
+            band_px = band_px[0], max(band_px[1], self._nearest_px)
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
 
     def rectify_surroundings(
@@ -189,8 +180,7 @@ class SurfaceMeter:
         region = self.find_region(pose, _AROUND)
         if region is None:
             return None
-        around = box or region[0]
-        return CoarseMap(match_coarsely(replace(pair, box=around), region[1]), around)
+        return match_coarsely(replace(pair, box=box or region[0]), region[1], self._nearest_px)
 
     def render(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
@@ -199,10 +189,7 @@ class SurfaceMeter:
         region = self.find_region(pose, margins)
         if region is None:
             return None
-        model = self.model
-        view = render_rectified(
-            model.rendered_mesh, pose, self.geometry, region[0], is_closed=model.is_closed
-        )
+        view = self.model.render(pose, self.geometry, region[0])
         support_px = self.geometry.disparity_map_px(view.depth_mm)
         return Expected(replace(pair, box=region[0]), support_px, view)
 

@@ -26,7 +26,7 @@ from navapp.values.contents import (
     StageContent,
     SurgicalContent,
 )
-from navapp.values.measured import DisparityMap, Origin, RowCheck, SurfaceCloud
+from navapp.values.measured import DisparityMap, Foreground, Origin, RowCheck, SurfaceCloud
 from navapp.values.pictures import OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
 from navapp.values.timings import FrameTimings, Stopwatch
@@ -50,6 +50,7 @@ __all__ = [
     "DisparityMap",
     "DrillAxis",
     "FollowedBone",
+    "Foreground",
     "FrameTimings",
     "Landmark",
     "Origin",

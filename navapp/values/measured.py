@@ -81,6 +81,20 @@ class DisparityMap:
         )  # fmt: skip
         return SurfaceCloud(points_mm, sigma_ray_mm, pixels, origin, stride_px)
 
+    def overlay(self, other: "DisparityMap") -> "DisparityMap":
+        """This map with what another one has matched, where they overlap."""
+        x, y = other.x - self.x, other.y - self.y
+        height, width = self.origin.shape
+        inside = Box(x, y, other.box.width, other.box.height).clip(width, height)
+        there = Box(inside.x - x, inside.y - y, inside.width, inside.height).slices
+        is_matched = other.origin[there] == Origin.MATCHED
+        disparity_px, sigma_px = self.disparity_px.copy(), self.sigma_px.copy()
+        origin = self.origin.copy()
+        np.copyto(disparity_px[inside.slices], other.disparity_px[there], where=is_matched)
+        np.copyto(sigma_px[inside.slices], other.sigma_px[there], where=is_matched)
+        origin[inside.slices][is_matched] = Origin.MATCHED
+        return DisparityMap(disparity_px, sigma_px, origin, self.x, self.y)
+
     def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
         """The map, unknown beside a mask (h, w)."""
         # What is compiled is not loaded by those who only read values.
@@ -98,6 +112,15 @@ class RowCheck:
 
     offset_px: float  # how much lower the right picture shows what the left one shows
     is_off: bool  # surely, and by more than may be wrong
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Foreground:
+    """What lies around a bone, and which of it stands in front of the bone's surface."""
+
+    # over a box around the bone. Where `origin` is not MATCHED, the disparity is a guess.
+    surroundings: DisparityMap
+    is_in_front: NDArray[np.bool_]  # (h, w) over the same box; nothing is where the bone is not
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,10 +17,11 @@ class FrameTimings:
     estimate_ms: float = 0.0
     judge_ms: float = 0.0
     overlay_ms: float = 0.0
+    fill_beside_ms: float = 0.0  # of a fill on the helper, beside the other parts
 
     @property
     def total_ms(self) -> float:
-        """Sum."""
+        """Sum of what was done in turn."""
         measured_ms = self.rectify_ms + self.stereo_ms + self.fill_ms
         return measured_ms + self.estimate_ms + self.judge_ms + self.overlay_ms
 
@@ -48,6 +49,11 @@ class Stopwatch:
             if part_ms:
                 self._parts_ms[name] = self._parts_ms.get(name, 0.0) + part_ms
         self._lap_began_ns = time.perf_counter_ns()
+
+    def add_fill_beside(self, fill_ms: float) -> None:
+        """What the helper took for a fill; the lap goes on."""
+        name = "fill_beside_ms"
+        self._parts_ms[name] = self._parts_ms.get(name, 0.0) + fill_ms
 
     @property
     def timings(self) -> FrameTimings:

@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.values.measured import RowCheck
+from navapp.values.measured import Foreground, RowCheck
 from navapp.values.timings import FrameTimings
 
 
@@ -208,6 +208,7 @@ class TrackedFrame:
     verdict: Verdict  # of the judge
     timings: FrameTimings  # of the tracker's steps
     rows: RowCheck | None = None  # what the pair says of the rig itself; None when it says nothing
+    foreground: Foreground | None = None  # at the pose; None without one
 
     @property
     def left_from_bone(self) -> RigidTransform | None:

@@ -8,9 +8,10 @@ import pytest
 from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import render_rectified
+from navapp.stereo import CoarseMap
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairChecks
-from navapp.tracking.surface_meter import CoarseMap, Measurement
+from navapp.tracking.surface_meter import Measurement
 from navapp.values import DisparityMap, SurfaceCloud
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
 from tests.tracking.rooms import blank_pair, measured_map

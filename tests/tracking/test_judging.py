@@ -10,7 +10,7 @@ from navapp.geometry.rig import RigQuality
 from navapp.registration import RegistrationModel, estimate_at, fit_bimcc
 from navapp.registration.verdict import OK_ERROR_MM
 from navapp.tracking import Goal
-from navapp.tracking.agreement import compare_at
+from navapp.tracking.agreement import compare
 from navapp.tracking.frame import FREE_SETTINGS
 from navapp.tracking.judging import PoseJudge
 from navapp.values import (
@@ -111,7 +111,7 @@ def test_a_large_occluder_leaves_too_little_of_the_bone() -> None:
 
 def test_filled_pixels_do_not_count_as_seen() -> None:
     filled = replace(MAP, origin=np.where(MAP.origin == 1, Origin.FILLED_INTERIOR, 0))
-    found = compare_at(TRUE, MODEL, filled, GEOMETRY)
+    found = compare(MODEL.render(TRUE, GEOMETRY, MAP.box), MODEL, filled, GEOMETRY)
     assert found.coverage == 0.0
 
 
@@ -319,5 +319,6 @@ def test_parts_that_were_cut_away_are_not_expected() -> None:
     kept = ~removed[BONE.mesh.faces].any(axis=1)
     rest = replace(BONE, mesh=replace(BONE.mesh, faces=BONE.mesh.faces[kept]))
     model = RegistrationModel(replace(BONE, is_removed=removed))
-    found = compare_at(TRUE, model, measured_map(rest), GEOMETRY)
+    seen = measured_map(rest)
+    found = compare(model.render(TRUE, GEOMETRY, seen.box), model, seen, GEOMETRY)
     assert found.coverage > 0.85

@@ -7,7 +7,7 @@ import pytest
 
 from navapp.registration import estimate_at
 from navapp.tracking import Goal, TrackState
-from navapp.tracking.agreement import compare_at
+from navapp.tracking.agreement import compare
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame
@@ -87,9 +87,9 @@ def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it
     check = as_matched.check(fit.measured, fit.pose).result()
     free = replace(fit, measured=replace(fit.measured, rendered=None))
     answer = judge.judge(frame, free, GOAL, checks=Told(check._replace(agreement=None)))
-    there = compare_at(
-        fit.pose, a.tracker.model, fit.measured.disparity, a.tracker.meter.geometry, check.coarse_px
-    )
+    disparity, geometry = fit.measured.disparity, a.tracker.meter.geometry
+    view = a.tracker.model.render(fit.pose, geometry, disparity.box)
+    there = compare(view, a.tracker.model, disparity, geometry, check.coarse_px)
     assert answer.verdict.coverage == there.coverage != 0.77
 
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from navapp.geometry.box import Box
-from navapp.tracking.surface_meter import CoarseMap, remove_gap_rims
+from navapp.tracking.surface_meter import remove_gap_rims
 from navapp.values import DisparityMap
 
 SHAPE = (80, 120)
@@ -50,12 +49,3 @@ def test_where_too_little_would_be_left_all_of_it_is_trusted() -> None:
     stripes[:, 3:] = np.arange(3, SHAPE[1]) % 8 > 0
     found = found_beside(stripes)
     np.testing.assert_array_equal(remove_gap_rims(found, EVERYWHERE).origin, found.origin)
-
-
-def test_a_coarse_map_tells_of_a_box_inside_it() -> None:
-    values = np.arange(48, dtype=np.float32).reshape(6, 8)
-    coarse = CoarseMap(values, Box(10, 20, 8, 6))
-    np.testing.assert_array_equal(coarse.over(Box(11, 22, 3, 4)), values[2:6, 1:4])
-    np.testing.assert_array_equal(coarse.over(coarse.box), values)
-    for beyond in (Box(9, 22, 3, 4), Box(11, 19, 3, 4), Box(16, 22, 3, 4), Box(11, 23, 3, 4)):
-        assert coarse.over(beyond) is None

@@ -1,0 +1,67 @@
+"""Guesses that contradict why they are guesses."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from navapp.stereo.occlusion.impossible_kernels import mark_impossible
+from navapp.values import Origin
+from tests.reference.impossible_reference import mark_impossible_slowly
+
+EDGE, LAYER = np.float32(2.0), np.float32(8.0)
+MATCHED, INTERIOR = Origin.MATCHED, Origin.FILLED_INTERIOR
+
+
+def marked(disparity, origin) -> np.ndarray:
+    disparity = np.atleast_2d(np.array(disparity, dtype=np.float32))
+    origin = np.atleast_2d(np.array(origin, dtype=np.uint8))
+    out = np.ones(origin.shape, dtype=np.bool_)
+    mark_impossible(disparity, origin, EDGE, LAYER, out)
+    return out
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(max_examples=60, deadline=None)
+def test_it_is_the_rule(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = int(rng.integers(0, 5)), int(rng.integers(0, 40))
+    origin = rng.integers(0, 5, shape).astype(np.uint8)
+    # Quarters: no sum is rounded.
+    disparity = (rng.integers(0, 160, shape) / 4.0).astype(np.float32)
+    disparity[origin == Origin.UNKNOWN] = np.nan
+    found = np.ones(shape, dtype=np.bool_)
+    mark_impossible(disparity, origin, EDGE, LAYER, found)
+    np.testing.assert_array_equal(found, mark_impossible_slowly(disparity, origin, EDGE, LAYER))
+
+
+def test_what_hides_a_pixel_bounds_how_near_it_is() -> None:
+    """Left of a hand at 60 px an instrument at 48 px may go on for 12 - 2 px less, no further."""
+    width = 40
+    disparity, origin = np.full(width, 48.0), np.full(width, INTERIOR)
+    origin[0], origin[-1], disparity[-1] = MATCHED, MATCHED, 60.0
+    room_px = np.arange(width)[::-1]
+    expected = (60.0 - room_px + EDGE < 48.0) & (origin == INTERIOR)
+    np.testing.assert_array_equal(marked(disparity, origin)[0], expected)
+    assert expected.sum() == 24
+
+
+def test_a_hole_in_one_surface_stays_closed() -> None:
+    disparity, origin = np.full(30, 60.0), np.full(30, INTERIOR)
+    origin[[0, -1]] = MATCHED
+    assert not marked(disparity, origin).any()
+    disparity[0] = 51.0  # another surface on the left
+    assert marked(disparity, origin).any()
+
+
+@pytest.mark.parametrize("kind", [MATCHED, Origin.FILLED_BORDER, Origin.UNKNOWN])
+def test_only_what_may_be_hidden_is_asked(kind: Origin) -> None:
+    disparity, origin = np.full(30, 60.0), np.full(30, kind)
+    origin[-1], disparity[-1] = MATCHED, 10.0
+    assert not marked(disparity, origin).any()
+
+
+def test_background_is_always_possible() -> None:
+    disparity, origin = np.full(30, 20.0), np.full(30, INTERIOR)
+    origin[[0, -1]], disparity[-1] = MATCHED, 60.0
+    assert not marked(disparity, origin).any()

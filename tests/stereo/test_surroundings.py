@@ -1,0 +1,134 @@
+"""A dense map around a surface: what is matched, what is a guess, what stands before the band."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from navapp.geometry.box import Box
+from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo import fill_surroundings, match_coarsely, surroundings
+from navapp.stereo.coarse import CoarseMap
+from navapp.values import DisparityMap, Origin
+from tests.stereo.pairs import shifted_pair
+from tests.stereo.test_chains import (
+    EVERY_RESOLUTION,
+    FULL,
+    HALF,
+    INSIDE,
+    IS_HIDDEN,
+    IS_NEAR,
+    TRUTH,
+    WALL,
+    X,
+    edge_distance_px,
+    part,
+    scene,
+    swapped,
+)
+
+# A rectangle so near stands before bands that hold the wall alone, at either resolution.
+HAND_PX = 64
+WALL_ALONE = pytest.mark.parametrize("band_px", [(20.0, 46.0), (10.0, 48.0)])
+
+
+@lru_cache
+def hand_before_wall(box: Box = INSIDE) -> RectifiedPair:
+    wall = shifted_pair(WALL, box, 0)
+    hand = shifted_pair(np.full(X.shape, float(HAND_PX)), box, 1)
+    left = np.where(IS_NEAR, hand.left, wall.left)
+    right = np.where(np.roll(IS_NEAR, -HAND_PX, axis=1), hand.right, wall.right)
+    return replace(wall, left=left, right=right)
+
+
+def fill(
+    pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
+) -> DisparityMap:
+    return fill_surroundings(match_coarsely(pair, band_px, nearest_px))
+
+
+def is_clear(distance_px: float = 8.0) -> np.ndarray:
+    """(h, w) of the box away from edges, where the wall is in both pictures."""
+    return part((edge_distance_px() > distance_px) & (X - WALL > 12.0), INSIDE)
+
+
+@EVERY_RESOLUTION
+def test_matches_stay_and_gaps_become_guesses_with_their_class(
+    band_px: tuple[float, float],
+) -> None:
+    found, clear = fill(scene(INSIDE), band_px), is_clear()
+    assert found.box == INSIDE
+    error = np.abs(found.disparity_px - part(TRUTH, INSIDE))
+    assert np.nanpercentile(error[clear & ~part(IS_HIDDEN, INSIDE)], 98) < 1.0
+    hidden = is_clear(4.0) & part(IS_HIDDEN, INSIDE)
+    assert (found.origin[hidden] == Origin.FILLED_INTERIOR).mean() > 0.9
+    # From the left, as the wall goes on.
+    assert np.percentile(error[hidden], 90) < 2.0
+    assert (found.origin[clear & ~hidden] == Origin.MATCHED).mean() > 0.95
+    assert np.array_equal(np.isnan(found.disparity_px), found.origin == Origin.UNKNOWN)
+
+
+@WALL_ALONE
+def test_what_stands_before_the_band_is_found(band_px: tuple[float, float]) -> None:
+    near = part(IS_NEAR, INSIDE) & is_clear(12.0)
+    without, found = (fill(hand_before_wall(), band_px, nearest) for nearest in (0.0, 80.0))
+    assert not (np.abs(without.disparity_px[near] - HAND_PX) < 2.0).any()
+    assert (np.abs(found.disparity_px[near] - HAND_PX) < 2.0).mean() > 0.97
+    assert (found.origin[near] == Origin.MATCHED).mean() > 0.9
+    # Left of it the wall is hidden, and above and below it the wall is what it was.
+    wall = is_clear(24.0) & ~part(IS_NEAR, INSIDE) & (part(X, INSIDE) > 260)
+    assert np.nanpercentile(np.abs(found.disparity_px - part(WALL, INSIDE))[wall], 98) < 1.0
+
+
+@WALL_ALONE
+def test_without_a_wide_gap_nothing_nearer_is_looked_for(
+    band_px: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def spy(matched):
+        asked.append(matched)
+        return matched.found
+
+    monkeypatch.setattr(surroundings, "_add_nearer", spy)
+    for box, n_asked in ((Box(344, 9, 110, 220), 0), (INSIDE, 1)):
+        fill(replace(hand_before_wall(), box=box), band_px, 80.0)
+        assert len(asked) == n_asked
+
+
+def test_guesses_that_cannot_be_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    def mark_all_guesses(disparity, origin, edge_px, layer_px, is_impossible) -> None:
+        is_impossible[...] = origin > Origin.MATCHED
+
+    monkeypatch.setattr(surroundings, "mark_impossible", mark_all_guesses)
+    found = fill_surroundings(match_coarsely(scene(INSIDE), FULL))
+    assert set(np.unique(found.origin)) == {Origin.UNKNOWN, Origin.MATCHED}
+    assert np.isnan(found.disparity_px[found.origin == Origin.UNKNOWN]).all()
+
+
+@EVERY_RESOLUTION
+def test_the_calm_map_is_the_same_whatever_may_stand_before_it(
+    band_px: tuple[float, float],
+) -> None:
+    one, other = (match_coarsely(scene(INSIDE), band_px, nearest) for nearest in (None, 90.0))
+    np.testing.assert_array_equal(one.disparity_px, other.disparity_px)
+
+
+@pytest.mark.parametrize("band_px", [FULL, HALF])
+def test_pictures_that_disagree_tell_nothing(band_px: tuple[float, float]) -> None:
+    coarse = match_coarsely(swapped(scene(INSIDE)), band_px)
+    assert coarse.matched is None
+    found = fill_surroundings(coarse)
+    assert found.box == INSIDE
+    assert np.isnan(found.disparity_px).all()
+    assert (found.origin == Origin.UNKNOWN).all()
+
+
+def test_a_coarse_map_tells_of_a_box_inside_it() -> None:
+    values = np.arange(48, dtype=np.float32).reshape(6, 8)
+    coarse = CoarseMap(values, Box(10, 20, 8, 6))
+    np.testing.assert_array_equal(coarse.over(Box(11, 22, 3, 4)), values[2:6, 1:4])
+    np.testing.assert_array_equal(coarse.over(coarse.box), values)
+    for beyond in (Box(9, 22, 3, 4), Box(11, 19, 3, 4), Box(16, 22, 3, 4), Box(11, 23, 3, 4)):
+        assert coarse.over(beyond) is None
