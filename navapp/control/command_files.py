@@ -17,6 +17,7 @@ from navapp.control.states import (
     Register,
     Reject,
     Show,
+    ToggleDepth,
 )
 from navapp.errors import SequenceError
 from navapp.geometry.transform import RigidTransform
@@ -26,6 +27,7 @@ _PLAIN: dict[str, type] = {
     "cancel": Cancel,
     "blank": Blank,
     "show": Show,
+    "depth": ToggleDepth,
     "reconnect": Reconnect,
     "interrupt": Interrupt,
     "quit": Quit,

@@ -23,6 +23,7 @@ from navapp.control.states import (
     Reject,
     SessionState,
     Show,
+    ToggleDepth,
 )
 from navapp.errors import UsageError
 from navapp.values import Plan, Status
@@ -64,6 +65,8 @@ class CommandHandler:
                 self._on_blank()
             case Show():
                 self._on_show()
+            case ToggleDepth():
+                self._session.toggle_depth()
             case EnterStage():
                 self._on_enter_stage(command)
             case Reconnect():

@@ -36,7 +36,7 @@ from navapp.control.specification import SessionSpecification
 from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
-from navapp.overlay import make_preview
+from navapp.overlay import DepthMarks, make_preview
 from navapp.tracking import make_tracker
 from navapp.values import FrameTimings, OverlayMode, OverlayPicture
 
@@ -73,6 +73,7 @@ class SessionController:
         self._overlay_valid_ms = specification.overlay_valid_ms
         self._devices = devices
         self._rig = rig
+        self._depth_marks = DepthMarks(rig)
         self._plan = plan
         self._executor = executor
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
@@ -207,7 +208,10 @@ class SessionController:
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
         if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
-        self._session.keep_preview(make_preview(image))
+        preview = make_preview(image)
+        if self._session.shows_depth and self._session.tracked is not None:
+            preview = self._depth_marks.draw(preview, self._session.tracked.foreground)
+        self._session.keep_preview(preview)
         age_ns = self._session.now_ns - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
 

@@ -51,6 +51,7 @@ class Session:
         self._others = others
         self._state = SessionState.STARTING
         self._tracked: TrackedFrame | None = None
+        self._shows_depth = False
         self._tracked_at_ns = 0
         self._preview: Image | None = None
         self._meter = RateMeter()
@@ -159,6 +160,16 @@ class Session:
         if self._state is SessionState.FAULT:
             return {}
         return self._others.follow(self._stage, frame, self._tracked)
+
+    @property
+    def shows_depth(self) -> bool:
+        """The operator's picture is coloured by what is known of the depth."""
+        return self._shows_depth
+
+    def toggle_depth(self) -> None:
+        """Colour the operator's picture by what is known of the depth, or no longer."""
+        self._shows_depth = not self._shows_depth
+        self.add_event("depth", f"depth {'marked' if self._shows_depth else 'no longer marked'}")
 
     def keep_preview(self, preview: Image) -> None:
         """The newest picture, made small."""

@@ -51,6 +51,7 @@ class SnapshotMaker:
             pose_age_ms=session.pose_age_ms(now_ns),
             others=session.other_bones(now_ns),
             preview=session.preview,
+            shows_depth=session.shows_depth,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
             events=session.events,

@@ -68,6 +68,11 @@ class Show:
 
 
 @dataclass(frozen=True, slots=True)
+class ToggleDepth:
+    """Mark in the operator's picture what is known of the depth, or no longer."""
+
+
+@dataclass(frozen=True, slots=True)
 class EnterStage:
     """Go to a stage by its number, 1 to 5."""
 
@@ -104,6 +109,7 @@ Command = (
     | Reject
     | Blank
     | Show
+    | ToggleDepth
     | EnterStage
     | Reconnect
     | Interrupt
@@ -206,6 +212,7 @@ class Snapshot:
     # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
     # frame.
     preview: NDArray[np.uint8] | None = None
+    shows_depth: bool = False  # it is coloured by what is known of the depth
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()
     events: tuple[Event, ...] = ()  # the newest, oldest first

@@ -19,6 +19,7 @@ from navapp.control.states import (
     SessionState,
     Show,
     Snapshot,
+    ToggleDepth,
 )
 from navapp.values import Status
 
@@ -191,6 +192,16 @@ ACTIONS: tuple[Action, ...] = (
         "open lost devices, turn the mirror back",
         _has_failed_device,
         lambda _: Reconnect(),
+    ),
+    Action(
+        "depth",
+        "z",
+        "depth",
+        "colour the picture here by what is known of the depth: matched, or filled from which side",
+        _always,
+        lambda _: ToggleDepth(),
+        slot="depth",
+        needs_width=True,
     ),
     Action("devices", "d", "devices", "see the devices in detail", _always, slot="devices"),
     Action(

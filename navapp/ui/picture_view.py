@@ -10,9 +10,16 @@ from textual.widget import Widget
 
 from navapp.ui.halfblocks import compute_cell_codes, make_row_strip
 from navapp.ui.view import Level, View
+from navapp.values import DEPTH_COLOURS, Origin
 
 _WAITING = "waiting for the first picture"
 NOTICE = "research, not for clinical use"
+_DEPTH_WORDS = {
+    Origin.MATCHED: "matched",
+    Origin.FILLED_BORDER: "border",
+    Origin.FILLED_INTERIOR: "interior",
+    Origin.MISMATCH_FILLED: "mismatch",
+}
 
 
 class HalfBlocks(Widget):
@@ -66,17 +73,32 @@ class HalfBlocks(Widget):
         return Strip.blank(width, self.rich_style)
 
 
+def _tell_depth_key() -> str:
+    """What the colours of the depth mean, as markup."""
+    words = []
+    for origin, word in _DEPTH_WORDS.items():
+        blue, green, red = DEPTH_COLOURS[origin]
+        words.append(f"[#{red:02x}{green:02x}{blue:02x}]{word}[/]")
+    return " · " + " ".join(words)
+
+
+_DEPTH_KEY = _tell_depth_key()
+
+
 class PictureView(HalfBlocks):
     """The newest preview of a session, in a frame that says how it stands."""
 
     def __init__(self) -> None:
         super().__init__("picture")
         self.border_subtitle = NOTICE
+        self._title = ""
 
     def show(self, view: View) -> None:
         """Take over the newest picture and say how it stands."""
-        if self.border_title != view.picture_title:
-            self.border_title = view.picture_title
+        key = _DEPTH_KEY if view.snapshot.shows_depth else ""
+        if self._title != view.picture_title + key:
+            self._title = view.picture_title + key
+            self.border_title = self._title
         for level in Level:
             self.set_class(level is view.level, f"-{level.name.lower()}")
         self.show_picture(view.snapshot.preview, view.symbols.ramp)

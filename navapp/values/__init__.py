@@ -27,7 +27,7 @@ from navapp.values.contents import (
     SurgicalContent,
 )
 from navapp.values.measured import DisparityMap, Foreground, Origin, RowCheck, SurfaceCloud
-from navapp.values.pictures import OverlayMode, OverlayPicture
+from navapp.values.pictures import DEPTH_COLOURS, OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
 from navapp.values.timings import FrameTimings, Stopwatch
 from navapp.values.verdicts import (
@@ -40,6 +40,7 @@ from navapp.values.verdicts import (
 
 __all__ = [
     "ANKLE_CENTRE",
+    "DEPTH_COLOURS",
     "FOLLOWED_BONES",
     "HIP_CENTRE",
     "AspectGraph",

@@ -2,9 +2,23 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+
+from navapp.values.measured import Origin
+
+# BGR by which an operator's picture tells matched depth from guesses, by the side of their source.
+DEPTH_COLOURS = MappingProxyType(
+    {
+        Origin.MATCHED: (200, 150, 60),
+        Origin.FILLED_BORDER: (210, 80, 210),
+        Origin.FILLED_INTERIOR: (40, 130, 250),
+        Origin.MISMATCH_FILLED: (70, 220, 240),
+        Origin.UNKNOWN: (30, 30, 30),
+    }
+)
 
 
 class OverlayMode(Enum):

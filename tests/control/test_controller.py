@@ -20,6 +20,7 @@ from navapp.control.states import (
     Register,
     Reject,
     Show,
+    ToggleDepth,
 )
 from navapp.errors import DeviceLost, DeviceNotFound
 from navapp.values import Prior, Reason, Status
@@ -210,7 +211,8 @@ ACTIONS = st.lists(
         [
             *["frame"] * 8, "ok", "doubted", "lost", "nowhere", "late", "silent", "speaks",
             "unplug", "plug", Register(), Register(), Accept(None), Accept(None), Reject(None),
-            Cancel(), Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), EnterStage(1),
+            Cancel(), Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), ToggleDepth(),
+            EnterStage(1),
             EnterStage(2), EnterStage(4), EnterStage(5), Reconnect(),
         ]
     ),

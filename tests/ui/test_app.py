@@ -23,6 +23,7 @@ from navapp.control.states import (
     SessionState,
     Show,
     Snapshot,
+    ToggleDepth,
 )
 from navapp.ui.app import NavigationApp
 from navapp.ui.main_screen import MainScreen, SmallNotice
@@ -81,6 +82,7 @@ def press(*keys: str) -> Script:
         (snapshots.navigating(), "right_square_bracket", EnterStage(3)),
         (snapshots.navigating(), "left_square_bracket", EnterStage(1)),
         (snapshots.suspended(), "o", Reconnect()),
+        (snapshots.navigating(), "z", ToggleDepth()),
         (snapshots.review(), "q", Quit()),
     ],
 )

@@ -1,9 +1,11 @@
 """Pictures of the screen; look at a difference before accepting it with --snapshot-update."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from textual.content import Content
 from textual.pilot import Pilot
 
 from navapp.control.states import Snapshot
@@ -34,6 +36,18 @@ def test_screen(state: str, size: tuple[int, int], snap_compare: Callable[..., b
         assert pilot.app.screen.query_one(PictureView).border_title == title
 
     assert snap_compare(app, terminal_size=size, run_before=look)
+
+
+def test_the_key_to_the_colours_of_the_depth(snap_compare: Callable[..., bool]) -> None:
+    shown = dataclasses.replace(snapshots.navigating(), shows_depth=True)
+    app = NavigationApp(snapshots.ScriptedSession(shown), polls_per_s=0)
+
+    async def look(pilot: Pilot[Any]) -> None:
+        await pilot.pause()
+        title = Content.from_markup(pilot.app.screen.query_one(PictureView).border_title)
+        assert title.plain == "left view · matched border interior mismatch"
+
+    assert snap_compare(app, run_before=look)
 
 
 def test_plain_terminal(snap_compare: Callable[..., bool]) -> None:

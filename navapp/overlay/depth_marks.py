@@ -1,0 +1,53 @@
+"""Marks in a small picture what is known of the depth around a bone, for the operator."""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import Rectifier
+from navapp.geometry.rig import StereoRig
+from navapp.values import DEPTH_COLOURS, Foreground, Origin
+
+Image = NDArray[np.uint8]
+
+# Share of the colour over the picture: what stands in front of the bone is nearly covered.
+_SHARE, _SHARE_IN_FRONT = 0.45, 0.85
+
+
+class DepthMarks:
+    """Colours small pictures of a rig's left camera by the classes of the depth around the bone."""
+
+    def __init__(self, rig: StereoRig) -> None:
+        self._camera, self._geometry = rig.left, Rectifier(rig).geometry
+        self._places = lru_cache(1)(self._find_places)
+
+    def draw(self, preview: Image, foreground: Foreground | None) -> Image:
+        """A preview (h, w, 3) with marks; as it is without a foreground."""
+        if foreground is None:
+            return preview
+        surroundings = foreground.surroundings
+        columns, rows = self._places(preview.shape[:2])
+        columns, rows = columns - surroundings.x, rows - surroundings.y
+        height, width = surroundings.origin.shape
+        is_inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+        inside = rows[is_inside], columns[is_inside]
+        colours = np.array([DEPTH_COLOURS[origin] for origin in Origin], dtype=np.float32)
+        share = np.where(foreground.is_in_front[inside], _SHARE_IN_FRONT, _SHARE)[:, None]
+        marked = preview.copy()
+        below = preview[is_inside].astype(np.float32)
+        colour = colours[surroundings.origin[inside]]
+        marked[is_inside] = np.round(below + share * (colour - below)).astype(np.uint8)
+        marked.setflags(write=False)
+        return marked
+
+    def _find_places(self, shape: tuple[int, int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Columns and rows (h, w) in the rectified left view of a small picture's pixels."""
+        height, width = shape
+        rows, columns = np.mgrid[:height, :width]
+        x = (columns.ravel() + 0.5) * self._camera.width / width - 0.5
+        y = (rows.ravel() + 0.5) * self._camera.height / height - 0.5
+        rays = self._camera.rays(np.column_stack([x, y]))
+        pixels = self._geometry.project(self._geometry.rectified_from_left.rotate(rays))
+        there = np.nan_to_num(np.round(pixels), nan=-1.0).astype(np.intp)
+        return there[:, 0].reshape(shape), there[:, 1].reshape(shape)

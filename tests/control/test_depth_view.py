@@ -1,0 +1,49 @@
+"""The operator has the depth marked in the picture of the screen, never on the display."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.states import ToggleDepth
+from navapp.values import DisparityMap, Foreground, Origin
+from tests.control.fakes import Bench, answer, navigating
+
+
+def with_foreground() -> Foreground:
+    shape = (4000, 4000)  # more than any picture shows
+    disparity_px = np.zeros(shape, np.float32)
+    origin = np.full(shape, Origin.FILLED_INTERIOR, np.uint8)
+    surroundings = DisparityMap(disparity_px, disparity_px, origin, -1000, -1000)
+    return Foreground(surroundings, np.zeros(shape, dtype=np.bool_))
+
+
+def test_the_key_marks_the_depth_and_a_second_time_no_longer() -> None:
+    bench = navigating(Bench())
+    bench.script.tracked = replace(answer(), foreground=with_foreground())
+    plain = bench.frames().preview
+    shown = bench.results[-1].picture.image.copy()
+    assert not bench.snapshot.shows_depth
+    bench.do(ToggleDepth())
+    marked = bench.frames()
+    assert marked.shows_depth
+    assert (marked.preview != plain).any(axis=2).mean() > 0.5
+    np.testing.assert_array_equal(bench.results[-1].picture.image, shown)
+    bench.do(ToggleDepth())
+    assert not bench.frames().shows_depth
+    np.testing.assert_array_equal(bench.snapshot.preview, plain)
+    assert [event.text for event in bench.events if event.kind == "depth"] == [
+        "depth marked",
+        "depth no longer marked",
+    ]
+
+
+def test_without_a_pose_nothing_is_marked() -> None:
+    bench = Bench()
+    plain = bench.frames().preview
+    bench.do(ToggleDepth())
+    np.testing.assert_array_equal(bench.frames().preview, plain)
+
+
+def test_it_is_recorded_as_a_command() -> None:
+    assert command_from_json(command_to_json(ToggleDepth())) == ToggleDepth()
