@@ -49,12 +49,6 @@ def add_parser(subparsers: Any) -> None:
         choices=("none", "wls"),
         help="of occlusions (wls; with --matcher gradient none: with wls it is the proposal's)",
     )
-    parser.add_argument(
-        "--smooth",
-        choices=("none", "gaussian", "wls"),
-        default="none",
-        help="to look at: wls keeps matched pixels within their sigma, gaussian is the paper's",
-    )
     parser.add_argument("--out", metavar="D.npy", help="float32 disparity px, NaN unknown")
     parser.add_argument("--sigma", metavar="S.npy", help="float32 standard deviation px")
     parser.add_argument("--origin", metavar="O.png", help="where each disparity comes from")
@@ -65,15 +59,12 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Match the pair, write what was asked for; the exit code."""
-    from navapp.stereo import smoothed
-
     _check(options)
     pair = read_pair(options)
     shape = pair.rectified.left.shape
     if options.json != "-":
         diagnostics.say(f"matching {shape[1]}x{shape[0]} (compiles first, once on a machine)")
     answer = _match(pair, options)
-    answer = smoothed(answer, pair.rectified, options.smooth)
     answer = replace(answer, timings=replace(answer.timings, rectify_ms=pair.rectify_ms))
     _write(pair, answer, options)
     content = _content(pair, answer)
@@ -104,11 +95,6 @@ def _check(options: argparse.Namespace) -> None:
         )
     if options.min_disparity is not None and options.disparities is None:
         raise UsageError("--min-disparity needs --disparities", remedy="give both or neither")
-    if options.cloud and options.smooth != "none":
-        raise UsageError(
-            "a smoothed map is to look at, not to measure with",
-            remedy="leave --smooth or --cloud away",
-        )
     if options.cloud and not options.rig:
         raise UsageError("--cloud needs --rig", remedy="a pair without a rig has no lengths")
     if options.disparities is None and not options.rig:

@@ -6,7 +6,6 @@ from navapp.stereo.chains import (
     match_on_support,
     match_scene,
     match_surface,
-    smoothed,
 )
 from navapp.stereo.coarse import CoarseMap, are_swapped, match_coarsely
 from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
@@ -37,5 +36,4 @@ __all__ = [
     "refine",
     "refine_on_model",
     "refine_samples",
-    "smoothed",
 ]

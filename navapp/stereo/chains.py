@@ -1,7 +1,6 @@
 """The stereo chains: match, then fill what one camera cannot see."""
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,10 @@ from navapp.stereo.matching.census_sgm import CensusSettings, match_census
 from navapp.stereo.matching.gradient import match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
-from navapp.stereo.occlusion.wls_smooth import smooth_wls
 from navapp.stereo.subpixel.coarse_to_fine import refine_surface
 from navapp.stereo.subpixel.refine import refine_on_model, without_specks
 from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, FrameTimings, Stopwatch
-
-Smoothing = Literal["none", "gaussian", "wls"]
 
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"
 _NO_CONTRAST = "no part of the pictures has any contrast: are they black or saturated?"
@@ -31,7 +27,6 @@ _WIDE_SEARCH_PX = 160
 
 # Of the paper's Gaussian filter over the disparity, px; chosen.
 _GAUSSIAN_SIGMA_PX = 1.0
-
 # A claimed sigma below this says no more.
 _BEST_SIGMA_PX = np.float32(0.1)
 
@@ -154,27 +149,6 @@ def _filter_gaussian(disparity: DisparityMap) -> DisparityMap:
     """The paper's noise filter, over the known pixels."""
     smooth_px = smooth_known(disparity.disparity_px, _GAUSSIAN_SIGMA_PX)
     return replace(disparity, disparity_px=smooth_px)
-
-
-def smoothed(answer: StereoAnswer, pair: RectifiedPair, smoothing: Smoothing) -> StereoAnswer:
-    """The answer with a smoother map: to look at, not to measure with, since smoothing tilts it.
-
-    Args:
-        answer: of the pair.
-        pair: it was matched in.
-        smoothing: "gaussian" is the paper's noise filter and moves every pixel; "wls" keeps matched
-            pixels within their sigma; "none" changes nothing.
-    """
-    before, watch = answer.disparity, Stopwatch()
-    if smoothing == "none":
-        return answer
-    if smoothing == "wls":
-        after = smooth_wls(before, _box_of(pair), _by_sigma(before))
-    else:
-        after = _filter_gaussian(before)
-    watch.lap("fill")
-    fill_ms = answer.timings.fill_ms + watch.timings.fill_ms
-    return replace(answer, disparity=after, timings=replace(answer.timings, fill_ms=fill_ms))
 
 
 def _answer(

@@ -18,7 +18,7 @@ import numpy as np
 
 from navapp.geometry import Box
 from navapp.geometry.zbuffer import render_rectified
-from navapp.stereo import match_on_support, match_surface, smoothed
+from navapp.stereo import match_on_support, match_surface
 from navapp.tracking.frame import Frame
 from navapp.values import BoneModel, DisparityMap, Status, Stopwatch
 from tests.bench.bone_scenes import (
@@ -55,7 +55,7 @@ def main() -> None:
             floor(sequence)
     if options.part in (None, "free"):
         print("without a pose: fit TRE median / worst mm, density, depth MAD, signed mm | worse "
-              "by at most: after the fill, after WLS smoothing | SGBM median / worst")  # fmt: skip
+              "by at most, after the fill | SGBM median / worst")  # fmt: skip
         for sequence in chosen:
             free(sequence)
     if options.part in (None, "guided"):
@@ -110,26 +110,21 @@ def floor(sequence: Sequence) -> None:
 
 def free(sequence: Sequence) -> None:
     """Without a pose, beside SGBM."""
-    ours, filled, calmed, theirs = [], [], [], []
+    ours, filled, theirs = [], [], []
     for scene in sequence.scenes:
         geometry = scene.pair.geometry
         pair = replace(scene.pair, box=Box(0, 0, geometry.width, geometry.height))
         band = geometry.disparity_px(_DEPTH_MM[1]), geometry.disparity_px(_DEPTH_MM[0])
         answer = match_surface(pair, band, fills=True)
-        smooth = smoothed(answer, pair, "wls").disparity
         ours.append(Quality.of(scene, answer.matched, sequence))
         filled.append(Quality.of(scene, answer.disparity, sequence))
-        calmed.append(Quality.of(scene, smooth, sequence))
         theirs.append(fit_error_mm(scene, match_sgbm(pair, band), sequence.mesh))
     fits = [q.fit_mm for q in ours]
-    worse = [
-        max(after.fit_mm - before.fit_mm for before, after in zip(ours, maps, strict=True))
-        for maps in (filled, calmed)
-    ]
+    worse = max(after.fit_mm - before.fit_mm for before, after in zip(ours, filled, strict=True))
     print(
         f"{sequence.name}: {np.median(fits):.3f} / {max(fits):.3f}, "
         f"{min(q.density for q in ours):.2f}, {max(q.mad_mm for q in ours):.2f}, "
-        f"{max((q.signed_mm for q in ours), key=abs):+.3f} | {worse[0]:+.3f}, {worse[1]:+.3f} | "
+        f"{max((q.signed_mm for q in ours), key=abs):+.3f} | {worse:+.3f} | "
         f"{np.median(theirs):.3f} / {max(theirs):.3f}",
         flush=True,
     )

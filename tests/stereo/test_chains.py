@@ -9,7 +9,6 @@ import pytest
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo import chains
 from navapp.stereo.chains import (
     StereoAnswer,
     match_on_support,
@@ -307,41 +306,6 @@ def test_every_part_is_timed(chain: str, fills: bool) -> None:
     assert (timings.fill_ms > 0.0) is fills
     # The parts do not overlap.
     assert timings.total_ms == timings.stereo_ms + timings.fill_ms <= elapsed_ms
-
-
-@pytest.mark.parametrize("smoothing", ["gaussian", "wls"])
-def test_a_smoothed_map_knows_the_same_pixels(smoothing: chains.Smoothing) -> None:
-    answer = surface(INSIDE, FULL, True)
-    smooth = chains.smoothed(answer, scene(INSIDE), smoothing)
-    before, after = answer.disparity, smooth.disparity
-    np.testing.assert_array_equal(np.isnan(after.disparity_px), np.isnan(before.disparity_px))
-    np.testing.assert_array_equal(after.origin, before.origin)
-    assert (after.disparity_px != before.disparity_px)[before.origin > 0].mean() > 0.5
-    assert smooth.timings.fill_ms > answer.timings.fill_ms
-
-
-def test_the_gaussian_takes_roughness_away() -> None:
-    answer = surface(INSIDE, FULL, True)
-    smooth = chains.smoothed(answer, scene(INSIDE), "gaussian")
-    inner = part(edge_distance_px(), INSIDE)[:, 3:] > 12.0
-    before, after = (
-        np.nanstd(np.diff(each.disparity.disparity_px, n=2, axis=1)[:, 1:][inner])
-        for each in (answer, smooth)
-    )
-    assert after < 0.5 * before
-
-
-def test_matched_pixels_stay_within_their_sigma_when_smoothed() -> None:
-    answer = surface(INSIDE, FULL, True)
-    after = chains.smoothed(answer, scene(INSIDE), "wls").disparity
-    moved = np.abs(after.disparity_px - answer.disparity.disparity_px)
-    matched = answer.disparity.origin == Origin.MATCHED
-    assert (moved[matched] <= answer.disparity.sigma_px[matched]).all()
-
-
-def test_without_smoothing_nothing_changes() -> None:
-    answer = surface(INSIDE, FULL, True)
-    assert chains.smoothed(answer, scene(INSIDE), "none") is answer
 
 
 @pytest.mark.parametrize("level", [0, 255])
