@@ -324,7 +324,7 @@ def test_a_map_laid_over_another_one_tells_what_it_has_matched() -> None:
     above = DisparityMap(
         np.full((4, 5), 12.0, np.float32), np.full((4, 5), 0.1, np.float32), origin, 23, 29
     )
-    both = below.overlay(above)
+    both = below.with_matches_of(above)
     expected = np.full((4, 5), 10.0)
     expected[0:3, 3:5] = 12.0
     np.testing.assert_array_equal(both.disparity_px, expected)
@@ -332,5 +332,6 @@ def test_a_map_laid_over_another_one_tells_what_it_has_matched() -> None:
     np.testing.assert_array_equal(both.origin == Origin.MATCHED, expected == 12.0)
     assert both.box == below.box
     assert (below.disparity_px == 10.0).all()
-    apart = below.overlay(DisparityMap(*(np.ones((2, 2), np.float32),) * 2, origin[1:3, :2], 90, 9))
+    far = DisparityMap(*(np.ones((2, 2), np.float32),) * 2, origin[1:3, :2], 90, 9)
+    apart = below.with_matches_of(far)
     np.testing.assert_array_equal(apart.disparity_px, below.disparity_px)

@@ -1,11 +1,12 @@
 """Marks in a small picture what is known of the depth around a bone, for the operator."""
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rectification import Rectifier
+from navapp.geometry.camera import Camera
+from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.values import DEPTH_COLOURS, Foreground, Origin
 
@@ -19,8 +20,9 @@ class DepthMarks:
     """Colours small pictures of a rig's left camera by the classes of the depth around the bone."""
 
     def __init__(self, rig: StereoRig) -> None:
-        self._camera, self._geometry = rig.left, Rectifier(rig).geometry
-        self._places = lru_cache(1)(self._find_places)
+        # No method: it would keep the marks alive.
+        find = partial(_find_places, rig.left, Rectifier(rig).geometry)
+        self._places = lru_cache(1)(find)
 
     def draw(self, preview: Image, foreground: Foreground | None) -> Image:
         """A preview (h, w, 3) with marks; as it is without a foreground."""
@@ -41,13 +43,16 @@ class DepthMarks:
         marked.setflags(write=False)
         return marked
 
-    def _find_places(self, shape: tuple[int, int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Columns and rows (h, w) in the rectified left view of a small picture's pixels."""
-        height, width = shape
-        rows, columns = np.mgrid[:height, :width]
-        x = (columns.ravel() + 0.5) * self._camera.width / width - 0.5
-        y = (rows.ravel() + 0.5) * self._camera.height / height - 0.5
-        rays = self._camera.rays(np.column_stack([x, y]))
-        pixels = self._geometry.project(self._geometry.rectified_from_left.rotate(rays))
-        there = np.nan_to_num(np.round(pixels), nan=-1.0).astype(np.intp)
-        return there[:, 0].reshape(shape), there[:, 1].reshape(shape)
+
+def _find_places(
+    camera: Camera, geometry: RectifiedGeometry, shape: tuple[int, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Columns and rows (h, w) in the rectified left view of a small picture's pixels."""
+    height, width = shape
+    rows, columns = np.mgrid[:height, :width]
+    x = (columns.ravel() + 0.5) * camera.width / width - 0.5
+    y = (rows.ravel() + 0.5) * camera.height / height - 0.5
+    rays = camera.rays(np.column_stack([x, y]))
+    pixels = geometry.project(geometry.rectified_from_left.rotate(rays))
+    there = np.nan_to_num(np.round(pixels), nan=-1.0).astype(np.intp)
+    return there[:, 0].reshape(shape), there[:, 1].reshape(shape)

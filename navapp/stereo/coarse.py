@@ -90,9 +90,8 @@ class CoarseMatch:
 
     pair: RectifiedPair  # whole or halved
     found: TwoViewDisparity
-    # band_px, nearest_px: disparities that were searched, and of what may stand before them.
-    band_px: tuple[float, float]
-    nearest_px: float
+    band_px: tuple[float, float]  # disparities that were searched
+    nearest_px: float  # of what may stand before them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,17 +110,18 @@ class CoarseMap:
 
 
 def match_coarsely(
-    pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float | None = None
+    pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
 ) -> CoarseMap:
     """What lies where, to about a pixel; all is unknown when the pictures hardly agree.
 
     Args:
         pair: rectified grey pictures; the part of `pair.box` inside them is matched.
         band_px: smallest and largest disparity expected.
-        nearest_px: disparity of the nearest thing that may stand before the band.
+        nearest_px: disparity of the nearest thing that may stand before the band, kept for those
+            who look for it.
     """
     pair = clip_box(pair)
-    nearest_px = max(nearest_px or 0.0, band_px[1])
+    nearest_px = max(nearest_px, band_px[1])
     is_half = _is_wide(pair, band_px)
     small = halve(pair, (band_px[0], nearest_px)) if is_half else pair
     if is_half:

@@ -11,16 +11,21 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch, double, halve
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
+from navapp.stereo.matching.search import Crop
 from navapp.stereo.occlusion.classify import classify
 from navapp.stereo.occlusion.impossible_kernels import mark_impossible
-from navapp.stereo.occlusion.wls_fill import fill_wls
+from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.values import DisparityMap, Origin
 
 # All chosen, on simulated knees with a hand (`python -m tests.bench.foreground --first 1`).
 # What stands before the searched band leaves a gap of at least so many pixels each way. It is
 # matched in small windows, which hang less over its edges, and where both views agree roughly.
 _LEAST_GAP_PX = 16
+# The ends of a search are no minima: a pixel of the half beyond the band.
+_BEYOND_PX = 2.0
 _NEAR_CENSUS = replace(SURFACE_CENSUS, radius_x=1, radius_y=1, max_difference_px=3.0, speckle_px=40)
+# A map to about a pixel needs no wider support.
+_FILL = FillSettings(radius_px=16)
 # A guess may be nearer than what hides it leaves room for, and differ from its neighbours, by so
 # much: edges and surfaces are known to about as much.
 _EDGE_PX, _LAYER_PX = np.float32(2.0), np.float32(8.0)
@@ -40,61 +45,68 @@ def fill_surroundings(coarse: CoarseMap) -> DisparityMap:
         origin = np.zeros(unknown.shape, dtype=np.uint8)
         return DisparityMap(unknown, unknown, origin, coarse.box.x, coarse.box.y)
     pair, found = matched.pair, matched.found
-    if _has_wide_gap(found.left):
-        found = _add_nearer(matched)
-    picture = pair.left[pair.box.slices]
+    gap = _find_wide_gaps(found.left)
+    if gap is not None and matched.nearest_px > matched.band_px[1] + _BEYOND_PX:
+        found = _add_nearer(matched, gap)
+    # The half of an odd picture lacks its last column or row, the half of a box has it.
+    picture = Crop.of(pair.left, pair.box, (0, 0)).inner
     classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
-    filled = fill_wls(found.left, picture, found.confidence, classes)
+    filled = fill_wls(found.left, picture, found.confidence, classes, _FILL)
     is_impossible = np.empty(filled.origin.shape, dtype=np.bool_)
     mark_impossible(filled.disparity_px, filled.origin, _EDGE_PX, _LAYER_PX, is_impossible)
     filled = filled.only(~is_impossible)
     return filled if pair.box == coarse.box else _double_map(filled, coarse.box)
 
 
-def _has_wide_gap(left: DisparityMap) -> bool:
-    """Whether something may stand before the band: it would not be matched."""
+def _find_wide_gaps(left: DisparityMap) -> Box | None:
+    """Where something may stand before the band, which would not be matched; None if nowhere."""
     import cv2
 
     is_gap = (left.origin == Origin.UNKNOWN).view(np.uint8)
     square = np.ones((_LEAST_GAP_PX, _LEAST_GAP_PX), np.uint8)
-    return bool(cv2.erode(is_gap, square, borderValue=0).any())
+    x, y, width, height = cv2.boundingRect(cv2.erode(is_gap, square, borderValue=0))
+    if width == 0:
+        return None
+    rows, columns = is_gap.shape
+    inside = Box(x, y, width, height).grow(_LEAST_GAP_PX).clip(columns, rows)
+    return replace(inside, x=inside.x + left.x, y=inside.y + left.y)
 
 
-def _add_nearer(matched: CoarseMatch) -> TwoViewDisparity:
+def _add_nearer(matched: CoarseMatch, gap: Box) -> TwoViewDisparity:
     """The matches with those of what stands before their band, at half their resolution."""
-    found, box = matched.found, matched.pair.box
+    found, left = matched.found, matched.found.left
     low, high = matched.band_px
-    half = halve(matched.pair, (low, matched.nearest_px))
+    half = halve(replace(matched.pair, box=gap), (low, matched.nearest_px))
     near = match_census(half, (low / 2.0, matched.nearest_px / 2.0), _NEAR_CENSUS)
-    # The ends of a search are no minima: a pixel of the half beyond the band.
-    least_px = high + 2.0
-    near_px = np.float32(2.0) * double(near.left.disparity_px, box)
+    least_px = high + _BEYOND_PX
+    near_px = np.float32(2.0) * double(near.left.disparity_px, gap)
     is_near = near_px > least_px
     if not is_near.any():
         return found
-    left = DisparityMap(
-        np.where(is_near, near_px, found.left.disparity_px),
-        np.where(is_near, 2.0 * double(near.left.sigma_px, box), found.left.sigma_px),
-        np.where(is_near, np.uint8(Origin.MATCHED), found.left.origin),
-        box.x,
-        box.y,
-    )
-    confidence = np.where(is_near, double(near.confidence, box), found.confidence)
-    right_px, right_x0 = _join_right(found, near, box, least_px)
-    return TwoViewDisparity(left, right_px, right_x0, confidence, found.agreement)
+    there = replace(gap, x=gap.x - left.x, y=gap.y - left.y).slices
+    disparity_px, sigma_px = left.disparity_px.copy(), left.sigma_px.copy()
+    origin, confidence = left.origin.copy(), found.confidence.copy()
+    np.copyto(disparity_px[there], near_px, where=is_near)
+    sigma_px[there][is_near] = 2.0 * _NEAR_CENSUS.sigma_px
+    origin[there][is_near] = Origin.MATCHED
+    np.copyto(confidence[there], double(near.confidence, gap), where=is_near)
+    right_px, right_x0 = _join_right(found, near, gap, least_px)
+    joined = DisparityMap(disparity_px, sigma_px, origin, left.x, left.y)
+    return TwoViewDisparity(joined, right_px, right_x0, confidence, found.agreement)
 
 
 def _join_right(
-    found: TwoViewDisparity, near: TwoViewDisparity, box: Box, least_px: float
+    found: TwoViewDisparity, near: TwoViewDisparity, gap: Box, least_px: float
 ) -> tuple[NDArray[np.float32], int]:
     """The right view of both searches, and its first column: the nearer one hides the other."""
-    beyond = replace(box, x=2 * near.right_x0, width=2 * near.right_px.shape[1])
+    beyond = replace(gap, x=2 * near.right_x0, width=2 * near.right_px.shape[1])
     near_px = np.float32(2.0) * double(near.right_px, beyond)
+    height, width = found.right_px.shape
     first = min(beyond.x, found.right_x0)
-    after = max(beyond.x + beyond.width, found.right_x0 + found.right_px.shape[1])
-    right_px = np.full((box.height, after - first), np.nan, dtype=np.float32)
-    right_px[:, found.right_x0 - first :][:, : found.right_px.shape[1]] = found.right_px
-    part = right_px[:, beyond.x - first :][:, : beyond.width]
+    after = max(beyond.x + beyond.width, found.right_x0 + width)
+    right_px = np.full((height, after - first), np.nan, dtype=np.float32)
+    right_px[:, found.right_x0 - first :][:, :width] = found.right_px
+    part = right_px[gap.y - found.left.y :, beyond.x - first :][: gap.height, : beyond.width]
     np.copyto(part, near_px, where=near_px > least_px)
     return right_px, first
 

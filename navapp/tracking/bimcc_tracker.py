@@ -32,6 +32,8 @@ class BimccTracker(Tracker):
     (docs/registration.md). The other parts have defaults; a test replaces them.
     """
 
+    tells_foreground = True
+
     def __init__(
         self,
         rig: StereoRig,

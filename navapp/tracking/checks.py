@@ -1,5 +1,7 @@
 """Checks of a measurement that need no fitted pose: they run on the helper, beside the fit."""
 
+import threading
+import time
 from functools import partial
 from typing import NamedTuple, Self
 
@@ -10,9 +12,10 @@ from navapp.geometry.bands import Job, begin_on_helper
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Agreement
-from navapp.stereo import CoarseMap, StereoHealth, measure_health
+from navapp.stereo import CoarseMap, StereoHealth, fill_surroundings, measure_health
 from navapp.tracking.agreement import compare
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values import DisparityMap, Stopwatch
 
 
 class PairCheck(NamedTuple):
@@ -20,16 +23,16 @@ class PairCheck(NamedTuple):
 
     health: StereoHealth  # of its pair of pictures
     agreement: Agreement | None  # of the model where it was matched; None of a free measurement
-    # whatever lies in its box, and perhaps around it; None out of view or depth.
-    coarse: CoarseMap | None
-    coarse_px: NDArray[np.float32] | None  # (h, w) of its box
+    # (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
+    coarse_px: NDArray[np.float32] | None
 
 
 class PairChecks:
     """Checks what is measured in one pair, one measurement at a time, on the helper.
 
     As a context manager it leaves nothing running. `coarse` is the map of what lies around the
-    bone, being made; where it does not reach, or without one, a check matches anew.
+    bone, being made; where it does not reach, or without one, a check matches anew. `fills` has its
+    gaps filled as well.
     """
 
     def __init__(
@@ -37,8 +40,14 @@ class PairChecks:
         meter: SurfaceMeter,
         pair: RectifiedPair,
         coarse: Job[CoarseMap | None] | None = None,
+        *,
+        fills: bool = False,
     ) -> None:
         self._meter, self._pair, self._coarse = meter, pair, coarse
+        self._filling: Job[tuple[DisparityMap | None, float]] | None = None
+        if fills and coarse is not None:
+            asking = threading.get_ident()
+            self._filling = begin_on_helper(partial(_fill_timed, coarse, asking))
         self._begun: tuple[Measurement, Job[PairCheck]] | None = None
 
     def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
@@ -49,17 +58,42 @@ class PairChecks:
             self._begun = measured, begin_on_helper(run)
         return self._begun[1]
 
+    def surroundings(self, watch: Stopwatch) -> DisparityMap | None:
+        """The coarse map with its gaps filled; None if that was not asked for, or out of view.
+
+        The watch is told what the helper took.
+        """
+        if self._filling is None:
+            return None
+        is_new = not self._filling.is_fetched
+        filled, beside_ms = self._filling.result()
+        if is_new:
+            watch.add_fill_beside(beside_ms)
+        return filled
+
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *rest: object) -> None:
         self._drop()
-        if self._coarse is not None and not self._coarse.is_fetched:
-            self._coarse.drop()
+        for job in (self._filling, self._coarse):
+            if job is not None and not job.is_fetched:
+                job.drop()
 
     def _drop(self) -> None:
         if self._begun is not None and not self._begun[1].is_fetched:
             self._begun[1].drop()
+
+
+def _fill_timed(
+    coarse_job: Job[CoarseMap | None], asking: int
+) -> tuple[DisparityMap | None, float]:
+    """A coarse map with its gaps filled, and the ms it took if another thread than `asking` did."""
+    coarse = coarse_job.result()
+    began_ns = time.perf_counter_ns()
+    filled = None if coarse is None else fill_surroundings(coarse)
+    took_ms = (time.perf_counter_ns() - began_ns) / 1e6
+    return filled, 0.0 if threading.get_ident() == asking else took_ms
 
 
 # Not a method: a job that knew its checks would keep them, and a frame's pictures, alive.
@@ -81,4 +115,4 @@ def _run_check(
     agreement = (
         None if view is None else compare(view, meter.model, found, meter.geometry, coarse_px)
     )
-    return PairCheck(health, agreement, coarse, coarse_px)
+    return PairCheck(health, agreement, coarse_px)

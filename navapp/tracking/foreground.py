@@ -1,26 +1,16 @@
 """What stands in front of a bone at its pose: a hand, an instrument, tissue."""
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
-from navapp.stereo import CoarseMap, fill_surroundings
 from navapp.values import DisparityMap, Foreground
 
 # Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
 NEAR_PX, IN_FRONT_MM = 4, 5.0
-
-
-def fill_in_time(coarse: CoarseMap | None) -> tuple[DisparityMap | None, float]:
-    """A coarse map with its gaps filled, if there is one, and the ms that it took."""
-    began_ns = time.perf_counter_ns()
-    filled = None if coarse is None else fill_surroundings(coarse)
-    return filled, (time.perf_counter_ns() - began_ns) / 1e6
 
 
 def find_foreground(

@@ -2,12 +2,10 @@
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
@@ -23,11 +21,20 @@ from navapp.stereo import StereoHealth
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.following import RestSettings
-from navapp.tracking.foreground import fill_in_time, find_foreground
+from navapp.tracking.foreground import find_foreground
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
-from navapp.values import PoseEstimate, Reason, RowCheck, Stopwatch, TrackedFrame, Verdict
+from navapp.values import (
+    Foreground,
+    PoseEstimate,
+    Reason,
+    RowCheck,
+    Status,
+    Stopwatch,
+    TrackedFrame,
+    Verdict,
+)
 
 # All chosen. Errors of a cartilage's thickness are correlated over much of a bone. Points do not
 # average them out: the pose may be off by so many of their standard deviations (docs/accuracy.md).
@@ -82,25 +89,32 @@ class PoseJudge:
         checks = checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
-        with begin_on_helper(partial(fill_in_time, check.coarse)) as filling:
-            fit, view, agreement = self._settle(frame, fit, check)
-            evidence = self._evidence_of_pair(check.health, depth_mm)
-            evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
-            verdict = decide(evidence)
-        surroundings, fill_ms = filling.result()
+        fit, view, agreement = self._settle(frame, fit, check)
+        evidence = self._evidence_of_pair(check.health, depth_mm)
+        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
+        verdict = decide(evidence)
         is_told = verdict.predicted_tre_mm is not None or self._tells_refused
-        foreground = None
-        if is_told and surroundings is not None and view is not None:
-            disparity = fit.measured.disparity
-            surroundings = surroundings.overlay(disparity)
-            foreground = find_foreground(surroundings, view, self._meter.geometry)
-        frame.watch.add_fill_beside(fill_ms)
-        frame.watch.lap("judge")
         estimate = self._unrectify(fit.estimate) if is_told else None
         rows = _check_rows(check.health, evidence, verdict)
+        frame.watch.lap("judge")
+        foreground = None
+        if view is not None and verdict.status is not Status.LOST:
+            foreground = self._find_foreground(frame, fit, view, checks)
         return TrackedFrame(
             model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
         )
+
+    def _find_foreground(
+        self, frame: Frame, fit: Fit, view: RenderedView, checks: PairChecks
+    ) -> Foreground | None:
+        """What stands in front of the bone, as it is seen at its pose; None if nobody asks."""
+        surroundings = checks.surroundings(frame.watch)
+        if surroundings is None:
+            return None
+        surroundings = surroundings.with_matches_of(fit.measured.disparity)
+        foreground = find_foreground(surroundings, view, self._meter.geometry)
+        frame.watch.lap("fill")
+        return foreground
 
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck

@@ -49,6 +49,7 @@ class Margins:
 
     box_px: int
     band_mm: float
+    reaches_camera: bool = False  # what stands before the band, of whatever depth, is seen too
 
 
 # Matched around an expected bone from frame to frame; at first, and after a loss.
@@ -56,7 +57,7 @@ NEAR_BOX = Margins(box_px=16, band_mm=15.0)
 WIDE_BOX = Margins(box_px=60, band_mm=35.0)
 # Rectified around it: a little more than is matched when it is there, for it may have moved; much
 # more when it has to be searched.
-NEAR_VIEW = Margins(box_px=56, band_mm=60.0)
+NEAR_VIEW = Margins(box_px=56, band_mm=60.0, reaches_camera=True)
 WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
 # What hides the bone may be so much nearer; what is seen through a wrong pose, so much further.
 _AROUND = Margins(box_px=24, band_mm=60.0)
@@ -118,9 +119,8 @@ class SurfaceMeter:
     ) -> RectifiedPair:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         box, band_px = self.find_region(around, margins) or (None, None)
-        if band_px is not None:
-            # What stands before the band is looked for too.
-            band_px = band_px[0], max(band_px[1], self._nearest_px)
+        if band_px is not None and margins.reaches_camera:
+            band_px = band_px[0], self._nearest_px
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
 
     def rectify_surroundings(

@@ -50,6 +50,7 @@ class Tracker(ABC):
     travels in a `TrackState`: a tracker keeps nothing of a frame.
 
     Attributes:
+        tells_foreground: a followed frame tells what stands in front of the bone.
         settings: of the tracker.
         model: of the bone.
         meter: of its surface.
@@ -58,6 +59,8 @@ class Tracker(ABC):
         scorer: tells how much of the model a fit explains.
         diagnosis: why the bone is not found.
     """
+
+    tells_foreground = False
 
     def __init__(
         self,
@@ -166,7 +169,7 @@ class Tracker(ABC):
         """Checks of a frame in which the bone is expected near the start, begun at once."""
         # What may hide the bone does not depend on where exactly it is.
         coarse = begin_on_helper(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
-        return PairChecks(self.meter, frame.pair, coarse)
+        return PairChecks(self.meter, frame.pair, coarse, fills=self.tells_foreground)
 
     def judge_fits(
         self,

@@ -197,7 +197,7 @@ ACTIONS: tuple[Action, ...] = (
         "depth",
         "z",
         "depth",
-        "colour the picture here by what is known of the depth: matched, or filled from which side",
+        "colour the picture by its depth: matched, or guessed from which side; dense: in front",
         _always,
         lambda _: ToggleDepth(),
         slot="depth",

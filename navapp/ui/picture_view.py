@@ -19,6 +19,7 @@ _DEPTH_WORDS = {
     Origin.FILLED_BORDER: "border",
     Origin.FILLED_INTERIOR: "interior",
     Origin.MISMATCH_FILLED: "mismatch",
+    Origin.UNKNOWN: "unknown",
 }
 
 

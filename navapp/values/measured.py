@@ -81,7 +81,7 @@ class DisparityMap:
         )  # fmt: skip
         return SurfaceCloud(points_mm, sigma_ray_mm, pixels, origin, stride_px)
 
-    def overlay(self, other: "DisparityMap") -> "DisparityMap":
+    def with_matches_of(self, other: "DisparityMap") -> "DisparityMap":
         """This map with what another one has matched, where they overlap."""
         x, y = other.x - self.x, other.y - self.y
         height, width = self.origin.shape
@@ -120,7 +120,7 @@ class Foreground:
 
     # over a box around the bone. Where `origin` is not MATCHED, the disparity is a guess.
     surroundings: DisparityMap
-    is_in_front: NDArray[np.bool_]  # (h, w) over the same box; nothing is where the bone is not
+    is_in_front: NDArray[np.bool_]  # (h, w) over that box; on the bone and just beside it
 
 
 @dataclass(frozen=True, slots=True, eq=False)

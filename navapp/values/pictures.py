@@ -16,7 +16,7 @@ DEPTH_COLOURS = MappingProxyType(
         Origin.FILLED_BORDER: (210, 80, 210),
         Origin.FILLED_INTERIOR: (40, 130, 250),
         Origin.MISMATCH_FILLED: (70, 220, 240),
-        Origin.UNKNOWN: (30, 30, 30),
+        Origin.UNKNOWN: (110, 110, 110),
     }
 )
 

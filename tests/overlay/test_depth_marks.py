@@ -9,7 +9,7 @@ from navapp.values import DEPTH_COLOURS, DisparityMap, Foreground, Origin
 from sim_devices.rigs import make_default_rig
 
 RIG = make_default_rig()
-GREY = np.full((90, 160, 3), 100, np.uint8)
+GREY = np.full((90, 160, 3), 140, np.uint8)
 X, Y, WIDTH, HEIGHT = 480, 200, 320, 240
 
 
@@ -30,8 +30,8 @@ def test_every_class_has_a_colour_of_its_own(origin: Origin) -> None:
     marked = DepthMarks(RIG).draw(GREY, foreground(origin))
     inside = marked[changed(marked)]
     assert len(np.unique(inside, axis=0)) == 1
-    towards = np.sign(inside[0].astype(int) - 100)
-    np.testing.assert_array_equal(towards, np.sign(np.array(DEPTH_COLOURS[origin]) - 100))
+    towards = np.sign(inside[0].astype(int) - 140)
+    np.testing.assert_array_equal(towards, np.sign(np.array(DEPTH_COLOURS[origin]) - 140))
     assert len(set(DEPTH_COLOURS.values())) == len(Origin)
 
 
@@ -60,4 +60,4 @@ def test_what_stands_in_front_is_nearly_covered() -> None:
 
 def test_without_a_pose_the_picture_stays_as_it_is() -> None:
     assert DepthMarks(RIG).draw(GREY, None) is GREY
-    assert (GREY == 100).all()
+    assert (GREY == 140).all()

@@ -16,11 +16,13 @@ from tests.stereo.test_chains import (
     EVERY_RESOLUTION,
     FULL,
     HALF,
+    HEIGHT,
     INSIDE,
     IS_HIDDEN,
     IS_NEAR,
     TRUTH,
     WALL,
+    WIDTH,
     X,
     edge_distance_px,
     part,
@@ -87,7 +89,7 @@ def test_without_a_wide_gap_nothing_nearer_is_looked_for(
 ) -> None:
     asked = []
 
-    def spy(matched):
+    def spy(matched, gap):
         asked.append(matched)
         return matched.found
 
@@ -111,7 +113,7 @@ def test_guesses_that_cannot_be_are_dropped(monkeypatch: pytest.MonkeyPatch) -> 
 def test_the_calm_map_is_the_same_whatever_may_stand_before_it(
     band_px: tuple[float, float],
 ) -> None:
-    one, other = (match_coarsely(scene(INSIDE), band_px, nearest) for nearest in (None, 90.0))
+    one, other = (match_coarsely(scene(INSIDE), band_px, nearest) for nearest in (0.0, 90.0))
     np.testing.assert_array_equal(one.disparity_px, other.disparity_px)
 
 
@@ -123,6 +125,18 @@ def test_pictures_that_disagree_tell_nothing(band_px: tuple[float, float]) -> No
     assert found.box == INSIDE
     assert np.isnan(found.disparity_px).all()
     assert (found.origin == Origin.UNKNOWN).all()
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 0), (0, 1), (1, 1)])
+def test_pictures_of_odd_size_are_filled_to_their_rim(rows: int, columns: int) -> None:
+    whole = scene(INSIDE)
+    height, width = HEIGHT - rows, WIDTH - columns
+    geometry = replace(whole.geometry, width=width, height=height)
+    cut = (picture[:height, :width].copy() for picture in (whole.left, whole.right))
+    pair = RectifiedPair(*cut, geometry, Box(61, 9, width - 61, height - 9))
+    found = fill(pair, HALF)
+    assert found.box == pair.box
+    assert (found.origin == Origin.MATCHED).mean() > 0.8
 
 
 def test_a_coarse_map_tells_of_a_box_inside_it() -> None:

@@ -40,6 +40,9 @@ class Told:
     def check(self, measured: Measurement, pose: RigidTransform) -> SimpleNamespace:
         return SimpleNamespace(result=lambda: self._check)
 
+    def surroundings(self, watch: Stopwatch) -> None:
+        return None
+
 
 def altered(checks: PairChecks, fit: Fit, **changes) -> Told:
     """The check of a fit, its agreement changed."""
@@ -77,5 +80,5 @@ def judged(
     cloud = measured.reproject(GEOMETRY, 3)
     fit = Fit(estimate, Measurement(measured, cloud, 1.0, FREE_CORRELATION_PX))
     frame = Frame(None, estimate.camera_from_bone, Stopwatch())
-    checks = Told(PairCheck(health, None, None, None))
+    checks = Told(PairCheck(health, None, None))
     return judge.judge(frame, fit, goal or Goal(NO_TARGETS, 3.0), predicted, checks=checks)

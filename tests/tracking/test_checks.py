@@ -12,7 +12,7 @@ from navapp.stereo import CoarseMap
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.surface_meter import Measurement
-from navapp.values import DisparityMap, SurfaceCloud
+from navapp.values import DisparityMap, Stopwatch, SurfaceCloud
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
 from tests.tracking.rooms import blank_pair, measured_map
 
@@ -127,3 +127,38 @@ def test_unknown_maps_are_checked_too() -> None:
     with checks_with(CoarseMeter()) as checks:
         found = checks.check(Measurement(nothing, NO_CLOUD, 0.0, 11.0), TRUE).result()
     assert np.isnan(found.health.row_offset_px)
+
+
+def test_gaps_are_filled_once_for_all_measurements_and_only_when_asked_for() -> None:
+    around = MAP.box.grow(3)
+    known_px = np.full((around.height, around.width), 7.0, np.float32)
+    for fills in (False, True):
+        coarse = begin_on_helper(lambda: CoarseMap(known_px, around))
+        with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=fills) as checks:
+            watch = Stopwatch()
+            first = checks.surroundings(watch)
+            told_ms = watch.timings.fill_beside_ms
+            assert checks.surroundings(watch) is first
+        assert (first is not None) is fills
+        assert watch.timings.fill_beside_ms == told_ms
+    assert first.box == around
+
+
+def test_gaps_of_nothing_are_nothing() -> None:
+    coarse = begin_on_helper(lambda: None)
+    with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=True) as checks:
+        assert checks.surroundings(Stopwatch()) is None
+
+
+def test_a_fill_that_nobody_asks_for_is_dropped() -> None:
+    ended = []
+
+    def fail() -> None:
+        time.sleep(0.05)
+        ended.append(True)
+        raise ValueError("coarsely")
+
+    coarse = begin_on_helper(fail)
+    with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=True):
+        time.sleep(0.01)
+    assert ended == [True]

@@ -1,15 +1,19 @@
 """What stands in front of a bone at its pose."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import cv2
 import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
-from navapp.tracking import TrackState
-from navapp.tracking.foreground import IN_FRONT_MM, NEAR_PX, fill_in_time, find_foreground
-from navapp.values import DisparityMap, Origin, Status
+from navapp.tracking import TrackerSettings, TrackState, make_tracker
+from navapp.tracking.foreground import IN_FRONT_MM, NEAR_PX, find_foreground
+from navapp.values import DisparityMap, Origin, Status, TrackedFrame
+from sim_devices.scenario import Scenario
+from sim_devices.sensor import SensorModel
+from tests.knees import SimulatedKnee, stepped_camera
 from tests.registration.shapes import GEOMETRY, TRUE
 from tests.tracking.judged import MAP, MODEL
 from tests.tracking.rooms import GOAL, room
@@ -74,29 +78,52 @@ def test_surroundings_may_be_larger_or_smaller_than_the_view(box: Box) -> None:
     np.testing.assert_array_equal(found.is_in_front[inner], expected[inner])
 
 
-def test_a_frame_tells_what_stands_in_front_and_which_of_it_is_a_guess() -> None:
+@lru_cache
+def swept() -> tuple[TrackedFrame, np.ndarray, np.ndarray]:
+    """A frame in which an instrument is over the bone; what of the box shows hand, and bone."""
+    knee = SimulatedKnee(Scenario(seed=301, side="left", motion="breathing", instrument="sweep"))
+    camera = stepped_camera(knee.world, SensorModel(seed=301), rate_hz=0.5)
+    camera.read(1.0)
+    frame = camera.read(1.0)
+    time_ns = camera.world_time_ns(frame.captured_ns)
+    state = TrackState.at_rest(knee.world.left_from_body("femur", time_ns), frame.captured_ns)
+    tracker = make_tracker(knee.rig, knee.bone)
+    tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    box = tracked.foreground.surroundings.box
+    seen = knee.world.depth("left", time_ns)
+    columns, rows = (one[box.slices] for one in tracker.meter.rectifier.maps[:2])
+    pose = tracker.rectify_pose(tracked.left_from_bone)
+    silhouette = tracker.model.render(pose, tracker.meter.geometry, box).mask
+    masks = [(seen.body == seen.bodies.index(name)).astype(np.uint8) for name in ("hand", "femur")]
+    masks[0] = cv2.erode(masks[0], np.ones((7, 7), np.uint8))
+    hand, bone = (cv2.remap(mask, columns, rows, cv2.INTER_NEAREST) > 0 for mask in masks)
+    return tracked, hand & silhouette, bone & silhouette
+
+
+def test_a_frame_tells_that_an_instrument_stands_in_front() -> None:
+    tracked, hand, bone = swept()
+    assert tracked.verdict.status is Status.OK
+    assert np.count_nonzero(hand) > 500
+    assert tracked.foreground.is_in_front[hand].mean() > 0.9
+    assert tracked.foreground.is_in_front[bone].mean() < 0.02
+
+
+def test_guesses_are_told_from_matches_and_the_fill_is_timed() -> None:
+    tracked, _, bone = swept()
+    surroundings = tracked.foreground.surroundings
+    assert {Origin.MATCHED, Origin.FILLED_INTERIOR} <= set(np.unique(surroundings.origin))
+    assert np.array_equal(np.isnan(surroundings.disparity_px), surroundings.origin == 0)
+    assert (surroundings.origin[bone] == Origin.MATCHED).mean() > 0.8
+    assert tracked.timings.fill_ms > 0.0
+
+
+def test_only_the_tracker_that_guides_tells_it() -> None:
     a = room()
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    tracked, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
-    assert tracked.verdict.status is Status.OK
-    foreground = tracked.foreground
-    surroundings = foreground.surroundings
-    origins = set(np.unique(surroundings.origin))
-    assert {Origin.MATCHED, Origin.FILLED_INTERIOR} <= origins
-    assert np.array_equal(np.isnan(surroundings.disparity_px), surroundings.origin == 0)
-    # The bone's own surface is measured, and not in front of itself.
-    pose = a.tracker.rectify_pose(tracked.left_from_bone)
-    view = a.tracker.model.render(pose, a.tracker.meter.geometry, surroundings.box)
-    deviation_px = surroundings.disparity_px - a.tracker.meter.geometry.disparity_map_px(
-        view.depth_mm
-    )
-    assert abs(np.nanmedian(deviation_px[view.mask])) < 0.1
-    assert not foreground.is_in_front[np.abs(deviation_px) < 1.0].any()
-    timings = tracked.timings
-    assert timings.fill_beside_ms > 0.0
-    assert timings.fill_ms == 0.0
-
-
-def test_without_a_coarse_map_there_is_nothing_to_fill() -> None:
-    assert fill_in_time(None)[0] is None
+    for method in ("bimcc", "icp"):
+        settings = TrackerSettings(method, follows_refused=True)
+        tracker = make_tracker(a.rig, a.tracker.model.bone, settings)
+        tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        assert (tracked.foreground is None) is (method == "icp")
+    assert a.tracker.assess(frame.left, frame.right, a.truth(frame), GOAL).foreground is None

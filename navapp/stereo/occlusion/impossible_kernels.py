@@ -20,7 +20,8 @@ def mark_impossible(
 
     Hidden at column x by a surface of disparity d' at column x' > x, a pixel has a disparity of at
     most d' - (x' - x). A guess that agrees with the matches on both sides is kept all the same: it
-    closes a hole in one surface.
+    closes a hole in one surface. Mismatches are asked too: beside something near, what the right
+    camera sees is not known well enough to tell them from what is hidden.
 
     Args:
         disparity: (h, w) px, matched and filled; NaN where unknown.
