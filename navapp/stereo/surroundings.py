@@ -1,4 +1,4 @@
-"""A dense map of what lies around a surface: the coarse matches, and guesses in their gaps.
+"""A dense map of what lies around a surface: the coarse matches with their gaps filled.
 
 To tell what stands where, for example a hand in front of a bone; never to measure with.
 """
@@ -12,8 +12,8 @@ from navapp.geometry.box import Box
 from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch, double, halve
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
 from navapp.stereo.matching.search import Crop
+from navapp.stereo.occlusion.bound_kernels import mark_beyond_bound
 from navapp.stereo.occlusion.classify import classify
-from navapp.stereo.occlusion.impossible_kernels import mark_impossible
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
 from navapp.values import DisparityMap, Origin
 
@@ -26,18 +26,18 @@ _BEYOND_PX = 2.0
 _NEAR_CENSUS = replace(SURFACE_CENSUS, radius_x=1, radius_y=1, max_difference_px=3.0, speckle_px=40)
 # A map to about a pixel needs no wider support.
 _FILL = FillSettings(radius_px=16)
-# A guess may be nearer than what hides it leaves room for, and differ from its neighbours, by so
-# much: edges and surfaces are known to about as much.
+# A filled disparity may exceed the bound of its occlusion by so much, the error of edges;
+# disparities further apart belong to different surfaces.
 _EDGE_PX, _LAYER_PX = np.float32(2.0), np.float32(8.0)
 
 
 def fill_surroundings(coarse: CoarseMap) -> DisparityMap:
     """The matches of a coarse map at full size, their gaps filled by weighted least squares.
 
-    What stands before the searched band is matched too. Gaps are classified and filled along the
-    picture's edges (`fill_wls`), a match that hangs over the edge of something near is withdrawn
-    first, and a guess that cannot be is dropped. What is no match keeps its class as origin: its
-    disparity is a guess.
+    What stands before the searched band is matched too. A match that hangs over the edge of
+    something near is withdrawn, gaps are classified and filled (`fill_wls`), and filled pixels
+    nearer than their occlusion allows become unknown (`mark_beyond_bound`). A filled pixel has its
+    class as origin: its disparity is a guess.
     """
     matched = coarse.matched
     if matched is None:
@@ -52,9 +52,9 @@ def fill_surroundings(coarse: CoarseMap) -> DisparityMap:
     picture = Crop.of(pair.left, pair.box, (0, 0)).inner
     classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
     filled = fill_wls(found.left, picture, found.confidence, classes, _FILL)
-    is_impossible = np.empty(filled.origin.shape, dtype=np.bool_)
-    mark_impossible(filled.disparity_px, filled.origin, _EDGE_PX, _LAYER_PX, is_impossible)
-    filled = filled.only(~is_impossible)
+    is_beyond = np.empty(filled.origin.shape, dtype=np.bool_)
+    mark_beyond_bound(filled.disparity_px, filled.origin, _EDGE_PX, _LAYER_PX, is_beyond)
+    filled = filled.only(~is_beyond)
     return filled if pair.box == coarse.box else _double_map(filled, coarse.box)
 
 

@@ -100,10 +100,10 @@ def test_without_a_wide_gap_nothing_nearer_is_looked_for(
 
 
 def test_guesses_that_cannot_be_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
-    def mark_all_guesses(disparity, origin, edge_px, layer_px, is_impossible) -> None:
-        is_impossible[...] = origin > Origin.MATCHED
+    def mark_all_guesses(disparity, origin, edge_px, layer_px, is_beyond) -> None:
+        is_beyond[...] = origin > Origin.MATCHED
 
-    monkeypatch.setattr(surroundings, "mark_impossible", mark_all_guesses)
+    monkeypatch.setattr(surroundings, "mark_beyond_bound", mark_all_guesses)
     found = fill_surroundings(match_coarsely(scene(INSIDE), FULL))
     assert set(np.unique(found.origin)) == {Origin.UNKNOWN, Origin.MATCHED}
     assert np.isnan(found.disparity_px[found.origin == Origin.UNKNOWN]).all()

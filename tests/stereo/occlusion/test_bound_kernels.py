@@ -1,13 +1,13 @@
-"""Guesses that contradict why they are guesses."""
+"""The bound that an occlusion sets to filled disparities."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from navapp.stereo.occlusion.impossible_kernels import mark_impossible
+from navapp.stereo.occlusion.bound_kernels import mark_beyond_bound
 from navapp.values import Origin
-from tests.reference.impossible_reference import mark_impossible_slowly
+from tests.reference.bound_reference import mark_beyond_bound_slowly
 
 EDGE, LAYER = np.float32(2.0), np.float32(8.0)
 MATCHED, INTERIOR = Origin.MATCHED, Origin.FILLED_INTERIOR
@@ -17,7 +17,7 @@ def marked(disparity, origin) -> np.ndarray:
     disparity = np.atleast_2d(np.array(disparity, dtype=np.float32))
     origin = np.atleast_2d(np.array(origin, dtype=np.uint8))
     out = np.ones(origin.shape, dtype=np.bool_)
-    mark_impossible(disparity, origin, EDGE, LAYER, out)
+    mark_beyond_bound(disparity, origin, EDGE, LAYER, out)
     return out
 
 
@@ -31,8 +31,8 @@ def test_it_is_the_rule(seed: int) -> None:
     disparity = (rng.integers(0, 160, shape) / 4.0).astype(np.float32)
     disparity[origin == Origin.UNKNOWN] = np.nan
     found = np.ones(shape, dtype=np.bool_)
-    mark_impossible(disparity, origin, EDGE, LAYER, found)
-    np.testing.assert_array_equal(found, mark_impossible_slowly(disparity, origin, EDGE, LAYER))
+    mark_beyond_bound(disparity, origin, EDGE, LAYER, found)
+    np.testing.assert_array_equal(found, mark_beyond_bound_slowly(disparity, origin, EDGE, LAYER))
 
 
 def test_what_hides_a_pixel_bounds_how_near_it_is() -> None:

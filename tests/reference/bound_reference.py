@@ -1,12 +1,12 @@
-"""Which guesses in gaps cannot be, pixel by pixel from the rule."""
+"""Filled pixels that are nearer than their occlusion allows, pixel by pixel from the rule."""
 
 import numpy as np
 
 MATCHED, INTERIOR = 1, 3
 
 
-def mark_impossible_slowly(disparity, origin, edge_px, layer_px):
-    """(h, w) guesses nearer than what hides them leaves room for, that differ from a neighbour."""
+def mark_beyond_bound_slowly(disparity, origin, edge_px, layer_px):
+    """(h, w) filled pixels beyond the bound that differ from a matched neighbour."""
     height, width = origin.shape
     out = np.zeros((height, width), dtype=bool)
     for y in range(height):
