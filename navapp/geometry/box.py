@@ -43,12 +43,19 @@ class Box:
         """Its rows and columns, to index a picture with; it must be clipped."""
         return slice(self.y, self.y + self.height), slice(self.x, self.x + self.width)
 
+    def intersect(self, other: "Box") -> "Box":
+        """The pixels of both; its width or height is 0 when there are none."""
+        inside = self.relative_to(other).clip(other.width, other.height)
+        return Box(inside.x + other.x, inside.y + other.y, inside.width, inside.height)
+
+    def relative_to(self, other: "Box") -> "Box":
+        """The same rectangle, its place counted from the first pixel of another box."""
+        return Box(self.x - other.x, self.y - other.y, self.width, self.height)
+
     def overlap(self, other: "Box") -> float:
         """Intersection over union, 0 to 1."""
-        x0, y0 = max(self.x, other.x), max(self.y, other.y)
-        x1 = min(self.x + self.width, other.x + other.width)
-        y1 = min(self.y + self.height, other.y + other.height)
-        shared = max(0, x1 - x0) * max(0, y1 - y0)
+        both = self.intersect(other)
+        shared = both.width * both.height
         union = self.width * self.height + other.width * other.height - shared
         return shared / union if union > 0 else 0.0
 

@@ -83,7 +83,7 @@ def _add_nearer(matched: CoarseMatch, gap: Box) -> TwoViewDisparity:
     is_near = near_px > least_px
     if not is_near.any():
         return found
-    there = replace(gap, x=gap.x - left.x, y=gap.y - left.y).slices
+    there = gap.relative_to(left.box).slices
     disparity_px, sigma_px = left.disparity_px.copy(), left.sigma_px.copy()
     origin, confidence = left.origin.copy(), found.confidence.copy()
     np.copyto(disparity_px[there], near_px, where=is_near)

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.values import DisparityMap, Foreground
@@ -29,10 +28,13 @@ def find_foreground(
         near_px: the nearest bone within so many pixels counts ...
         in_front_mm: ... and what is nearer by so much.
     """
-    near_mm = _nearest_bone_mm(_render_over(view, surroundings.box), near_px)
-    is_bone = np.isfinite(near_mm)
-    limit_px = geometry.disparity_map_px(np.where(is_bone, near_mm - in_front_mm, np.nan))
-    return Foreground(surroundings, surroundings.disparity_px > limit_px)
+    both = view.box.intersect(surroundings.box)
+    there, in_view = (both.relative_to(box).slices for box in (surroundings.box, view.box))
+    near_mm = _nearest_bone_mm(view.depth_mm, near_px)[in_view]
+    limit_px = geometry.disparity_map_px(near_mm - in_front_mm)
+    is_in_front = np.zeros(surroundings.disparity_px.shape, dtype=np.bool_)
+    is_in_front[there] = (surroundings.disparity_px[there] > limit_px) & np.isfinite(near_mm)
+    return Foreground(surroundings, is_in_front)
 
 
 def _nearest_bone_mm(depth_mm: NDArray[np.float32], near_px: int) -> NDArray[np.float32]:
@@ -44,14 +46,3 @@ def _nearest_bone_mm(depth_mm: NDArray[np.float32], near_px: int) -> NDArray[np.
     # OpenCV's own border is the largest finite number.
     around = cv2.erode(depth_mm, np.ones(size, np.uint8), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(around, dtype=np.float32)
-
-
-def _render_over(view: RenderedView, box: Box) -> NDArray[np.float32]:
-    """(h, w) depth of a rendered view over another box; NaN beyond the view's."""
-    depth_mm = np.full((box.height, box.width), np.nan, dtype=np.float32)
-    x, y = view.box.x - box.x, view.box.y - box.y
-    height, width = view.depth_mm.shape
-    inside = Box(x, y, width, height).clip(box.width, box.height)
-    source = Box(inside.x - x, inside.y - y, inside.width, inside.height)
-    depth_mm[inside.slices] = view.depth_mm[source.slices]
-    return depth_mm

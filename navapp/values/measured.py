@@ -83,16 +83,14 @@ class DisparityMap:
 
     def with_matches_of(self, other: "DisparityMap") -> "DisparityMap":
         """This map with what another one has matched, where they overlap."""
-        x, y = other.x - self.x, other.y - self.y
-        height, width = self.origin.shape
-        inside = Box(x, y, other.box.width, other.box.height).clip(width, height)
-        there = Box(inside.x - x, inside.y - y, inside.width, inside.height).slices
+        both = self.box.intersect(other.box)
+        here, there = (both.relative_to(box).slices for box in (self.box, other.box))
         is_matched = other.origin[there] == Origin.MATCHED
         disparity_px, sigma_px = self.disparity_px.copy(), self.sigma_px.copy()
         origin = self.origin.copy()
-        np.copyto(disparity_px[inside.slices], other.disparity_px[there], where=is_matched)
-        np.copyto(sigma_px[inside.slices], other.sigma_px[there], where=is_matched)
-        origin[inside.slices][is_matched] = Origin.MATCHED
+        np.copyto(disparity_px[here], other.disparity_px[there], where=is_matched)
+        np.copyto(sigma_px[here], other.sigma_px[there], where=is_matched)
+        origin[here][is_matched] = Origin.MATCHED
         return DisparityMap(disparity_px, sigma_px, origin, self.x, self.y)
 
     def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":

@@ -39,3 +39,13 @@ def test_a_box_around_pixels_holds_them_and_no_more():
     assert Box.around(np.array([[4.0, 5.0]])) == Box(4, 5, 1, 1)
     assert Box.around(np.full((2, 2), np.nan)) is None
     assert Box.around(np.empty((0, 2))) is None
+
+
+def test_two_boxes_share_the_pixels_of_both() -> None:
+    one, other = Box(3, 4, 10, 6), Box(8, -2, 20, 9)
+    both = one.intersect(other)
+    assert both == Box(8, 4, 5, 3) == other.intersect(one)
+    assert both.relative_to(one) == Box(5, 0, 5, 3)
+    assert both.relative_to(other) == Box(0, 6, 5, 3)
+    assert one.intersect(Box(13, 4, 5, 5)).is_empty
+    assert one.intersect(Box(90, 90, 5, 5)).is_empty
