@@ -81,21 +81,24 @@ def main() -> int:
     print("|---|---|---|---|---|---|---|")
     pooled = {pair: np.zeros(6) for pair in pairs}
     pooled_ms: list[float] = []
-    is_good = True
+    is_good, n_pooled = True, 0
     for name, rig, bone, cases in _sequences(options):
         tracker = make_tracker(rig, bone)
         counts = {pair: np.zeros(6) for pair in pairs}
         fill_ms: list[float] = []
+        n_frames = 0
         for case in cases:
+            n_frames += 1
             _judge(tracker, rig, case, counts, fill_ms, options.pictures)
         if name.startswith(_SIMULATED):
             for pair, n in counts.items():
                 pooled[pair] += n
             pooled_ms += fill_ms
+            n_pooled += n_frames
         else:
             is_good &= _is_good(counts)
-        _print_rows(name, counts, fill_ms)
-    _print_rows("all simulated", pooled, pooled_ms)
+        _print_rows(name, counts, fill_ms, n_frames)
+    _print_rows("all simulated", pooled, pooled_ms, n_pooled)
     return 0 if is_good and _is_good(pooled) else 1
 
 
@@ -104,13 +107,13 @@ def _is_good(counts: Counts) -> bool:
     return any(n[0] >= _LEAST_MARKED * n[1] and n[2] <= _MOST_WRONG * n[3] for n in counts.values())
 
 
-def _print_rows(name: str, counts: Counts, fill_ms: list[float]) -> None:
+def _print_rows(name: str, counts: Counts, fill_ms: list[float], n_frames: int) -> None:
     if not fill_ms:
         return
     for (near_px, in_front_mm), n in counts.items():
         print(
             f"| {name} | {near_px} px, {in_front_mm:.0f} mm | "
-            f"{len(fill_ms)} | {n[0] / n[1]:.4f} of {n[1]:.0f} | "
+            f"{len(fill_ms)} of {n_frames} | {n[0] / n[1]:.4f} of {n[1]:.0f} | "
             f"{n[2] / n[3]:.4f} of {n[3]:.0f} | {n[4] / max(n[5], 1.0):.3f} | "
             f"{np.median(fill_ms):.1f}, p95 {np.percentile(fill_ms, 95):.1f} ms |",
             flush=True,

@@ -99,7 +99,7 @@ def test_without_a_wide_gap_nothing_nearer_is_looked_for(
         assert len(asked) == n_asked
 
 
-def test_guesses_that_cannot_be_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_filled_pixels_beyond_their_bound_become_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     def mark_all_guesses(disparity, origin, edge_px, layer_px, is_beyond) -> None:
         is_beyond[...] = origin > Origin.MATCHED
 

@@ -9,6 +9,7 @@ from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import render_rectified
 from navapp.stereo import CoarseMap
+from navapp.tracking import checks as checks_module
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.surface_meter import Measurement
@@ -150,15 +151,19 @@ def test_gaps_of_nothing_are_nothing() -> None:
         assert checks.surroundings(Stopwatch()) is None
 
 
-def test_a_fill_that_nobody_asks_for_is_dropped() -> None:
-    ended = []
+def test_a_fill_that_nobody_asks_for_ends_with_the_checks(monkeypatch) -> None:
+    begun, ended = [], []
 
-    def fail() -> None:
+    def fill_slowly(coarse: CoarseMap) -> DisparityMap:
+        begun.append(True)
         time.sleep(0.05)
         ended.append(True)
-        raise ValueError("coarsely")
+        return MAP
 
-    coarse = begin_on_helper(fail)
+    monkeypatch.setattr(checks_module, "fill_surroundings", fill_slowly)
+    known_px = np.full((9, 9), 7.0, np.float32)
+    coarse = begin_on_helper(lambda: CoarseMap(known_px, Box(0, 0, 9, 9)))
     with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=True):
-        time.sleep(0.01)
+        while not begun:
+            time.sleep(0.001)
     assert ended == [True]
