@@ -69,7 +69,7 @@ class Show:
 
 @dataclass(frozen=True, slots=True)
 class ToggleDepth:
-    """Mark in the operator's picture what is known of the depth, or no longer."""
+    """Colour the operator's picture by the classes of the depth map, or no longer."""
 
 
 @dataclass(frozen=True, slots=True)

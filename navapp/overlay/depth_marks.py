@@ -1,4 +1,4 @@
-"""Marks in a small picture what is known of the depth around a bone, for the operator."""
+"""The classes of the depth around a bone, as colours in the operator's small picture."""
 
 from functools import lru_cache, partial
 

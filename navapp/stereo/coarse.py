@@ -117,8 +117,8 @@ def match_coarsely(
     Args:
         pair: rectified grey pictures; the part of `pair.box` inside them is matched.
         band_px: smallest and largest disparity expected.
-        nearest_px: disparity of the nearest thing that may stand before the band, kept for those
-            who look for it.
+        nearest_px: largest disparity of anything in view. Nothing beyond the band is matched here;
+            `fill_surroundings` does that, and reads this.
     """
     pair = clip_box(pair)
     nearest_px = max(nearest_px, band_px[1])

@@ -107,7 +107,7 @@ class PoseJudge:
     def _find_foreground(
         self, frame: Frame, fit: Fit, view: RenderedView, checks: PairChecks
     ) -> Foreground | None:
-        """What stands in front of the bone, as it is seen at its pose; None if nobody asks."""
+        """What stands in front of the bone at its pose; None where the gaps are not filled."""
         surroundings = checks.surroundings(frame.watch)
         if surroundings is None:
             return None

@@ -28,6 +28,6 @@ def make_tracker(
     settings: TrackerSettings | None = None,
     aspects: AspectGraph | None = None,
 ) -> Tracker:
-    """The tracker of `settings.method`; see there for what it takes the aspects."""
+    """The tracker of `settings.method`; its class says what the aspects are for."""
     settings = settings or TrackerSettings()
     return _TRACKERS[settings.method](rig, bone, settings, aspects)
