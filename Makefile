@@ -7,7 +7,17 @@ BIN    := $(VENV)/bin
 PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
-# Every kernel is run by one of them at least.
+# Without the bytecode every worker would compile all tests again.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
+# Compiled code does not check its indices: kernels run again with the check, and with a cache of
+# their own, because the cache does not know about that switch. Most of the time goes into
+# compiling: quickly rather than well, and a kernel in one worker if possible.
+KERNELS := $(shell find navapp sim_devices drivers calibration -name '*kernels.py' | sort)
+CHECKED := NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 \
+    NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck-$(shell cat $(KERNELS) | cksum | cut -d' ' -f1) \
+    $(PYTEST) -q -n 2 --dist loadfile --every-kernel
+# Every kernel is run by one of them at least: --every-kernel sees to it.
+TWINS = $(shell grep -rl --include='test_*.py' 'mark\.twin' tests)
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
     tests/registration --ignore tests/registration/test_register.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
@@ -22,7 +32,7 @@ SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
     xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils \
     libxcb-randr0 libxcb-render0 libxcb-shm0 libxcb-xfixes0
 
-.PHONY: run test check setup bench bench-peers system-deps clean help
+.PHONY: run test test-all check setup bench bench-peers system-deps clean help
 
 help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -30,14 +40,14 @@ help:           ## this list
 run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
-test: setup check  ## the whole test suite
+test: setup check  ## style, types, import rules and the tests: some minutes
 	# One worker more than two cores carry: some tests wait in real time.
-	$(BIN)/python -m pytest -n 3 --dist loadgroup
-	# Compiled code does not check its indices: the kernels' tests run again with the check, and
-	# with a cache of their own, because the cache does not know about that switch. Most of the
-	# time goes into compiling: quickly rather than well, and a kernel in one worker if possible.
-	NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck \
-	    $(BIN)/python -m pytest -q -n 2 --dist loadfile $(KERNEL_TESTS)
+	$(PYTEST) -n 3 --dist loadgroup
+	$(CHECKED) -m twin $(TWINS)
+
+test-all: setup check  ## the release gate: as test, with every case of every test
+	$(PYTEST) -n 3 --dist loadgroup --release
+	$(CHECKED) --release $(KERNEL_TESTS) $(TWINS)
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -1,4 +1,4 @@
-"""Shared by all tests: the user's settings hidden, leaks found, skips counted."""
+"""Shared by all tests: the user's settings hidden, leaks found, skips counted, knees kept."""
 
 import itertools
 import os
@@ -11,8 +11,10 @@ import pytest
 
 import navapp  # sets the environment before any heavy import
 from navapp.config import Configuration, load
+from tests import kept
 
 assert navapp.__version__
+kept.install()
 
 DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
 
@@ -77,6 +79,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     Slow ones come first: what is left for the end is short, and no worker waits for another.
     """
+    if not config.getoption("--release"):
+        many = [item for item in items if item.get_closest_marker("release")]
+        items[:] = [item for item in items if not item.get_closest_marker("release")]
+        config.hook.pytest_deselected(items=many)
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     for item in items:
@@ -87,7 +93,24 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--every-kernel"):
+        from tests.kernels_run import EveryKernel
+
+        config.pluginmanager.register(EveryKernel())
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--release",
+        action="store_true",
+        help="also what is marked as release: the many further cases of one thing",
+    )
+    parser.addoption(
+        "--every-kernel",
+        action="store_true",
+        help="fail when a compiled kernel of the product was not run",
+    )
     parser.addoption(
         "--hardware",
         metavar="FILE",

@@ -6,6 +6,7 @@ import pytest
 from calibration.pivot import solve_pivot
 from navapp.errors import ResultError
 from navapp.geometry.transform import rotation_from_vector
+from tests.many import few_of
 
 TIP_MM = np.array([-14.0, 160.0, -7.0])
 PIVOT_MM = np.array([-80.0, -85.0, -1200.0])
@@ -37,7 +38,7 @@ def poses(
     return found
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", few_of(range(20), 3))
 def test_a_tip_is_found_to_a_tenth_of_a_millimetre(seed: int) -> None:
     found = solve_pivot(poses(np.random.default_rng(seed)))
     assert np.linalg.norm(found.robust.tip_mm - TIP_MM) < 0.1
@@ -46,7 +47,7 @@ def test_a_tip_is_found_to_a_tenth_of_a_millimetre(seed: int) -> None:
     assert found.bound_mm < 0.15
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", few_of(range(10), 3))
 def test_wrong_poses_are_named_and_do_no_harm(seed: int) -> None:
     rng = np.random.default_rng(seed)
     given = poses(rng)

@@ -90,9 +90,3 @@ def test_other_bones_neither_make_navigable_nor_prevent_it() -> None:
     assert check_interlocks(replace(GOOD, others=lost)) == ()
     well = (OtherBone("tibia", Verdict(Status.OK, 0.1), 1.0),)
     assert check_interlocks(replace(GOOD, others=well, left_from_bone=None)) == (Reason.BONE_LOST,)
-
-
-@pytest.mark.parametrize("reason", list(Reason))
-def test_every_reason_has_a_phrase_and_a_remedy(reason: Reason) -> None:
-    assert reason.value
-    assert reason.remedy

@@ -11,8 +11,9 @@ from sim_devices.firmware import wire
 from sim_devices.firmware.escvp21 import Power, ProjectorModel
 from sim_devices.firmware.wire import Pieces
 from tests.drivers.firmware_rigs import SERIAL, ProjectorRig, StageRig
+from tests.many import few_of
 
-N_REPLIES = 100_000
+REPLIES = few_of([20_000, 100_000])
 # Beyond all that a driver may wait for: lamp, probes, retries.
 LONGEST_S = 400.0
 TOLERANCE_DEG = 0.01
@@ -86,12 +87,12 @@ class Fuzz:
 
 
 def drive(
-    rig: ProjectorRig | StageRig, fuzz: Fuzz, actions: list[Callable[[], object]]
+    rig: ProjectorRig | StageRig, fuzz: Fuzz, n_replies: int, actions: list[Callable[[], object]]
 ) -> tuple[int, int]:
     """Do random things until all replies have come; how many went well, and how many did not."""
     n_well = n_failed = 0
     rig.wire.spoiler, rig.wire.command_spoiler = fuzz, fuzz.command
-    while fuzz.n_replies < N_REPLIES:
+    while fuzz.n_replies < n_replies:
         begin_s = rig.now_s
         fuzz.share = fuzz.random.choice((0.02, 0.2, 0.7))
         try:
@@ -107,7 +108,8 @@ def drive(
 
 
 @pytest.mark.slow
-def test_a_projector_never_believes_a_spoilt_line() -> None:
+@pytest.mark.parametrize("n_replies", REPLIES)
+def test_a_projector_never_believes_a_spoilt_line(n_replies: int) -> None:
     rig = ProjectorRig(ProjectorModel(is_quick=True, has_events=True, cooling_s=5.0))
     fuzz, model = Fuzz(1), rig.firmware.model
     n_verified = dict.fromkeys(("power", "source", "mute", "flips", "status"), 0)
@@ -158,15 +160,17 @@ def test_a_projector_never_believes_a_spoilt_line() -> None:
                 assert said in (None, so)
             n_verified["status"] += said is not None
 
-    n_well, n_failed = drive(rig, fuzz, [power, source, mute, flips, status, status_after_noise])
-    assert n_well > 1000
-    assert n_failed > 1000
+    actions = [power, source, mute, flips, status, status_after_noise]
+    n_well, n_failed = drive(rig, fuzz, n_replies, actions)
+    assert n_well > n_replies // 100
+    assert n_failed > n_replies // 100
     # The test sees something: each kind of command was verified often.
-    assert min(n_verified.values()) > 100, n_verified
+    assert min(n_verified.values()) > n_replies // 1000, n_verified
 
 
 @pytest.mark.slow
-def test_a_mirror_never_believes_a_spoilt_line() -> None:
+@pytest.mark.parametrize("n_replies", REPLIES)
+def test_a_mirror_never_believes_a_spoilt_line(n_replies: int) -> None:
     rig = StageRig()
     fuzz, firmware = Fuzz(2), rig.firmware
     # A protocol with numbers and checksums must bear these as well.
@@ -201,7 +205,8 @@ def test_a_mirror_never_believes_a_spoilt_line() -> None:
         )
         deed()
 
-    n_well, n_failed = drive(rig, fuzz, [home, move, move, position, position, position, trouble])
-    assert n_well > 1000
-    assert n_failed > 1000
-    assert min(n_known.values()) > 100, n_known
+    actions = [home, move, move, position, position, position, trouble]
+    n_well, n_failed = drive(rig, fuzz, n_replies, actions)
+    assert n_well > n_replies // 100
+    assert n_failed > n_replies // 100
+    assert min(n_known.values()) > n_replies // 1000, n_known

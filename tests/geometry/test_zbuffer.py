@@ -53,6 +53,7 @@ def drawn(pixels, depths, faces, width, height, bands=None):
     return np.where(face_index < 0, 0.0, 1.0 / depth), face_index
 
 
+@pytest.mark.twin
 @pytest.mark.parametrize("seed", range(4))
 def test_the_kernel_agrees_with_the_reference(seed):
     rng = np.random.default_rng(seed)
@@ -71,6 +72,7 @@ def test_the_kernel_agrees_with_the_reference(seed):
     np.testing.assert_allclose(inverse_depth, expected_depth, rtol=1e-5)
 
 
+@pytest.mark.twin
 def test_the_edges_of_a_triangle_on_pixel_centres_belong_to_it():
     pixels = np.array([[2.0, 3.0], [8.0, 3.0], [2.0, 9.0]])
     faces = np.array([[0, 1, 2]], dtype=np.int32)

@@ -2,6 +2,8 @@
 
 import pytest
 
+from sim_devices.anatomy import KneeAnatomy
+from tests.many import few_of
 from tests.preop.knees import knees
 
 
@@ -10,3 +12,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if isinstance(item, pytest.Function) and getattr(item.module, "knees", None) is knees:
             item.add_marker(pytest.mark.xdist_group("knees"))
+
+
+@pytest.fixture(params=few_of([8, 20]), ids="{} knees".format)
+def people(request: pytest.FixtureRequest) -> list[KneeAnatomy]:
+    """Both knees of four people, or of all."""
+    return knees()[: request.param]

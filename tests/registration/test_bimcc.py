@@ -8,6 +8,7 @@ from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
 from navapp.registration.bimcc import fit_coarsely, fit_pose
 from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.values import BoneModel, PoseEstimate, Reason
+from tests.many import few_of
 from tests.registration.shapes import (
     TRUE,
     as_cloud,
@@ -31,7 +32,7 @@ MODEL = femur_for_registration()
 EYE = np.zeros(3)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few_of(range(4)))
 def test_a_clean_one_sided_scene_gives_the_pose_back(seed: int) -> None:
     scene = scene_of(seen_cloud(BONE, 900, 0.0, seed))
     found = fit_bimcc(scene, MODEL, disturbed(MODEL, 6.0, 5.0, seed))
@@ -41,7 +42,7 @@ def test_a_clean_one_sided_scene_gives_the_pose_back(seed: int) -> None:
     assert found.rms_mm < 0.02
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few_of(range(4)))
 def test_noise_is_averaged_out(seed: int) -> None:
     scene = scene_of(seen_cloud(BONE, 1200, 0.3, seed))
     found = fit_bimcc(scene, MODEL, disturbed(MODEL, 8.0, 6.0, seed + 10))
@@ -51,7 +52,7 @@ def test_noise_is_averaged_out(seed: int) -> None:
     assert 0.7 < found.rms_mm / found.expected_rms_mm < 1.25
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", few_of(range(3)))
 def test_clutter_of_two_fifths_does_not_pull(seed: int) -> None:
     scene = seen_scene(900, 0.3, seed, n_clutter=600)
     found = fit_bimcc(scene, MODEL, disturbed(MODEL, 6.0, 5.0, seed))
@@ -156,7 +157,7 @@ def test_an_approach_leads_near_or_nowhere() -> None:
     assert fit_coarsely(scene, MODEL, disturbed(MODEL, 0.0, 400.0, 1), BimccSettings()) is None
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", few_of(range(3)))
 def test_any_orientation_of_the_world_gives_the_same_pose(seed: int) -> None:
     """Scene, camera and start moved together: the answer moves with them."""
     rng = np.random.default_rng(seed)

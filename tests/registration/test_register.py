@@ -12,6 +12,7 @@ from navapp.registration.bimcc import solution_at
 from navapp.registration.multi_start import ScoredPose
 from navapp.registration.register import measure_smooth_part_mm
 from navapp.values import BoneModel, Reason
+from tests.many import few_of
 from tests.registration.shapes import (
     TRUE,
     ball_mesh,
@@ -32,7 +33,7 @@ EYE = np.zeros(3)
 METHODS = ("bimcc", "icp", "bimcc-literal")
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", few_of(range(5)))
 def test_the_pose_is_found_from_far_through_clutter(seed: int) -> None:
     scene = seen_scene(1200, 0.4, seed, n_clutter=800)
     found = register(scene, MODEL, disturbed(MODEL, 25.0, 15.0, seed))
@@ -54,7 +55,7 @@ def test_a_good_start_is_the_only_one() -> None:
     assert mean_error_mm(everywhere.estimate.camera_from_bone, BONE) < 0.2
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", few_of(range(3)))
 def test_the_search_everywhere_finds_a_bone_that_is_turned_away(seed: int) -> None:
     start = disturbed(MODEL, 120.0, 0.0, seed)
     found = register(seen_scene(1200, 0.4, seed), MODEL, start, is_global=True)
@@ -228,7 +229,7 @@ def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
     assert Reason.AMBIGUOUS in found.reasons
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few_of(range(4)))
 def test_a_shape_that_repeats_itself_every_45_degrees_is_a_guess(seed: int) -> None:
     """The twins lie beyond the near starts, and nobody knows where the camera stood."""
     ball = ball_mesh(1.0, 3000)

@@ -4,13 +4,22 @@ import numpy as np
 import pytest
 
 from navapp.errors import UsageError
-from sim_devices.anatomy import KneeSpec, make_knee
+from sim_devices.anatomy import KneeSpec
+from tests.kept import make_new_knee as make_knee
+from tests.many import few_of
 
-SPECS = [
+ALL = [
     KneeSpec(seed, "right", sex, age)
     for sex, age in itertools.product(("female", "male"), ("young", "middle", "old"))
     for seed in (1, 2)
 ]
+# Both sexes and every age among the first.
+FIRST = [
+    KneeSpec(1, "right", "female", "young"),
+    KneeSpec(2, "right", "male", "middle"),
+    KneeSpec(1, "right", "female", "old"),
+]
+SPECS = few_of([*FIRST, *(spec for spec in ALL if spec not in FIRST)], len(FIRST))
 
 
 @pytest.fixture(scope="module", params=SPECS, ids=lambda s: f"{s.sex}-{s.age_group}-{s.seed}")

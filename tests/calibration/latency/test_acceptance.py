@@ -7,6 +7,7 @@ from calibration.latency.acceptance import WORST_MS, measure_accepted_latency
 from calibration.latency.display_area import WatchedCells
 from navapp.errors import ResultError
 from tests.calibration.latency.scenes import CASES, Bench, drawn_bench
+from tests.many import few_of
 
 GOOD = (
     "15 Hz", "25 Hz, 5 ms", "30 Hz, 30 ms", "60 Hz", "display of 144 Hz",
@@ -20,7 +21,7 @@ def judged(bench: Bench, seed: int):
 
 
 @pytest.mark.parametrize("name", GOOD)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few_of(range(4)))
 def test_delay_and_offset_are_recovered(name: str, seed: int) -> None:
     bench = drawn_bench(seed, **CASES[name])
     found = judged(bench, seed)
@@ -30,7 +31,7 @@ def test_delay_and_offset_are_recovered(name: str, seed: int) -> None:
     assert found.stamped_ms == pytest.approx(bench.skew_ms, abs=0.5)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", few_of(range(4)))
 def test_jitter_noise_and_dropped_frames_are_borne(seed: int) -> None:
     bench = drawn_bench(seed, rate_hz=25.0, **CASES["jitter, a third dropped"])
     found = judged(bench, seed)

@@ -8,7 +8,7 @@ from navapp.preop.ct_surface import make_surfaces
 from navapp.preop.segmentation import segment
 from navapp.preop.volume import CtVolume
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.ct_volume import make_ct
+from tests.kept import make_ct
 
 pytestmark = pytest.mark.slow
 
@@ -20,7 +20,7 @@ def knee():
 
 @pytest.fixture(scope="module")
 def found(knee):
-    made = make_ct(knee, (0.8, 0.8, 1.0), seed=4)
+    made = make_ct(knee.spec, (0.8, 0.8, 1.0), seed=4)
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = made.direction * made.spacing_mm, made.origin_mm
     segmentation = segment(CtVolume(made.hounsfield, matrix, made.spacing_mm))

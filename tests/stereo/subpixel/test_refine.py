@@ -131,6 +131,7 @@ def test_a_support_of_another_size_and_colour_are_refused() -> None:
         refine(RectifiedPair(colour, colour, pair.geometry, pair.box), in_box(SLANT))
 
 
+@pytest.mark.twin
 @pytest.mark.parametrize("case", ["ordinary", "holes", "empty", "one row", "at the border"])
 def test_the_kernel_agrees_with_the_readable_reference(case: str) -> None:
     rng = np.random.default_rng(7)
