@@ -17,7 +17,7 @@ CHECKED := NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 \
     NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck-$(shell cat $(KERNELS) | cksum | cut -d' ' -f1) \
     $(PYTEST) -q -n 2 --dist loadfile --every-kernel
 # Every kernel is run by one of them at least: --every-kernel sees to it.
-TWINS = $(shell grep -rl --include='test_*.py' 'mark\.twin' tests)
+KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests)
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
     tests/registration --ignore tests/registration/test_register.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
@@ -43,11 +43,11 @@ run: setup      ## the application on the simulated rig
 test: setup check  ## style, types, import rules and the tests: some minutes
 	# One worker more than two cores carry: some tests wait in real time.
 	$(PYTEST) -n 3 --dist loadgroup
-	$(CHECKED) -m twin $(TWINS)
+	$(CHECKED) -m kernel $(KERNEL_FILES)
 
 test-all: setup check  ## the release gate: as test, with every case of every test
 	$(PYTEST) -n 3 --dist loadgroup --release
-	$(CHECKED) --release $(KERNEL_TESTS) $(TWINS)
+	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -4,6 +4,8 @@ import pytest
 from navapp.values import DisparityMap, Origin
 from tests.stereo.pairs import geometry
 
+pytestmark = pytest.mark.kernel
+
 
 def a_map(height: int = 30, width: int = 40) -> DisparityMap:
     rng = np.random.default_rng(3)

@@ -93,6 +93,7 @@ def test_no_targets_have_no_predicted_error():
         estimate(np.eye(6)).predict_tre_mm(np.zeros(3), np.empty((0, 3)))
 
 
+@pytest.mark.kernel
 def test_vertices_that_face_the_camera_are_visible():
     ball = sphere(30.0, 24)
     visible = ball.visible_vertices(POSE)
@@ -104,6 +105,7 @@ def test_vertices_that_face_the_camera_are_visible():
     assert not ball.flip().visible_vertices(POSE)[cosine > 0].any()
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize(
     "mesh",
     [sphere(30.0, 24, (400.0, -150.0, 80.0)), cube(40.0, (-5.0, 20.0, 9.0)), sphere(9.0, 12)],

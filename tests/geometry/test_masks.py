@@ -7,6 +7,8 @@ import pytest
 
 from navapp.geometry.masks import large_regions, large_smooth_regions, mark_large, where
 
+pytestmark = pytest.mark.kernel
+
 RNG = np.random.default_rng(3)
 
 

@@ -48,7 +48,7 @@ def bent(height: int, width: int, turn: float, scale: float) -> tuple[np.ndarray
     return u.astype(np.float32), v.astype(np.float32)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize(("turn", "scale"), [(0.02, 1.03), (-0.05, 0.94), (0.2, 1.2)])
 def test_the_kernel_agrees_with_the_readable_reference(turn: float, scale: float) -> None:
     rng = np.random.default_rng(3)

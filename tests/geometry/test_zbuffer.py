@@ -53,7 +53,7 @@ def drawn(pixels, depths, faces, width, height, bands=None):
     return np.where(face_index < 0, 0.0, 1.0 / depth), face_index
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("seed", range(4))
 def test_the_kernel_agrees_with_the_reference(seed):
     rng = np.random.default_rng(seed)
@@ -72,7 +72,7 @@ def test_the_kernel_agrees_with_the_reference(seed):
     np.testing.assert_allclose(inverse_depth, expected_depth, rtol=1e-5)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_edges_of_a_triangle_on_pixel_centres_belong_to_it():
     pixels = np.array([[2.0, 3.0], [8.0, 3.0], [2.0, 9.0]])
     faces = np.array([[0, 1, 2]], dtype=np.int32)
@@ -340,6 +340,7 @@ def test_points_are_projected_as_the_geometry_says():
     np.testing.assert_allclose(limits[4:], [moved[:, 2].min(), moved[:, 2].max()], rtol=1e-9)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("is_whole", [True, False])
 @pytest.mark.parametrize("turned", range(3))
 @pytest.mark.parametrize("away", [(100.0, 0.0), (60.0, 80.0), (90.0, 120.0)])
@@ -352,6 +353,7 @@ def test_where_a_lens_shows_nothing_nothing_is_drawn(away, turned, is_whole):
     assert not view.mask.any()
 
 
+@pytest.mark.kernel
 def test_the_range_is_that_of_what_is_known():
     values = np.array([[np.nan, 3.0, -1.0], [7.0, np.nan, 2.0]], dtype=np.float32)
     assert find_known_range(values) == (-1.0, 7.0)

@@ -1,8 +1,11 @@
 """The veil's compiled blending."""
 
 import numpy as np
+import pytest
 
 from navapp.overlay.tint_kernels import compute_face_tints, tint_pixels
+
+pytestmark = pytest.mark.kernel
 
 
 def test_pixels_of_the_mesh_are_blended_and_no_others() -> None:

@@ -203,7 +203,7 @@ def test_the_work_is_told_and_can_be_stopped() -> None:
         build_aspects(femur_model(), (0, -0.6, -0.8), 12.0, on_progress=stop)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_contours_are_those_of_the_reference() -> None:
     mesh = sphere()
     facing = mesh.vertices_mm @ (0.3, 0.5, 0.8) - 4.0
@@ -218,7 +218,7 @@ def test_contours_are_those_of_the_reference() -> None:
     np.testing.assert_allclose(np.abs((along * tangents[:n]).sum(axis=1)), 1.0, atol=1e-6)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_spreading_is_that_of_the_reference() -> None:
     points = np.random.default_rng(3).normal(size=(80, 3))
     order = np.empty(20, dtype=np.int64)

@@ -27,7 +27,7 @@ def moved_points(case: Case, R: np.ndarray, t: np.ndarray) -> np.ndarray:
     return case.scene.points @ R.T + t
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("has_camera", [True, False])
 @pytest.mark.parametrize("sigma_mm", [1.0, 2.7, 6.0])
 def test_a_coarse_step_is_that_of_the_reference(has_camera: bool, sigma_mm: float) -> None:
@@ -45,7 +45,7 @@ def test_a_coarse_step_is_that_of_the_reference(has_camera: bool, sigma_mm: floa
     assert np.abs(moved_points(case, *pose) - moved_points(case, case.R, case.t)).max() > 0.1
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("has_camera", [True, False])
 @pytest.mark.parametrize("knows_noise", [True, False])
 @pytest.mark.parametrize("sigma_mm", [0.5, 2.4])
@@ -67,7 +67,7 @@ def test_a_fine_step_is_that_of_the_reference(
     assert (state.iterations, state.has_finished) == (1, False)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_first_kernel_follows_the_median_distance_within_its_bounds() -> None:
     case, settings, pairs = make_case(), settings_of(), make_pairs(500)
     chosen, vertex = reference.pair_forward(case.scene, case.model, case.R, case.t, 2)

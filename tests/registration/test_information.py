@@ -28,7 +28,7 @@ def pairs_on(points: np.ndarray, normals: np.ndarray) -> tuple[Pairs, int]:
     return pairs, len(points)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_covariance_is_the_inverse_of_the_information() -> None:
     pairs, n, measured, _ = measured_pairs(make_case())
     weigh(pairs, n, 1.0, 2.5, 0.0)

@@ -217,7 +217,7 @@ def test_a_cone_needs_an_axis_with_a_length() -> None:
         ViewCone(np.zeros(3), 20.0)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_gradients_and_responses_are_those_of_the_reference() -> None:
     picture = np.random.default_rng(2).normal(0.0, 20.0, (40, 50)).astype(np.float32)
     gy, gx = np.gradient(picture)
@@ -238,7 +238,7 @@ def random_hypotheses(n: int) -> Hypotheses:
     return select_hypotheses(some, rng.choice(len(some.orientation), n, replace=False))
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_scores_are_those_of_the_reference() -> None:
     rng = np.random.default_rng(6)
     some, n = random_hypotheses(12), 25

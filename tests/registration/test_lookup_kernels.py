@@ -18,7 +18,7 @@ def points_near(spread_mm: float, n: int = 600) -> np.ndarray:
     return MODEL.points_mm[chosen] + rng.normal(0.0, spread_mm, (n, 3))
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("spread_mm", [0.0, 0.3, 1.5, 4.0])
 def test_the_nearest_vertex_is_found(spread_mm: float) -> None:
     points = points_near(spread_mm)
@@ -31,7 +31,7 @@ def test_the_nearest_vertex_is_found(spread_mm: float) -> None:
     np.testing.assert_allclose(distance, own, rtol=1e-12)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_a_point_outside_the_grid_gets_a_vertex_on_its_own_side() -> None:
     far = np.concatenate([500.0 * np.eye(3), -1e9 * np.eye(3)])
     index, distance = MODEL.nearest(far)
@@ -55,7 +55,7 @@ def grid_of(points: np.ndarray, every: int, voxel_mm: float) -> VoxelGrid:
     return grid
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @given(
     seed=st.integers(0, 2**32 - 1),
     n=st.integers(1, 60),
@@ -72,7 +72,7 @@ def test_the_scenes_grid_is_that_of_the_equations(
     np.testing.assert_array_equal(grid.nearest, expected)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_scenes_grid_knows_the_nearest_point_or_almost() -> None:
     points = points_near(1.0)
     every = 2

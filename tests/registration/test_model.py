@@ -69,7 +69,7 @@ def test_an_open_border_may_not_pair() -> None:
     np.testing.assert_array_equal(model.arrays.can_pair, ~is_rim)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_a_cloud_with_normals_is_a_model_all_of_which_may_pair() -> None:
     mesh = blob().mesh
     no_faces = np.empty((0, 3), dtype=np.int32)
@@ -86,7 +86,7 @@ def test_a_cloud_with_normals_is_a_model_all_of_which_may_pair() -> None:
     assert np.median(inner) < 0.005
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_grid_reaches_beyond_the_bone_and_names_the_nearest_vertices() -> None:
     model = RegistrationModel(blob())
     grid = model.arrays.grid

@@ -33,7 +33,7 @@ def backward(case: Case, radius_mm: float, first: int = 0) -> tuple[np.ndarray, 
     return pairs.scene[first:n], pairs.vertex[first:n]
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("has_camera", [True, False])
 @pytest.mark.parametrize("every", [1, 3])
 def test_forward_pairs_are_those_of_the_reference(has_camera: bool, every: int) -> None:
@@ -45,7 +45,7 @@ def test_forward_pairs_are_those_of_the_reference(has_camera: bool, every: int) 
     assert 20 < len(chosen) < -(-500 // every)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("has_camera", [True, False])
 @pytest.mark.parametrize("radius_mm", [1.5, 9.0])
 def test_backward_pairs_are_those_of_the_reference(has_camera: bool, radius_mm: float) -> None:
@@ -80,7 +80,7 @@ def test_what_was_cut_away_pairs_in_no_direction() -> None:
     assert not removed[backward(case, 9.0)[1]].any()
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_far_side_pairs_in_no_direction() -> None:
     case = make_case()
     cosine = reference.facing(case.model, case.camera)
@@ -107,7 +107,7 @@ def test_pairs_are_measured_as_by_the_reference(has_camera: bool, knows_noise: b
         )
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_far_from_its_vertex_a_point_is_measured_against_the_plane() -> None:
     """Pairs of any length: both branches of the surface, and an excess."""
     case = make_case()
@@ -148,7 +148,7 @@ def test_the_bend_brings_points_of_a_ball_nearer_to_its_surface() -> None:
     assert of_bend.mean() < 0.2 * of_plane.mean()
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("least_cosine", [0.2, 0.45])
 @pytest.mark.parametrize("every", [1, 3])
 def test_the_visible_vertices_are_counted(least_cosine: float, every: int) -> None:

@@ -133,7 +133,7 @@ def test_the_objective_never_falls_while_the_kernel_keeps_its_width(
         pose = kabsch(a, b, weight, pose)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_literal_variant_is_weighted_kabsch_on_both_ways_under_a_narrowing_kernel() -> None:
     start = a_pose(4, 0.1, 2.0)
     found = solve_bimcc_literal(Scene(SAMPLES), BLOB, start).estimate

@@ -37,7 +37,7 @@ def seen_map(noise_mm: float = 0.1) -> DisparityMap:
     )
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_scores_as_the_reference() -> None:
     rng = np.random.default_rng(0)
     normals = rng.standard_normal((60, 3))

@@ -30,7 +30,7 @@ def weighed_pairs():
     return case, pairs, n, measured, vertex
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("sigma_mm", [0.3, 1.2, 12.0])
 @pytest.mark.parametrize("noise_mm2", [0.0, 0.25])
 def test_the_weights_are_those_of_the_reference(sigma_mm: float, noise_mm2: float) -> None:
@@ -62,7 +62,7 @@ def test_the_noise_is_found_beneath_the_kernel(noise_mm: float, sigma_mm: float)
     assert found**0.5 == pytest.approx(noise_mm, rel=0.01)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_noise_is_that_of_the_reference_and_at_most_the_kernel() -> None:
     pairs, n, measured, _ = measured_pairs(make_case())
     for sigma_mm in (0.2, 0.6, 3.0):
@@ -77,7 +77,7 @@ def test_the_noise_is_that_of_the_reference_and_at_most_the_kernel() -> None:
     assert noise_under_kernel_mm2(0.0, 0.0, 1.0) == 0.0
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_centre_is_the_weighted_mean_and_the_lever_its_spread() -> None:
     _, pairs, n, measured, _ = weighed_pairs()
     centre, lever = find_weighted_centre(pairs, n)
@@ -93,7 +93,7 @@ def test_a_lever_is_never_nothing() -> None:
     assert 0.0 < find_weighted_centre(pairs, 5)[1] < 1e-3
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_plane_system_is_that_of_the_reference() -> None:
     _, pairs, n, measured, _ = weighed_pairs()
     H, g = sum_plane_system(pairs, n, CENTRE, LEVER_MM)
@@ -102,7 +102,7 @@ def test_the_plane_system_is_that_of_the_reference() -> None:
     np.testing.assert_allclose(g, g_expected, atol=1e-9 * np.abs(H_expected).max())
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_terms_of_the_size_are_those_of_the_reference() -> None:
     _, pairs, n, measured, _ = weighed_pairs()
     mixed, *found = sum_size_terms(pairs, n, CENTRE, LEVER_MM)
@@ -111,7 +111,7 @@ def test_the_terms_of_the_size_are_those_of_the_reference() -> None:
     np.testing.assert_allclose(found, expected[1:], rtol=1e-9)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_point_system_is_added_as_by_the_reference() -> None:
     case, pairs, n, measured, vertex = weighed_pairs()
     H, g = sum_plane_system(pairs, n, CENTRE, LEVER_MM)
@@ -125,7 +125,7 @@ def test_the_point_system_is_added_as_by_the_reference() -> None:
     np.testing.assert_allclose(g - g_before, g_expected, atol=1e-9 * scale)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_gradients_are_slopes_of_the_weighted_squares() -> None:
     """Half the weighted squares, planes and a tenth of the points, after a small twist."""
     case, pairs, n, measured, vertex = weighed_pairs()
@@ -145,7 +145,7 @@ def test_the_gradients_are_slopes_of_the_weighted_squares() -> None:
     np.testing.assert_allclose(g, slope, rtol=1e-5, atol=1e-6 * np.abs(g).max())
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_step_is_that_of_the_reference_and_goes_downhill() -> None:
     _, pairs, n, _, _ = weighed_pairs()
     H, g = sum_plane_system(pairs, n, CENTRE, LEVER_MM)
@@ -154,7 +154,7 @@ def test_the_step_is_that_of_the_reference_and_goes_downhill() -> None:
     assert np.append(twist[:3] * LEVER_MM, twist[3:]) @ g < 0.0
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_a_large_step_is_capped_in_both_parts() -> None:
     H, g = np.eye(6), np.array([300.0, 400.0, 0.0, 0.0, -600.0, 800.0])
     twist = solve_step(H, g, 10.0)
@@ -172,7 +172,7 @@ def test_a_direction_that_nothing_fixes_stays_where_it_is() -> None:
 coordinates = st.floats(-3.0, 3.0)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @given(st.lists(coordinates, min_size=12, max_size=12), st.sampled_from([1.0, 1e-4, 1e-9, 0.0]))
 @settings(max_examples=60, deadline=None)
 def test_a_twist_moves_the_pose_as_by_the_reference(values: list[float], size: float) -> None:

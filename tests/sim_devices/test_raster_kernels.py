@@ -46,7 +46,7 @@ def random_soup(seed, count=60):
     return screen, np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_projection_agrees_with_opencv():
     rng = np.random.default_rng(1)
     points = rng.uniform(-200, 200, (500, 3))
@@ -69,7 +69,7 @@ def test_a_vertex_behind_the_camera_is_marked_and_its_triangles_are_not_drawn():
     assert (rastered(screen, np.array([[0, 1, 2]], dtype=np.int32))[1] == -1).all()
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("seed", range(4))
 def test_raster_agrees_with_the_reference(seed):
     screen, faces = random_soup(seed)

@@ -148,7 +148,7 @@ def bilinear(image, pixels):
     return top * (1 - y) + bottom * y
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_a_small_picture_agrees_with_the_reference():
     camera = Camera(np.array([[40.0, 0, 11.3], [0, 41.0, 7.6], [0, 0, 1]]), np.zeros(5), 24, 16)
     mesh = disc(np.array([0.0, 0.0, 0.1]), 90.0)

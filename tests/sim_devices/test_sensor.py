@@ -16,7 +16,7 @@ def grey_value(signal: float) -> float:
     return float(255.0 * compute_tone_curve(np.array([signal]))[0])
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_kernel_equals_reference():
     rng = np.random.default_rng(1)
     radiance = rng.uniform(-0.2, 1.4, (37, 90)).astype(np.float32)

@@ -12,7 +12,7 @@ def tile():
     return make_noise_tile(5, size=32).values
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_tile_lookup_agrees_with_the_reference_and_is_periodic(tile):
     rng = np.random.default_rng(2)
     out, again = np.empty(5, np.float32), np.empty(5, np.float32)
@@ -25,7 +25,7 @@ def test_tile_lookup_agrees_with_the_reference_and_is_periodic(tile):
         np.testing.assert_allclose(again, out, atol=2e-3)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("material", list(MaterialId))
 def test_albedo_agrees_with_the_reference(material):
     rng = np.random.default_rng(3)
@@ -39,7 +39,7 @@ def test_albedo_agrees_with_the_reference(material):
         np.testing.assert_allclose(out, expected, rtol=2e-4, atol=2e-5)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_light_agrees_with_the_reference():
     rng = np.random.default_rng(4)
     out = np.empty(2, np.float32)

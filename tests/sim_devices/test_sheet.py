@@ -74,7 +74,7 @@ def test_every_corner_is_where_the_optics_put_it(eye, distance_mm, turn_rad):
     assert np.sqrt((off_px(eye, pose, simulated_picture) ** 2).mean()) < 0.02
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_kernel_does_what_its_reference_does():
     rng = np.random.default_rng(3)
     y, x = np.mgrid[0:41, 0:61]

@@ -23,7 +23,7 @@ def scene(seed: int):
     return *pictures, disparity, origin
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("row_shift_px", [0.0, 0.4, -1.3])
 def test_every_window_is_solved_as_by_numpy(row_shift_px: float) -> None:
     left, right, disparity, origin = scene(4)

@@ -144,7 +144,7 @@ def test_a_view_without_the_model_agrees_with_nothing() -> None:
     assert agreement(nothing).spread_ratio == 0.0
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("with_coarse", [True, False])
 def test_the_compiled_comparison_is_the_equations(with_coarse: bool) -> None:
     rng = np.random.default_rng(4)

@@ -13,6 +13,8 @@ from navapp.tracking.edge_kernels import (
 from navapp.tracking.outline_kernels import Rim
 from tests.reference import outline_reference as reference
 
+pytestmark = pytest.mark.kernel
+
 SIZE = 64
 
 
@@ -67,7 +69,6 @@ def test_nothing_is_found_in_noise_or_out_of_view() -> None:
     assert np.isnan(measure_edge_offsets(picture(0.0, 0.0), rim_at(0.0, 3.0))[0])
 
 
-@pytest.mark.twin
 def test_samples_and_levels_are_those_of_the_reference() -> None:
     seen = np.random.default_rng(2).integers(0, 255, (SIZE, SIZE)).astype(np.uint8)
     values = np.empty(17)

@@ -37,7 +37,7 @@ def left_view():
     return render_rectified(femur().mesh, TRUE, GEOMETRY, box)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_rim_is_that_of_the_reference() -> None:
     ridges = ridge_edges(femur().mesh)
     for eye in (LEFT, RIGHT):
@@ -65,7 +65,7 @@ def test_rays_to_the_rim_of_a_ball_touch_it() -> None:
     assert ((outward * rim.normal).sum(axis=1) > 0.0).all()
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_what_is_seen_of_the_rim_is_that_of_the_reference() -> None:
     rim, view = rim_of(LEFT), left_view()
     found = is_outline(rim, view.depth_mm, view.box.x, view.box.y)
@@ -85,7 +85,7 @@ def test_the_seen_rim_runs_along_the_silhouette() -> None:
     assert np.quantile(apart, 0.9) < 4.0
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize(("before", "width"), [(270, 400), (200, 150), (150, 60)])
 def test_the_warped_buffer_is_that_of_the_reference(before: int, width: int) -> None:
     """Also where it ends before the surface does, on either side."""
@@ -103,7 +103,7 @@ def test_the_warped_buffer_is_that_of_the_reference(before: int, width: int) -> 
     assert np.isnan(around[:, -10:]).all()
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_the_nearer_of_two_stays_in_the_warped_buffer() -> None:
     scale_px_mm, first = RIGHT.focal_px * RIGHT.x_mm, -300
     depth = np.full((2, 400), np.nan, dtype=np.float32)
@@ -118,7 +118,7 @@ def test_the_nearer_of_two_stays_in_the_warped_buffer() -> None:
     assert np.flatnonzero(warped[1] == depth[1, 150]).tolist() == [169, 170]
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 def test_thinned_points_are_outermost_with_the_normals_of_the_reference() -> None:
     view, rim = left_view(), rim_of(LEFT)
     rim = Rim(*(part[is_outline(rim, view.depth_mm, view.box.x, view.box.y)] for part in rim))

@@ -48,6 +48,7 @@ def seen_and_true(name, turn, **kwargs):
     return seen, CAMERA.project(pose.apply(board.points_mm[seen.ids]))
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("turn", few_of(TURNS))
 @pytest.mark.parametrize("name", BOARDS)
 def test_every_mark_is_found_to_a_fiftieth_of_a_pixel(name, turn):

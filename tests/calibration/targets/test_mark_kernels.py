@@ -41,7 +41,7 @@ def test_a_mark_has_the_grey_values_and_slopes_of_its_equation(
     np.testing.assert_allclose(slopes, told, atol=1e-4)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("place", PLACES)
 def test_a_disc_has_the_grey_values_of_its_equation_everywhere(place):
     found = circle_kernels.predict(*place, DISC, np.empty(len(DISC)))

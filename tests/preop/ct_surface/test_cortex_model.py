@@ -26,7 +26,7 @@ def half_maximum_mm(profile):
     return POSITIONS_MM[first - 1] + share * (POSITIONS_MM[first] - POSITIONS_MM[first - 1])
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("until_mm", [0.75, 3.0])
 def test_the_fit_is_that_of_trying_every_plate(until_mm):
     rng = np.random.default_rng(5)

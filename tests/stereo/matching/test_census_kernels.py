@@ -7,7 +7,7 @@ from navapp.stereo.matching.census_kernels import census_rows
 from tests.reference.sgm_reference import census
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("radius", [(1, 1), (2, 1), (0, 2), (2, 2), (3, 3)])
 def test_census_bits_are_the_darker_neighbours(radius) -> None:
     image = np.random.default_rng(5).integers(0, 60, (9, 13), dtype=np.uint8)

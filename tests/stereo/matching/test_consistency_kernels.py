@@ -29,7 +29,7 @@ def evidence(shift: int) -> Evidence:
     )
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("shift", [-6, 0, 3, 40])
 @pytest.mark.parametrize("least_contrast", [0, 3])
 def test_matches_are_judged_as_the_definition_says(shift, least_contrast) -> None:
@@ -47,7 +47,7 @@ def test_matches_are_judged_as_the_definition_says(shift, least_contrast) -> Non
     assert expected_matched.any() == (shift < 40)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("shift", [-6, 0, 3])
 def test_partners_are_found_as_the_definition_says(shift) -> None:
     seen = evidence(shift)

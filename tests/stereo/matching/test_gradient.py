@@ -19,7 +19,7 @@ from tests.stereo.pairs import HEIGHT, WIDTH, geometry, shifted_pair
 INNER = Box(90, 20, 180, 80)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("inside", [(0, 21), (4, 17)])
 def test_the_kernel_agrees_with_the_equations(inside) -> None:
     rng = np.random.default_rng(3)

@@ -55,7 +55,7 @@ def cost_of(first_partner: int, count: int) -> np.ndarray:
     return reference.matching_cost(*codes, first_partner, count, NO_PARTNER)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("penalties", [SMALL, LARGE])
 @pytest.mark.parametrize(
     ("first_partner", "count"), [(4, 5), (0, 32), (-2, 5), (12, 40), (70, 5), (-50, 40)]
@@ -73,7 +73,7 @@ def test_each_scan_adds_what_the_definition_says(first_partner, count, penalties
         assert (kept[:, :, :count] == expected).all()
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("middle", [0, 4, HEIGHT])
 @pytest.mark.parametrize("penalties", [SMALL, LARGE])
 @pytest.mark.parametrize(

@@ -8,6 +8,8 @@ from navapp.stereo.occlusion.classify_kernels import class_rows
 from navapp.values import DisparityMap, Origin
 from tests.reference.occlusion_reference import seen_from_right_reference
 
+pytestmark = pytest.mark.kernel
+
 HEIGHT, WIDTH = 50, 160
 NEAR = 30.0
 # The square in the left view, and in the right one.
@@ -229,7 +231,6 @@ def test_a_picture_that_does_not_fit_is_refused(shape: tuple[int, ...]) -> None:
         with_channels(np.zeros(shape, dtype=np.uint8), as_map(left))
 
 
-@pytest.mark.twin
 @pytest.mark.parametrize("left_x", [0, 37, 150, -20])
 def test_what_the_right_camera_sees_is_what_the_reference_says(left_x: int) -> None:
     rng = np.random.default_rng(7)

@@ -245,7 +245,7 @@ def test_sizes_that_differ_are_refused() -> None:
         fill_wls(before, grey[1:], np.ones((20, 60), np.float32), classes)
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("seed", range(4))
 def test_the_result_is_that_of_the_slow_reference(seed: int) -> None:
     rng = np.random.default_rng(seed)

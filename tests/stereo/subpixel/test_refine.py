@@ -131,7 +131,7 @@ def test_a_support_of_another_size_and_colour_are_refused() -> None:
         refine(RectifiedPair(colour, colour, pair.geometry, pair.box), in_box(SLANT))
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize("case", ["ordinary", "holes", "empty", "one row", "at the border"])
 def test_the_kernel_agrees_with_the_readable_reference(case: str) -> None:
     rng = np.random.default_rng(7)
@@ -161,6 +161,7 @@ def test_the_kernel_agrees_with_the_readable_reference(case: str) -> None:
         np.testing.assert_allclose(found, wanted, rtol=2e-3, atol=2e-3)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("stride", [2, 4, 6])
 def test_with_a_stride_the_same_windows_answer_the_same(stride: int) -> None:
     pair, support = pair_with(SLANT), in_box(SLANT + 0.2)

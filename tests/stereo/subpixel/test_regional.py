@@ -110,7 +110,7 @@ def test_heavier_pixels_lead() -> None:
         assert np.abs(inner(surface(sheets, weight=weight)) - heavy).max() < 0.1
 
 
-@pytest.mark.twin
+@pytest.mark.kernel
 @pytest.mark.parametrize(
     "settings",
     [
