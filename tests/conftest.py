@@ -1,5 +1,6 @@
 """Shared by all tests: the user's settings hidden, leaks found, skips counted, knees kept."""
 
+import gc
 import itertools
 import os
 import threading
@@ -91,6 +92,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         used = item._fixtureinfo.name2fixturedefs.values()
         if any(definitions[-1].scope == "module" for definitions in used):
             item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
+def pytest_collection_finish() -> None:
+    """What is there now stays: the collector of garbage need not look through it every time."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_configure(config: pytest.Config) -> None:

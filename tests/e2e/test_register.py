@@ -460,14 +460,20 @@ def test_a_million_points_are_subsampled_and_it_says_so(bone: Bone) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("is_mesh", [True, False])
 def test_a_fine_model_is_thinned_and_it_says_so(bone: Bone, is_mesh: bool) -> None:
-    mesh = bone.mesh
-    while len(mesh.vertices_mm) < 100_000:
-        mesh = divided(mesh)
+    mesh = fine_end_of_femur()
     write_ply(bone.model, TriangleMesh(mesh.vertices_mm, mesh.faces if is_mesh else NO_FACES))
     found = register(bone.scene, bone.model, "--initial", bone.start(10.0, 8.0))
     assert "were thinned to" in found["warnings"][0]
     assert found["model_vertices"] <= 50_000
     assert bone.tre(found["scene_from_model"]) < 0.25
+
+
+@lru_cache
+def fine_end_of_femur() -> TriangleMesh:
+    mesh = end_of_femur()
+    while len(mesh.vertices_mm) < 100_000:
+        mesh = divided(mesh)
+    return mesh
 
 
 def divided(mesh: TriangleMesh) -> TriangleMesh:

@@ -1,4 +1,7 @@
-"""The simulator's CT of a knee, from voxels to named surfaces: its meshes are the truth."""
+"""The simulator's CT of a knee, from voxels to named surfaces: its meshes are the truth.
+
+A second person beside the recorded phantom of tests/accuracy/test_ct.py.
+"""
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from navapp.preop.volume import CtVolume
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.kept import make_ct
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.release]
 
 
 @pytest.fixture(scope="module")
