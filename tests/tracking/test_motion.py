@@ -92,7 +92,7 @@ def test_a_refused_pose_is_followed_only_when_that_is_asked_for() -> None:
 
 
 def test_the_box_stays_through_poses_and_losses() -> None:
-    box = BoxState(np.zeros((2, 2), np.uint8), PictureBox(0.0, 0.0, 1.0, 1.0))
+    box = BoxState(PictureBox(0.0, 0.0, 1.0, 1.0))
     state = replace(TrackState.at_rest(START, 0), box=box)
     assert state.update(frame(None, Status.LOST), PERIOD_NS, CENTRE).box is box
     assert state.update(frame(moved(START, STEP)), PERIOD_NS, CENTRE).box is box

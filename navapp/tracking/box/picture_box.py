@@ -40,18 +40,3 @@ class PictureBox:
         x, y = self.centre + shift
         width, height = scale * self.width, scale * self.height
         return PictureBox(float(x) - 0.5 * width, float(y) - 0.5 * height, width, height)
-
-    def clip(self, width: int, height: int) -> "PictureBox":
-        """The part inside a picture; its sides may be 0."""
-        x0, x1 = np.clip([self.x, self.x + self.width], 0.0, width - 1.0)
-        y0, y1 = np.clip([self.y, self.y + self.height], 0.0, height - 1.0)
-        return PictureBox(float(x0), float(y0), float(x1 - x0), float(y1 - y0))
-
-    def overlap(self, other: "PictureBox") -> float:
-        """Intersection over union, 0 to 1."""
-        x0, y0 = max(self.x, other.x), max(self.y, other.y)
-        x1 = min(self.x + self.width, other.x + other.width)
-        y1 = min(self.y + self.height, other.y + other.height)
-        shared = max(0.0, x1 - x0) * max(0.0, y1 - y0)
-        union = self.width * self.height + other.width * other.height - shared
-        return shared / union if union > 0.0 else 0.0

@@ -1,8 +1,8 @@
 """The bone's box from picture to picture, with or without a pose (the paper's bounding box).
 
-Tracking-learning-detection after Kalal, Mikolajczyk, Matas (PAMI 2012): median flow follows the
-box, a detector finds it again, and it learns. It learns from frames that the judge accepted and
-from nothing else: where the box lies in them is known, so that no mistake of its own feeds it.
+It is where the picture looks like a template: near the last one, or anywhere. Templates are learned
+from frames that the judge accepted and from nothing else: where the box lies in them is known, so
+that no mistake of its own feeds it. Where nothing looks enough like them, there is no box.
 """
 
 from dataclasses import dataclass, replace
@@ -13,22 +13,22 @@ from navapp.geometry.rectification import Image, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel
-from navapp.tracking.box.detector import SURE, BoxMemory, Detection, detect, learn, polish
-from navapp.tracking.box.median_flow import median_flow
 from navapp.tracking.box.picture_box import PictureBox
+from navapp.tracking.box.templates import Match, Templates, find_anywhere, find_near, learn
 from navapp.values import Status, TrackedFrame
 
 # All chosen, limits of similarity on the simulated knees of
-# `python -m tests.bench.box_tracking --first 0 --seeds 4`. Pictures are reduced by this factor.
+# `python -m tests.bench.box_tracking`, seeds 0 to 3 and 9 to 14. Pictures are reduced by this
+# factor.
 _REDUCTION = 4
 # One accepted frame of so many is learned from.
 _LEARN_EVERY = 15
 # A frame that hides so much more of the bone than another one did is not learned from: the hand
 # would be learned with it. (Tissue hides a part of it always.)
 _HAND_FRACTION = 0.1
-# Least similarity and least relative similarity of a box that is found in the whole picture, and of
-# one that the flow has followed.
-_FOUND, _FOLLOWED = (0.5, 0.54), (0.28, 0.48)
+# Least similarity of a box near the last one, and of one that is found anywhere; the whole picture
+# is searched for none better than what is surely the bone.
+_NEAR, _ANYWHERE, _SURE = 0.38, 0.57, 0.7
 # The size of a box is known to a few percent: depth follows it only where it changed by more (log).
 _SAME_SIZE = 0.1
 # A bone whose box moved it by less is found from where it was last seen.
@@ -39,10 +39,9 @@ _SAME_PLACE_MM = 3.0
 class BoxState:
     """What is remembered of one bone's box from picture to picture; bounded."""
 
-    newest: Image  # (H, W) or (H, W, 3) picture of the left camera; never written to
-    box: PictureBox | None  # in that picture, px of the reduced one; None when it is not known
-    # what it looked like in accepted frames; None before the first.
-    memory: BoxMemory | None = None
+    box: PictureBox | None  # px of the reduced picture; None when it is not known
+    templates: Templates | None = None  # of accepted frames; None before the first
+    accepted: PictureBox | None = None  # of the newest accepted frame, px of the reduced picture
     n_accepted: int = 0  # accepted frames so far that were learned from or might have been
     least_hidden: float = 1.0  # smallest fraction of the bone that was hidden in an accepted frame
 
@@ -64,30 +63,30 @@ def place_box(
         hidden_fraction: of the bone, when the judge accepted the pose; None otherwise.
     """
     small = None if box is None else box.resize(1.0 / _REDUCTION)
-    state = BoxState(left, small) if state is None else replace(state, newest=left, box=small)
+    state = BoxState(small) if state is None else replace(state, box=small)
     if small is None or hidden_fraction is None:
         return state
     if hidden_fraction > state.least_hidden + _HAND_FRACTION:
         return state
-    memory = state.memory
-    if memory is None or state.n_accepted % _LEARN_EVERY == 0:
-        memory = learn(memory, reduce_picture(left), small)
+    templates = state.templates
+    if templates is None or state.n_accepted % _LEARN_EVERY == 0:
+        templates = learn(templates, reduce_picture(left), small)
     least_hidden = min(state.least_hidden, hidden_fraction)
-    return BoxState(left, small, memory, state.n_accepted + 1, least_hidden)
+    return BoxState(small, templates, small, state.n_accepted + 1, least_hidden)
 
 
 def follow_box(state: BoxState, left: Image) -> BoxState:
     """After a frame without a pose: the box where it moved, or where it is found again, or None."""
-    memory = state.memory
-    if memory is None:
-        return replace(state, newest=left, box=None)
+    templates, accepted = state.templates, state.accepted
+    if templates is None or accepted is None:
+        return replace(state, box=None)
     picture = reduce_picture(left)
-    likely = _follow(state, memory, picture)
-    if not likely or likely[0].similarity < SURE:
-        found = [one for one in detect(memory, picture) if _is_enough(one, _FOUND)]
-        likely += [polish(memory, picture, one.box) for one in found[:1]]
-    best = max(likely, key=lambda one: one.similarity, default=None)
-    return replace(state, newest=left, box=None if best is None else best.box)
+    best = None if state.box is None else _follow(templates, picture, state.box)
+    if best is None or best.similarity < _SURE:
+        found = find_anywhere(templates, picture, accepted)
+        least = _ANYWHERE if best is None else max(_ANYWHERE, best.similarity)
+        best = found if found.similarity >= least else best
+    return replace(state, box=None if best is None else best.box)
 
 
 def reduce_picture(left: Image) -> Image:
@@ -99,20 +98,12 @@ def reduce_picture(left: Image) -> Image:
     return np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def _follow(state: BoxState, memory: BoxMemory, picture: Image) -> list[Detection]:
-    """The box that the flow leads to; none unless it still looks like the bone."""
-    if state.box is None:
-        return []
-    before = reduce_picture(state.newest)
-    box = median_flow(before, picture, state.box) if before.shape == picture.shape else None
-    if box is None:
-        return []
-    followed = polish(memory, picture, box)
-    return [followed] if _is_enough(followed, _FOLLOWED) else []
-
-
-def _is_enough(one: Detection, least: tuple[float, float]) -> bool:
-    return one.similarity >= least[0] and one.relative >= least[1]
+def _follow(templates: Templates, picture: Image, box: PictureBox) -> Match | None:
+    """Near the last box; None unless its middle is in view and it still looks like the bone."""
+    near = find_near(templates, picture, box)
+    middle = near.box.centre
+    is_in_view = ((middle >= 0.0) & (middle < picture.shape[::-1])).all()
+    return near if is_in_view and near.similarity >= _NEAR else None
 
 
 class BoxTracker:

@@ -49,6 +49,11 @@ def empty(seed: int = 0) -> np.ndarray:
     return scene(shift=(-3000.0, 0.0), seed=seed)
 
 
+def clutter(sigma: float, deviation: float, seed: int) -> np.ndarray:
+    """Another pattern all over the picture."""
+    return np.clip(110.0 + texture(SHAPE, sigma, deviation, seed), 0.0, 255.0).astype(np.uint8)
+
+
 def enlarged(picture: np.ndarray) -> np.ndarray:
     """As a camera takes it, four times as large."""
     return cv2.resize(picture, None, fx=4.0, fy=4.0, interpolation=cv2.INTER_CUBIC)

@@ -25,24 +25,3 @@ def test_resizing_there_and_back() -> None:
     # The first pixel's centre stays half a pixel inside the picture.
     assert small.x == pytest.approx(0.25 * 10.5 - 0.5)
     assert small.resize(4.0).x == pytest.approx(A.x)
-
-
-@pytest.mark.parametrize(
-    ("other", "expected"),
-    [
-        (A, 1.0),
-        (PictureBox(30.0, 20.0, 40.0, 30.0), 600.0 / 1800.0),
-        (PictureBox(60.0, 20.0, 40.0, 30.0), 0.0),
-        (PictureBox(20.0, 25.0, 20.0, 15.0), 0.25),
-    ],
-)
-def test_overlap(other: PictureBox, expected: float) -> None:
-    assert A.overlap(other) == pytest.approx(expected)
-    assert other.overlap(A) == pytest.approx(expected)
-
-
-def test_what_lies_in_a_picture() -> None:
-    assert A.clip(320, 180) == A
-    out = PictureBox(-20.0, 10.0, 40.0, 30.0)
-    assert out.clip(320, 180) == PictureBox(0.0, 10.0, 20.0, 30.0)
-    assert PictureBox(-60.0, 10.0, 40.0, 30.0).clip(320, 180).width == 0.0
