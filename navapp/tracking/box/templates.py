@@ -13,7 +13,8 @@ from navapp.geometry.rectification import Image
 from navapp.geometry.transform import FloatArray
 from navapp.tracking.box.picture_box import PictureBox
 
-# (n, SIZE_PX, SIZE_PX) what the box looked like in accepted frames, the newest last.
+# (n, turns, SIZE_PX, SIZE_PX) what the box looked like in accepted frames, the newest last: as it
+# was, then with the picture turned about the box's middle.
 Templates = NDArray[np.uint8]
 
 # All chosen, on the simulated knees of `python -m tests.bench.box_tracking`, seeds 0 to 3 and 9 to
@@ -27,6 +28,8 @@ _MOST_NEWEST, _KNOWN = 4, 0.8
 # Sizes that are tried, and how far a box is moved, as a fraction of its own size.
 _NEAR_SCALES, _NEAR_FRACTION = (1.0, 0.97, 1.03), 0.11
 _ANY_SCALES = (1.0, 0.9, 1.11)
+# Turns of the picture that a template is learned with, in its plane.
+_TURNS_DEG = (0.0, -20.0, 20.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +42,7 @@ class Match:
 
 def learn(templates: Templates | None, picture: Image, box: PictureBox) -> Templates:
     """The templates, None before the first, after a picture (H, W) with the box accepted in it."""
-    new = _cut(picture, box, np.zeros(2, int))[None]
+    new = np.array([[_cut(picture, box, turn_deg=turn_deg) for turn_deg in _TURNS_DEG]])
     if templates is None:
         return new
     if find_near(templates, picture, box).similarity >= _KNOWN:
@@ -50,18 +53,31 @@ def learn(templates: Templates | None, picture: Image, box: PictureBox) -> Templ
 def find_near(templates: Templates, picture: Image, box: PictureBox) -> Match:
     """The box moved and scaled a little to where it looks most like what was accepted."""
     reach = _NEAR_FRACTION * np.array([box.width, box.height])
-    return _find(templates, picture, box, _NEAR_SCALES, reach)
+    return _find(templates[:, 0], picture, box, _NEAR_SCALES, reach)
 
 
 def find_anywhere(templates: Templates, picture: Image, box: PictureBox) -> Match:
     """A box of about the given one's size, its middle anywhere in the picture (H, W)."""
+    found = _find_anywhere(templates[:, 0], picture, box, _ANY_SCALES)
+    return find_near(templates, picture, found.box)
+
+
+def find_turned(templates: Templates, picture: Image, box: PictureBox) -> Match:
+    """A box of the given one's size anywhere, of a bone that has turned in the picture's plane."""
+    turned = templates[:, 1:].reshape(-1, SIZE_PX, SIZE_PX)
+    return _find_anywhere(turned, picture, box, (1.0,))
+
+
+def _find_anywhere(
+    templates: NDArray[np.uint8], picture: Image, box: PictureBox, scales: tuple[float, ...]
+) -> Match:
+    """The best match of any template (n, SIZE_PX, SIZE_PX) in the whole picture."""
     reach = 0.5 * np.array(picture.shape[::-1])
-    centred = box.move(reach - 0.5 - box.centre)
-    return find_near(templates, picture, _find(templates, picture, centred, _ANY_SCALES, reach).box)
+    return _find(templates, picture, box.move(reach - 0.5 - box.centre), scales, reach)
 
 
 def _find(
-    templates: Templates,
+    templates: NDArray[np.uint8],
     picture: Image,
     box: PictureBox,
     scales: tuple[float, ...],
@@ -108,20 +124,24 @@ def _correlate_patch(view: Image, patch: Image) -> NDArray[np.float32]:
     return found.clip(min=0.0)
 
 
-def _cut(picture: Image, box: PictureBox, margin: NDArray[np.int_]) -> Image:
+def _cut(
+    picture: Image, box: PictureBox, margin: NDArray[np.int_] | None = None, turn_deg: float = 0.0
+) -> Image:
     """A picture where a box of it is SIZE_PX square, with a margin (2,) of more such pixels.
 
-    Beyond the picture its rim goes on.
+    The picture is turned about the box's middle first. Beyond the picture its rim goes on.
     """
     import cv2
 
     step = np.array([box.width, box.height]) / SIZE_PX
     blur_px = np.maximum(np.round(step), 1).astype(int).tolist()
     blurred = cv2.blur(picture, blur_px, borderType=cv2.BORDER_REPLICATE)
-    corner = (box.x, box.y) + (0.5 - margin) * step
-    matrix = np.column_stack([np.diag(step), corner])
+    size = np.full(2, SIZE_PX) if margin is None else SIZE_PX + 2 * margin
+    cos, sin = np.cos(np.deg2rad(turn_deg)), np.sin(np.deg2rad(turn_deg))
+    turned = np.array([[cos, sin], [-sin, cos]]) * step
+    matrix = np.column_stack([turned, box.centre - turned @ (0.5 * (size - 1))])
     cut = cv2.warpAffine(
-        blurred, matrix, (SIZE_PX + 2 * margin).tolist(),
+        blurred, matrix, size.tolist(),
         flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE,
     )  # fmt: skip
     return np.asarray(cut, dtype=np.uint8)

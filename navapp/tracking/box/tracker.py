@@ -14,7 +14,14 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel
 from navapp.tracking.box.picture_box import PictureBox
-from navapp.tracking.box.templates import Match, Templates, find_anywhere, find_near, learn
+from navapp.tracking.box.templates import (
+    Match,
+    Templates,
+    find_anywhere,
+    find_near,
+    find_turned,
+    learn,
+)
 from navapp.values import Status, TrackedFrame
 
 # All chosen, limits of similarity on the simulated knees of
@@ -86,6 +93,9 @@ def follow_box(state: BoxState, left: Image) -> BoxState:
         found = find_anywhere(templates, picture, accepted)
         least = _ANYWHERE if best is None else max(_ANYWHERE, best.similarity)
         best = found if found.similarity >= least else best
+    if best is None:
+        turned = find_turned(templates, picture, accepted)
+        best = turned if turned.similarity >= _ANYWHERE else None
     return replace(state, box=None if best is None else best.box)
 
 

@@ -44,6 +44,12 @@ def box_at(shift=(0.0, 0.0), scale: float = 1.0) -> PictureBox:
     return BOX.move(np.array(shift), scale)
 
 
+def turned(picture: np.ndarray, box: PictureBox, turn_deg: float) -> np.ndarray:
+    """A picture turned about a box's middle."""
+    matrix = cv2.getRotationMatrix2D(box.centre.tolist(), turn_deg, 1.0)
+    return cv2.warpAffine(picture, matrix, SHAPE[::-1], borderMode=cv2.BORDER_REPLICATE)
+
+
 def empty(seed: int = 0) -> np.ndarray:
     """The ground alone, and a hand on it."""
     return scene(shift=(-3000.0, 0.0), seed=seed)

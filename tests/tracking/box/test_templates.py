@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from navapp.tracking.box.templates import SIZE_PX, find_anywhere, find_near, learn
+from navapp.tracking.box.templates import SIZE_PX, find_anywhere, find_near, find_turned, learn
 from tests.picture_boxes import overlap
-from tests.tracking.box.pictures import BOX, SHAPE, box_at, clutter, empty, scene
+from tests.tracking.box.pictures import BOX, SHAPE, box_at, clutter, empty, scene, turned
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +38,18 @@ def test_the_whole_box_of_a_thing_that_is_hidden_in_part(templates, hidden_fract
 def test_nothing_else_is_like_it(templates, seed: int) -> None:
     for picture in (clutter(4.0, 25.0, 50 + seed), empty(seed)):
         assert find_anywhere(templates, picture, BOX).similarity < 0.55
+        assert find_turned(templates, picture, BOX).similarity < 0.55
+
+
+@pytest.mark.parametrize("turn_deg", [-27.0, -20.0, 20.0, 27.0])
+def test_a_thing_that_has_turned_in_the_picture(templates, turn_deg: float) -> None:
+    true = box_at((-40.0, 12.0))
+    picture = turned(scene((-40.0, 12.0), seed=7), true, turn_deg)
+    assert find_anywhere(templates, picture, BOX).similarity < 0.57
+    found = find_turned(templates, picture, BOX)
+    assert found.similarity > 0.57
+    np.testing.assert_allclose(found.box.centre, true.centre, atol=4.0)
+    assert (found.box.width, found.box.height) == pytest.approx((BOX.width, BOX.height))
 
 
 @pytest.mark.parametrize("grey", [0, 90, 255])
@@ -79,7 +91,7 @@ def test_the_first_template_and_the_newest_are_kept(templates) -> None:
     for seed in range(8):
         grown = learn(grown, clutter(3.0, 30.0, 100 + seed), BOX)
         assert len(grown) <= 5
-    assert grown.shape == (5, SIZE_PX, SIZE_PX)
+    assert grown.shape == (5, 3, SIZE_PX, SIZE_PX)
     np.testing.assert_array_equal(grown[0], templates[0])
     for seed in range(4, 8):
         assert find_near(grown, clutter(3.0, 30.0, 100 + seed), BOX).similarity > 0.99

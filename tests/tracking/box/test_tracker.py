@@ -7,7 +7,7 @@ from navapp.tracking.box.picture_box import PictureBox
 from navapp.tracking.box.tracker import BoxState, BoxTracker, follow_box, place_box, reduce_picture
 from navapp.values import FrameTimings, PoseEstimate, Status, TrackedFrame, Verdict
 from tests.picture_boxes import overlap
-from tests.tracking.box.pictures import BOX, box_at, clutter, empty, enlarged, scene
+from tests.tracking.box.pictures import BOX, box_at, clutter, empty, enlarged, scene, turned
 from tests.tracking.rooms import room
 
 LARGE = BOX.resize(4.0)
@@ -53,6 +53,15 @@ def test_a_lost_box_is_none_until_it_is_back_elsewhere() -> None:
         assert state.picture_box is None
     state = follow_box(state, enlarged(scene((-80.0, 20.0), 1.1, seed=4)))
     assert right(state, (-80.0, 20.0), 1.1)
+
+
+@pytest.mark.parametrize("turn_deg", [-20.0, 20.0])
+def test_a_lost_box_is_found_where_the_bone_has_turned(turn_deg: float) -> None:
+    state = follow_box(start(), enlarged(empty()))
+    assert state.box is None
+    shift = (-40.0, 12.0)
+    state = follow_box(state, enlarged(turned(scene(shift, seed=4), box_at(shift), turn_deg)))
+    assert right(state, shift)
 
 
 def test_a_jump_is_followed() -> None:
