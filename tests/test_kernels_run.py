@@ -29,7 +29,7 @@ def test_what_was_called_and_what_it_calls_was_run() -> None:
 
 def test_every_kernels_file_is_looked_into() -> None:
     found = all_kernels()
-    assert "navapp.geometry.zbuffer_kernels.find_known_range" in found
+    assert "navapp.geometry.zbuffer_kernels.raster_nearest" in found
     assert {name.split(".")[0] for name in found} >= {"navapp", "sim_devices", "calibration"}
 
 

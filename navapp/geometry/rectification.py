@@ -301,13 +301,13 @@ def _extend(line: NDArray[np.float32], *_: object) -> None:
 
 
 def _lane_blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(h, blocks, LANES) of (h, w); a cut block is filled up with numbers that are not the same."""
-    from navapp.geometry.float_lane_kernels import LANES, lanes_for
+    """(h, blocks, FLOAT_LANES) of (h, w); a cut block is filled up with NaN."""
+    from navapp.geometry.lane_kernels import FLOAT_LANES, lanes_for
 
     height, width = values.shape
-    full = np.full((height, lanes_for(width)), np.nan, dtype=np.float32)
+    full = np.full((height, lanes_for(width, FLOAT_LANES)), np.nan, dtype=np.float32)
     full[:, :width] = values
-    return full.reshape(height, -1, LANES)
+    return full.reshape(height, -1, FLOAT_LANES)
 
 
 def resample(picture: Image, places: "Places", part: Box | None = None) -> Image:

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import (
-    LANES,
+from navapp.geometry.lane_kernels import (
+    FLOAT_LANES,
     all_positive,
     larger,
     load,
@@ -34,8 +34,8 @@ class Places(NamedTuple):
     columns: NDArray[np.float32]  # (h, w) px
     # (h, W) px: where the curve along which a row is looked for crosses the other's columns.
     rows: NDArray[np.float32]
-    # (h, blocks of w) whether the pixels of a block of `LANES` lie one column apart, but for one
-    # jump at most.
+    # (h, blocks of w) whether the pixels of a block of `FLOAT_LANES` lie one column apart, but for
+    # one jump at most.
     in_step: NDArray[np.bool_]
     # (h, blocks of W) whether a block of `rows` lies between the same two rows.
     in_row: NDArray[np.bool_]
@@ -106,7 +106,7 @@ def value_down(picture: NDArray[np.uint8], place: np.float32, x: int) -> np.floa
 
 @njit(cache=True, nogil=True)
 def block_down(grey: NDArray[np.uint8], width: int, place: Any, row: int, first: int) -> Any:
-    """Values of `LANES` columns of a flat picture from `first` on, at places just below a row."""
+    """Values of `FLOAT_LANES` columns of a flat picture from `first` on, just below a row."""
     w0, w1, w2, w3, w4, w5 = lanes_at(place - whole(place))
     at = (row - _BEFORE) * width + first
     value = w0 * load_grey(grey, at) + w1 * load_grey(grey, at + width)
@@ -118,8 +118,8 @@ def block_down(grey: NDArray[np.uint8], width: int, place: Any, row: int, first:
 
 @njit(cache=True, nogil=True)
 def is_in_two_rows(rows: NDArray[np.float32], first: int, height: int) -> bool:
-    """Whether `LANES` places lie between three rows of a picture, with room around them."""
-    low = np.floor(min(rows[first], rows[first + LANES - 1]))
+    """Whether `FLOAT_LANES` places lie between three rows of a picture, with room around them."""
+    low = np.floor(min(rows[first], rows[first + FLOAT_LANES - 1]))
     if not (low >= np.float32(_BEFORE) and low + np.float32(_AFTER + 1) < np.float32(height)):
         return False
     one, lower = spread(np.float32(1.0)), whole(load(rows, first)) - spread(np.float32(low))
@@ -147,19 +147,19 @@ def cross_row(
     """
     height, width = picture.shape
     grey = picture.ravel()
-    for first in range(span[0], span[1], LANES):
+    for first in range(span[0], span[1], FLOAT_LANES):
         row = int(np.floor(rows[first]))
         # A cut block is never in a row.
-        if in_row[first // LANES] and row >= _BEFORE and row + _AFTER < height:
+        if in_row[first // FLOAT_LANES] and row >= _BEFORE and row + _AFTER < height:
             store(crossed, _BEFORE + first, block_down(grey, width, load(rows, first), row, first))
-        elif first + LANES <= width and is_in_two_rows(rows, first, height):
-            row, place = int(min(rows[first], rows[first + LANES - 1])), load(rows, first)
+        elif first + FLOAT_LANES <= width and is_in_two_rows(rows, first, height):
+            row, place = int(min(rows[first], rows[first + FLOAT_LANES - 1])), load(rows, first)
             upper = block_down(grey, width, place, row, first)
             lower = block_down(grey, width, place, row + 1, first)
             is_lower = whole(place) - spread(np.float32(row))
             store(crossed, _BEFORE + first, where_positive(is_lower, lower, upper))
         else:
-            for x in range(first, min(first + LANES, width)):
+            for x in range(first, min(first + FLOAT_LANES, width)):
                 crossed[_BEFORE + x] = value_down(picture, rows[x], x)
 
 
@@ -168,7 +168,7 @@ def resample_block(
     crossed: NDArray[np.float32], columns: NDArray[np.float32], first: int,
     greys: NDArray[np.uint8], at: int, room: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Grey values of `LANES` places of a row that lie one column apart, but for one jump.
+    """Grey values of `FLOAT_LANES` places of a row that lie one column apart, but for one jump.
 
     Args:
         crossed: of the row; all that is asked for lies in it.
@@ -181,7 +181,7 @@ def resample_block(
     place = load(columns, first)
     w0, w1, w2, w3, w4, w5 = lanes_at(place - whole(place))
     zero, most, half = spread(np.float32(0.0)), spread(np.float32(255.0)), spread(np.float32(0.5))
-    begin, end = int(columns[first]), int(columns[first + LANES - 1]) - (LANES - 1)
+    begin, end = int(columns[first]), int(columns[first + FLOAT_LANES - 1]) - (FLOAT_LANES - 1)
     value = w0 * load(crossed, begin) + w1 * load(crossed, begin + 1)
     value = value + w2 * load(crossed, begin + 2) + w3 * load(crossed, begin + 3)
     value = value + w4 * load(crossed, begin + 4) + w5 * load(crossed, begin + 5)
@@ -192,7 +192,7 @@ def resample_block(
     value = value + w2 * load(crossed, end + 2) + w3 * load(crossed, end + 3)
     value = value + w4 * load(crossed, end + 4) + w5 * load(crossed, end + 5)
     store_grey(room, 0, smaller(larger(value + half, zero), most))
-    for k in range(LANES):
+    for k in range(FLOAT_LANES):
         if int(columns[first + k]) - k != begin:
             greys[at + k] = room[k]
 
@@ -217,22 +217,22 @@ def resample_rows(
     height, width = picture.shape
     zero, most, half = np.float32(0.0), np.float32(255.0), np.float32(0.5)
     last_column, last_row = np.float32(width - 1), np.float32(height - 1)
-    far_column = np.float32(width - LANES)
+    far_column = np.float32(width - FLOAT_LANES)
     crossed = np.zeros(width + 2 * N_TAPS + 1, dtype=np.float32)
-    greys, n_columns, room = resampled.ravel(), resampled.shape[1], np.empty(LANES, np.uint8)
+    greys, n_columns, room = resampled.ravel(), resampled.shape[1], np.empty(FLOAT_LANES, np.uint8)
     for y in range(band[0], band[1]):
         columns, rows, out = places.columns[y], places.rows[y], resampled[y]
         in_step = places.in_step[y]
         # Columns only grow along a row.
-        low = min(max(int(columns[span[0]]) - _BEFORE, 0), width - 1) // LANES * LANES
+        low = min(max(int(columns[span[0]]) - _BEFORE, 0), width - 1) // FLOAT_LANES * FLOAT_LANES
         high = min(max(int(columns[span[1] - 1]) + _AFTER + 1, low + 1), width)
         cross_row(picture, rows, places.in_row[y], (low, high), crossed)
         crossed[:_BEFORE], crossed[_BEFORE + width :] = crossed[_BEFORE], crossed[width + 1]
-        for block in range(span[0] // LANES * LANES, span[1], LANES):
-            first, after = max(block, span[0]), min(block + LANES, span[1])
+        for block in range(span[0] // FLOAT_LANES * FLOAT_LANES, span[1], FLOAT_LANES):
+            first, after = max(block, span[0]), min(block + FLOAT_LANES, span[1])
             begin, end = columns[first], columns[after - 1]
-            is_full = after == block + LANES and first == block
-            if is_full and in_step[block // LANES] and begin >= zero and end < far_column:
+            is_full = after == block + FLOAT_LANES and first == block
+            if is_full and in_step[block // FLOAT_LANES] and begin >= zero and end < far_column:
                 resample_block(crossed, columns, block, greys, y * n_columns + block, room)
             else:
                 for x in range(first, after):

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
-from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -110,6 +109,12 @@ def bounds_of(
     return None if clipped.is_empty else clipped, (near_mm, far_mm)
 
 
+def find_known_range(values: NDArray[np.float32]) -> tuple[float, float]:
+    """Least and largest of the numbers that are known; of none, infinity and its negative."""
+    least = np.fmin.reduce(values, axis=None, initial=np.inf)
+    return float(least), float(np.fmax.reduce(values, axis=None, initial=-np.inf))
+
+
 def _raster(
     pixels: FloatArray,
     depths_mm: FloatArray,
@@ -121,14 +126,9 @@ def _raster(
     height, width = max(box.height, 0), max(box.width, 0)
     depth = np.empty((height, width), dtype=np.float32)
     face_index = np.empty(depth.shape, dtype=np.int32)
-    inverse_depth = np.zeros((height, width + LANES), dtype=np.float32)
-    face_code = np.full(inverse_depth.shape, -1, dtype=np.int32)
-    writable = np.array(faces)
-
     if not box.is_empty:
         draw = partial(
-            render_rows, pixels, depths_mm, writable, is_closed, inverse_depth=inverse_depth,
-            face_code=face_code.view(np.float32), coded=face_code, depth=depth,
+            render_rows, pixels, depths_mm, np.array(faces), is_closed, depth=depth,
             face_index=face_index,
         )  # fmt: skip
         in_row_bands(box.height, draw)

@@ -4,17 +4,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import (
-    LANES,
-    lane_numbers,
-    larger,
-    load,
-    smaller,
-    spread,
-    store,
-    where_positive,
-)
-
 
 @njit(cache=True, nogil=True)
 def project_points(
@@ -75,29 +64,12 @@ def bounds_of_points(
 
 
 @njit(cache=True, nogil=True)
-def find_known_range(values: NDArray[np.float32]) -> tuple[float, float]:
-    """Least and largest of (h, w) numbers that are known; of none, infinity and its negative."""
-    flat, ends = values.ravel(), np.empty(2 * LANES, dtype=np.float32)
-    least, largest = spread(np.float32(np.inf)), spread(np.float32(-np.inf))
-    whole = flat.size // LANES * LANES
-    for at in range(0, whole, LANES):
-        # Comparisons with NaN are false, and the second is kept.
-        least, largest = smaller(load(flat, at), least), larger(load(flat, at), largest)
-    store(ends, 0, least)
-    store(ends, LANES, largest)
-    low, high = ends[:LANES].min(), ends[LANES:].max()
-    for value in flat[whole:]:
-        low, high = value if value < low else low, value if value > high else high
-    return float(low), float(high)
-
-
-@njit(cache=True, nogil=True)
 def raster_nearest(
     pixels: NDArray[np.float64],
     depths: NDArray[np.float64],
     faces: NDArray[np.int32],
     inverse_depth: NDArray[np.float32],
-    face_code: NDArray[np.float32],
+    face_index: NDArray[np.int32],
     band: tuple[int, int],
     is_closed: bool,
 ) -> None:
@@ -107,9 +79,8 @@ def raster_nearest(
         pixels: (V, 2) px of the vertices, the buffer's pixel (0, 0) at its centre; NaN hides them.
         depths: (V,) depth along the optical axis, mm, positive in front.
         faces: (F, 3).
-        inverse_depth: (h, pitch) in place, 1/mm, 0 where nothing is seen; at least `LANES` columns
-            more than count.
-        face_code: (h, pitch) in place: the bits of the triangle's number, an int32.
+        inverse_depth: (h, w) in place, 1/mm, 0 where nothing is seen.
+        face_index: (h, w) in place: the triangle's number where one is drawn.
         band: first row to draw, and after the last.
         is_closed: the mesh shows no inner side: triangles seen from behind are left out.
 
@@ -117,10 +88,8 @@ def raster_nearest(
     ends of its edge: a neighbour computes the same number with the other sign, so that no pixel on
     a shared edge is lost to both.
     """
-    pitch = inverse_depth.shape[1]
-    width = pitch - LANES
-    near, seen = inverse_depth.ravel(), face_code.ravel()
-    codes = np.arange(faces.shape[0]).astype(np.int32).view(np.float32)
+    width = inverse_depth.shape[1]
+    near, seen = inverse_depth.ravel(), face_index.ravel()
     first_row, last_row = band[0], band[1] - 1
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -144,7 +113,7 @@ def raster_nearest(
             continue
         _draw(
             (ax, ay, bx, by, cx, cy), (1.0 / za, 1.0 / zb, 1.0 / zc), 1.0 / area,
-            (x0, x1, y0, y1), pitch, codes[f], near, seen,
+            (x0, x1, y0, y1), width, np.int32(f), near, seen,
         )  # fmt: skip
 
 
@@ -155,61 +124,33 @@ def _draw(
     scale: float,
     extent: tuple[int, int, int, int],
     pitch: int,
-    code: np.float32,
+    face: np.int32,
     near: NDArray[np.float32],
-    seen: NDArray[np.float32],
+    seen: NDArray[np.int32],
 ) -> None:
-    """One triangle into flat buffers, eight pixels at once."""
+    """One triangle into flat buffers whose rows lie `pitch` apart."""
     x0, x1, y0, y1 = extent
     ax, ay, bx, by, cx, cy = (
         np.float32(corners[0]), np.float32(corners[1]), np.float32(corners[2]),
         np.float32(corners[3]), np.float32(corners[4]), np.float32(corners[5]),
     )  # fmt: skip
-    zero, face, per_area = spread(np.float32(0.0)), spread(code), spread(np.float32(scale))
-    at_a = spread(np.float32(inverse[0]))
-    to_b = spread(np.float32(inverse[1] - inverse[0]))
-    to_c = spread(np.float32(inverse[2] - inverse[0]))
-    for x in range(x0, x1 + 1, LANES):
-        column = spread(np.float32(x)) + lane_numbers()
-        a, b, c = spread(ax) - column, spread(bx) - column, spread(cx) - column
-        for y in range(y0, y1 + 1):
-            row = np.float32(y)
-            da, db, dc = spread(ay - row), spread(by - row), spread(cy - row)
-            wa = (b * dc - db * c) * per_area
-            wb = (c * da - dc * a) * per_area
+    zero, per_area, at_a = np.float32(0.0), np.float32(scale), np.float32(inverse[0])
+    to_b, to_c = np.float32(inverse[1] - inverse[0]), np.float32(inverse[2] - inverse[0])
+    for y in range(y0, y1 + 1):
+        row = np.float32(y)
+        da, db, dc = ay - row, by - row, cy - row
+        for x in range(x0, x1 + 1):
+            column = np.float32(x)
+            a, b, c = ax - column, bx - column, cx - column
+            wa, wb = (b * dc - db * c) * per_area, (c * da - dc * a) * per_area
             wc = (a * db - da * b) * per_area
             value = at_a + wb * to_b + wc * to_c
-            outside = zero - smaller(smaller(wa, wb), wc)
             at = y * pitch + x
-            before = load(near, at)
-            nearer = where_positive(outside, zero, value) - before
-            store(near, at, where_positive(nearer, value, before))
-            store(seen, at, where_positive(nearer, face, load(seen, at)))
-
-
-@njit(cache=True, nogil=True)
-def tell_depth(
-    inverse_depth: NDArray[np.float32],
-    face_code: NDArray[np.int32],
-    band: tuple[int, int],
-    depth: NDArray[np.float32],
-    face_index: NDArray[np.int32],
-) -> None:
-    """Depth and triangle of some rows, from what `raster_nearest` has drawn.
-
-    Args:
-        inverse_depth: (h, pitch) 1/mm.
-        face_code: (h, pitch).
-        band: first row, and after the last.
-        depth: (h, w) in place, mm; NaN where nothing is seen.
-        face_index: (h, w) in place, -1 where nothing is seen.
-    """
-    unknown, one = np.float32(np.nan), np.float32(1.0)
-    for y in range(band[0], band[1]):
-        drawn, out = inverse_depth[y], depth[y]
-        for x in range(out.shape[0]):
-            out[x] = one / drawn[x] if drawn[x] > np.float32(0.0) else unknown
-        face_index[y] = face_code[y, : face_index.shape[1]]
+            # Computed without branches: a processor guesses badly where a triangle ends.
+            is_inside = (wa >= zero) & (wb >= zero) & (wc >= zero)
+            is_nearer = is_inside & (value > near[at])
+            near[at] = max(near[at], value * np.float32(is_inside))
+            seen[at] += (face - seen[at]) * np.int32(is_nearer)
 
 
 @njit(cache=True, nogil=True)
@@ -219,12 +160,15 @@ def render_rows(
     faces: NDArray[np.int32],
     is_closed: bool,
     band: tuple[int, int],
-    inverse_depth: NDArray[np.float32],
-    face_code: NDArray[np.float32],
-    coded: NDArray[np.int32],
     depth: NDArray[np.float32],
     face_index: NDArray[np.int32],
 ) -> None:
-    """`raster_nearest`, then `tell_depth`; `coded` is `face_code` read as whole numbers."""
-    raster_nearest(pixels, depths, faces, inverse_depth, face_code, band, is_closed)
-    tell_depth(inverse_depth, coded, band, depth, face_index)
+    """`raster_nearest` into rows of (h, w) buffers that are empty; then depth, NaN where unseen."""
+    depth[band[0] : band[1]] = np.float32(0.0)
+    face_index[band[0] : band[1]] = -1
+    raster_nearest(pixels, depths, faces, depth, face_index, band, is_closed)
+    unknown, one = np.float32(np.nan), np.float32(1.0)
+    for y in range(band[0], band[1]):
+        for x in range(depth.shape[1]):
+            inverse = depth[y, x]
+            depth[y, x] = one / inverse if inverse > np.float32(0.0) else unknown

@@ -16,8 +16,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.geometry.zbuffer import RenderedView
-from navapp.geometry.zbuffer_kernels import find_known_range
+from navapp.geometry.zbuffer import RenderedView, find_known_range
 from navapp.registration.information import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
 from navapp.tracking.edge_kernels import measure_edge_offsets

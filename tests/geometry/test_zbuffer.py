@@ -2,17 +2,14 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
-from navapp.geometry.float_lane_kernels import LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.geometry.zbuffer import render, render_rectified
+from navapp.geometry.zbuffer import find_known_range, render, render_rectified
 from navapp.geometry.zbuffer_kernels import (
     bounds_of_points,
-    find_known_range,
     project_points,
-    raster_nearest,
-    tell_depth,
+    render_rows,
 )
 from tests.geometry.shapes import STRONG, camera, cube, sphere
 from tests.reference import zbuffer_reference
@@ -43,12 +40,9 @@ def square(z_mm, half_mm=10.0, centre=(0.0, 0.0)):
 
 def drawn(pixels, depths, faces, width, height, bands=None):
     """Inverse depth and triangle per pixel."""
-    inverse_depth = np.zeros((height, width + LANES), dtype=np.float32)
-    codes = np.full(inverse_depth.shape, -1, dtype=np.int32)
     depth, face_index = (np.empty((height, width), dtype=kind) for kind in (np.float32, np.int32))
     for band in bands or [(0, height)]:
-        raster_nearest(pixels, depths, faces, inverse_depth, codes.view(np.float32), band, False)
-        tell_depth(inverse_depth, codes, band, depth, face_index)
+        render_rows(pixels, depths, faces, False, band, depth, face_index)
     np.testing.assert_array_equal(np.isnan(depth), face_index < 0)
     return np.where(face_index < 0, 0.0, 1.0 / depth), face_index
 
@@ -353,7 +347,6 @@ def test_where_a_lens_shows_nothing_nothing_is_drawn(away, turned, is_whole):
     assert not view.mask.any()
 
 
-@pytest.mark.kernel
 def test_the_range_is_that_of_what_is_known():
     values = np.array([[np.nan, 3.0, -1.0], [7.0, np.nan, 2.0]], dtype=np.float32)
     assert find_known_range(values) == (-1.0, 7.0)

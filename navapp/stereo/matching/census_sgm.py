@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands, run_both
+from navapp.geometry.lane_kernels import WHOLE_LANES, lanes_for
 from navapp.geometry.masks import large_smooth_regions
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.stereo.matching.byte_lane_kernels import lanes_for
 from navapp.stereo.matching.census_kernels import census_rows
 from navapp.stereo.matching.choice_kernels import Choice, choose_rows
 from navapp.stereo.matching.consistency_kernels import Demands, Evidence, judge_rows
@@ -150,7 +150,7 @@ def _demands(settings: CensusSettings) -> Demands:
 
 
 def _check_volume(search: Search, settings: CensusSettings) -> None:
-    cells = search.inside.width * search.inside.height * lanes_for(search.count)
+    cells = search.inside.width * search.inside.height * lanes_for(search.count, WHOLE_LANES)
     n_bytes = cells * np.dtype(surplus_dtype(settings.p2)).itemsize
     if n_bytes > _MAX_VOLUME_BYTES:
         raise ValueError(
@@ -183,7 +183,7 @@ def _aggregate_and_choose(
     the memory, and no third pass over it.
     """
     height, width = left.grey.shape
-    n = lanes_for(search.count)
+    n = lanes_for(search.count, WHOLE_LANES)
     views = _views(left, right, search, settings)
     kept = np.empty((height, width, n), dtype=surplus_dtype(settings.p2))
     choice = Choice(
@@ -207,7 +207,7 @@ def _aggregate_and_choose(
 
 
 def _views(left: _View, right: _View, search: Search, settings: CensusSettings) -> Views:
-    n = lanes_for(search.count)
+    n = lanes_for(search.count, WHOLE_LANES)
     return Views(
         left.codes,
         mirror_codes(right.codes, n),

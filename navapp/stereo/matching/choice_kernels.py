@@ -6,20 +6,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.stereo.matching.byte_lane_kernels import (
-    LANES,
-    added,
-    both_bits,
-    chosen,
-    eightfold,
-    in_upper_half,
-    less,
+from navapp.geometry.lane_kernels import (
+    WHOLE_LANES,
+    larger,
     load,
     smaller,
     smallest,
     spread,
     store,
-    what_exceeds,
+    where_positive,
     widened,
 )
 from navapp.stereo.matching.sgm_kernels import (
@@ -35,6 +30,8 @@ _MOST_16 = np.uint16(65535)
 _MOST_32 = np.uint32(4294967295)
 _NUMBER_BITS = np.uint32(16)
 _NUMBER_MASK = np.uint32(65535)
+_UPPER_HALF = np.uint32(65536)
+_N_PATHS = np.uint16(8)
 
 
 class Choice(NamedTuple):
@@ -66,9 +63,9 @@ def add_up(
         cost: (n,) matching cost of the pixel.
         sums: (n,) in place.
     """
-    for k in range(0, sums.shape[0], LANES):
-        both = added(widened(load(surplus, k), sums), widened(load(kept, first + k), sums))
-        store(sums, k, added(both, eightfold(widened(load(cost, k), sums))))
+    for k in range(0, sums.shape[0], WHOLE_LANES):
+        both = widened(load(surplus, k), sums) + widened(load(kept, first + k), sums)
+        store(sums, k, both + widened(load(cost, k), sums) * spread(_N_PATHS))
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -93,11 +90,9 @@ def offer(
         The pixel's own best offer.
     """
     lowest = spread(_MOST_32)
-    for k in range(0, sums.shape[0], LANES):
-        offered = both_bits(
-            in_upper_half(widened(load(sums, k), right_best)),
-            widened(load(numbers, k), right_best),
-        )
+    for k in range(0, sums.shape[0], WHOLE_LANES):
+        upper_half = widened(load(sums, k), right_best) * spread(_UPPER_HALF)
+        offered = upper_half | widened(load(numbers, k), right_best)
         store(right_best, first + k, smaller(load(right_best, first + k), offered))
         lowest = smaller(lowest, offered)
     best: np.uint32 = smallest(lowest)
@@ -110,10 +105,10 @@ def second_least(best: int, sums: NDArray[np.uint16], numbers: NDArray[np.uint16
     nothing = spread(_MOST_16)
     before, two = spread(np.uint16(best - 1)), spread(np.uint16(2))
     lowest = nothing
-    for k in range(0, sums.shape[0], LANES):
+    for k in range(0, sums.shape[0], WHOLE_LANES):
         # Smaller numbers wrap around and become large ones.
-        is_apart = what_exceeds(less(load(numbers, k), before), two)
-        lowest = smaller(lowest, chosen(is_apart, load(sums, k), nothing))
+        beyond = larger(load(numbers, k) - before, two) - two
+        lowest = smaller(lowest, where_positive(beyond, load(sums, k), nothing))
     second: np.uint16 = smallest(lowest)
     return second
 

@@ -13,20 +13,17 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.stereo.matching.byte_lane_kernels import (
-    LANES,
-    added,
+from navapp.geometry.lane_kernels import (
+    WHOLE_LANES,
     capped_sum,
-    chosen,
-    differing,
     larger,
-    less,
     load,
     ones,
     smaller,
     smallest,
     spread,
     store,
+    where_positive,
     widened,
 )
 
@@ -43,7 +40,7 @@ _ROW_PATHS = 3
 
 
 class Views(NamedTuple):
-    """What is matched; n is a multiple of `LANES`."""
+    """What is matched; n is a multiple of `WHOLE_LANES`."""
 
     left: NDArray[np.uint8]  # (h, bytes, w) census codes
     # (h, bytes, n + W + n) codes of the right view, columns from right to left, with a margin:
@@ -123,15 +120,15 @@ def census_cost(
     first = right_width - 1 - u
     # However far outside, all partners lie in the margin.
     column = n + min(max(first, -n), right_width)
-    for k in range(0, n, LANES):
+    for k in range(0, n, WHOLE_LANES):
         distance = spread(np.uint8(0))
         for byte in range(n_bytes):
             partners = load(mirrored, (y * n_bytes + byte) * row_length + column + k)
-            distance = added(distance, ones(differing(spread(left[y, byte, x]), partners)))
+            distance = distance + ones(spread(left[y, byte, x]) ^ partners)
         store(cost, k, larger(distance, load(beyond, k)))
     if first < 0 or first + n > right_width:
-        for k in range(0, n, LANES):
-            known = chosen(load(outside, column + k), spread(no_partner), load(cost, k))
+        for k in range(0, n, WHOLE_LANES):
+            known = where_positive(load(outside, column + k), spread(no_partner), load(cost, k))
             store(cost, k, larger(known, load(beyond, k)))
 
 
@@ -142,7 +139,7 @@ def _surplus(
     """Lanes of what one path adds to the cost; `before` is the place of the disparity one lower."""
     neighbours = smaller(load(costs, before), load(costs, before + 2))
     near = capped_sum(neighbours, near_penalty)
-    return less(smaller(smaller(load(costs, before + 1), near), highest), lowest)
+    return smaller(smaller(load(costs, before + 1), near), highest) - lowest
 
 
 @njit(cache=True, nogil=True, forceinline=True)
@@ -175,18 +172,18 @@ def extend_paths(
     near = spread(p1)
     low_a, low_b = spread(lowest[before[0]]), spread(lowest[before[1]])
     low_c, low_d = spread(lowest[before[2]]), spread(lowest[before[3]])
-    high_a, high_b = added(low_a, spread(jumps[0])), added(low_b, spread(jumps[1]))
-    high_c, high_d = added(low_c, spread(jumps[2])), added(low_d, spread(jumps[3]))
+    high_a, high_b = low_a + spread(jumps[0]), low_b + spread(jumps[1])
+    high_c, high_d = low_c + spread(jumps[2]), low_d + spread(jumps[3])
     least_a = least_b = least_c = least_d = spread(NONE)
-    for k in range(0, cost.shape[0], LANES):
+    for k in range(0, cost.shape[0], WHOLE_LANES):
         here = load(cost, k)
         a = _surplus(costs, before[0] * slot + k, near, high_a, low_a)
         b = _surplus(costs, before[1] * slot + k, near, high_b, low_b)
         c = _surplus(costs, before[2] * slot + k, near, high_c, low_c)
         d = _surplus(costs, before[3] * slot + k, near, high_d, low_d)
-        two = added(widened(a, surplus), widened(b, surplus))
-        other_two = added(widened(c, surplus), widened(d, surplus))
-        store(surplus, first + k, added(two, other_two))
+        two = widened(a, surplus) + widened(b, surplus)
+        other_two = widened(c, surplus) + widened(d, surplus)
+        store(surplus, first + k, two + other_two)
         a, b, c, d = (
             capped_sum(a, here), capped_sum(b, here), capped_sum(c, here), capped_sum(d, here)
         )  # fmt: skip

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.masks import large_smooth_regions
 from navapp.geometry.rectification import RectifiedPair
-from navapp.geometry.zbuffer_kernels import find_known_range
+from navapp.geometry.zbuffer import find_known_range
 from navapp.stereo.subpixel.refine_kernels import (
     CORRELATION,
     N_QUALITIES,

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import LANES
+from navapp.geometry.lane_kernels import FLOAT_LANES
 from navapp.stereo.subpixel.window_step_kernels import (
     SOLVED_CORRELATION,
     SOLVED_NEW,
@@ -118,8 +118,8 @@ def joint_span(
     if low >= high:
         return 0, 0
     return (
-        max(low - radius, 0) // LANES * LANES,
-        min(-(-(high + radius) // LANES) * LANES, pitch),
+        max(low - radius, 0) // FLOAT_LANES * FLOAT_LANES,
+        min(-(-(high + radius) // FLOAT_LANES) * FLOAT_LANES, pitch),
     )
 
 
@@ -180,7 +180,10 @@ def refine_rows(
                 add_up(planes, place, radius, asked)
                 thin_out(planes, support[row], stride)
                 if stride > 1:
-                    asked = (asked[0] // stride // LANES * LANES, -(-asked[1] // stride))
+                    asked = (
+                        asked[0] // stride // FLOAT_LANES * FLOAT_LANES,
+                        -(-asked[1] // stride),
+                    )
                 solve_windows(planes, asked, np.float32(least))
                 take_roots(planes, asked)
                 tell_row(planes, stride, asked, refined[row], quality[row // stride])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
-from navapp.geometry.float_lane_kernels import lanes_for
+from navapp.geometry.lane_kernels import FLOAT_LANES, lanes_for
 from navapp.stereo.subpixel.regional_kernels import Rules, fit_rows
 from navapp.stereo.subpixel.regional_picture_kernels import picture_rows
 from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, place_rows
@@ -75,7 +75,7 @@ def regional_support(
         raise ValueError("samples and weights need the size of the map, thinned")
     side = settings.node_px
     n_rows, n_columns = ((size - 1) // side + 2 for size in shape)
-    nodes = np.empty((n_rows, 7, lanes_for(n_columns)), dtype=np.float32)
+    nodes = np.empty((n_rows, 7, lanes_for(n_columns, FLOAT_LANES)), dtype=np.float32)
     samples = _samples(samples_px, weights, nodes.shape, settings)
     window, rules = _window(samples, settings), _rules(settings)
     in_row_bands(

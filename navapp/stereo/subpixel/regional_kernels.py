@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import LANES, load, spread, store, where_positive
+from navapp.geometry.lane_kernels import FLOAT_LANES, load, spread, store, where_positive
 from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, count_known, medians
 
 # 1, u, v, u^2, uv, v^2.
@@ -49,19 +49,19 @@ def fit_rows(
         first: row of nodes.
         last: row after the last.
         nodes: (rows, 7, columns) in place: support, and support times the coefficients of 1, u, v,
-            u^2, uv, v^2; columns a multiple of `LANES`.
+            u^2, uv, v^2; columns a multiple of `FLOAT_LANES`.
     """
     n_columns = nodes.shape[2]
     told = nodes.ravel()
-    state = np.zeros(_N_STATE * LANES, np.float32)
-    ranked = np.empty(len(window.start) * LANES, np.float32)
-    counts = np.empty(LANES, np.float32)
+    state = np.zeros(_N_STATE * FLOAT_LANES, np.float32)
+    ranked = np.empty(len(window.start) * FLOAT_LANES, np.float32)
+    counts = np.empty(FLOAT_LANES, np.float32)
     for j in range(first, last):
-        for i in range(0, n_columns, LANES):
+        for i in range(0, n_columns, FLOAT_LANES):
             begin = j * samples.spacing * samples.width + i
             count_known(samples, window, begin, counts)
             if counts.max() >= rules.min_samples:
-                state[: _N_TERMS * LANES] = np.float32(0.0)
+                state[: _N_TERMS * FLOAT_LANES] = np.float32(0.0)
                 medians(samples, window, begin, ranked, state)
                 for scale in rules.scales_px:
                     _add_window(samples, window, begin, scale, state)
@@ -77,12 +77,14 @@ def _add_window(
     zero, one = spread(np.float32(0.0)), spread(np.float32(1.0))
     per_px = spread(np.float32(1.0) / scale)
     for k in range(_MOMENTS, _BELOW):
-        store(state, k * LANES, zero)
-    bend = load(state, 3 * LANES)
+        store(state, k * FLOAT_LANES, zero)
+    bend = load(state, 3 * FLOAT_LANES)
     for j in range(len(window.offsets)):
         v, taper = spread(window.offsets[j]), spread(window.taper[j])
-        level = load(state, 0) + v * (load(state, 2 * LANES) + v * load(state, 5 * LANES))
-        slope = load(state, 1 * LANES) + v * load(state, 4 * LANES)
+        level = load(state, 0) + v * (
+            load(state, 2 * FLOAT_LANES) + v * load(state, 5 * FLOAT_LANES)
+        )
+        slope = load(state, 1 * FLOAT_LANES) + v * load(state, 4 * FLOAT_LANES)
         s0, s1, s2, s3, s4 = zero, zero, zero, zero, zero
         r0, r1, r2 = zero, zero, zero
         place = begin + j * samples.width
@@ -113,7 +115,7 @@ def _add_row(
     n, factor = len(row), taper
     for q in range(n):
         for p in range(n - q):
-            at = (sums + n * q + p) * LANES
+            at = (sums + n * q + p) * FLOAT_LANES
             store(state, at, load(state, at) + factor * row[p])
         factor = factor * v
 
@@ -128,12 +130,12 @@ def _solve(
         p, q = _POWER_OF_U[j], _POWER_OF_V[j]
         for k in range(j, _N_TERMS):
             moment = _MOMENTS + _N_POWERS * (q + _POWER_OF_V[k]) + p + _POWER_OF_U[k]
-            store(state, _below(k, j), load(state, moment * LANES))
+            store(state, _below(k, j), load(state, moment * FLOAT_LANES))
         # The ridge draws all to zero but the level, which only moves less.
         small = spread(ridge[j]) * count
-        drawn = load(state, (_RIGHT + _N_RIGHT_POWERS * q + p) * LANES)
+        drawn = load(state, (_RIGHT + _N_RIGHT_POWERS * q + p) * FLOAT_LANES)
         if j > 0:
-            drawn = drawn - small * load(state, j * LANES)
+            drawn = drawn - small * load(state, j * FLOAT_LANES)
         store(state, _below(j, j), load(state, _below(j, j)) + small)
         store(state, _below(_N_TERMS, j), drawn)
         for k in range(j, _N_TERMS + 1):
@@ -150,19 +152,19 @@ def _solve(
         for k in range(j + 1, _N_TERMS):
             change = change - load(state, _scale(k, j)) * load(state, _scale(_N_TERMS, k))
         store(state, _scale(_N_TERMS, j), change)
-        store(state, j * LANES, load(state, j * LANES) + change)
+        store(state, j * FLOAT_LANES, load(state, j * FLOAT_LANES) + change)
 
 
 @njit(cache=True, nogil=True)
 def _below(k: int, j: int) -> int:
     """Where L D is."""
-    return (_BELOW + k * _N_TERMS + j) * LANES
+    return (_BELOW + k * _N_TERMS + j) * FLOAT_LANES
 
 
 @njit(cache=True, nogil=True)
 def _scale(k: int, j: int) -> int:
     """Where L is; its last row is the answer."""
-    return (_SCALED + k * _N_TERMS + j) * LANES
+    return (_SCALED + k * _N_TERMS + j) * FLOAT_LANES
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -174,12 +176,12 @@ def _tell(
     told: NDArray[np.float32],
 ) -> None:
     """Hand out support, the mean weight, and polynomials; no support with too few samples."""
-    for k in range(LANES):
+    for k in range(FLOAT_LANES):
         if counts[k] >= min_samples:
-            told[k] = state[_MOMENTS * LANES + k] / counts[k]
+            told[k] = state[_MOMENTS * FLOAT_LANES + k] / counts[k]
         else:
             told[k] = np.float32(0.0)
     support, zero = load(told, 0), spread(np.float32(0.0))
     for term in range(_N_TERMS):
-        told_term = where_positive(support, support * load(state, term * LANES), zero)
+        told_term = where_positive(support, support * load(state, term * FLOAT_LANES), zero)
         store(told, (1 + term) * n_columns, told_term)

@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import (
-    LANES,
+from navapp.geometry.lane_kernels import (
+    FLOAT_LANES,
     larger,
     load,
     smaller,
@@ -101,13 +101,13 @@ def medians(
     for k in range(len(window.start)):
         weight = load(samples.weights, begin + window.start[k])
         value = load(samples.values, begin + window.start[k])
-        store(ranked, k * LANES, where_positive(weight, value, nothing))
+        store(ranked, k * FLOAT_LANES, where_positive(weight, value, nothing))
         count = count + where_positive(weight, one, zero)
     _sort(ranked)
     store(found, 0, count)
-    for k in range(LANES):
+    for k in range(FLOAT_LANES):
         n = int(found[k])
-        low, high = ranked[(max(n, 1) - 1) // 2 * LANES + k], ranked[n // 2 * LANES + k]
+        low, high = ranked[(max(n, 1) - 1) // 2 * FLOAT_LANES + k], ranked[n // 2 * FLOAT_LANES + k]
         found[k] = np.float32(0.5) * (low + high) if n > 0 else np.float32(0.0)
 
 
@@ -117,7 +117,7 @@ def _sort(ranked: NDArray[np.float32]) -> None:
 
     Source: Batcher's merge exchange, Knuth, The Art of Computer Programming 3, algorithm 5.2.2M.
     """
-    n = len(ranked) // LANES
+    n = len(ranked) // FLOAT_LANES
     largest = 1
     while 2 * largest < n:
         largest *= 2
@@ -127,9 +127,9 @@ def _sort(ranked: NDArray[np.float32]) -> None:
         while True:
             for i in range(n - d):
                 if i & p == r:
-                    low, high = load(ranked, i * LANES), load(ranked, (i + d) * LANES)
-                    store(ranked, i * LANES, smaller(low, high))
-                    store(ranked, (i + d) * LANES, larger(low, high))
+                    low, high = load(ranked, i * FLOAT_LANES), load(ranked, (i + d) * FLOAT_LANES)
+                    store(ranked, i * FLOAT_LANES, smaller(low, high))
+                    store(ranked, (i + d) * FLOAT_LANES, larger(low, high))
             if q == p:
                 break
             d, q, r = q - p, q // 2, p

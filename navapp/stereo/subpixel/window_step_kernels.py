@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import (
-    LANES,
+from navapp.geometry.lane_kernels import (
+    FLOAT_LANES,
     larger,
     load,
     smaller,
@@ -72,7 +72,7 @@ def solve_windows(planes: Planes, span: tuple[int, int], least: np.float32) -> N
     """
     pitch, sums, solved = planes.pitch, planes.sums, planes.solved
     zero, one, unknown = spread(_NOTHING), spread(np.float32(1.0)), spread(np.float32(np.nan))
-    for x in range(span[0], span[1], LANES):
+    for x in range(span[0], span[1], FLOAT_LANES):
         n, s_l, s_r = load(sums, x), load(sums, SUM_L * pitch + x), load(sums, SUM_R * pitch + x)
         s_g, weight = load(sums, SUM_G * pitch + x), load(sums, SUM_GG * pitch + x)
         per_n = one / larger(n, one)

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.float_lane_kernels import LANES, load, spread, store
+from navapp.geometry.lane_kernels import FLOAT_LANES, load, spread, store
 
 # Window sums: number of pixels; left, right, gradient; their products; gradient^2 times the
 # offset and its square.
@@ -45,8 +45,8 @@ class Planes(NamedTuple):
 @njit(cache=True, nogil=True)
 def make_planes(width: int, radius: int) -> Planes:
     """Room for rows of a width, empty."""
-    pitch = -(-width // LANES) * LANES
-    wide_pitch = pitch + -(-2 * radius // LANES) * LANES
+    pitch = -(-width // FLOAT_LANES) * FLOAT_LANES
+    wide_pitch = pitch + -(-2 * radius // FLOAT_LANES) * FLOAT_LANES
     return Planes(
         pitch,
         wide_pitch,
@@ -117,7 +117,7 @@ def enter_row(planes: Planes, place: int, span: tuple[int, int]) -> None:
     half, two = spread(np.float32(0.5)), spread(np.float32(2.0))
     three_halves, five_halves = spread(np.float32(1.5)), spread(np.float32(2.5))
     three = spread(np.float32(3.0))
-    for x in range(span[0], span[1], LANES):
+    for x in range(span[0], span[1], FLOAT_LANES):
         p0, p1 = load(samples, _P0 * pitch + x), load(samples, _P1 * pitch + x)
         p2, p3 = load(samples, _P2 * pitch + x), load(samples, _P3 * pitch + x)
         t = load(samples, _T * pitch + x)
@@ -163,7 +163,7 @@ def close_block(planes: Planes, size: int, span: tuple[int, int]) -> None:
     for place in range(size - 2, -1, -1):
         for term in range(N_SUMS):
             begin = place * length + term * pitch
-            for at in range(begin + span[0], begin + span[1], LANES):
+            for at in range(begin + span[0], begin + span[1], FLOAT_LANES):
                 store(planes.ring, at, load(planes.ring, at) + load(planes.ring, at + length))
     planes.block[:] = np.float32(0.0)
 
@@ -178,19 +178,19 @@ def add_up(planes: Planes, place: int, radius: int, span: tuple[int, int]) -> No
         radius: px.
         span: first pixel, and after the last; multiples of the lanes.
     """
-    margin = -(-radius // LANES) * LANES
+    margin = -(-radius // FLOAT_LANES) * FLOAT_LANES
     low, high = max(span[0] - margin, 0), min(span[1] + margin, planes.pitch)
     pitch, wide, columns = planes.pitch, planes.wide_pitch, planes.columns
     # The older rows of the windows end the block before, unless the block is all of them.
     older = (place + 1) * N_SUMS * pitch
     for term in range(N_SUMS):
         middle = term * (wide - pitch) + radius
-        for at in range(term * pitch + low, term * pitch + high, LANES):
+        for at in range(term * pitch + low, term * pitch + high, FLOAT_LANES):
             value = load(planes.block, at)
             if place < 2 * radius:
                 value = value + load(planes.ring, older + at)
             store(columns, middle + at, value)
-        for x in range(span[0], span[1], LANES):
+        for x in range(span[0], span[1], FLOAT_LANES):
             at = term * wide + x
             value = load(columns, at)
             for k in range(at + 1, at + 2 * radius + 1, 2):

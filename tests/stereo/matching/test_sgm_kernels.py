@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.stereo.matching.byte_lane_kernels import lanes_for
+from navapp.geometry.lane_kernels import WHOLE_LANES, lanes_for
 from navapp.stereo.matching.census_kernels import census_rows
 from navapp.stereo.matching.choice_kernels import Choice, choose_rows
 from navapp.stereo.matching.sgm_kernels import (
@@ -32,7 +32,7 @@ def pictures() -> tuple[np.ndarray, np.ndarray]:
 
 
 def views_of(first_partner: int, count: int, p1: int, p2: int) -> Views:
-    n = lanes_for(count)
+    n = lanes_for(count, WHOLE_LANES)
     codes = []
     for image in pictures():
         codes.append(np.empty((HEIGHT, 3, image.shape[1]), dtype=np.uint8))
@@ -62,7 +62,7 @@ def cost_of(first_partner: int, count: int) -> np.ndarray:
 )
 def test_each_scan_adds_what_the_definition_says(first_partner, count, penalties) -> None:
     cost, grey = cost_of(first_partner, count), pictures()[0]
-    views, n = views_of(first_partner, count, *penalties), lanes_for(count)
+    views, n = views_of(first_partner, count, *penalties), lanes_for(count, WHOLE_LANES)
     for directions, rows, direction in (
         (reference.DOWN, (0, HEIGHT), 1),
         (reference.UP, (HEIGHT - 1, -1), -1),
@@ -80,7 +80,7 @@ def test_each_scan_adds_what_the_definition_says(first_partner, count, penalties
     ("first_partner", "count"), [(4, 5), (0, 32), (-2, 5), (12, 40), (70, 5), (-50, 40)]
 )
 def test_the_choice_agrees_with_the_definitions(first_partner, count, penalties, middle) -> None:
-    views, n = views_of(first_partner, count, *penalties), lanes_for(count)
+    views, n = views_of(first_partner, count, *penalties), lanes_for(count, WHOLE_LANES)
     shape = (HEIGHT, WIDTH)
     left_px, unique = (np.empty(shape, dtype=np.float32) for _ in range(2))
     choice = Choice(left_px, np.empty((HEIGHT, RIGHT_WIDTH), dtype=np.float32), unique, 7, count)
