@@ -314,26 +314,3 @@ def test_verdicts_have_an_order() -> None:
     good, lost = Verdict(Status.OK, 0.3, coverage=0.3), Verdict(Status.LOST, None)
     found = sorted([lost, guess, degraded, more, good], key=lambda one: one.rank)
     assert found == [good, more, degraded, guess, lost]
-
-
-def test_a_map_laid_over_another_one_tells_what_it_has_matched() -> None:
-    below = DisparityMap(
-        np.full((4, 5), 10.0, np.float32), np.full((4, 5), 5.0, np.float32),
-        np.full((4, 5), Origin.FILLED_BORDER, np.uint8), 20, 30,
-    )  # fmt: skip
-    origin = np.full((4, 5), Origin.MATCHED, np.uint8)
-    origin[0] = Origin.FILLED_INTERIOR
-    above = DisparityMap(
-        np.full((4, 5), 12.0, np.float32), np.full((4, 5), 0.1, np.float32), origin, 23, 29
-    )
-    both = below.with_matches_of(above)
-    expected = np.full((4, 5), 10.0)
-    expected[0:3, 3:5] = 12.0
-    np.testing.assert_array_equal(both.disparity_px, expected)
-    np.testing.assert_array_equal(both.sigma_px == np.float32(0.1), expected == 12.0)
-    np.testing.assert_array_equal(both.origin == Origin.MATCHED, expected == 12.0)
-    assert both.box == below.box
-    assert (below.disparity_px == 10.0).all()
-    far = DisparityMap(*(np.ones((2, 2), np.float32),) * 2, origin[1:3, :2], 90, 9)
-    apart = below.with_matches_of(far)
-    np.testing.assert_array_equal(apart.disparity_px, below.disparity_px)

@@ -153,6 +153,16 @@ def spread(_: Any, number: Any) -> Any:
 
 
 @intrinsic
+def lane_numbers(_: Any) -> Any:
+    """0, 1, 2 and so on, as floats."""
+
+    def generate(__: Any, ___: Any, ____: Any, _____: Any) -> Any:
+        return ir.Constant(_FLOATS.vector, [float(number) for number in range(FLOAT_LANES)])
+
+    return _FLOATS(), generate
+
+
+@intrinsic
 def widened(_: Any, lanes: Any, array: Any) -> Any:
     """The same whole numbers with as many bits as an array's elements, which are no fewer."""
     wide = Lanes(array.dtype)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
+from navapp.geometry.lane_kernels import FLOAT_LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -126,9 +127,14 @@ def _raster(
     height, width = max(box.height, 0), max(box.width, 0)
     depth = np.empty((height, width), dtype=np.float32)
     face_index = np.empty(depth.shape, dtype=np.int32)
+    inverse_depth = np.zeros((height, width + FLOAT_LANES), dtype=np.float32)
+    face_code = np.full(inverse_depth.shape, -1, dtype=np.int32)
+    writable = np.array(faces)
+
     if not box.is_empty:
         draw = partial(
-            render_rows, pixels, depths_mm, np.array(faces), is_closed, depth=depth,
+            render_rows, pixels, depths_mm, writable, is_closed, inverse_depth=inverse_depth,
+            face_code=face_code.view(np.float32), coded=face_code, depth=depth,
             face_index=face_index,
         )  # fmt: skip
         in_row_bands(box.height, draw)

@@ -4,6 +4,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.lane_kernels import (
+    FLOAT_LANES,
+    lane_numbers,
+    load,
+    smaller,
+    spread,
+    store,
+    where_positive,
+)
+
 
 @njit(cache=True, nogil=True)
 def project_points(
@@ -69,7 +79,7 @@ def raster_nearest(
     depths: NDArray[np.float64],
     faces: NDArray[np.int32],
     inverse_depth: NDArray[np.float32],
-    face_index: NDArray[np.int32],
+    face_code: NDArray[np.float32],
     band: tuple[int, int],
     is_closed: bool,
 ) -> None:
@@ -79,8 +89,9 @@ def raster_nearest(
         pixels: (V, 2) px of the vertices, the buffer's pixel (0, 0) at its centre; NaN hides them.
         depths: (V,) depth along the optical axis, mm, positive in front.
         faces: (F, 3).
-        inverse_depth: (h, w) in place, 1/mm, 0 where nothing is seen.
-        face_index: (h, w) in place: the triangle's number where one is drawn.
+        inverse_depth: (h, pitch) in place, 1/mm, 0 where nothing is seen; it has `FLOAT_LANES`
+            columns more than count.
+        face_code: (h, pitch) in place: the bits of the triangle's number, an int32.
         band: first row to draw, and after the last.
         is_closed: the mesh shows no inner side: triangles seen from behind are left out.
 
@@ -88,8 +99,10 @@ def raster_nearest(
     ends of its edge: a neighbour computes the same number with the other sign, so that no pixel on
     a shared edge is lost to both.
     """
-    width = inverse_depth.shape[1]
-    near, seen = inverse_depth.ravel(), face_index.ravel()
+    pitch = inverse_depth.shape[1]
+    width = pitch - FLOAT_LANES
+    near, seen = inverse_depth.ravel(), face_code.ravel()
+    codes = np.arange(faces.shape[0]).astype(np.int32).view(np.float32)
     first_row, last_row = band[0], band[1] - 1
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
@@ -113,7 +126,7 @@ def raster_nearest(
             continue
         _draw(
             (ax, ay, bx, by, cx, cy), (1.0 / za, 1.0 / zb, 1.0 / zc), 1.0 / area,
-            (x0, x1, y0, y1), width, np.int32(f), near, seen,
+            (x0, x1, y0, y1), pitch, codes[f], near, seen,
         )  # fmt: skip
 
 
@@ -124,33 +137,61 @@ def _draw(
     scale: float,
     extent: tuple[int, int, int, int],
     pitch: int,
-    face: np.int32,
+    code: np.float32,
     near: NDArray[np.float32],
-    seen: NDArray[np.int32],
+    seen: NDArray[np.float32],
 ) -> None:
-    """One triangle into flat buffers whose rows lie `pitch` apart."""
+    """One triangle into flat buffers, eight pixels at once."""
     x0, x1, y0, y1 = extent
     ax, ay, bx, by, cx, cy = (
         np.float32(corners[0]), np.float32(corners[1]), np.float32(corners[2]),
         np.float32(corners[3]), np.float32(corners[4]), np.float32(corners[5]),
     )  # fmt: skip
-    zero, per_area, at_a = np.float32(0.0), np.float32(scale), np.float32(inverse[0])
-    to_b, to_c = np.float32(inverse[1] - inverse[0]), np.float32(inverse[2] - inverse[0])
-    for y in range(y0, y1 + 1):
-        row = np.float32(y)
-        da, db, dc = ay - row, by - row, cy - row
-        for x in range(x0, x1 + 1):
-            column = np.float32(x)
-            a, b, c = ax - column, bx - column, cx - column
-            wa, wb = (b * dc - db * c) * per_area, (c * da - dc * a) * per_area
+    zero, face, per_area = spread(np.float32(0.0)), spread(code), spread(np.float32(scale))
+    at_a = spread(np.float32(inverse[0]))
+    to_b = spread(np.float32(inverse[1] - inverse[0]))
+    to_c = spread(np.float32(inverse[2] - inverse[0]))
+    for x in range(x0, x1 + 1, FLOAT_LANES):
+        column = spread(np.float32(x)) + lane_numbers()
+        a, b, c = spread(ax) - column, spread(bx) - column, spread(cx) - column
+        for y in range(y0, y1 + 1):
+            row = np.float32(y)
+            da, db, dc = spread(ay - row), spread(by - row), spread(cy - row)
+            wa = (b * dc - db * c) * per_area
+            wb = (c * da - dc * a) * per_area
             wc = (a * db - da * b) * per_area
             value = at_a + wb * to_b + wc * to_c
+            outside = zero - smaller(smaller(wa, wb), wc)
             at = y * pitch + x
-            # Computed without branches: a processor guesses badly where a triangle ends.
-            is_inside = (wa >= zero) & (wb >= zero) & (wc >= zero)
-            is_nearer = is_inside & (value > near[at])
-            near[at] = max(near[at], value * np.float32(is_inside))
-            seen[at] += (face - seen[at]) * np.int32(is_nearer)
+            before = load(near, at)
+            nearer = where_positive(outside, zero, value) - before
+            store(near, at, where_positive(nearer, value, before))
+            store(seen, at, where_positive(nearer, face, load(seen, at)))
+
+
+@njit(cache=True, nogil=True)
+def tell_depth(
+    inverse_depth: NDArray[np.float32],
+    face_code: NDArray[np.int32],
+    band: tuple[int, int],
+    depth: NDArray[np.float32],
+    face_index: NDArray[np.int32],
+) -> None:
+    """Depth and triangle of some rows, from what `raster_nearest` has drawn.
+
+    Args:
+        inverse_depth: (h, pitch) 1/mm.
+        face_code: (h, pitch).
+        band: first row, and after the last.
+        depth: (h, w) in place, mm; NaN where nothing is seen.
+        face_index: (h, w) in place, -1 where nothing is seen.
+    """
+    unknown, one = np.float32(np.nan), np.float32(1.0)
+    for y in range(band[0], band[1]):
+        drawn, out = inverse_depth[y], depth[y]
+        for x in range(out.shape[0]):
+            out[x] = one / drawn[x] if drawn[x] > np.float32(0.0) else unknown
+        face_index[y] = face_code[y, : face_index.shape[1]]
 
 
 @njit(cache=True, nogil=True)
@@ -160,15 +201,12 @@ def render_rows(
     faces: NDArray[np.int32],
     is_closed: bool,
     band: tuple[int, int],
+    inverse_depth: NDArray[np.float32],
+    face_code: NDArray[np.float32],
+    coded: NDArray[np.int32],
     depth: NDArray[np.float32],
     face_index: NDArray[np.int32],
 ) -> None:
-    """`raster_nearest` into rows of (h, w) buffers that are empty; then depth, NaN where unseen."""
-    depth[band[0] : band[1]] = np.float32(0.0)
-    face_index[band[0] : band[1]] = -1
-    raster_nearest(pixels, depths, faces, depth, face_index, band, is_closed)
-    unknown, one = np.float32(np.nan), np.float32(1.0)
-    for y in range(band[0], band[1]):
-        for x in range(depth.shape[1]):
-            inverse = depth[y, x]
-            depth[y, x] = one / inverse if inverse > np.float32(0.0) else unknown
+    """`raster_nearest`, then `tell_depth`; `coded` is `face_code` read as whole numbers."""
+    raster_nearest(pixels, depths, faces, inverse_depth, face_code, band, is_closed)
+    tell_depth(inverse_depth, coded, band, depth, face_index)

@@ -28,17 +28,17 @@ class DepthMarks:
         """A preview (h, w, 3) with marks; as it is without a foreground."""
         if foreground is None:
             return preview
-        surroundings = foreground.surroundings
         columns, rows = self._places(preview.shape[:2])
-        columns, rows = columns - surroundings.x, rows - surroundings.y
-        height, width = surroundings.origin.shape
+        columns, rows = columns - foreground.box.x, rows - foreground.box.y
+        _, origin = foreground.depth
+        height, width = origin.shape
         is_inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
         inside = rows[is_inside], columns[is_inside]
         colours = np.array([DEPTH_COLOURS[origin] for origin in Origin], dtype=np.float32)
         share = np.where(foreground.is_in_front[inside], _SHARE_IN_FRONT, _SHARE)[:, None]
         marked = preview.copy()
         below = preview[is_inside].astype(np.float32)
-        colour = colours[surroundings.origin[inside]]
+        colour = colours[origin[inside]]
         marked[is_inside] = np.round(below + share * (colour - below)).astype(np.uint8)
         marked.setflags(write=False)
         return marked

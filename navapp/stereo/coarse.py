@@ -7,18 +7,16 @@ the whole is exactly twice that of the half.
 
 import math
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.halves import double, half_box, inside_of_halves
 from navapp.geometry.masks import where
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.census_sgm import CensusSettings, TwoViewDisparity, match_census
 from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
-
-T = TypeVar("T", bound=np.generic)
 
 # Below this share of left-right agreement the two pictures do not show the same scene that way
 # round: with left and right swapped a few per cent agree by chance, otherwise far more than half.
@@ -88,10 +86,10 @@ def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> Coarse
 class CoarseMatch:
     """The matches behind a coarse map, at the resolution they were made in."""
 
-    pair: RectifiedPair  # whole or halved
+    pair: RectifiedPair
+    is_half: bool  # halved from the pictures
     found: TwoViewDisparity
-    band_px: tuple[float, float]  # disparities that were searched
-    nearest_px: float  # of what may stand before them
+    band_px: tuple[float, float]  # disparities that were searched, at that resolution
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,30 +107,25 @@ class CoarseMap:
         return part if min(row, column) >= 0 and part.shape == (box.height, box.width) else None
 
 
-def match_coarsely(
-    pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
-) -> CoarseMap:
+def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseMap:
     """What lies where, to about a pixel; all is unknown when the pictures hardly agree.
 
     Args:
         pair: rectified grey pictures; the part of `pair.box` inside them is matched.
         band_px: smallest and largest disparity expected.
-        nearest_px: largest disparity of anything in view. Nothing beyond the band is matched here;
-            `fill_surroundings` does that, and reads this.
     """
     pair = clip_box(pair)
-    nearest_px = max(nearest_px, band_px[1])
     is_half = _is_wide(pair, band_px)
-    small = halve(pair, (band_px[0], nearest_px)) if is_half else pair
+    small = halve(pair, band_px) if is_half else pair
     if is_half:
-        band_px, nearest_px = (band_px[0] / 2.0, band_px[1] / 2.0), nearest_px / 2.0
+        band_px = band_px[0] / 2.0, band_px[1] / 2.0
     found = match_census(small, band_px, SURFACE_CENSUS)
     if not found.agreement >= LEAST_AGREEMENT:
         unknown = np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
         return CoarseMap(unknown, pair.box)
     surface_px = calm(found.left.disparity_px)
     surface_px = double_disparity(surface_px, pair.box) if is_half else surface_px
-    return CoarseMap(surface_px, pair.box, CoarseMatch(small, found, band_px, nearest_px))
+    return CoarseMap(surface_px, pair.box, CoarseMatch(small, is_half, found, band_px))
 
 
 def are_swapped(
@@ -241,12 +234,6 @@ def _halve(image: Image, part: Box, whole: Box) -> Image:
     return small
 
 
-def half_box(box: Box) -> Box:
-    """The pixels of the half that cover a box of the whole."""
-    x, y = box.x // 2, box.y // 2
-    return Box(x, y, -(-(box.x + box.width) // 2) - x, -(-(box.y + box.height) // 2) - y)
-
-
 def double_disparity(half_px: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
     """(h, w) disparity over a box of the whole, from that over `half_box(box)`; interpolated.
 
@@ -257,18 +244,7 @@ def double_disparity(half_px: NDArray[np.float32], box: Box) -> NDArray[np.float
     height, width = half_px.shape
     # OpenCV's enlargement puts the half's pixel k at 2 k + 0.5, as it should be.
     between = cv2.resize(half_px, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
-    between = between[_inside(box)]
+    between = between[inside_of_halves(box)]
     finest = double(half_px, box)
     cv2.copyTo(between, np.isfinite(between).view(np.uint8), finest)
     return np.asarray(np.float32(2.0) * finest, dtype=np.float32)
-
-
-def double(half: NDArray[T], box: Box) -> NDArray[T]:
-    """(h, w) values over a box of the whole: those of the half pixel each pixel lies in."""
-    return np.repeat(np.repeat(half, 2, axis=0), 2, axis=1)[_inside(box)]
-
-
-def _inside(box: Box) -> tuple[slice, slice]:
-    """The box's rows and columns among the pixels that its half covers."""
-    top, left = box.y % 2, box.x % 2
-    return slice(top, top + box.height), slice(left, left + box.width)

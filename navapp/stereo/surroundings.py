@@ -3,19 +3,22 @@
 To tell what stands where, for example a hand in front of a bone; never to measure with.
 """
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch, double, halve
+from navapp.geometry.halves import double
+from navapp.geometry.rectification import RectifiedPair
+from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch, halve
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
 from navapp.stereo.matching.search import Crop
-from navapp.stereo.occlusion.bound_kernels import mark_beyond_bound
+from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
 from navapp.stereo.occlusion.classify import classify
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap, Origin, Surroundings
 
 # All chosen, on simulated knees with a hand (`python -m tests.bench.foreground --first 1`).
 # What stands before the searched band leaves a gap of at least so many pixels each way. It is
@@ -25,37 +28,43 @@ _LEAST_GAP_PX = 16
 _BEYOND_PX = 2.0
 _NEAR_CENSUS = replace(SURFACE_CENSUS, radius_x=1, radius_y=1, max_difference_px=3.0, speckle_px=40)
 # A map to about a pixel needs no wider support.
-_FILL = FillSettings(radius_px=16)
+_FILL = FillSettings(radius_px=8)
 # A filled disparity may exceed the bound of its occlusion by so much, the error of edges;
 # disparities further apart belong to different surfaces.
 _EDGE_PX, _LAYER_PX = np.float32(2.0), np.float32(8.0)
 
 
-def fill_surroundings(coarse: CoarseMap) -> DisparityMap:
-    """The matches of a coarse map at full size, their gaps filled by weighted least squares.
+@dataclass(frozen=True, slots=True)
+class Nearer:
+    """How to look for what stands before the searched disparities."""
 
-    What stands before the searched band is matched too. A match that hangs over the edge of
-    something near is withdrawn, gaps are classified and filled (`fill_wls`), and filled pixels
-    nearer than their occlusion allows become unknown (`mark_beyond_bound`). A filled pixel has its
-    class as origin: its disparity is a guess.
+    nearest_px: float  # largest disparity of anything in view
+    # the same pictures, rectified in a box and as far as a band of disparities reaches.
+    rectify: Callable[[Box, tuple[float, float]], RectifiedPair]
+
+
+def fill_surroundings(coarse: CoarseMap, nearer: Nearer | None = None) -> Surroundings:
+    """The matches of a coarse map, their gaps filled by weighted least squares.
+
+    What stands before the searched band is matched too, if `nearer` tells how. A match that hangs
+    over the edge of something near is withdrawn, gaps are classified and filled (`fill_wls`), and
+    filled pixels nearer than their occlusion allows become unknown (`drop_beyond_bound`). A filled
+    pixel has its class as origin: its disparity is a guess.
     """
     matched = coarse.matched
     if matched is None:
         unknown = np.full_like(coarse.disparity_px, np.nan)
-        origin = np.zeros(unknown.shape, dtype=np.uint8)
-        return DisparityMap(unknown, unknown, origin, coarse.box.x, coarse.box.y)
+        return Surroundings(unknown, np.zeros(unknown.shape, dtype=np.uint8), coarse.box, False)
     pair, found = matched.pair, matched.found
     gap = _find_wide_gaps(found.left)
-    if gap is not None and matched.nearest_px > matched.band_px[1] + _BEYOND_PX:
-        found = _add_nearer(matched, gap)
+    if gap is not None and nearer is not None:
+        found = _add_nearer(matched, gap, nearer)
     # The half of an odd picture lacks its last column or row, the half of a box has it.
     picture = Crop.of(pair.left, pair.box, (0, 0)).inner
     classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
     filled = fill_wls(found.left, picture, found.confidence, classes, _FILL)
-    is_beyond = np.empty(filled.origin.shape, dtype=np.bool_)
-    mark_beyond_bound(filled.disparity_px, filled.origin, _EDGE_PX, _LAYER_PX, is_beyond)
-    filled = filled.only(~is_beyond)
-    return filled if pair.box == coarse.box else _double_map(filled, coarse.box)
+    drop_beyond_bound(filled.disparity_px, filled.origin, _EDGE_PX, _LAYER_PX)
+    return Surroundings(filled.disparity_px, filled.origin, coarse.box, matched.is_half)
 
 
 def _find_wide_gaps(left: DisparityMap) -> Box | None:
@@ -72,12 +81,20 @@ def _find_wide_gaps(left: DisparityMap) -> Box | None:
     return replace(inside, x=inside.x + left.x, y=inside.y + left.y)
 
 
-def _add_nearer(matched: CoarseMatch, gap: Box) -> TwoViewDisparity:
+def _add_nearer(matched: CoarseMatch, gap: Box, nearer: Nearer) -> TwoViewDisparity:
     """The matches with those of what stands before their band, at half their resolution."""
     found, left = matched.found, matched.found.left
     low, high = matched.band_px
-    half = halve(replace(matched.pair, box=gap), (low, matched.nearest_px))
-    near = match_census(half, (low / 2.0, matched.nearest_px / 2.0), _NEAR_CENSUS)
+    scale = 2 if matched.is_half else 1
+    most_px = nearer.nearest_px / scale
+    if most_px <= high + _BEYOND_PX:
+        return found
+    around = Box(scale * gap.x, scale * gap.y, scale * gap.width, scale * gap.height)
+    pair = nearer.rectify(around, (scale * low, nearer.nearest_px))
+    if matched.is_half:
+        pair = halve(pair, (2.0 * low, 2.0 * most_px))
+    half = halve(replace(pair, box=gap), (low, most_px))
+    near = match_census(half, (low / 2.0, most_px / 2.0), _NEAR_CENSUS)
     least_px = high + _BEYOND_PX
     near_px = np.float32(2.0) * double(near.left.disparity_px, gap)
     is_near = near_px > least_px
@@ -109,11 +126,3 @@ def _join_right(
     part = right_px[gap.y - found.left.y :, beyond.x - first :][: gap.height, : beyond.width]
     np.copyto(part, near_px, where=near_px > least_px)
     return right_px, first
-
-
-def _double_map(half: DisparityMap, box: Box) -> DisparityMap:
-    """Over a box of the whole, from a map over `half_box(box)`; each pixel as its half pixel."""
-    disparity_px, sigma_px = (
-        np.float32(2.0) * double(px, box) for px in (half.disparity_px, half.sigma_px)
-    )
-    return DisparityMap(disparity_px, sigma_px, double(half.origin, box), box.x, box.y)

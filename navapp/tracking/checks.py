@@ -12,10 +12,16 @@ from navapp.geometry.bands import Job, begin_on_helper
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Agreement
-from navapp.stereo import CoarseMap, StereoHealth, fill_surroundings, measure_health
+from navapp.stereo import (
+    CoarseMap,
+    Nearer,
+    StereoHealth,
+    fill_surroundings,
+    measure_health,
+)
 from navapp.tracking.agreement import compare
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
-from navapp.values import DisparityMap, Stopwatch
+from navapp.values import Stopwatch, Surroundings
 
 
 class PairCheck(NamedTuple):
@@ -31,8 +37,8 @@ class PairChecks:
     """Checks what is measured in one pair, one measurement at a time, on the helper.
 
     As a context manager it leaves nothing running. `coarse` is the map of what lies around the
-    bone, being made; where it does not reach, or without one, a check matches anew. `fills` has its
-    gaps filled as well.
+    bone, being made; where it does not reach, or without one, a check matches anew. With `nearer`
+    its gaps are filled as well.
     """
 
     def __init__(
@@ -40,14 +46,11 @@ class PairChecks:
         meter: SurfaceMeter,
         pair: RectifiedPair,
         coarse: Job[CoarseMap | None] | None = None,
-        *,
-        fills: bool = False,
+        nearer: Nearer | None = None,
     ) -> None:
         self._meter, self._pair, self._coarse = meter, pair, coarse
-        self._filling: Job[tuple[DisparityMap | None, float]] | None = None
-        if fills and coarse is not None:
-            asking = threading.get_ident()
-            self._filling = begin_on_helper(partial(_fill_timed, coarse, asking))
+        self._nearer = nearer
+        self._filling: Job[tuple[Surroundings | None, float]] | None = None
         self._begun: tuple[Measurement, Job[PairCheck]] | None = None
 
     def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
@@ -56,13 +59,16 @@ class PairChecks:
             self._drop()
             run = partial(_run_check, self._meter, self._pair, self._coarse, measured, pose)
             self._begun = measured, begin_on_helper(run)
+            # After the check, beside the fit: before it, the measurement needs the helper.
+            self._begin_filling()
         return self._begun[1]
 
-    def surroundings(self, watch: Stopwatch) -> DisparityMap | None:
+    def surroundings(self, watch: Stopwatch) -> Surroundings | None:
         """The coarse map with its gaps filled; None if that was not asked for, or out of view.
 
         The watch is told what the helper took.
         """
+        self._begin_filling()
         if self._filling is None:
             return None
         is_new = not self._filling.is_fetched
@@ -80,18 +86,23 @@ class PairChecks:
             if job is not None and not job.is_fetched:
                 job.drop()
 
+    def _begin_filling(self) -> None:
+        if self._filling is None and self._nearer is not None and self._coarse is not None:
+            fill = partial(_fill_timed, self._coarse, self._nearer, threading.get_ident())
+            self._filling = begin_on_helper(fill)
+
     def _drop(self) -> None:
         if self._begun is not None and not self._begun[1].is_fetched:
             self._begun[1].drop()
 
 
 def _fill_timed(
-    coarse_job: Job[CoarseMap | None], asking: int
-) -> tuple[DisparityMap | None, float]:
+    coarse_job: Job[CoarseMap | None], nearer: Nearer, asking: int
+) -> tuple[Surroundings | None, float]:
     """A coarse map with its gaps filled, and the ms it took if another thread than `asking` did."""
     coarse = coarse_job.result()
     began_ns = time.perf_counter_ns()
-    filled = None if coarse is None else fill_surroundings(coarse)
+    filled = None if coarse is None else fill_surroundings(coarse, nearer)
     took_ms = (time.perf_counter_ns() - began_ns) / 1e6
     return filled, 0.0 if threading.get_ident() == asking else took_ms
 

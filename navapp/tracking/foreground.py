@@ -3,9 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.box import Box
+from navapp.geometry.halves import double, half_box
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
-from navapp.values import DisparityMap, Foreground
+from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 
 # Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
@@ -13,36 +15,64 @@ NEAR_PX, IN_FRONT_MM = 4, 5.0
 
 
 def find_foreground(
-    surroundings: DisparityMap,
+    surroundings: Surroundings,
+    measured: DisparityMap,
     view: RenderedView,
     geometry: RectifiedGeometry,
     near_px: int = NEAR_PX,
     in_front_mm: float = IN_FRONT_MM,
 ) -> Foreground:
-    """Which of a bone's surroundings stand in front of it.
+    """A bone's surroundings, and which of them stand in front of it.
+
+    Both are compared in the resolution of the surroundings, and what was measured in its own.
 
     Args:
         surroundings: filled, over a box around the bone.
+        measured: what it has matched replaces the surroundings.
         view: of the bone at its pose, in the same rectified view.
         geometry: of the rectified pair.
         near_px: the nearest bone within so many pixels counts ...
         in_front_mm: ... and what is nearer by so much.
     """
-    both = view.box.intersect(surroundings.box)
-    there, in_view = (both.relative_to(box).slices for box in (surroundings.box, view.box))
-    near_mm = _nearest_bone_mm(view.depth_mm, near_px)[in_view]
-    limit_px = geometry.disparity_map_px(near_mm - in_front_mm)
-    is_in_front = np.zeros(surroundings.disparity_px.shape, dtype=np.bool_)
-    is_in_front[there] = (surroundings.disparity_px[there] > limit_px) & np.isfinite(near_mm)
-    return Foreground(surroundings, is_in_front)
+    box, is_half = surroundings.box, surroundings.is_half
+    limit_px, at = _limit_px(view, geometry, near_px, in_front_mm, is_half)
+    own = half_box(box) if is_half else box
+    nearest_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
+    both = own.intersect(at)
+    here, there = (both.relative_to(one).slices for one in (own, at))
+    nearest_px[here] = limit_px[there]
+    is_nearer = surroundings.disparity_px > nearest_px
+    if is_half:
+        is_nearer = double(is_nearer.view(np.uint8), box).view(np.bool_)
+        nearest_px = np.float32(2.0) * double(nearest_px, box)
+    both = box.intersect(measured.box)
+    here, there = (both.relative_to(one).slices for one in (box, measured.box))
+    is_matched = measured.origin[there] == Origin.MATCHED
+    is_exactly = measured.disparity_px[there] > nearest_px[here]
+    is_nearer[here] &= ~is_matched
+    is_nearer[here] |= is_matched & is_exactly
+    return Foreground(surroundings, measured, is_nearer)
 
 
-def _nearest_bone_mm(depth_mm: NDArray[np.float32], near_px: int) -> NDArray[np.float32]:
-    """(h, w) depth of the nearest bone within some pixels, from its depth; infinite without any."""
+def _limit_px(
+    view: RenderedView,
+    geometry: RectifiedGeometry,
+    near_px: int,
+    in_front_mm: float,
+    is_half: bool,
+) -> tuple[NDArray[np.float32], Box]:
+    """Disparity so far in front of the nearest bone around, infinite without any, and its box.
+
+    In half the resolution, if that is asked for.
+    """
     import cv2
 
-    depth_mm = np.where(np.isnan(depth_mm), np.float32(np.inf), depth_mm)
-    size = (2 * near_px + 1, 2 * near_px + 1)
-    # OpenCV's own border is the largest finite number.
-    around = cv2.erode(depth_mm, np.ones(size, np.uint8), borderType=cv2.BORDER_REPLICATE)
-    return np.asarray(around, dtype=np.float32)
+    step, box = 2 if is_half else 1, view.box
+    row, column = box.y % step, box.x % step
+    depth_mm = view.depth_mm[row::step, column::step]
+    limit_px = geometry.disparity_map_px(depth_mm - np.float32(in_front_mm)) / np.float32(step)
+    size = 2 * (near_px // step) + 1
+    around_px = cv2.dilate(cv2.patchNaNs(limit_px, 0.0), np.ones((size, size), np.uint8))
+    limit_px = np.where(around_px > 0.0, around_px, np.float32(np.inf))
+    height, width = limit_px.shape
+    return limit_px, Box((box.x + column) // step, (box.y + row) // step, width, height)

@@ -111,8 +111,8 @@ class PoseJudge:
         surroundings = checks.surroundings(frame.watch)
         if surroundings is None:
             return None
-        surroundings = surroundings.with_matches_of(fit.measured.disparity)
-        foreground = find_foreground(surroundings, view, self._meter.geometry)
+        measured, geometry = fit.measured.disparity, self._meter.geometry
+        foreground = find_foreground(surroundings, measured, view, geometry)
         frame.watch.lap("fill")
         return foreground
 

@@ -20,6 +20,7 @@ from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     MODEL_REFINEMENT,
     CoarseMap,
+    Nearer,
     match_coarsely,
     match_surface,
     refine_on_model,
@@ -49,7 +50,6 @@ class Margins:
 
     box_px: int
     band_mm: float
-    reaches_camera: bool = False  # what stands before the band, of whatever depth, is seen too
 
 
 # Matched around an expected bone from frame to frame; at first, and after a loss.
@@ -57,7 +57,7 @@ NEAR_BOX = Margins(box_px=16, band_mm=15.0)
 WIDE_BOX = Margins(box_px=60, band_mm=35.0)
 # Rectified around it: a little more than is matched when it is there, for it may have moved; much
 # more when it has to be searched.
-NEAR_VIEW = Margins(box_px=56, band_mm=60.0, reaches_camera=True)
+NEAR_VIEW = Margins(box_px=56, band_mm=60.0)
 WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
 # What hides the bone may be so much nearer; what is seen through a wrong pose, so much further.
 _AROUND = Margins(box_px=24, band_mm=60.0)
@@ -109,7 +109,6 @@ class SurfaceMeter:
         self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
         self.rectifier = Rectifier(rig)
         self.geometry = self.rectifier.geometry
-        self._nearest_px = self.geometry.disparity_px(depth_mm[0])
         # Several steps ask for the same few poses. No method: it would keep the meter alive.
         bounds = partial(bounds_of, model.hull_mm, geometry=self.geometry)
         self._bounds = lru_cache(_KEPT_BOUNDS)(bounds)
@@ -119,9 +118,12 @@ class SurfaceMeter:
     ) -> RectifiedPair:
         """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
         box, band_px = self.find_region(around, margins) or (None, None)
-        if band_px is not None and margins.reaches_camera:
-            band_px = band_px[0], self._nearest_px
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
+
+    def look_nearer(self, left: Image, right: Image) -> Nearer:
+        """How to look for what stands before the depths that were rectified, up to the nearest."""
+        rectify = partial(self.rectifier.rectify, left, right, is_grey=True)
+        return Nearer(self.geometry.disparity_px(self.depth_mm[0]), rectify)
 
     def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None
@@ -180,7 +182,7 @@ class SurfaceMeter:
         region = self.find_region(pose, _AROUND)
         if region is None:
             return None
-        return match_coarsely(replace(pair, box=box or region[0]), region[1], self._nearest_px)
+        return match_coarsely(replace(pair, box=box or region[0]), region[1])
 
     def render(
         self, pair: RectifiedPair, pose: RigidTransform, margins: Margins

@@ -163,13 +163,14 @@ class Tracker(ABC):
         start = self.rectify_pose(left_from_bone)
         pair = self.meter.rectify(left, right, start, margins)
         watch.lap("rectify")
-        return Frame(pair, start, watch)
+        return Frame(pair, start, watch, self.meter.look_nearer(left, right))
 
     def begin_checks(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""
         # What may hide the bone does not depend on where exactly it is.
         coarse = begin_on_helper(lambda: self.meter.measure_coarsely(frame.pair, frame.start))
-        return PairChecks(self.meter, frame.pair, coarse, fills=self.tells_foreground)
+        nearer = frame.nearer if self.tells_foreground else None
+        return PairChecks(self.meter, frame.pair, coarse, nearer)
 
     def judge_fits(
         self,

@@ -26,7 +26,14 @@ from navapp.values.contents import (
     StageContent,
     SurgicalContent,
 )
-from navapp.values.measured import DisparityMap, Foreground, Origin, RowCheck, SurfaceCloud
+from navapp.values.measured import (
+    DisparityMap,
+    Foreground,
+    Origin,
+    RowCheck,
+    SurfaceCloud,
+    Surroundings,
+)
 from navapp.values.pictures import DEPTH_COLOURS, OverlayMode, OverlayPicture
 from navapp.values.plans import Plan, Prior, StageSpec
 from navapp.values.timings import FrameTimings, Stopwatch
@@ -74,6 +81,7 @@ __all__ = [
     "Stopwatch",
     "SurfaceCloud",
     "SurgicalContent",
+    "Surroundings",
     "TrackedFrame",
     "Verdict",
 ]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.halves import double
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray
 
@@ -81,18 +82,6 @@ class DisparityMap:
         )  # fmt: skip
         return SurfaceCloud(points_mm, sigma_ray_mm, pixels, origin, stride_px)
 
-    def with_matches_of(self, other: "DisparityMap") -> "DisparityMap":
-        """This map with what another one has matched, where they overlap."""
-        both = self.box.intersect(other.box)
-        here, there = (both.relative_to(box).slices for box in (self.box, other.box))
-        is_matched = other.origin[there] == Origin.MATCHED
-        disparity_px, sigma_px = self.disparity_px.copy(), self.sigma_px.copy()
-        origin = self.origin.copy()
-        np.copyto(disparity_px[here], other.disparity_px[there], where=is_matched)
-        np.copyto(sigma_px[here], other.sigma_px[there], where=is_matched)
-        origin[here][is_matched] = Origin.MATCHED
-        return DisparityMap(disparity_px, sigma_px, origin, self.x, self.y)
-
     def only(self, stays: NDArray[np.bool_]) -> "DisparityMap":
         """The map, unknown beside a mask (h, w)."""
         # What is compiled is not loaded by those who only read values.
@@ -113,12 +102,46 @@ class RowCheck:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """What lies around a bone, to about a pixel, gaps filled: to tell what is where."""
+
+    # over the box, or over `half_box(box)` in pixels of half the resolution; NaN where unknown.
+    disparity_px: NDArray[np.float32]
+    origin: NDArray[np.uint8]  # of `Origin`: unless MATCHED, the disparity is a guess
+    box: Box  # of the rectified left view
+    is_half: bool
+
+    @property
+    def whole(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """(h, w) disparity in px and origin over the box."""
+        if not self.is_half:
+            return self.disparity_px.copy(), self.origin.copy()
+        return np.float32(2.0) * double(self.disparity_px, self.box), double(self.origin, self.box)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Foreground:
     """What lies around a bone, and which of it stands in front of the bone's surface."""
 
-    # over a box around the bone. Where `origin` is not MATCHED, the disparity is a guess.
-    surroundings: DisparityMap
-    is_in_front: NDArray[np.bool_]  # (h, w) over that box; on the bone and just beside it
+    surroundings: Surroundings
+    measured: DisparityMap  # what it has matched holds instead of the surroundings
+    is_in_front: NDArray[np.bool_]  # (h, w) over the box, on the bone and just beside it
+
+    @property
+    def box(self) -> Box:
+        """Of the rectified left view, around the bone."""
+        return self.surroundings.box
+
+    @property
+    def depth(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """(h, w) disparity in px, NaN where unknown, and origin of all that is around the bone."""
+        disparity_px, origin = self.surroundings.whole
+        both = self.box.intersect(self.measured.box)
+        here, there = (both.relative_to(box).slices for box in (self.box, self.measured.box))
+        is_matched = self.measured.origin[there] == Origin.MATCHED
+        np.copyto(disparity_px[here], self.measured.disparity_px[there], where=is_matched)
+        origin[here][is_matched] = Origin.MATCHED
+        return disparity_px, origin
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -137,7 +137,8 @@ def _judge(
     assert tracked.foreground is not None
     assert tracked.left_from_bone is not None
     fill_ms.append(tracked.timings.fill_beside_ms)
-    geometry, surroundings = tracker.meter.geometry, tracked.foreground.surroundings
+    geometry, told = tracker.meter.geometry, tracked.foreground
+    surroundings = told.surroundings
     pose = tracker.rectify_pose(tracked.left_from_bone)
     view = tracker.model.render(pose, geometry, surroundings.box)
     silhouette = tracker.model.render(tracker.rectify_pose(case.truth), geometry, surroundings.box)
@@ -147,9 +148,9 @@ def _judge(
     size = 2 * _EDGE_PX + 1
     inner = cv2.erode(occluder.view(np.uint8), np.ones((size, size), np.uint8)) > 0
     inner, seen = inner & silhouette.mask, bone & silhouette.mask
-    is_guess = surroundings.origin != Origin.MATCHED
+    is_guess = told.depth[1] != Origin.MATCHED
     for pair, n in counts.items():
-        found = find_foreground(surroundings, view, geometry, *pair).is_in_front
+        found = find_foreground(surroundings, told.measured, view, geometry, *pair).is_in_front
         asked = (found & inner, inner, found & seen, seen, found & is_guess, found)
         n += [np.count_nonzero(mask) for mask in asked]
         if pictures is not None:

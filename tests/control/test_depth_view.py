@@ -6,7 +6,8 @@ import numpy as np
 
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.states import ToggleDepth
-from navapp.values import DisparityMap, Foreground, Origin
+from navapp.geometry.box import Box
+from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 from tests.control.fakes import Bench, answer, navigating
 
 
@@ -14,8 +15,11 @@ def with_foreground() -> Foreground:
     shape = (4000, 4000)  # more than any picture shows
     disparity_px = np.zeros(shape, np.float32)
     origin = np.full(shape, Origin.FILLED_INTERIOR, np.uint8)
-    surroundings = DisparityMap(disparity_px, disparity_px, origin, -1000, -1000)
-    return Foreground(surroundings, np.zeros(shape, dtype=np.bool_))
+    is_in_front = np.zeros(shape, dtype=np.bool_)
+    box = Box(-1000, -1000, 4000, 4000)
+    surroundings = Surroundings(disparity_px, origin, box, is_half=False)
+    nothing = DisparityMap(*(np.empty((0, 0), np.float32),) * 2, np.empty((0, 0), np.uint8), 0, 0)
+    return Foreground(surroundings, nothing, is_in_front)
 
 
 def test_the_key_marks_the_depth_and_a_second_time_no_longer() -> None:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
+from navapp.geometry.lane_kernels import FLOAT_LANES
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
@@ -9,7 +10,8 @@ from navapp.geometry.zbuffer import find_known_range, render, render_rectified
 from navapp.geometry.zbuffer_kernels import (
     bounds_of_points,
     project_points,
-    render_rows,
+    raster_nearest,
+    tell_depth,
 )
 from tests.geometry.shapes import STRONG, camera, cube, sphere
 from tests.reference import zbuffer_reference
@@ -40,9 +42,12 @@ def square(z_mm, half_mm=10.0, centre=(0.0, 0.0)):
 
 def drawn(pixels, depths, faces, width, height, bands=None):
     """Inverse depth and triangle per pixel."""
+    inverse_depth = np.zeros((height, width + FLOAT_LANES), dtype=np.float32)
+    codes = np.full(inverse_depth.shape, -1, dtype=np.int32)
     depth, face_index = (np.empty((height, width), dtype=kind) for kind in (np.float32, np.int32))
     for band in bands or [(0, height)]:
-        render_rows(pixels, depths, faces, False, band, depth, face_index)
+        raster_nearest(pixels, depths, faces, inverse_depth, codes.view(np.float32), band, False)
+        tell_depth(inverse_depth, codes, band, depth, face_index)
     np.testing.assert_array_equal(np.isnan(depth), face_index < 0)
     return np.where(face_index < 0, 0.0, 1.0 / depth), face_index
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.box import Box
 from navapp.geometry.rectification import Rectifier
 from navapp.overlay import DepthMarks
-from navapp.values import DEPTH_COLOURS, DisparityMap, Foreground, Origin
+from navapp.values import DEPTH_COLOURS, DisparityMap, Foreground, Origin, Surroundings
 from sim_devices.rigs import make_default_rig
 
 RIG = make_default_rig()
@@ -16,9 +17,11 @@ X, Y, WIDTH, HEIGHT = 480, 200, 320, 240
 def foreground(origin: Origin, in_front: np.ndarray | None = None) -> Foreground:
     shape = (HEIGHT, WIDTH)
     disparity_px = np.full(shape, 200.0, np.float32)
-    surroundings = DisparityMap(disparity_px, disparity_px, np.full(shape, origin, np.uint8), X, Y)
     is_in_front = np.zeros(shape, dtype=np.bool_) if in_front is None else in_front
-    return Foreground(surroundings, is_in_front)
+    box = Box(X, Y, WIDTH, HEIGHT)
+    surroundings = Surroundings(disparity_px, np.full(shape, origin, np.uint8), box, is_half=False)
+    nothing = DisparityMap(*(np.empty((0, 0), np.float32),) * 2, np.empty((0, 0), np.uint8), 0, 0)
+    return Foreground(surroundings, nothing, is_in_front)
 
 
 def changed(preview: np.ndarray) -> np.ndarray:

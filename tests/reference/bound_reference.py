@@ -5,7 +5,7 @@ import numpy as np
 MATCHED, INTERIOR = 1, 3
 
 
-def mark_beyond_bound_slowly(disparity, origin, edge_px, layer_px):
+def find_beyond_bound_slowly(disparity, origin, edge_px, layer_px):
     """(h, w) filled pixels beyond the bound that differ from a matched neighbour."""
     height, width = origin.shape
     out = np.zeros((height, width), dtype=bool)

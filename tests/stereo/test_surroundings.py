@@ -8,9 +8,14 @@ import pytest
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo import fill_surroundings, match_coarsely, surroundings
+from navapp.stereo import (
+    Nearer,
+    fill_surroundings,
+    match_coarsely,
+    surroundings,
+)
 from navapp.stereo.coarse import CoarseMap
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap, Origin, Surroundings
 from tests.stereo.pairs import shifted_pair
 from tests.stereo.test_chains import (
     EVERY_RESOLUTION,
@@ -47,7 +52,13 @@ def hand_before_wall(box: Box = INSIDE) -> RectifiedPair:
 def fill(
     pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
 ) -> DisparityMap:
-    return fill_surroundings(match_coarsely(pair, band_px, nearest_px))
+    nearer = Nearer(nearest_px, lambda box, _: replace(pair, box=box))
+    return whole(fill_surroundings(match_coarsely(pair, band_px), nearer))
+
+
+def whole(filled: Surroundings) -> DisparityMap:
+    disparity_px, origin = filled.whole
+    return DisparityMap(disparity_px, disparity_px, origin, filled.box.x, filled.box.y)
 
 
 def is_clear(distance_px: float = 8.0) -> np.ndarray:
@@ -89,7 +100,7 @@ def test_without_a_wide_gap_nothing_nearer_is_looked_for(
 ) -> None:
     asked = []
 
-    def spy(matched, gap):
+    def spy(matched, gap, nearer):
         asked.append(matched)
         return matched.found
 
@@ -100,28 +111,20 @@ def test_without_a_wide_gap_nothing_nearer_is_looked_for(
 
 
 def test_filled_pixels_beyond_their_bound_become_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    def mark_all_guesses(disparity, origin, edge_px, layer_px, is_beyond) -> None:
-        is_beyond[...] = origin > Origin.MATCHED
+    def drop_all_guesses(disparity, origin, edge_px, layer_px) -> None:
+        disparity[origin > Origin.MATCHED], origin[origin > Origin.MATCHED] = np.nan, 0
 
-    monkeypatch.setattr(surroundings, "mark_beyond_bound", mark_all_guesses)
-    found = fill_surroundings(match_coarsely(scene(INSIDE), FULL))
+    monkeypatch.setattr(surroundings, "drop_beyond_bound", drop_all_guesses)
+    found = fill(scene(INSIDE), FULL)
     assert set(np.unique(found.origin)) == {Origin.UNKNOWN, Origin.MATCHED}
     assert np.isnan(found.disparity_px[found.origin == Origin.UNKNOWN]).all()
-
-
-@EVERY_RESOLUTION
-def test_the_calm_map_is_the_same_whatever_may_stand_before_it(
-    band_px: tuple[float, float],
-) -> None:
-    one, other = (match_coarsely(scene(INSIDE), band_px, nearest) for nearest in (0.0, 90.0))
-    np.testing.assert_array_equal(one.disparity_px, other.disparity_px)
 
 
 @pytest.mark.parametrize("band_px", [FULL, HALF])
 def test_pictures_that_disagree_tell_nothing(band_px: tuple[float, float]) -> None:
     coarse = match_coarsely(swapped(scene(INSIDE)), band_px)
     assert coarse.matched is None
-    found = fill_surroundings(coarse)
+    found = whole(fill_surroundings(coarse))
     assert found.box == INSIDE
     assert np.isnan(found.disparity_px).all()
     assert (found.origin == Origin.UNKNOWN).all()

@@ -8,7 +8,7 @@ import pytest
 from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import render_rectified
-from navapp.stereo import CoarseMap
+from navapp.stereo import CoarseMap, Nearer
 from navapp.tracking import checks as checks_module
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairChecks
@@ -21,6 +21,8 @@ MAP = measured_map(femur())
 NO_CLOUD = SurfaceCloud(
     np.empty((0, 3)), np.empty(0), np.empty((0, 2), np.int32), np.empty(0, np.uint8)
 )
+
+NOTHING_NEARER = Nearer(0.0, lambda *_: blank_pair())
 
 
 def measurement(*, is_on_model: bool = False) -> Measurement:
@@ -133,37 +135,46 @@ def test_unknown_maps_are_checked_too() -> None:
 def test_gaps_are_filled_once_for_all_measurements_and_only_when_asked_for() -> None:
     around = MAP.box.grow(3)
     known_px = np.full((around.height, around.width), 7.0, np.float32)
-    for fills in (False, True):
+    for nearer in (None, NOTHING_NEARER):
         coarse = begin_on_helper(lambda: CoarseMap(known_px, around))
-        with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=fills) as checks:
+        with PairChecks(CoarseMeter(), blank_pair(), coarse, nearer) as checks:
             watch = Stopwatch()
             first = checks.surroundings(watch)
             told_ms = watch.timings.fill_beside_ms
             assert checks.surroundings(watch) is first
-        assert (first is not None) is fills
+        assert (first is not None) is (nearer is not None)
         assert watch.timings.fill_beside_ms == told_ms
     assert first.box == around
 
 
 def test_gaps_of_nothing_are_nothing() -> None:
     coarse = begin_on_helper(lambda: None)
-    with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=True) as checks:
+    with PairChecks(CoarseMeter(), blank_pair(), coarse, NOTHING_NEARER) as checks:
         assert checks.surroundings(Stopwatch()) is None
 
 
 def test_a_fill_that_nobody_asks_for_ends_with_the_checks(monkeypatch) -> None:
     begun, ended = [], []
 
-    def fill_slowly(coarse: CoarseMap) -> DisparityMap:
+    def fill_slowly(*_: object) -> None:
         begun.append(True)
         time.sleep(0.05)
         ended.append(True)
-        return MAP
 
     monkeypatch.setattr(checks_module, "fill_surroundings", fill_slowly)
     known_px = np.full((9, 9), 7.0, np.float32)
     coarse = begin_on_helper(lambda: CoarseMap(known_px, Box(0, 0, 9, 9)))
-    with PairChecks(CoarseMeter(), blank_pair(), coarse, fills=True):
-        while not begun:
+    with PairChecks(CoarseMeter(), blank_pair(), coarse, NOTHING_NEARER) as checks:
+        checks.check(measurement(), TRUE).result()
+        deadline = time.monotonic() + 10.0
+        while not begun and time.monotonic() < deadline:
             time.sleep(0.001)
     assert ended == [True]
+
+
+def test_nothing_is_filled_before_something_was_measured() -> None:
+    coarse = begin_on_helper(lambda: CoarseMap(np.full((9, 9), 7.0, np.float32), Box(0, 0, 9, 9)))
+    with PairChecks(CoarseMeter(), blank_pair(), coarse, NOTHING_NEARER) as checks:
+        assert checks._filling is None
+        checks.check(measurement(), TRUE).result()
+        assert checks._filling is not None

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
+from navapp.geometry.halves import half_box
+from navapp.geometry.zbuffer import RenderedView
 from navapp.tracking import TrackerSettings, TrackState, make_tracker
 from navapp.tracking.foreground import IN_FRONT_MM, NEAR_PX, find_foreground
-from navapp.values import DisparityMap, Origin, Status, TrackedFrame
+from navapp.values import DisparityMap, Foreground, Origin, Status, Surroundings, TrackedFrame
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from tests.knees import SimulatedKnee, stepped_camera
@@ -22,10 +24,17 @@ BOX = MAP.box
 VIEW = MODEL.render(TRUE, GEOMETRY, BOX)
 
 
-def everywhere(depth_mm: np.ndarray, box: Box = BOX) -> DisparityMap:
+NOTHING = DisparityMap(*(np.empty((0, 0), np.float32),) * 2, np.empty((0, 0), np.uint8), 0, 0)
+
+
+def everywhere(depth_mm: np.ndarray, box: Box = BOX) -> Surroundings:
     disparity_px = GEOMETRY.disparity_map_px(depth_mm)
-    origin = np.where(np.isfinite(disparity_px), Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8)
-    return DisparityMap(disparity_px, np.full_like(disparity_px, 0.2), origin, box.x, box.y)
+    origin = np.where(np.isfinite(disparity_px), Origin.FILLED_BORDER, Origin.UNKNOWN)
+    return Surroundings(disparity_px, origin.astype(np.uint8), box, is_half=False)
+
+
+def find(surroundings: Surroundings, view: RenderedView = VIEW) -> Foreground:
+    return find_foreground(surroundings, NOTHING, view, GEOMETRY)
 
 
 def interior(margin_px: int = NEAR_PX + 1) -> np.ndarray:
@@ -39,7 +48,7 @@ def test_the_view_holds_the_bone() -> None:
 
 @pytest.mark.parametrize(("nearer_mm", "is_marked"), [(40.0, True), (-20.0, False), (0.0, False)])
 def test_what_is_nearer_than_the_bone_is_in_front(nearer_mm: float, is_marked: bool) -> None:
-    found = find_foreground(everywhere(VIEW.depth_mm - nearer_mm), VIEW, GEOMETRY)
+    found = find(everywhere(VIEW.depth_mm - nearer_mm))
     assert (found.is_in_front[interior()] == is_marked).all()
 
 
@@ -49,7 +58,7 @@ def test_as_near_as_the_tolerance_counts_from_the_nearest_bone_around() -> None:
     assert flat.depth_mm[140:161, 150:171].min() == 440.0
     for nearer_mm, is_marked in ((IN_FRONT_MM + 0.1, True), (IN_FRONT_MM - 0.1, False)):
         at = np.full(VIEW.depth_mm.shape, 450.0 - nearer_mm, np.float32)
-        found = find_foreground(everywhere(at), flat, GEOMETRY).is_in_front
+        found = find(everywhere(at), flat).is_in_front
         assert found[100, 160] == is_marked
         # Around the crest the depth of the crest counts.
         beside = 150 + NEAR_PX
@@ -59,23 +68,53 @@ def test_as_near_as_the_tolerance_counts_from_the_nearest_bone_around() -> None:
 
 def test_unknown_depth_and_what_lies_beside_the_bone_are_not_marked() -> None:
     near = everywhere(np.full(VIEW.depth_mm.shape, 300.0, np.float32))
-    found = find_foreground(near, VIEW, GEOMETRY).is_in_front
+    found = find(near).is_in_front
     assert found[VIEW.mask].all()
     size = 2 * NEAR_PX + 1
     around = cv2.dilate(VIEW.mask.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     np.testing.assert_array_equal(found, around)
-    unknown = near.only(np.zeros(VIEW.mask.shape, dtype=np.bool_))
-    assert not find_foreground(unknown, VIEW, GEOMETRY).is_in_front.any()
+    unknown = everywhere(np.full(VIEW.depth_mm.shape, np.nan, np.float32))
+    assert not find(unknown).is_in_front.any()
 
 
 @pytest.mark.parametrize("box", [BOX.grow(30), BOX.grow(-60)])
 def test_surroundings_may_be_larger_or_smaller_than_the_view(box: Box) -> None:
     near = everywhere(np.full((box.height, box.width), 300.0, np.float32), box)
-    found = find_foreground(near, VIEW, GEOMETRY)
-    assert found.surroundings is near
-    expected = find_foreground(near, MODEL.render(TRUE, GEOMETRY, box), GEOMETRY).is_in_front
+    found = find(near)
+    assert found.box == box
+    np.testing.assert_array_equal(found.depth[0], near.disparity_px)
+    expected = find(near, MODEL.render(TRUE, GEOMETRY, box)).is_in_front
     inner = np.s_[8:-8, 8:-8]
     np.testing.assert_array_equal(found.is_in_front[inner], expected[inner])
+
+
+@pytest.mark.parametrize("x", [-2, 0, 3, 40])
+def test_what_was_measured_replaces_the_surroundings(x: int) -> None:
+    """From column x of the box on, in every second row."""
+    depth_mm = np.full(VIEW.depth_mm.shape, 300.0, np.float32)
+    origin = np.zeros((6, 5), np.uint8)
+    origin[::2] = Origin.MATCHED
+    measured = DisparityMap(*(np.full((6, 5), 9.0, np.float32),) * 2, origin, BOX.x + x, BOX.y)
+    found = find_foreground(everywhere(depth_mm), measured, VIEW, GEOMETRY)
+    expected = np.full(depth_mm.shape, GEOMETRY.disparity_px(300.0), np.float32)
+    expected[0:6:2, max(x, 0) : x + 5] = 9.0
+    disparity_px, origin = found.depth
+    np.testing.assert_array_equal(disparity_px, expected)
+    np.testing.assert_array_equal(origin == Origin.MATCHED, expected == 9.0)
+    assert not found.is_in_front[expected == 9.0].any()
+
+
+@pytest.mark.parametrize("box", [BOX, Box(BOX.x + 1, BOX.y + 1, BOX.width - 2, BOX.height - 3)])
+def test_half_the_resolution_is_doubled(box: Box) -> None:
+    half = half_box(box)
+    disparity_px = np.arange(half.width * half.height, dtype=np.float32)
+    disparity_px = disparity_px.reshape(half.height, half.width)
+    origin = (disparity_px % 5).astype(np.uint8)
+    found = find(Surroundings(disparity_px, origin, box, is_half=True))
+    rows, columns = np.mgrid[: box.height, : box.width]
+    there = (rows + box.y) // 2 - half.y, (columns + box.x) // 2 - half.x
+    np.testing.assert_array_equal(found.depth[0], 2.0 * disparity_px[there])
+    np.testing.assert_array_equal(found.depth[1], origin[there])
 
 
 @lru_cache
@@ -89,7 +128,7 @@ def swept() -> tuple[TrackedFrame, np.ndarray, np.ndarray]:
     state = TrackState.at_rest(knee.world.left_from_body("femur", time_ns), frame.captured_ns)
     tracker = make_tracker(knee.rig, knee.bone)
     tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
-    box = tracked.foreground.surroundings.box
+    box = tracked.foreground.box
     seen = knee.world.depth("left", time_ns)
     columns, rows = (one[box.slices] for one in tracker.meter.rectifier.maps[:2])
     pose = tracker.rectify_pose(tracked.left_from_bone)
@@ -110,10 +149,10 @@ def test_a_frame_tells_that_an_instrument_stands_in_front() -> None:
 
 def test_guesses_are_told_from_matches_and_the_fill_is_timed() -> None:
     tracked, _, bone = swept()
-    surroundings = tracked.foreground.surroundings
-    assert {Origin.MATCHED, Origin.FILLED_INTERIOR} <= set(np.unique(surroundings.origin))
-    assert np.array_equal(np.isnan(surroundings.disparity_px), surroundings.origin == 0)
-    assert (surroundings.origin[bone] == Origin.MATCHED).mean() > 0.8
+    disparity_px, origin = tracked.foreground.depth
+    assert {Origin.MATCHED, Origin.FILLED_INTERIOR} <= set(np.unique(origin))
+    assert np.array_equal(np.isnan(disparity_px), origin == 0)
+    assert (origin[bone] == Origin.MATCHED).mean() > 0.8
     assert tracked.timings.fill_ms > 0.0
 
 

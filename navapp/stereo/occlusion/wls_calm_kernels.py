@@ -57,6 +57,9 @@ def _medians_of_rows(
     ya, yb, y, yd, ye = rows
     for x in range(len(medians)):
         v, own = told[y, x], classes[y, x]
+        if own == 0:
+            # Nobody asks: a neighbour of another class has no say.
+            continue
         a = _vote(told[ya, x], classes[ya, x] == own, v)
         b = _vote(told[yb, x], classes[yb, x] == own, v)
         d = _vote(told[yd, x], classes[yd, x] == own, v)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import run_both
+from navapp.geometry.masks import where
 from navapp.stereo.occlusion.classify import in_two_shares, with_channels
 from navapp.stereo.occlusion.wls_calm_kernels import calm_rows
 from navapp.stereo.occlusion.wls_fill_kernels import between_rows, fit_rows
@@ -92,8 +93,8 @@ def fill_wls(
     told = _fit_all(scene, settings)
     disparity, origin = np.empty_like(told), np.empty_like(scene.origin)
     in_two_shares(lambda *rows: calm_rows(scene, told, *rows, disparity, origin))
-    sigma = np.where(classes == 0, left.sigma_px, np.float32(_FILLED_SIGMA_PX))
-    sigma[origin == Origin.UNKNOWN] = np.nan
+    sigma = where(classes == 0, left.sigma_px, _FILLED_SIGMA_PX)
+    sigma = where(origin != Origin.UNKNOWN, sigma, np.nan)
     return DisparityMap(disparity, sigma, origin, left.x, left.y)
 
 

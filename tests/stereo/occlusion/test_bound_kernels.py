@@ -5,22 +5,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from navapp.stereo.occlusion.bound_kernels import mark_beyond_bound
+from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
 from navapp.values import Origin
-from tests.reference.bound_reference import mark_beyond_bound_slowly
+from tests.reference.bound_reference import find_beyond_bound_slowly
 
 EDGE, LAYER = np.float32(2.0), np.float32(8.0)
 MATCHED, INTERIOR = Origin.MATCHED, Origin.FILLED_INTERIOR
 
 
-def marked(disparity, origin) -> np.ndarray:
+def dropped(disparity, origin) -> np.ndarray:
     disparity = np.atleast_2d(np.array(disparity, dtype=np.float32))
     origin = np.atleast_2d(np.array(origin, dtype=np.uint8))
-    out = np.ones(origin.shape, dtype=np.bool_)
-    mark_beyond_bound(disparity, origin, EDGE, LAYER, out)
-    return out
+    left_px, left = disparity.copy(), origin.copy()
+    drop_beyond_bound(left_px, left, EDGE, LAYER)
+    is_dropped = (left == Origin.UNKNOWN) & (origin != Origin.UNKNOWN)
+    assert np.isnan(left_px[is_dropped]).all()
+    np.testing.assert_array_equal(left_px[~is_dropped], disparity[~is_dropped])
+    np.testing.assert_array_equal(left[~is_dropped], origin[~is_dropped])
+    return is_dropped
 
 
+@pytest.mark.kernel
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=60, deadline=None)
 def test_it_is_the_rule(seed: int) -> None:
@@ -30,9 +35,8 @@ def test_it_is_the_rule(seed: int) -> None:
     # Quarters: no sum is rounded.
     disparity = (rng.integers(0, 160, shape) / 4.0).astype(np.float32)
     disparity[origin == Origin.UNKNOWN] = np.nan
-    found = np.ones(shape, dtype=np.bool_)
-    mark_beyond_bound(disparity, origin, EDGE, LAYER, found)
-    np.testing.assert_array_equal(found, mark_beyond_bound_slowly(disparity, origin, EDGE, LAYER))
+    expected = find_beyond_bound_slowly(disparity, origin, EDGE, LAYER)
+    np.testing.assert_array_equal(dropped(disparity, origin), expected)
 
 
 def test_what_hides_a_pixel_bounds_how_near_it_is() -> None:
@@ -42,26 +46,26 @@ def test_what_hides_a_pixel_bounds_how_near_it_is() -> None:
     origin[0], origin[-1], disparity[-1] = MATCHED, MATCHED, 60.0
     room_px = np.arange(width)[::-1]
     expected = (60.0 - room_px + EDGE < 48.0) & (origin == INTERIOR)
-    np.testing.assert_array_equal(marked(disparity, origin)[0], expected)
+    np.testing.assert_array_equal(dropped(disparity, origin)[0], expected)
     assert expected.sum() == 24
 
 
 def test_a_hole_in_one_surface_stays_closed() -> None:
     disparity, origin = np.full(30, 60.0), np.full(30, INTERIOR)
     origin[[0, -1]] = MATCHED
-    assert not marked(disparity, origin).any()
+    assert not dropped(disparity, origin).any()
     disparity[0] = 51.0  # another surface on the left
-    assert marked(disparity, origin).any()
+    assert dropped(disparity, origin).any()
 
 
 @pytest.mark.parametrize("kind", [MATCHED, Origin.FILLED_BORDER, Origin.UNKNOWN])
 def test_only_what_may_be_hidden_is_asked(kind: Origin) -> None:
     disparity, origin = np.full(30, 60.0), np.full(30, kind)
     origin[-1], disparity[-1] = MATCHED, 10.0
-    assert not marked(disparity, origin).any()
+    assert not dropped(disparity, origin).any()
 
 
 def test_background_is_always_possible() -> None:
     disparity, origin = np.full(30, 20.0), np.full(30, INTERIOR)
     origin[[0, -1]], disparity[-1] = MATCHED, 60.0
-    assert not marked(disparity, origin).any()
+    assert not dropped(disparity, origin).any()
