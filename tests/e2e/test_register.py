@@ -17,6 +17,7 @@ from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotati
 from tests.bones import femur_model
 from tests.geometry.pcd_bytes import lines, pcd
 from tests.geometry.shapes import sphere
+from tests.many import few_of
 
 NO_FACES = np.empty((0, 3), dtype=int)
 # The knee's side: most of a surgeon's view.
@@ -150,7 +151,7 @@ def test_the_covariance_is_about_the_mean_of_the_file(bone: Bone) -> None:
     np.testing.assert_allclose(there[:3, :3], moved, rtol=1e-6)
 
 
-@pytest.mark.parametrize("more", [[], ["--global"]])
+@pytest.mark.parametrize("more", few_of([[], ["--global"]]))
 def test_metres_and_millimetres_give_the_same(bone: Bone, more: list[str]) -> None:
     in_mm = register(
         bone.scene, bone.model, "--initial", bone.start(10.0, 8.0), *bone.seen_from(), *more
@@ -177,7 +178,7 @@ def test_metres_and_millimetres_give_the_same(bone: Bone, more: list[str]) -> No
     np.testing.assert_allclose(scaled, in_mm["covariance"], rtol=1e-4, atol=1e-12)
 
 
-@pytest.mark.parametrize("scale", [1e-4, 1.0, 700.0])
+@pytest.mark.parametrize("scale", few_of([700.0, 1e-4, 1.0]))
 def test_without_a_unit_any_size_is_found(bone: Bone, scale: float) -> None:
     bone.write(scale, "none")
     start = bone.start(10.0, 8.0, scale)
@@ -458,7 +459,7 @@ def test_a_million_points_are_subsampled_and_it_says_so(bone: Bone) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("is_mesh", [True, False])
+@pytest.mark.parametrize("is_mesh", few_of([True, False]))
 def test_a_fine_model_is_thinned_and_it_says_so(bone: Bone, is_mesh: bool) -> None:
     mesh = fine_end_of_femur()
     write_ply(bone.model, TriangleMesh(mesh.vertices_mm, mesh.faces if is_mesh else NO_FACES))

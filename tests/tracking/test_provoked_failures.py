@@ -8,6 +8,7 @@ from navapp.tracking import Tracker, make_tracker
 from navapp.values import Reason
 from tests.bench.provoked import Event, Shown, Theatre, played
 from tests.bench.provoked_failures import back_after_s
+from tests.many import few_of
 
 SEED = 143
 RATE_HZ = 15.0
@@ -34,7 +35,7 @@ def frames_of(event: Event, until_s: float) -> list[Shown]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", EVENTS)
+@pytest.mark.parametrize("name", few_of(EVENTS, 4))
 def test_what_goes_wrong_shows_no_wrong_pose_and_is_over_soon(name: str) -> None:
     event = EVENTS[name]
     frames = frames_of(event, event.end_s + 0.2)
