@@ -13,8 +13,9 @@ PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 # their own, because the cache does not know about that switch. Most of the time goes into
 # compiling: quickly rather than well, and a kernel in one worker if possible.
 KERNELS := $(shell find navapp sim_devices drivers calibration -name '*kernels.py' | sort)
+CHECKED_CACHE := $(VENV)/numba-boundscheck-$(shell cat $(KERNELS) | cksum | cut -d' ' -f1)
 CHECKED := NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 \
-    NUMBA_CACHE_DIR=$(VENV)/numba-boundscheck-$(shell cat $(KERNELS) | cksum | cut -d' ' -f1) \
+    NUMBA_CACHE_DIR=$(CHECKED_CACHE) \
     $(PYTEST) -q -n 2 --dist loadfile --every-kernel
 # Every kernel is run by one of them at least: --every-kernel sees to it.
 KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests)
@@ -43,6 +44,7 @@ run: setup      ## the application on the simulated rig
 test: setup check  ## style, types, import rules and the tests: some minutes
 	# One worker more than two cores carry: some tests wait in real time.
 	$(PYTEST) -n 3 --dist loadgroup
+	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
 
 test-all: setup check  ## the release gate: as test, with every case of every test

@@ -19,6 +19,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import cv2
+import numba
 import numpy as np
 import scipy
 
@@ -45,7 +47,9 @@ _FIRST = KneeSpec()
 @cache
 def sources_hash() -> str:
     """Of the simulator, what it stands on, and the libraries that compute it."""
-    digest = hashlib.sha256(f"{sys.version} {np.__version__} {scipy.__version__}".encode())
+    libraries = np.__version__, scipy.__version__, numba.__version__, cv2.__version__
+    checks = os.environ.get("NUMBA_BOUNDSCHECK"), os.environ.get("NUMBA_OPT")
+    digest = hashlib.sha256(f"{sys.version} {libraries} {checks}".encode())
     for source in SOURCES:
         path = ROOT / source
         for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
@@ -173,4 +177,5 @@ def make_ct(spec: KneeSpec, spacing_mm: tuple[float, float, float], seed: int) -
 
 def install() -> None:
     """Let `make_knee` be the kept one for all who import it from now on."""
+    sources_hash()  # of the sources as they were imported, whatever is edited meanwhile
     anatomy.make_knee = make_knee

@@ -21,6 +21,8 @@ def double(half: NDArray[T], box: Box) -> NDArray[T]:
     import cv2
 
     height, width = half.shape
+    if half.size == 0:
+        return np.empty((box.height, box.width), dtype=half.dtype)
     size = (2 * width, 2 * height)
     whole = cv2.resize(half, size, interpolation=cv2.INTER_NEAREST)  # type: ignore[arg-type]
     return np.asarray(whole[inside_of_halves(box)], dtype=half.dtype)

@@ -170,7 +170,9 @@ def widened(_: Any, lanes: Any, array: Any) -> Any:
     def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
         return values[0] if wide == lanes else builder.zext(values[0], wide.vector)
 
-    return wide(lanes, array), generate
+    are_whole = not lanes.is_float and not wide.is_float
+    is_wider = are_whole and wide.dtype.bitwidth >= lanes.dtype.bitwidth
+    return (wide(lanes, array), generate) if is_wider else None
 
 
 def _of_two(of_floats: Any, of_whole: Callable[[Any, Any, Any], Any], doc: str) -> Any:
@@ -219,7 +221,8 @@ def where_positive(_: Any, test: Any, chosen: Any, other: Any) -> Any:
     def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
         return builder.select(_is_positive(builder, values[0]), values[1], values[2])
 
-    return chosen(test, chosen, other), generate
+    fits = chosen == other and test.vector.count == chosen.vector.count
+    return (chosen(test, chosen, other), generate) if fits else None
 
 
 @intrinsic
@@ -258,7 +261,7 @@ def smallest(_: Any, lanes: Any) -> Any:
     def generate(__: Any, builder: Any, ___: Any, values: Any) -> Any:
         return _call(builder, "vector.reduce.umin", values[0].type.element, [values[0]])
 
-    return lanes.dtype(lanes), generate
+    return None if lanes.is_float else (lanes.dtype(lanes), generate)
 
 
 def _operator(symbol: Callable[[Any, Any], Any], of_floats: str, of_whole: str) -> None:

@@ -16,12 +16,12 @@ from navapp.stereo.subpixel.refine import (
     refine_on_model,
     refine_samples,
 )
-from navapp.stereo.surroundings import Nearer, fill_surroundings
+from navapp.stereo.surroundings import NearerSearch, fill_surroundings
 
 __all__ = [
     "MODEL_REFINEMENT",
     "CoarseMap",
-    "Nearer",
+    "NearerSearch",
     "PictureHealth",
     "RefineSettings",
     "StereoAnswer",

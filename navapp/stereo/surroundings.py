@@ -27,6 +27,8 @@ _LEAST_GAP_PX = 16
 # The ends of a search are no minima: a pixel of the half beyond the band.
 _BEYOND_PX = 2.0
 _NEAR_CENSUS = replace(SURFACE_CENSUS, radius_x=1, radius_y=1, max_difference_px=3.0, speckle_px=40)
+# What its windows ask for beside a box.
+_WINDOW_PX = 8
 # A map to about a pixel needs no wider support.
 _FILL = FillSettings(radius_px=8)
 # A filled disparity may exceed the bound of its occlusion by so much, the error of edges;
@@ -35,15 +37,15 @@ _EDGE_PX, _LAYER_PX = np.float32(2.0), np.float32(8.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Nearer:
-    """How to look for what stands before the searched disparities."""
+class NearerSearch:
+    """How to search for what stands before the searched disparities."""
 
     nearest_px: float  # largest disparity of anything in view
     # the same pictures, rectified in a box and as far as a band of disparities reaches.
     rectify: Callable[[Box, tuple[float, float]], RectifiedPair]
 
 
-def fill_surroundings(coarse: CoarseMap, nearer: Nearer | None = None) -> Surroundings:
+def fill_surroundings(coarse: CoarseMap, nearer: NearerSearch | None = None) -> Surroundings:
     """The matches of a coarse map, their gaps filled by weighted least squares.
 
     What stands before the searched band is matched too, if `nearer` tells how. A match that hangs
@@ -81,7 +83,7 @@ def _find_wide_gaps(left: DisparityMap) -> Box | None:
     return replace(inside, x=inside.x + left.x, y=inside.y + left.y)
 
 
-def _add_nearer(matched: CoarseMatch, gap: Box, nearer: Nearer) -> TwoViewDisparity:
+def _add_nearer(matched: CoarseMatch, gap: Box, nearer: NearerSearch) -> TwoViewDisparity:
     """The matches with those of what stands before their band, at half their resolution."""
     found, left = matched.found, matched.found.left
     low, high = matched.band_px
@@ -90,7 +92,8 @@ def _add_nearer(matched: CoarseMatch, gap: Box, nearer: Nearer) -> TwoViewDispar
     if most_px <= high + _BEYOND_PX:
         return found
     around = Box(scale * gap.x, scale * gap.y, scale * gap.width, scale * gap.height)
-    pair = nearer.rectify(around, (scale * low, nearer.nearest_px))
+    # Windows look beyond the gap, at half its resolution.
+    pair = nearer.rectify(around.grow(2 * scale * _WINDOW_PX), (scale * low, nearer.nearest_px))
     if matched.is_half:
         pair = halve(pair, (2.0 * low, 2.0 * most_px))
     half = halve(replace(pair, box=gap), (low, most_px))

@@ -14,7 +14,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Agreement
 from navapp.stereo import (
     CoarseMap,
-    Nearer,
+    NearerSearch,
     StereoHealth,
     fill_surroundings,
     measure_health,
@@ -46,7 +46,7 @@ class PairChecks:
         meter: SurfaceMeter,
         pair: RectifiedPair,
         coarse: Job[CoarseMap | None] | None = None,
-        nearer: Nearer | None = None,
+        nearer: NearerSearch | None = None,
     ) -> None:
         self._meter, self._pair, self._coarse = meter, pair, coarse
         self._nearer = nearer
@@ -97,7 +97,7 @@ class PairChecks:
 
 
 def _fill_timed(
-    coarse_job: Job[CoarseMap | None], nearer: Nearer, asking: int
+    coarse_job: Job[CoarseMap | None], nearer: NearerSearch, asking: int
 ) -> tuple[Surroundings | None, float]:
     """A coarse map with its gaps filled, and the ms it took if another thread than `asking` did."""
     coarse = coarse_job.result()

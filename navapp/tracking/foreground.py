@@ -9,7 +9,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 
-# Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
+# NearerSearch than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
 NEAR_PX, IN_FRONT_MM = 4, 5.0
 
@@ -24,7 +24,7 @@ def find_foreground(
 ) -> Foreground:
     """A bone's surroundings, and which of them stand in front of it.
 
-    Both are compared in the resolution of the surroundings, and what was measured in its own.
+    The bone's depth is taken in the resolution of the surroundings.
 
     Args:
         surroundings: filled, over a box around the bone.
@@ -35,23 +35,21 @@ def find_foreground(
         in_front_mm: ... and what is nearer by so much.
     """
     box, is_half = surroundings.box, surroundings.is_half
-    limit_px, at = _limit_px(view, geometry, near_px, in_front_mm, is_half)
     own = half_box(box) if is_half else box
-    nearest_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
+    bone_px, at = _limit_px(view, geometry, near_px, in_front_mm, is_half)
     both = own.intersect(at)
     here, there = (both.relative_to(one).slices for one in (own, at))
-    nearest_px[here] = limit_px[there]
-    is_nearer = surroundings.disparity_px > nearest_px
+    limit_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
+    limit_px[here] = bone_px[there]
+    is_in_front = surroundings.disparity_px > limit_px
     if is_half:
-        is_nearer = double(is_nearer.view(np.uint8), box).view(np.bool_)
-        nearest_px = np.float32(2.0) * double(nearest_px, box)
+        is_in_front = double(is_in_front.view(np.uint8), box).view(np.bool_)
+        limit_px = np.float32(2.0) * double(limit_px, box)
     both = box.intersect(measured.box)
     here, there = (both.relative_to(one).slices for one in (box, measured.box))
     is_matched = measured.origin[there] == Origin.MATCHED
-    is_exactly = measured.disparity_px[there] > nearest_px[here]
-    is_nearer[here] &= ~is_matched
-    is_nearer[here] |= is_matched & is_exactly
-    return Foreground(surroundings, measured, is_nearer)
+    np.copyto(is_in_front[here], measured.disparity_px[there] > limit_px[here], where=is_matched)
+    return Foreground(surroundings, measured, is_in_front)
 
 
 def _limit_px(

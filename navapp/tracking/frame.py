@@ -7,7 +7,7 @@ from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
-from navapp.stereo import Nearer
+from navapp.stereo import NearerSearch
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, MODEL_CORRELATION_PX, Measurement
 from navapp.values import PoseEstimate, Reason, Stopwatch
 
@@ -35,7 +35,7 @@ class Frame:
     pair: RectifiedPair  # grey pictures, rectified as far around the bone as is looked
     start: RigidTransform  # rectified left camera from bone, expected
     watch: Stopwatch
-    nearer: Nearer | None = None  # how to look for what stands before all of that
+    nearer: NearerSearch | None = None  # how to look for what stands before all of that
     n_lost: int = 0  # frames lost before this one; in odd ones a search goes further off
     may_search_long: bool = True  # a search that takes as long as many frames is worth it
     # told what is measured on all of the model near `start`, and at which pose.

@@ -20,7 +20,7 @@ from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
     MODEL_REFINEMENT,
     CoarseMap,
-    Nearer,
+    NearerSearch,
     match_coarsely,
     match_surface,
     refine_on_model,
@@ -120,10 +120,10 @@ class SurfaceMeter:
         box, band_px = self.find_region(around, margins) or (None, None)
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
 
-    def look_nearer(self, left: Image, right: Image) -> Nearer:
+    def look_nearer(self, left: Image, right: Image) -> NearerSearch:
         """How to look for what stands before the depths that were rectified, up to the nearest."""
         rectify = partial(self.rectifier.rectify, left, right, is_grey=True)
-        return Nearer(self.geometry.disparity_px(self.depth_mm[0]), rectify)
+        return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify)
 
     def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None

@@ -105,7 +105,7 @@ class RowCheck:
 class Surroundings:
     """What lies around a bone, to about a pixel, gaps filled: to tell what is where."""
 
-    # over the box, or over `half_box(box)` in pixels of half the resolution; NaN where unknown.
+    # over the box; where `is_half`, over `half_box(box)` and half as large; NaN where unknown.
     disparity_px: NDArray[np.float32]
     origin: NDArray[np.uint8]  # of `Origin`: unless MATCHED, the disparity is a guess
     box: Box  # of the rectified left view

@@ -40,7 +40,7 @@ def plan_of(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[s
         ("phantom_a", ("camera_from_model",)),
         # Another person from the same start as the first.
         pytest.param("phantom_c", ("camera_from_model",), marks=pytest.mark.release),
-        # Less of a start than the box, which is left to the release.
+        # More of a start than the next one.
         pytest.param("phantom_c", ("approach_cone", "box"), marks=pytest.mark.release),
         ("phantom_c", ("approach_cone",)),
     ],

@@ -88,6 +88,31 @@ def test_what_floats_do_not_understand_is_refused(operate) -> None:
         compile_two(operate)(floats(1), floats(2), floats(3))
 
 
+def test_lanes_of_other_types_do_not_go_together() -> None:
+    @njit
+    def choose(test, a, b, out):
+        store(out, 0, where_positive(load(test, 0), load(a, 0), load(b, 0)))
+
+    @njit
+    def find_smallest(a):
+        return smallest(load(a, 0))
+
+    @njit
+    def widen(a, out):
+        store(out, 0, widened(load(a, 0), out))
+
+    bytes_, shorts = whole_numbers(1), whole_numbers(2, np.uint16)
+    for run, arrays in (
+        (choose, (bytes_, bytes_, shorts, shorts)),
+        (choose, (floats(1), bytes_, bytes_, bytes_)),
+        (find_smallest, (floats(1),)),
+        (widen, (shorts, bytes_)),
+        (widen, (bytes_, floats(1))),
+    ):
+        with pytest.raises(TypingError):
+            run(*arrays)
+
+
 def test_all_lanes_have_to_be_above_zero() -> None:
     @njit
     def run(a):

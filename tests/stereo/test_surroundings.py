@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from math import ceil, floor
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo import (
-    Nearer,
+    NearerSearch,
     fill_surroundings,
     match_coarsely,
     surroundings,
@@ -52,8 +53,22 @@ def hand_before_wall(box: Box = INSIDE) -> RectifiedPair:
 def fill(
     pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
 ) -> DisparityMap:
-    nearer = Nearer(nearest_px, lambda box, _: replace(pair, box=box))
+    nearer = NearerSearch(nearest_px, lambda box, band_px: seen_in(pair, box, band_px))
     return whole(fill_surroundings(match_coarsely(pair, band_px), nearer))
+
+
+def seen_in(pair: RectifiedPair, box: Box, band_px: tuple[float, float]) -> RectifiedPair:
+    """What a rectification of a box and a band shows: beside it all is black."""
+    height, width = pair.left.shape
+    left, right = np.zeros_like(pair.left), np.zeros_like(pair.right)
+    inside = box.clip(width, height)
+    rows, columns = inside.slices
+    left[rows, columns] = pair.left[rows, columns]
+    reached = slice(
+        max(columns.start - ceil(band_px[1]), 0), max(columns.stop - floor(band_px[0]), 0)
+    )
+    right[rows, reached] = pair.right[rows, reached]
+    return replace(pair, left=left, right=right, box=inside)
 
 
 def whole(filled: Surroundings) -> DisparityMap:

@@ -8,7 +8,7 @@ import pytest
 from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import render_rectified
-from navapp.stereo import CoarseMap, Nearer
+from navapp.stereo import CoarseMap, NearerSearch
 from navapp.tracking import checks as checks_module
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairChecks
@@ -22,7 +22,7 @@ NO_CLOUD = SurfaceCloud(
     np.empty((0, 3)), np.empty(0), np.empty((0, 2), np.int32), np.empty(0, np.uint8)
 )
 
-NOTHING_NEARER = Nearer(0.0, lambda *_: blank_pair())
+NOTHING_NEARER = NearerSearch(0.0, lambda *_: blank_pair())
 
 
 def measurement(*, is_on_model: bool = False) -> Measurement:

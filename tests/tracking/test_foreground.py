@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
-from navapp.geometry.halves import half_box
+from navapp.geometry.halves import double, half_box
 from navapp.geometry.zbuffer import RenderedView
 from navapp.tracking import TrackerSettings, TrackState, make_tracker
 from navapp.tracking.foreground import IN_FRONT_MM, NEAR_PX, find_foreground
@@ -115,6 +115,31 @@ def test_half_the_resolution_is_doubled(box: Box) -> None:
     there = (rows + box.y) // 2 - half.y, (columns + box.x) // 2 - half.x
     np.testing.assert_array_equal(found.depth[0], 2.0 * disparity_px[there])
     np.testing.assert_array_equal(found.depth[1], origin[there])
+
+
+@pytest.mark.parametrize("shift", [0, 1])
+def test_in_half_the_resolution_the_same_stands_in_front(shift: int) -> None:
+    """But for a rim of the places that half a resolution leaves open."""
+    box = Box(BOX.x + shift, BOX.y + shift, BOX.width - 3, BOX.height - 3)
+    half = half_box(box)
+    view = MODEL.render(TRUE, GEOMETRY, Box(box.x + 1, box.y, box.width - 2, box.height))
+    rows, columns = np.mgrid[: half.height, : half.width]
+    slant_mm = 380.0 + 0.5 * (columns + rows)
+    near_px = GEOMETRY.disparity_map_px(slant_mm) / np.float32(2.0)
+    origin = np.full(near_px.shape, Origin.FILLED_INTERIOR, np.uint8)
+    found = find(Surroundings(near_px, origin, box, is_half=True), view)
+    exact = find(everywhere(*whole_of(slant_mm, box)), view).is_in_front
+    assert 0.1 < exact.mean() < 0.9
+    size = np.ones((7, 7), np.uint8)
+    is_sure = cv2.erode(exact.astype(np.uint8), size) > 0
+    is_never = cv2.dilate(exact.astype(np.uint8), size) == 0
+    inner = np.s_[4:-4, 4:-4]
+    assert found.is_in_front[inner][is_sure[inner]].all()
+    assert not found.is_in_front[inner][is_never[inner]].any()
+
+
+def whole_of(half_mm: np.ndarray, box: Box) -> tuple[np.ndarray, Box]:
+    return double(half_mm.astype(np.float32), box), box
 
 
 @lru_cache

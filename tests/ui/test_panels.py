@@ -40,6 +40,8 @@ def lines_of(widget: TextView, view: View, width: int, height: int) -> list[str]
 
 @pytest.mark.parametrize("reason", list(Reason))
 def test_every_reason_with_its_remedy_fits_the_small_panel(reason: Reason) -> None:
+    assert reason.value
+    assert reason.remedy
     view = view_of(snapshots.suspended(reasons=(reason,)))
     assert len(format_reason_lines(view, WIDTH)) <= POSE_LINES - 3
     text = " ".join(line.plain for line in format_reason_lines(view, WIDTH))
