@@ -52,12 +52,10 @@ class Box:
         """The same rectangle, its place counted from the first pixel of another box."""
         return Box(self.x - other.x, self.y - other.y, self.width, self.height)
 
-    def overlap(self, other: "Box") -> float:
-        """Intersection over union, 0 to 1."""
+    def shared_slices(self, other: "Box") -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+        """Rows and columns of the pixels of both, in an array over this box and over the other."""
         both = self.intersect(other)
-        shared = both.width * both.height
-        union = self.width * self.height + other.width * other.height - shared
-        return shared / union if union > 0 else 0.0
+        return both.relative_to(self).slices, both.relative_to(other).slices
 
     @classmethod
     def around(cls, pixels: FloatArray) -> "Box | None":

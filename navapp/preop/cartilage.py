@@ -25,7 +25,7 @@ MAPPED_SD_MM = 0.4
 
 # Along the bone's normals a surface is looked for so far, in and out.
 _REACH_MM = 6.0
-# NearerSearch than this two surfaces are the same one.
+# Nearer than this two surfaces are the same one.
 _COINCIDES_MM = 0.05
 # Two segmentations cross where there is no cartilage; deeper, or more often, one of them is wrong.
 _DIPS_MM, _DIPS_FRACTION = 0.5, 0.02

@@ -31,7 +31,7 @@ _CALM_PX = 5
 _COARSE_STEP_PX = 0.5
 _FAR_FROM_MATCH_PX = 1.5
 # What windows and the steps at the ends of a search ask for beside a box, at half resolution.
-_WINDOW_PX = 8
+WINDOW_PX = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +199,7 @@ def halve(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> Re
     half, whole = half_box(pair.box), Box(0, 0, width, height)
     in_left = in_right = whole
     if band_px is not None:
-        in_left = half.grow(_WINDOW_PX)
+        in_left = half.grow(WINDOW_PX)
         # From the farthest partner of the first column to the nearest of the last.
         farthest, nearest = math.ceil(band_px[1] / 2.0), math.floor(band_px[0] / 2.0)
         first, after = in_left.x - farthest, in_left.x + in_left.width - nearest

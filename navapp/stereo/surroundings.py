@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.geometry.halves import double
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch, halve
+from navapp.stereo.coarse import SURFACE_CENSUS, WINDOW_PX, CoarseMap, CoarseMatch, halve
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
 from navapp.stereo.matching.search import Crop
 from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
@@ -27,8 +27,6 @@ _LEAST_GAP_PX = 16
 # The ends of a search are no minima: a pixel of the half beyond the band.
 _BEYOND_PX = 2.0
 _NEAR_CENSUS = replace(SURFACE_CENSUS, radius_x=1, radius_y=1, max_difference_px=3.0, speckle_px=40)
-# What its windows ask for beside a box.
-_WINDOW_PX = 8
 # A map to about a pixel needs no wider support.
 _FILL = FillSettings(radius_px=8)
 # A filled disparity may exceed the bound of its occlusion by so much, the error of edges;
@@ -93,7 +91,7 @@ def _add_nearer(matched: CoarseMatch, gap: Box, nearer: NearerSearch) -> TwoView
         return found
     around = Box(scale * gap.x, scale * gap.y, scale * gap.width, scale * gap.height)
     # Windows look beyond the gap, at half its resolution.
-    pair = nearer.rectify(around.grow(2 * scale * _WINDOW_PX), (scale * low, nearer.nearest_px))
+    pair = nearer.rectify(around.grow(2 * scale * WINDOW_PX), (scale * low, nearer.nearest_px))
     if matched.is_half:
         pair = halve(pair, (2.0 * low, 2.0 * most_px))
     half = halve(replace(pair, box=gap), (low, most_px))

@@ -9,7 +9,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 
-# NearerSearch than the nearest bone within so many pixels, by so much: chosen on simulated knees
+# Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
 NEAR_PX, IN_FRONT_MM = 4, 5.0
 
@@ -37,16 +37,14 @@ def find_foreground(
     box, is_half = surroundings.box, surroundings.is_half
     own = half_box(box) if is_half else box
     bone_px, at = _limit_px(view, geometry, near_px, in_front_mm, is_half)
-    both = own.intersect(at)
-    here, there = (both.relative_to(one).slices for one in (own, at))
+    here, there = own.shared_slices(at)
     limit_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
     limit_px[here] = bone_px[there]
     is_in_front = surroundings.disparity_px > limit_px
     if is_half:
         is_in_front = double(is_in_front.view(np.uint8), box).view(np.bool_)
         limit_px = np.float32(2.0) * double(limit_px, box)
-    both = box.intersect(measured.box)
-    here, there = (both.relative_to(one).slices for one in (box, measured.box))
+    here, there = box.shared_slices(measured.box)
     is_matched = measured.origin[there] == Origin.MATCHED
     np.copyto(is_in_front[here], measured.disparity_px[there] > limit_px[here], where=is_matched)
     return Foreground(surroundings, measured, is_in_front)

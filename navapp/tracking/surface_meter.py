@@ -120,7 +120,7 @@ class SurfaceMeter:
         box, band_px = self.find_region(around, margins) or (None, None)
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
 
-    def look_nearer(self, left: Image, right: Image) -> NearerSearch:
+    def make_nearer_search(self, left: Image, right: Image) -> NearerSearch:
         """How to look for what stands before the depths that were rectified, up to the nearest."""
         rectify = partial(self.rectifier.rectify, left, right, is_grey=True)
         return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify)

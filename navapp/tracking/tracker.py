@@ -163,7 +163,7 @@ class Tracker(ABC):
         start = self.rectify_pose(left_from_bone)
         pair = self.meter.rectify(left, right, start, margins)
         watch.lap("rectify")
-        return Frame(pair, start, watch, self.meter.look_nearer(left, right))
+        return Frame(pair, start, watch, self.meter.make_nearer_search(left, right))
 
     def begin_checks(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""

@@ -136,8 +136,7 @@ class Foreground:
     def depth(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         """(h, w) disparity in px, NaN where unknown, and origin of all that is around the bone."""
         disparity_px, origin = self.surroundings.whole
-        both = self.box.intersect(self.measured.box)
-        here, there = (both.relative_to(box).slices for box in (self.box, self.measured.box))
+        here, there = self.box.shared_slices(self.measured.box)
         is_matched = self.measured.origin[there] == Origin.MATCHED
         np.copyto(disparity_px[here], self.measured.disparity_px[there], where=is_matched)
         origin[here][is_matched] = Origin.MATCHED

@@ -87,7 +87,7 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=401)
     parser.add_argument("--only", default="", help="ways and cases whose names hold these words")
-    parser.add_argument("--filled", action="store_true", help="gaps filled, as nobody else does")
+    parser.add_argument("--filled", action="store_true", help="fill the gaps of free measurements")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     with fill_gaps() if options.filled else nullcontext():

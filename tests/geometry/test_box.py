@@ -25,12 +25,19 @@ def test_a_box_is_clipped_to_the_picture(box, clipped):
     assert clipped.is_empty == (clipped.width == 0 or clipped.height == 0)
 
 
-def test_overlap_is_the_share_of_the_union():
-    assert Box(0, 0, 10, 10).overlap(Box(0, 0, 10, 10)) == 1.0
-    assert Box(0, 0, 10, 10).overlap(Box(5, 0, 10, 10)) == pytest.approx(50 / 150)
-    assert Box(0, 0, 10, 10).overlap(Box(20, 20, 5, 5)) == 0.0
-    assert Box(0, 0, 10, 10).overlap(Box(20, 0, 5, 10)) == 0.0
-    assert Box(0, 0, 0, 0).overlap(Box(0, 0, 0, 0)) == 0.0
+@pytest.mark.parametrize(
+    "other", [Box(4, 1, 6, 9), Box(-3, 2, 5, 2), Box(0, 0, 8, 6), Box(9, 9, 2, 2)]
+)
+def test_arrays_over_two_boxes_meet_where_both_are(other: Box) -> None:
+    box = Box(1, 0, 7, 5)
+    places = [np.mgrid[b.y : b.y + b.height, b.x : b.x + b.width] for b in (box, other)]
+    here, there = box.shared_slices(other)
+    mine, theirs = places[0][:, *here], places[1][:, *there]
+    np.testing.assert_array_equal(mine, theirs)
+    rows, columns = places[0]
+    in_other = (rows >= other.y) & (rows < other.y + other.height)
+    in_other &= (columns >= other.x) & (columns < other.x + other.width)
+    assert mine[0].size == in_other.sum()
 
 
 def test_a_box_around_pixels_holds_them_and_no_more():
