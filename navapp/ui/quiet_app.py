@@ -8,6 +8,9 @@ from pathlib import Path
 from textual.app import App
 
 from navapp.errors import NavappError
+from navapp.ui.terminal import is_terminal_lost
+
+_S_PER_LOOK = 0.5
 
 
 class QuietApp(App[int]):
@@ -34,12 +37,23 @@ class QuietApp(App[int]):
 
 
 async def drive(app: QuietApp) -> int:
-    """Run it to its end; the exit code, 128 and the number of the signal that ended it."""
+    """Run it to its end; the exit code, 128 and the number of the signal that ended it.
+
+    A lost terminal ends it as SIGHUP does, which not every terminal sends.
+    """
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
         loop.add_signal_handler(number, app.exit, 128 + number)
+    watch = asyncio.create_task(_end_without_terminal(app))
     result = await app.run_async(mouse=False)
+    watch.cancel()
     return 1 if result is None else result
+
+
+async def _end_without_terminal(app: QuietApp) -> None:
+    while not is_terminal_lost():
+        await asyncio.sleep(_S_PER_LOOK)
+    app.exit(128 + signal.SIGHUP)
 
 
 def say(failure: Exception, log_path: Path) -> int:

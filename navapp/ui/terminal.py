@@ -1,7 +1,9 @@
 """Takes over the terminal for the screen; output of libraries goes to a log."""
 
 import contextlib
+import io
 import os
+import select
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,9 +31,7 @@ def own_terminal(log_path: Path) -> Iterator[None]:
     sys.stderr.flush()
     saved = os.dup(1), os.dup(2)
     streams = sys.__stdout__, sys.__stderr__
-    terminal = os.fdopen(
-        os.dup(1), "w", buffering=1, encoding=sys.stdout.encoding or "utf-8", errors="replace"
-    )
+    terminal = _LosableTerminal(os.dup(1), sys.stdout.encoding or "utf-8")
     os.dup2(log, 1)
     os.dup2(log, 2)
     os.close(log)
@@ -40,15 +40,47 @@ def own_terminal(log_path: Path) -> Iterator[None]:
         yield
     finally:
         sys.__stdout__, sys.__stderr__ = streams  # type: ignore[misc]
-        # A terminal that was closed takes no more text.
-        with contextlib.suppress(OSError):
-            terminal.close()
+        terminal.close()
         sys.stdout.flush()
         sys.stderr.flush()
         os.dup2(saved[0], 1)
         os.dup2(saved[1], 2)
         for descriptor in saved:
             os.close(descriptor)
+
+
+def is_terminal_lost() -> bool:
+    """Whether the terminal was closed: nobody sees the screen or presses a key any more."""
+    watch = select.poll()
+    watch.register(0, 0)
+    return bool(watch.poll(0))  # hang-up and error are told without being asked for
+
+
+class _LosableTerminal(io.TextIOWrapper):
+    """Writes to a terminal; once that is closed, text is dropped.
+
+    Textual's thread for output would end at the error, and its screen then wait for it for ever.
+    """
+
+    def __init__(self, descriptor: int, encoding: str) -> None:
+        file = open(descriptor, "wb")  # noqa: SIM115 (closed with this one)
+        super().__init__(file, encoding=encoding, errors="replace", line_buffering=True)
+
+    def write(self, text: str) -> int:
+        """Write what can be written; the length of the text."""
+        with contextlib.suppress(OSError):
+            super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """As `write`."""
+        with contextlib.suppress(OSError):
+            super().flush()
+
+    def close(self) -> None:
+        """As `write`."""
+        with contextlib.suppress(OSError):
+            super().close()
 
 
 def _open_log(log_path: Path) -> int:

@@ -117,14 +117,17 @@ def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> No
         screen.close()
 
 
-def test_a_closed_terminal_stops_the_session(tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_told", [True, False])
+def test_a_closed_terminal_stops_the_session(tmp_path: Path, is_told: bool) -> None:
     screen = Screen(tmp_path, "run")
     try:
         screen.read_until(b"NAVIGABLE")
         os.close(screen.master)
         screen.master = -1
-        os.kill(screen.process.pid, signal.SIGHUP)
+        if is_told:
+            os.kill(screen.process.pid, signal.SIGHUP)
         screen.process.communicate(timeout=20)
+        assert screen.process.returncode == 128 + signal.SIGHUP
         assert (tmp_path / "stopped").exists()
     finally:
         screen.close()
