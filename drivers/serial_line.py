@@ -123,9 +123,10 @@ class SerialLine:
     def close(self) -> None:
         """Release; never fails."""
         with self.lock:
-            if self._port is not None:
-                self._port.close()
-            self._port = None
+            # Whoever reads it meanwhile must see that it is closed.
+            port, self._port = self._port, None
+            if port is not None:
+                port.close()
 
     def silence(self) -> DeviceTimeout:
         """The error of an answer that did not come."""
@@ -150,6 +151,9 @@ class SerialLine:
         except DeviceLost:
             self.close()
             raise
+        if self._port is not port:
+            # Closed by another thread, a read may end as if nothing had come.
+            raise self.absence()
         self._received += data
         return bool(data)
 

@@ -64,6 +64,17 @@ class RectifiedGeometry:
         """Depth of a point with that disparity."""
         return self.focal_px * self.baseline_mm / disparity_px
 
+    def reduced(self, reduction: int) -> "RectifiedGeometry":
+        """Of the same pictures at 1/reduction of their resolution: pixels are means of blocks."""
+        return replace(
+            self,
+            focal_px=self.focal_px / reduction,
+            centre_x_px=(self.centre_x_px + 0.5) / reduction - 0.5,
+            centre_y_px=(self.centre_y_px + 0.5) / reduction - 0.5,
+            width=self.width // reduction,
+            height=self.height // reduction,
+        )
+
     def project(self, points_mm: FloatArray) -> FloatArray:
         """(N, 2) px in the left picture of points (N, 3) mm; NaN at or behind the camera."""
         z = np.where(points_mm[:, 2] > 1e-6, points_mm[:, 2], np.nan)
@@ -100,6 +111,9 @@ class Rectifier:
     # R1, R2 (3, 3) and P1, P2 (3, 4) that another program has rectified with, instead of ours.
     given: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
     _solved: tuple[Any, ...] = field(init=False, repr=False)
+    _maps_by_reduction: dict[int, tuple[Any, ...]] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         rig = self.rig
@@ -163,21 +177,12 @@ class Rectifier:
         Raises:
             ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
         """
-        for picture in (left, right):
-            if picture.shape[:2] != (self.rig.height, self.rig.width):
-                raise ValueError(
-                    f"pictures are {picture.shape[1]}x{picture.shape[0]}, "
-                    f"the rig {self.rig.width}x{self.rig.height}"
-                )
-        if left.shape != right.shape:
-            raise ValueError("one picture of the pair is grey and the other coloured")
+        self._check(left, right)
         whole = Box(0, 0, self.rig.width, self.rig.height)
         inside = whole if box is None else box.clip(whole.width, whole.height)
         in_left, in_right = whole, whole
         if band_px is not None:
-            first = inside.x - math.ceil(band_px[1]) - TAPS_PX
-            last = inside.x + inside.width - math.floor(band_px[0]) + TAPS_PX
-            in_left, in_right = inside, replace(inside, x=first, width=last - first)
+            in_left, in_right = _reached(inside, band_px)
         if self.interpolation == "bilinear":
             greys = (luma(left), luma(right)) if is_grey else (left, right)
             return self._bilinear(greys, (in_left, in_right), inside)
@@ -192,6 +197,56 @@ class Rectifier:
             lambda: rectify_one(right, for_right, in_right),
         )
         return RectifiedPair(*pictures, self.geometry, inside)
+
+    def rectify_reduced(
+        self,
+        left: Image,
+        right: Image,
+        reduction: int,
+        box: Box,
+        band_px: tuple[float, float],
+    ) -> RectifiedPair:
+        """Both pictures, grey, at 1/reduction of their resolution: to tell what lies where.
+
+        Made from reduced pictures, in a fraction of the time that `rectify` takes. A last row or
+        column that fills no block is left out.
+
+        Args:
+            left: picture of the left camera.
+            right: of the right one.
+            reduction: rows and columns of a block that becomes one pixel.
+            box: region of interest in the reduced, rectified left view.
+            band_px: smallest and largest disparity, in reduced pixels. Only the box, what it
+                reaches in the right picture, and `TAPS_PX` around are made; the rest is 0.
+
+        Raises:
+            ValueError: as `rectify`.
+        """
+        self._check(left, right)
+        maps = self._maps_by_reduction.get(reduction)
+        if maps is None:
+            # Means of blocks lie in the middle of their block, in the pictures as in the maps.
+            maps = tuple((_reduce(part, reduction) + 0.5) / reduction - 0.5 for part in self.maps)
+            self._maps_by_reduction[reduction] = maps
+        geometry = self.geometry.reduced(reduction)
+        inside = box.clip(geometry.width, geometry.height)
+        in_left, in_right = _reached(inside.grow(TAPS_PX), band_px)
+        return RectifiedPair(
+            _resample_reduced(left, reduction, maps[:2], in_left),
+            _resample_reduced(right, reduction, maps[2:], in_right),
+            geometry,
+            inside,
+        )
+
+    def _check(self, left: Image, right: Image) -> None:
+        for picture in (left, right):
+            if picture.shape[:2] != (self.rig.height, self.rig.width):
+                raise ValueError(
+                    f"pictures are {picture.shape[1]}x{picture.shape[0]}, "
+                    f"the rig {self.rig.width}x{self.rig.height}"
+                )
+        if left.shape != right.shape:
+            raise ValueError("one picture of the pair is grey and the other coloured")
 
     def _bilinear(
         self, pictures: tuple[Image, Image], parts: tuple[Box, Box], inside: Box
@@ -235,6 +290,45 @@ def luma(picture: Image) -> Image:
     if picture.ndim == 2:
         return picture
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+
+
+def _reached(box: Box, band_px: tuple[float, float]) -> tuple[Box, Box]:
+    """The box, and what its disparities and interpolation reach in the right picture."""
+    first = box.x - math.ceil(band_px[1]) - TAPS_PX
+    last = box.x + box.width - math.floor(band_px[0]) + TAPS_PX
+    return box, replace(box, x=first, width=last - first)
+
+
+def _reduce(values: NDArray[Any], reduction: int) -> NDArray[Any]:
+    """(h // reduction, w // reduction) means of the blocks of (h, w) values."""
+    import cv2
+
+    height, width = (length // reduction for length in values.shape[:2])
+    even = values[: reduction * height, : reduction * width]
+    return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA))
+
+
+def _resample_reduced(
+    picture: Image, reduction: int, maps: tuple[NDArray[np.float32], ...], part: Box
+) -> Image:
+    """A part of a reduced grey picture at real places (h, w), x and y, linear; 0 beside it."""
+    import cv2
+
+    height, width = maps[0].shape
+    resampled = np.zeros((height, width), dtype=np.uint8)
+    part = part.clip(width, height)
+    if part.is_empty:
+        return resampled
+    x, y = (places[part.slices] for places in maps)
+    first_x, first_y = (math.floor(places.min()) for places in (x, y))
+    n_columns, n_rows = math.ceil(x.max()) - first_x + 1, math.ceil(y.max()) - first_y + 1
+    asked = Box(first_x, first_y, n_columns, n_rows).clip(width, height)
+    if not asked.is_empty:
+        block = Box(*(reduction * n for n in (asked.x, asked.y, asked.width, asked.height)))
+        reduced = _reduce(luma(picture[block.slices]), reduction)
+        places = x - np.float32(asked.x), y - np.float32(asked.y)
+        resampled[part.slices] = cv2.remap(reduced, *places, cv2.INTER_LINEAR)
+    return resampled
 
 
 def _luma_for(picture: Image, places: "Places", part: Box) -> Image:

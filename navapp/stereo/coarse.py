@@ -194,7 +194,6 @@ def halve(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> Re
         band_px: smallest and largest disparity. With it only the pair's box, and what it reaches in
             the right picture, is made; the rest is 0.
     """
-    geometry = pair.geometry
     height, width = (length // 2 for length in pair.left.shape)
     half, whole = half_box(pair.box), Box(0, 0, width, height)
     in_left = in_right = whole
@@ -207,14 +206,7 @@ def halve(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> Re
     return RectifiedPair(
         _halve(pair.left, in_left.clip(width, height), whole),
         _halve(pair.right, in_right.clip(width, height), whole),
-        replace(
-            geometry,
-            focal_px=geometry.focal_px / 2.0,
-            centre_x_px=(geometry.centre_x_px - 0.5) / 2.0,
-            centre_y_px=(geometry.centre_y_px - 0.5) / 2.0,
-            width=width,
-            height=height,
-        ),
+        pair.geometry.reduced(2),
         half,
     )
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.geometry.halves import double
+from navapp.geometry.halves import double, half_box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo.coarse import SURFACE_CENSUS, WINDOW_PX, CoarseMap, CoarseMatch, halve
+from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
 from navapp.stereo.matching.search import Crop
 from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
@@ -39,8 +39,9 @@ class NearerSearch:
     """How to search for what stands before the searched disparities."""
 
     nearest_px: float  # largest disparity of anything in view
-    # the same pictures, rectified in a box and as far as a band of disparities reaches.
-    rectify: Callable[[Box, tuple[float, float]], RectifiedPair]
+    # the same pictures, rectified at 1/so much of their resolution, in a box of the reduced left
+    # view and as far as a band of disparities reaches.
+    rectify_reduced: Callable[[int, Box, tuple[float, float]], RectifiedPair]
 
 
 def fill_surroundings(coarse: CoarseMap, nearer: NearerSearch | None = None) -> Surroundings:
@@ -89,13 +90,9 @@ def _add_nearer(matched: CoarseMatch, gap: Box, nearer: NearerSearch) -> TwoView
     most_px = nearer.nearest_px / scale
     if most_px <= high + _BEYOND_PX:
         return found
-    around = Box(scale * gap.x, scale * gap.y, scale * gap.width, scale * gap.height)
-    # Windows look beyond the gap, at half its resolution.
-    pair = nearer.rectify(around.grow(2 * scale * WINDOW_PX), (scale * low, nearer.nearest_px))
-    if matched.is_half:
-        pair = halve(pair, (2.0 * low, 2.0 * most_px))
-    half = halve(replace(pair, box=gap), (low, most_px))
-    near = match_census(half, (low / 2.0, most_px / 2.0), _NEAR_CENSUS)
+    half_px = low / 2.0, most_px / 2.0
+    half = nearer.rectify_reduced(2 * scale, half_box(gap), half_px)
+    near = match_census(half, half_px, _NEAR_CENSUS)
     least_px = high + _BEYOND_PX
     near_px = np.float32(2.0) * double(near.left.disparity_px, gap)
     is_near = near_px > least_px

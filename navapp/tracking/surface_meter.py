@@ -122,8 +122,8 @@ class SurfaceMeter:
 
     def make_nearer_search(self, left: Image, right: Image) -> NearerSearch:
         """How to look for what stands before the depths that were rectified, up to the nearest."""
-        rectify = partial(self.rectifier.rectify, left, right, is_grey=True)
-        return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify)
+        rectify_reduced = partial(self.rectifier.rectify_reduced, left, right)
+        return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify_reduced)
 
     def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None

@@ -157,6 +157,22 @@ def test_a_line_closed_by_another_thread_is_lost(line) -> None:
     assert time.monotonic() - begin_s < 5.0
 
 
+def test_a_line_closed_while_it_is_read_is_lost_whatever_the_read_returned(
+    line, monkeypatch
+) -> None:
+    """pyserial, closed by another thread, ends a read as if its time were over, or fails."""
+
+    def read_nothing(*_: object) -> bytes:
+        thread = threading.Thread(target=line.close)
+        thread.start()
+        thread.join()
+        return b""
+
+    monkeypatch.setattr(serial.Serial, "read", read_nothing)
+    with pytest.raises(DeviceLost):
+        line.next(soon(line))
+
+
 def test_a_peer_that_takes_nothing_times_out(line) -> None:
     with pytest.raises(DeviceTimeout, match="takes no more bytes"):
         line.send(bytes(1_000_000))

@@ -4,11 +4,12 @@ from dataclasses import replace
 from functools import lru_cache
 from math import ceil, floor
 
+import cv2
 import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
 from navapp.stereo import (
     NearerSearch,
     fill_surroundings,
@@ -53,22 +54,32 @@ def hand_before_wall(box: Box = INSIDE) -> RectifiedPair:
 def fill(
     pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
 ) -> DisparityMap:
-    nearer = NearerSearch(nearest_px, lambda box, band_px: seen_in(pair, box, band_px))
+    nearer = NearerSearch(nearest_px, lambda *asked: reduced(pair, *asked))
     return whole(fill_surroundings(match_coarsely(pair, band_px), nearer))
 
 
-def seen_in(pair: RectifiedPair, box: Box, band_px: tuple[float, float]) -> RectifiedPair:
-    """What a rectification of a box and a band shows: beside it all is black."""
-    height, width = pair.left.shape
-    left, right = np.zeros_like(pair.left), np.zeros_like(pair.right)
-    inside = box.clip(width, height)
-    rows, columns = inside.slices
-    left[rows, columns] = pair.left[rows, columns]
-    reached = slice(
-        max(columns.start - ceil(band_px[1]), 0), max(columns.stop - floor(band_px[0]), 0)
-    )
-    right[rows, reached] = pair.right[rows, reached]
-    return replace(pair, left=left, right=right, box=inside)
+def reduced(
+    pair: RectifiedPair, reduction: int, box: Box, band_px: tuple[float, float]
+) -> RectifiedPair:
+    """What is rectified at 1/reduction of the resolution for a box and a band: else all is 0."""
+    geometry = pair.geometry.reduced(reduction)
+    inside = box.clip(geometry.width, geometry.height)
+    around = inside.grow(8)
+    first = max(around.x - ceil(band_px[1]), 0)
+    reached = slice(first, max(around.x + around.width - floor(band_px[0]), first))
+    rows, columns = around.clip(geometry.width, geometry.height).slices
+    left, right = np.zeros((2, geometry.height, geometry.width), np.uint8)
+    left[rows, columns] = reduce(pair.left, geometry)[rows, columns]
+    right[rows, reached] = reduce(pair.right, geometry)[rows, reached]
+    return RectifiedPair(left, right, geometry, inside)
+
+
+def reduce(picture: np.ndarray, geometry: RectifiedGeometry) -> np.ndarray:
+    """Means of the blocks that fill the reduced picture."""
+    reduction = picture.shape[1] // geometry.width
+    even = picture[: reduction * geometry.height, : reduction * geometry.width]
+    size = geometry.width, geometry.height
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA))
 
 
 def whole(filled: Surroundings) -> DisparityMap:
