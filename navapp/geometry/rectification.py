@@ -12,6 +12,7 @@ from navapp.errors import RigError
 from navapp.geometry.bands import in_row_bands, run_both
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
+from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -223,12 +224,7 @@ class Rectifier:
             ValueError: as `rectify`.
         """
         self._check(left, right)
-        maps = self._maps_by_reduction.get(reduction)
-        if maps is None:
-            # Means of blocks lie in the middle of their block, in the pictures as in the maps.
-            maps = tuple((_reduce(part, reduction) + 0.5) / reduction - 0.5 for part in self.maps)
-            self._maps_by_reduction[reduction] = maps
-        geometry = self.geometry.reduced(reduction)
+        geometry, maps = self.geometry.reduced(reduction), self._reduced_maps(reduction)
         inside = box.clip(geometry.width, geometry.height)
         in_left, in_right = _reached(inside.grow(TAPS_PX), band_px)
         return RectifiedPair(
@@ -237,6 +233,22 @@ class Rectifier:
             geometry,
             inside,
         )
+
+    def _reduced_maps(self, reduction: int) -> tuple[Any, ...]:
+        """As `maps`, between reduced pictures; each made once."""
+        if reduction not in self._maps_by_reduction:
+            r1, r2, p1, p2 = self._solved
+            sides = (self.rig.left, r1, p1), (self.rig.right, r2, p2)
+            self._maps_by_reduction[reduction] = tuple(
+                part
+                for camera, rotation, projection in sides
+                for part in lens_maps(
+                    _reduce_camera(camera, reduction),
+                    rotation,
+                    _reduce_matrix(projection, reduction),
+                )
+            )
+        return self._maps_by_reduction[reduction]
 
     def _check(self, left: Image, right: Image) -> None:
         for picture in (left, right):
@@ -297,6 +309,21 @@ def _reached(box: Box, band_px: tuple[float, float]) -> tuple[Box, Box]:
     first = box.x - math.ceil(band_px[1]) - TAPS_PX
     last = box.x + box.width - math.floor(band_px[0]) + TAPS_PX
     return box, replace(box, x=first, width=last - first)
+
+
+def _reduce_camera(camera: Camera, reduction: int) -> Camera:
+    """Of pictures whose pixels are means of blocks; one that is not full is left out."""
+    width, height = camera.width // reduction, camera.height // reduction
+    return replace(
+        camera, matrix=_reduce_matrix(camera.matrix, reduction), width=width, height=height
+    )
+
+
+def _reduce_matrix(matrix: FloatArray, reduction: int) -> FloatArray:
+    """A camera's matrix (3, n) of pictures whose pixels are means of blocks."""
+    shift = 0.5 / reduction - 0.5
+    scaling = np.array([[1 / reduction, 0.0, shift], [0.0, 1 / reduction, shift], [0.0, 0.0, 1.0]])
+    return np.asarray(scaling @ matrix)
 
 
 def _reduce(values: NDArray[Any], reduction: int) -> NDArray[Any]:
