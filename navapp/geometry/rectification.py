@@ -12,7 +12,6 @@ from navapp.errors import RigError
 from navapp.geometry.bands import in_row_bands, run_both
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
-from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -112,9 +111,6 @@ class Rectifier:
     # R1, R2 (3, 3) and P1, P2 (3, 4) that another program has rectified with, instead of ours.
     given: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
     _solved: tuple[Any, ...] = field(init=False, repr=False)
-    _maps_by_reduction: dict[int, tuple[Any, ...]] = field(
-        init=False, repr=False, default_factory=dict
-    )
 
     def __post_init__(self) -> None:
         rig = self.rig
@@ -178,12 +174,12 @@ class Rectifier:
         Raises:
             ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
         """
-        self._check(left, right)
+        self.check(left, right)
         whole = Box(0, 0, self.rig.width, self.rig.height)
         inside = whole if box is None else box.clip(whole.width, whole.height)
         in_left, in_right = whole, whole
         if band_px is not None:
-            in_left, in_right = _reached(inside, band_px)
+            in_left, in_right = find_reached(inside, band_px)
         if self.interpolation == "bilinear":
             greys = (luma(left), luma(right)) if is_grey else (left, right)
             return self._bilinear(greys, (in_left, in_right), inside)
@@ -199,58 +195,12 @@ class Rectifier:
         )
         return RectifiedPair(*pictures, self.geometry, inside)
 
-    def rectify_reduced(
-        self,
-        left: Image,
-        right: Image,
-        reduction: int,
-        box: Box,
-        band_px: tuple[float, float],
-    ) -> RectifiedPair:
-        """Both pictures, grey, at 1/reduction of their resolution: to tell what lies where.
-
-        Made from reduced pictures, in a fraction of the time that `rectify` takes. A last row or
-        column that fills no block is left out.
-
-        Args:
-            left: picture of the left camera.
-            right: of the right one.
-            reduction: rows and columns of a block that becomes one pixel.
-            box: region of interest in the reduced, rectified left view.
-            band_px: smallest and largest disparity, in reduced pixels. Only the box, what it
-                reaches in the right picture, and `TAPS_PX` around are made; the rest is 0.
+    def check(self, left: Image, right: Image) -> None:
+        """Refuse what `rectify` would refuse.
 
         Raises:
-            ValueError: as `rectify`.
+            ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
         """
-        self._check(left, right)
-        geometry, maps = self.geometry.reduced(reduction), self._reduced_maps(reduction)
-        inside = box.clip(geometry.width, geometry.height)
-        in_left, in_right = _reached(inside.grow(TAPS_PX), band_px)
-        return RectifiedPair(
-            _resample_reduced(left, reduction, maps[:2], in_left),
-            _resample_reduced(right, reduction, maps[2:], in_right),
-            geometry,
-            inside,
-        )
-
-    def _reduced_maps(self, reduction: int) -> tuple[Any, ...]:
-        """As `maps`, between reduced pictures; each made once."""
-        if reduction not in self._maps_by_reduction:
-            r1, r2, p1, p2 = self._solved
-            sides = (self.rig.left, r1, p1), (self.rig.right, r2, p2)
-            self._maps_by_reduction[reduction] = tuple(
-                part
-                for camera, rotation, projection in sides
-                for part in lens_maps(
-                    _reduce_camera(camera, reduction),
-                    rotation,
-                    _reduce_matrix(projection, reduction),
-                )
-            )
-        return self._maps_by_reduction[reduction]
-
-    def _check(self, left: Image, right: Image) -> None:
         for picture in (left, right):
             if picture.shape[:2] != (self.rig.height, self.rig.width):
                 raise ValueError(
@@ -304,58 +254,11 @@ def luma(picture: Image) -> Image:
     return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
 
-def _reached(box: Box, band_px: tuple[float, float]) -> tuple[Box, Box]:
+def find_reached(box: Box, band_px: tuple[float, float]) -> tuple[Box, Box]:
     """The box, and what its disparities and interpolation reach in the right picture."""
     first = box.x - math.ceil(band_px[1]) - TAPS_PX
     last = box.x + box.width - math.floor(band_px[0]) + TAPS_PX
     return box, replace(box, x=first, width=last - first)
-
-
-def _reduce_camera(camera: Camera, reduction: int) -> Camera:
-    """Of pictures whose pixels are means of blocks; one that is not full is left out."""
-    width, height = camera.width // reduction, camera.height // reduction
-    return replace(
-        camera, matrix=_reduce_matrix(camera.matrix, reduction), width=width, height=height
-    )
-
-
-def _reduce_matrix(matrix: FloatArray, reduction: int) -> FloatArray:
-    """A camera's matrix (3, n) of pictures whose pixels are means of blocks."""
-    shift = 0.5 / reduction - 0.5
-    scaling = np.array([[1 / reduction, 0.0, shift], [0.0, 1 / reduction, shift], [0.0, 0.0, 1.0]])
-    return np.asarray(scaling @ matrix)
-
-
-def _reduce(values: NDArray[Any], reduction: int) -> NDArray[Any]:
-    """(h // reduction, w // reduction) means of the blocks of (h, w) values."""
-    import cv2
-
-    height, width = (length // reduction for length in values.shape[:2])
-    even = values[: reduction * height, : reduction * width]
-    return np.asarray(cv2.resize(even, (width, height), interpolation=cv2.INTER_AREA))
-
-
-def _resample_reduced(
-    picture: Image, reduction: int, maps: tuple[NDArray[np.float32], ...], part: Box
-) -> Image:
-    """A part of a reduced grey picture at real places (h, w), x and y, linear; 0 beside it."""
-    import cv2
-
-    height, width = maps[0].shape
-    resampled = np.zeros((height, width), dtype=np.uint8)
-    part = part.clip(width, height)
-    if part.is_empty:
-        return resampled
-    x, y = (places[part.slices] for places in maps)
-    first_x, first_y = (math.floor(places.min()) for places in (x, y))
-    n_columns, n_rows = math.ceil(x.max()) - first_x + 1, math.ceil(y.max()) - first_y + 1
-    asked = Box(first_x, first_y, n_columns, n_rows).clip(width, height)
-    if not asked.is_empty:
-        block = Box(*(reduction * n for n in (asked.x, asked.y, asked.width, asked.height)))
-        reduced = _reduce(luma(picture[block.slices]), reduction)
-        places = x - np.float32(asked.x), y - np.float32(asked.y)
-        resampled[part.slices] = cv2.remap(reduced, *places, cv2.INTER_LINEAR)
-    return resampled
 
 
 def _luma_for(picture: Image, places: "Places", part: Box) -> Image:

@@ -3,8 +3,9 @@
 To tell what stands where, for example a hand in front of a bone; never to measure with.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,9 @@ class NearerSearch:
     nearest_px: float  # largest disparity of anything in view
     # the same pictures, rectified at 1/so much of their resolution, in a box of the reduced left
     # view and as far as a band of disparities reaches.
-    rectify_reduced: Callable[[int, Box, tuple[float, float]], RectifiedPair]
+    rectify: Mapping[int, Callable[[Box, tuple[float, float]], RectifiedPair]]
+
+    REDUCTIONS: ClassVar[tuple[int, int]] = (2, 4)  # asked for by maps at full, at half resolution
 
 
 def fill_surroundings(coarse: CoarseMap, nearer: NearerSearch | None = None) -> Surroundings:
@@ -92,7 +95,7 @@ def _add_nearer(matched: CoarseMatch, gap: Box, nearer: NearerSearch) -> TwoView
     if most_px <= high + _BEYOND_PX:
         return found
     half_px = low / 2.0, most_px / 2.0
-    half = nearer.rectify_reduced(2 * scale, half_box(gap), half_px)
+    half = nearer.rectify[2 * scale](half_box(gap), half_px)
     near = match_census(half, half_px, _NEAR_CENSUS)
     least_px = high + _BEYOND_PX
     near_px = np.float32(2.0) * double(near.left.disparity_px, gap)

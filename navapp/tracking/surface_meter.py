@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.geometry.masks import large_regions
 from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
+from navapp.geometry.reduced_rectification import ReducedRectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of
@@ -109,6 +110,7 @@ class SurfaceMeter:
         self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
         self.rectifier = Rectifier(rig)
         self.geometry = self.rectifier.geometry
+        self._reduced = {n: ReducedRectifier(self.rectifier, n) for n in NearerSearch.REDUCTIONS}
         # Several steps ask for the same few poses. No method: it would keep the meter alive.
         bounds = partial(bounds_of, model.hull_mm, geometry=self.geometry)
         self._bounds = lru_cache(_KEPT_BOUNDS)(bounds)
@@ -122,8 +124,8 @@ class SurfaceMeter:
 
     def make_nearer_search(self, left: Image, right: Image) -> NearerSearch:
         """How to look for what stands before the depths that were rectified, up to the nearest."""
-        rectify_reduced = partial(self.rectifier.rectify_reduced, left, right)
-        return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify_reduced)
+        rectify = {n: partial(one.rectify, left, right) for n, one in self._reduced.items()}
+        return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify)
 
     def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None

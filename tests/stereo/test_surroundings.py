@@ -1,7 +1,7 @@
 """A dense map around a surface: what is matched, what is a guess, what stands before the band."""
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import ceil, floor
 
 import cv2
@@ -54,7 +54,8 @@ def hand_before_wall(box: Box = INSIDE) -> RectifiedPair:
 def fill(
     pair: RectifiedPair, band_px: tuple[float, float], nearest_px: float = 0.0
 ) -> DisparityMap:
-    nearer = NearerSearch(nearest_px, lambda *asked: reduced(pair, *asked))
+    rectify = {n: partial(reduced, pair, n) for n in NearerSearch.REDUCTIONS}
+    nearer = NearerSearch(nearest_px, rectify)
     return whole(fill_surroundings(match_coarsely(pair, band_px), nearer))
 
 

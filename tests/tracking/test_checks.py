@@ -22,7 +22,7 @@ NO_CLOUD = SurfaceCloud(
     np.empty((0, 3)), np.empty(0), np.empty((0, 2), np.int32), np.empty(0, np.uint8)
 )
 
-NOTHING_NEARER = NearerSearch(0.0, lambda *_: blank_pair())
+NOTHING_NEARER = NearerSearch(0.0, {})
 
 
 def measurement(*, is_on_model: bool = False) -> Measurement:
