@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 PEERS  := .venv-peers
 STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cut -d' ' -f1)
 
-# Without the bytecode every worker would compile all tests again.
+# Without the bytecode, made once (bytecode), every worker would compile all tests again.
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 # Compiled code does not check its indices: kernels run again with the check, and with a cache of
 # their own, because the cache does not know about that switch. Most of the time goes into
@@ -41,15 +41,22 @@ help:           ## this list
 run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
-test: setup check  ## style, types, import rules and the tests: some minutes
-	# One worker more than two cores carry: some tests wait in real time.
-	$(PYTEST) -n 3 --dist loadgroup
+test: setup  ## style, types, import rules and the tests: some minutes
+	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels
+	# More workers than cores: some tests wait in real time.
+	$(PYTEST) -n 4 --dist loadgroup
+
+test-all: setup check bytecode  ## the release gate: as test, with every case of every test
+	$(PYTEST) -n 4 --dist loadgroup --release
+	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
+
+.PHONY: bytecode checked-kernels
+bytecode: setup
+	@$(PYTEST) -q --collect-only --release >/dev/null
+
+checked-kernels: setup
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
-
-test-all: setup check  ## the release gate: as test, with every case of every test
-	$(PYTEST) -n 3 --dist loadgroup --release
-	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -87,7 +87,7 @@ do = "register"
 [[step]]
 do = "stage"
 stage = "opening"
-at_frame = 12
+at_frame = 9
 """
 
 
@@ -98,13 +98,13 @@ def test_two_bones_are_followed_at_once_and_replay_to_the_same_poses(
     script, session = tmp_path / "script.toml", tmp_path / "session"
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     script.write_text(TWO_BONES, encoding="utf-8")
-    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "20"]
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "14"]
     options += ["--operator", str(script), "--record", str(session)]
     assert run([*options, "--json", str(first)]) == 0
     frames = result(first)["frames"]
     for bone, other in (("tibia", "femur"), ("femur", "tibia")):
         its_turns = [f for f in frames if f["bone"] == bone and f["bodies"]]
-        assert len(its_turns) >= 3
+        assert len(its_turns) >= 2
         assert all(set(frame["bodies"]) == {other} for frame in its_turns)
         assert all(b["index"] - a["index"] == 2 for a, b in itertools.pairwise(its_turns))
         said = [frame["bodies"][other] for frame in its_turns]
@@ -188,7 +188,7 @@ def test_nothing_found_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixt
     other = tmp_path / "other.toml"
     other.write_text("[camera.simulated]\nseed = 1\n", encoding="utf-8")
     plan = make_foreign_plan(tmp_path)
-    options = ["--quiet", "--config", str(other), "run", "--headless", "--frames", "2"]
+    options = ["--quiet", "--config", str(other), "run", "--headless", "--frames", "1"]
     assert run([*options, "--plan", str(plan)]) == 4
     assert "no frame was OK" in capsys.readouterr().err
 

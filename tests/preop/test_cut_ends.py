@@ -118,9 +118,9 @@ def test_what_is_hardly_a_surface_has_no_caps(points) -> None:
     assert not on_flat_caps(TriangleMesh(points, faces)).any()
 
 
-def test_the_joints_surfaces_of_simulated_bones_are_no_caps() -> None:
+def test_the_joints_surfaces_of_simulated_bones_are_no_caps(people) -> None:
     """Some of their patellae have facets as flat as a cut."""
-    for knee in knees():
+    for knee in people:
         for name, sign in (("femur", -1.0), ("tibia", 1.0), ("patella", 0.0)):
             mesh = knee.bones[name]
             height = sign * (mesh.vertices_mm[:, 2] - mesh.centroid_mm[2])

@@ -27,9 +27,9 @@ SAME = (
 
 
 @pytest.fixture(scope="module")
-def found():
+def found(people):
     """Of every knee: the simulator's landmarks and ours."""
-    return [(knee, estimate_landmarks(bones_of(knee))) for knee in knees()]
+    return [(knee, estimate_landmarks(bones_of(knee))) for knee in people]
 
 
 def shaft_axis(landmarks):
@@ -40,8 +40,8 @@ def shaft_axis(landmarks):
 @pytest.mark.parametrize("name", SAME)
 def test_landmarks_lie_where_the_simulator_has_them_and_say_how_sure_they_are(found, name) -> None:
     pairs = [(ours[name], knee.landmarks[name]) for knee, ours in found if name in ours]
-    # A flat extremum may be none, for a few.
-    assert len(pairs) >= 0.8 * len(found)
+    # A flat extremum may be none: for two, or one in five.
+    assert len(found) - len(pairs) <= max(2.0, 0.2 * len(found))
     shares = [np.linalg.norm(one.point_mm - true) / one.sd_mm for one, true in pairs]
     assert np.sqrt(np.mean(np.square(shares))) < 1.2
     assert max(shares) < 3.0

@@ -442,16 +442,16 @@ def test_what_is_smaller_than_a_kernel_fits_everywhere() -> None:
     assert "the scene is too small to fix a bone" in found.details
 
 
-def test_a_scene_that_holds_no_bone_is_no_registration() -> None:
+@pytest.mark.parametrize("seed", few_of(range(4)))
+def test_a_scene_that_holds_no_bone_is_no_registration(seed: int) -> None:
     """A noisy sheet lies against a bone's flank well enough: its residuals are no noise."""
-    rng = np.random.default_rng(4)
-    middle = TRUE.apply(MODEL.centre_mm)
-    for seed in range(4):
-        place = np.random.default_rng(seed).uniform(-1.0, 1.0, (600, 2)) * (40.0, 12.0)
-        sheet = middle + np.column_stack([place, rng.normal(-25.0, 0.3, 600)])
-        for camera in (EYE, None):
-            found = register(Scene(sheet, camera), MODEL, disturbed(MODEL, 10.0, 8.0, seed))
-            assert found.outcome is not Outcome.CONVERGED
+    rng = np.random.default_rng(seed)
+    place = rng.uniform(-1.0, 1.0, (600, 2)) * (40.0, 12.0)
+    off_mm = np.column_stack([place, rng.normal(-25.0, 0.3, 600)])
+    sheet = TRUE.apply(MODEL.centre_mm) + off_mm
+    for camera in (EYE, None):
+        found = register(Scene(sheet, camera), MODEL, disturbed(MODEL, 10.0, 8.0, seed))
+        assert found.outcome is not Outcome.CONVERGED
 
 
 @pytest.mark.parametrize("rough_mm", [0.15, 0.3])
