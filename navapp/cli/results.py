@@ -57,6 +57,7 @@ def _answer_to_json(
         "timing_ms": {
             "rectify": timings.rectify_ms,
             "stereo": timings.stereo_ms,
+            "nearer": timings.nearer_beside_ms,
             "fill": timings.fill_ms + timings.fill_beside_ms,
             "estimate": timings.estimate_ms,
             "judge": timings.judge_ms,

@@ -16,7 +16,7 @@ from navapp.stereo.subpixel.refine import (
     refine_on_model,
     refine_samples,
 )
-from navapp.stereo.surroundings import NearerSearch, fill_surroundings
+from navapp.stereo.surroundings import NearerSearch, fill_surroundings, match_nearer
 
 __all__ = [
     "MODEL_REFINEMENT",
@@ -30,6 +30,7 @@ __all__ = [
     "fill_surroundings",
     "match_baseline",
     "match_coarsely",
+    "match_nearer",
     "match_on_support",
     "match_scene",
     "match_surface",

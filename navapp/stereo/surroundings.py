@@ -18,7 +18,7 @@ from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
 from navapp.stereo.matching.search import Crop
 from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
 from navapp.stereo.occlusion.classify import classify
-from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
+from navapp.stereo.occlusion.wls_fill import FillSettings, fill_gaps
 from navapp.values import DisparityMap, Origin, Surroundings
 
 # All chosen, on simulated knees with a hand (`python -m tests.bench.foreground --first 1`).
@@ -47,28 +47,37 @@ class NearerSearch:
     REDUCTIONS: ClassVar[tuple[int, int]] = (2, 4)  # asked for by maps at full, at half resolution
 
 
-def fill_surroundings(coarse: CoarseMap, nearer: NearerSearch | None = None) -> Surroundings:
+def match_nearer(coarse: CoarseMap, nearer: NearerSearch) -> CoarseMap:
+    """The map, its matches joined with those of what stands before the searched band.
+
+    That leaves a wide gap in the matches; without one the map is returned as it is. Its calm
+    disparities stay: they tell of the band alone.
+    """
+    matched = coarse.matched
+    gap = None if matched is None else _find_wide_gaps(matched.found.left)
+    if matched is None or gap is None:
+        return coarse
+    return replace(coarse, matched=replace(matched, found=_add_nearer(matched, gap, nearer)))
+
+
+def fill_surroundings(coarse: CoarseMap) -> Surroundings:
     """The matches of a coarse map, their gaps filled by weighted least squares.
 
-    What stands before the searched band is matched too, if `nearer` tells how. A match that hangs
-    over the edge of something near is withdrawn, gaps are classified and filled (`fill_wls`), and
-    filled pixels nearer than their occlusion allows become unknown (`drop_beyond_bound`). A filled
-    pixel has its class as origin: its disparity is a guess.
+    A match that hangs over the edge of something near is withdrawn, gaps are classified and filled
+    (`fill_gaps`), and filled pixels nearer than their occlusion allows become unknown
+    (`drop_beyond_bound`). A filled pixel has its class as origin: its disparity is a guess.
     """
     matched = coarse.matched
     if matched is None:
         unknown = np.full_like(coarse.disparity_px, np.nan)
         return Surroundings(unknown, np.zeros(unknown.shape, dtype=np.uint8), coarse.box, False)
     pair, found = matched.pair, matched.found
-    gap = _find_wide_gaps(found.left)
-    if gap is not None and nearer is not None:
-        found = _add_nearer(matched, gap, nearer)
     # The half of an odd picture lacks its last column or row, the half of a box has it.
     picture = Crop.of(pair.left, pair.box, (0, 0)).inner
     classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
-    filled = fill_wls(found.left, picture, found.confidence, classes, _FILL)
-    drop_beyond_bound(filled.disparity_px, filled.origin, _EDGE_PX, _LAYER_PX)
-    return Surroundings(filled.disparity_px, filled.origin, coarse.box, matched.is_half)
+    disparity_px, origin = fill_gaps(found.left, picture, found.confidence, classes, _FILL)
+    drop_beyond_bound(disparity_px, origin, _EDGE_PX, _LAYER_PX)
+    return Surroundings(disparity_px, origin, coarse.box, matched.is_half)
 
 
 def _find_wide_gaps(left: DisparityMap) -> Box | None:

@@ -17,6 +17,7 @@ from navapp.stereo import (
     NearerSearch,
     StereoHealth,
     fill_surroundings,
+    match_nearer,
     measure_health,
 )
 from navapp.tracking.agreement import compare
@@ -50,7 +51,7 @@ class PairChecks:
     ) -> None:
         self._meter, self._pair, self._coarse = meter, pair, coarse
         self._nearer = nearer
-        self._filling: Job[tuple[Surroundings | None, float]] | None = None
+        self._filling: Job[_Filled] | None = None
         self._begun: tuple[Measurement, Job[PairCheck]] | None = None
 
     def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
@@ -72,10 +73,10 @@ class PairChecks:
         if self._filling is None:
             return None
         is_new = not self._filling.is_fetched
-        filled, beside_ms = self._filling.result()
+        filled = self._filling.result()
         if is_new:
-            watch.add_fill_beside(beside_ms)
-        return filled
+            watch.add_beside(filled.nearer_beside_ms, filled.fill_beside_ms)
+        return filled.surroundings
 
     def __enter__(self) -> Self:
         return self
@@ -96,15 +97,26 @@ class PairChecks:
             self._begun[1].drop()
 
 
-def _fill_timed(
-    coarse_job: Job[CoarseMap | None], nearer: NearerSearch, asking: int
-) -> tuple[Surroundings | None, float]:
-    """A coarse map with its gaps filled, and the ms it took if another thread than `asking` did."""
+class _Filled(NamedTuple):
+    """A coarse map with its gaps filled, and what that took where it was not the asking thread."""
+
+    surroundings: Surroundings | None
+    nearer_beside_ms: float = 0.0  # of the search for what stands before the band
+    fill_beside_ms: float = 0.0
+
+
+def _fill_timed(coarse_job: Job[CoarseMap | None], nearer: NearerSearch, asking: int) -> _Filled:
     coarse = coarse_job.result()
+    if coarse is None:
+        return _Filled(None)
     began_ns = time.perf_counter_ns()
-    filled = None if coarse is None else fill_surroundings(coarse, nearer)
-    took_ms = (time.perf_counter_ns() - began_ns) / 1e6
-    return filled, 0.0 if threading.get_ident() == asking else took_ms
+    coarse = match_nearer(coarse, nearer)
+    matched_ns = time.perf_counter_ns()
+    filled = fill_surroundings(coarse)
+    filled_ns = time.perf_counter_ns()
+    if threading.get_ident() == asking:
+        return _Filled(filled)
+    return _Filled(filled, (matched_ns - began_ns) / 1e6, (filled_ns - matched_ns) / 1e6)
 
 
 # Not a method: a job that knew its checks would keep them, and a frame's pictures, alive.

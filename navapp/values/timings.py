@@ -17,7 +17,9 @@ class FrameTimings:
     estimate_ms: float = 0.0
     judge_ms: float = 0.0
     overlay_ms: float = 0.0
-    fill_beside_ms: float = 0.0  # of a fill on the helper, beside the other parts
+    # of the search before the band and of a fill on the helper, beside the other parts.
+    nearer_beside_ms: float = 0.0
+    fill_beside_ms: float = 0.0
 
     @property
     def total_ms(self) -> float:
@@ -50,10 +52,10 @@ class Stopwatch:
                 self._parts_ms[name] = self._parts_ms.get(name, 0.0) + part_ms
         self._lap_began_ns = time.perf_counter_ns()
 
-    def add_fill_beside(self, fill_ms: float) -> None:
-        """What the helper took for a fill; the lap goes on."""
-        name = "fill_beside_ms"
-        self._parts_ms[name] = self._parts_ms.get(name, 0.0) + fill_ms
+    def add_beside(self, nearer_ms: float, fill_ms: float) -> None:
+        """What the helper took for a search before the band and for a fill; the lap goes on."""
+        for name, part_ms in (("nearer_beside_ms", nearer_ms), ("fill_beside_ms", fill_ms)):
+            self._parts_ms[name] = self._parts_ms.get(name, 0.0) + part_ms
 
     @property
     def timings(self) -> FrameTimings:

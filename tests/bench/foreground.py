@@ -43,8 +43,8 @@ Mask = NDArray[np.bool_]
 # By thresholds (px, mm): pixels of the occluder marked and in all, of the bone, guesses and all.
 Counts = dict[tuple[int, float], NDArray[np.float64]]
 
-# ms beside the fit, and in turn.
-FillTimes = tuple[float, float]
+# ms of the fill beside the fit and in turn, and of the search for what stands before the band.
+FillTimes = tuple[float, float, float]
 
 FIRST_SEED = 301
 _GRID = [(near_px, mm) for near_px in (0, 1, 2, 3, 4, 5) for mm in (3.0, 4.0, 5.0, 6.0, 8.0)]
@@ -80,9 +80,9 @@ def main() -> int:
     pairs = _GRID if options.grid else [(NEAR_PX, IN_FRONT_MM)]
     print(
         "| sequence | near, in front | OK | occluder marked | bone marked | of it a guess | "
-        "fill, beside the fit | in turn |"
+        "fill, beside the fit | in turn | search before the band |"
     )
-    print("|---|---|---|---|---|---|---|---|")
+    print("|---|---|---|---|---|---|---|---|---|")
     pooled = {pair: np.zeros(6) for pair in pairs}
     pooled_ms: list[FillTimes] = []
     is_good, is_first, n_pooled = True, True, 0
@@ -147,7 +147,8 @@ def _judge(
         return
     assert tracked.foreground is not None
     assert tracked.left_from_bone is not None
-    fill_ms.append((tracked.timings.fill_beside_ms, tracked.timings.fill_ms))
+    times = tracked.timings
+    fill_ms.append((times.fill_beside_ms, times.fill_ms, times.nearer_beside_ms))
     geometry, told = tracker.meter.geometry, tracked.foreground
     surroundings = told.surroundings
     pose = tracker.rectify_pose(tracked.left_from_bone)

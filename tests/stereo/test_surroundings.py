@@ -14,6 +14,7 @@ from navapp.stereo import (
     NearerSearch,
     fill_surroundings,
     match_coarsely,
+    match_nearer,
     surroundings,
 )
 from navapp.stereo.coarse import CoarseMap
@@ -56,7 +57,7 @@ def fill(
 ) -> DisparityMap:
     rectify = {n: partial(reduced, pair, n) for n in NearerSearch.REDUCTIONS}
     nearer = NearerSearch(nearest_px, rectify)
-    return whole(fill_surroundings(match_coarsely(pair, band_px), nearer))
+    return whole(fill_surroundings(match_nearer(match_coarsely(pair, band_px), nearer)))
 
 
 def reduced(

@@ -61,7 +61,24 @@ def fill_wls(
     classes: NDArray[np.uint8],
     settings: FillSettings | None = None,
 ) -> DisparityMap:
-    """The map with its classified pixels filled; every other pixel keeps all its bits.
+    """The map with its classified pixels filled, as of `fill_gaps`.
+
+    Filled pixels have a large sigma: they make a picture whole, they measure nothing.
+    """
+    disparity, origin = fill_gaps(left, picture, confidence, classes, settings)
+    sigma = where(classes == 0, left.sigma_px, _FILLED_SIGMA_PX)
+    sigma = where(origin != Origin.UNKNOWN, sigma, np.nan)
+    return DisparityMap(disparity, sigma, origin, left.x, left.y)
+
+
+def fill_gaps(
+    left: DisparityMap,
+    picture: NDArray[np.uint8],
+    confidence: NDArray[np.float32],
+    classes: NDArray[np.uint8],
+    settings: FillSettings | None = None,
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Disparity and origin (h, w) with classified pixels filled; the others keep all their bits.
 
     Args:
         left: of the left view, or a mirrored one of the right view (`occlusion.classify.mirrored`).
@@ -71,8 +88,7 @@ def fill_wls(
         settings: of the fit.
 
     Returns:
-        Filled pixels have their class as origin and a large sigma: they make a picture whole, they
-        measure nothing. What nothing may speak for is unknown.
+        Filled pixels have their class as origin. What nothing may speak for is unknown.
 
     Raises:
         ValueError: sizes that differ.
@@ -93,9 +109,7 @@ def fill_wls(
     told = _fit_all(scene, settings)
     disparity, origin = np.empty_like(told), np.empty_like(scene.origin)
     in_two_shares(lambda *rows: calm_rows(scene, told, *rows, disparity, origin))
-    sigma = where(classes == 0, left.sigma_px, _FILLED_SIGMA_PX)
-    sigma = where(origin != Origin.UNKNOWN, sigma, np.nan)
-    return DisparityMap(disparity, sigma, origin, left.x, left.y)
+    return disparity, origin
 
 
 def support_radius_px(matched_px: NDArray[np.float32]) -> int:
