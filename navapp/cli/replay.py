@@ -69,6 +69,13 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--fps", type=float, metavar="F", help="rate where there are no times (15)")
     parser.add_argument("--split", choices=("side-by-side",), help="one video holds both pictures")
     parser.add_argument("--overlay", metavar="DIR", help="write a picture of every frame")
+    parser.add_argument("--png", action="store_true", help="lossless pictures in --overlay")
+    parser.add_argument("--video", metavar="FILE.mp4", help="write the pictures as a video")
+    parser.add_argument(
+        "--layers",
+        metavar="NAME,...",
+        help="layers of the overlay that are drawn (default: those of the stage)",
+    )
     parser.add_argument(
         "--allow-unaccepted", action="store_true", help="use a rig that was not accepted"
     )
@@ -111,7 +118,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             check_start(specification.prior, bone)
     opened = open_recording(options.sequence, settings, rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
-    seconds, failure = _run_session(replay, opened, log, options.overlay)
+    seconds, failure = _run_session(replay, opened, log, options, settings.rate_hz)
     frames = [frame_to_json(result, {}) for result in log.results]
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
@@ -119,19 +126,26 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 
 def _run_session(
-    replay: _Replay, opened: "OpenedDevices", log: "FrameLog", overlay: str | None
+    replay: _Replay,
+    opened: "OpenedDevices",
+    log: "FrameLog",
+    options: argparse.Namespace,
+    rate_hz: float,
 ) -> "tuple[float, NavappError | None]":
     """Handle all frames; the seconds that they took, and the fault in which the session ended."""
     from navapp.cli.headless import run_session
-    from navapp.cli.overlay_folder import OverlayFolder
+    from navapp.cli.overlay_files import OverlayFolder, OverlayVideo
     from navapp.control.controller import SessionController
     from navapp.control.event_log import SessionHooks
 
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         listeners: list[FrameListener] = [log]
-        if overlay is not None:
-            listeners.append(undo.enter_context(OverlayFolder(overlay)).add)
+        if options.overlay is not None:
+            folder = OverlayFolder(options.overlay, is_lossless=options.png)
+            listeners.append(undo.enter_context(folder).add)
+        if options.video is not None:
+            listeners.append(undo.enter_context(OverlayVideo(options.video, rate_hz)).add)
         controller = SessionController(
             opened.devices,
             replay.specification,
@@ -151,6 +165,8 @@ def _check(options: argparse.Namespace) -> None:
         raise UsageError(
             "--order each follows no bone from frame to frame", remedy="leave --also out"
         )
+    if options.png and options.overlay is None:
+        raise UsageError("--png is of the pictures of --overlay", remedy="add --overlay DIR")
     check_writable(options.json)
 
 
@@ -202,6 +218,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         method=method,
         follows_refused=options.follow_refused or is_recorded_so or None,
         others=others,
+        layers=_layers(options.layers),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
     return _Replay(
@@ -212,6 +229,20 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         list_warnings(session, options),
         find_moved_rig(session, options),
     )
+
+
+def _layers(names: str | None) -> tuple[str, ...] | None:
+    """The layers of a list of names; None for the stage's own."""
+    from navapp.overlay import LAYERS
+
+    if names is None:
+        return None
+    layers = tuple(name.strip() for name in names.split(",") if name.strip())
+    unknown = [name for name in layers if name not in LAYERS]
+    if unknown:
+        known = ", ".join(LAYERS)
+        raise UsageError(f"there is no layer '{unknown[0]}'", remedy=f"choose of {known}")
+    return layers
 
 
 def _stages(

@@ -18,6 +18,7 @@ from navapp.control.states import (
     Reject,
     Show,
     ToggleDepth,
+    ToggleLayer,
 )
 from navapp.errors import SequenceError
 from navapp.geometry.transform import RigidTransform
@@ -41,6 +42,8 @@ def command_to_json(command: Command) -> dict[str, Any]:
     """A command as a JSON object."""
     if isinstance(command, EnterStage):
         return {"command": "stage", "number": command.number}
+    if isinstance(command, ToggleLayer):
+        return {"command": "layer", "name": command.name}
     if isinstance(command, Propose):
         pose = command.left_from_bone
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
@@ -61,6 +64,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
     try:
         if name == "stage":
             return EnterStage(int(value["number"]))
+        if name == "layer":
+            return ToggleLayer(str(value["name"]))
         if name == "propose":
             matrix = value["camera_from_model"]
             return Propose(RigidTransform("left", str(value["bone"]), matrix))

@@ -24,8 +24,10 @@ from navapp.control.states import (
     SessionState,
     Show,
     ToggleDepth,
+    ToggleLayer,
 )
 from navapp.errors import UsageError
+from navapp.overlay import LAYERS
 from navapp.values import Plan, Status
 
 
@@ -67,6 +69,8 @@ class CommandHandler:
                 self._on_show()
             case ToggleDepth():
                 self._session.toggle_depth()
+            case ToggleLayer():
+                self._on_toggle_layer(command)
             case EnterStage():
                 self._on_enter_stage(command)
             case Reconnect():
@@ -131,6 +135,12 @@ class CommandHandler:
         if self._display.is_blanked:
             self._display.show_again()
             self._session.add_event("show", "display shown again")
+
+    def _on_toggle_layer(self, command: ToggleLayer) -> None:
+        if command.name not in LAYERS:
+            self._refuse("layer", f"there is no layer '{command.name}'")
+            return
+        self._session.toggle_layer(command.name)
 
     def _on_enter_stage(self, command: EnterStage) -> None:
         try:

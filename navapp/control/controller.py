@@ -36,7 +36,7 @@ from navapp.control.specification import SessionSpecification
 from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
-from navapp.overlay import DepthMarks, make_preview
+from navapp.overlay import DepthMarks, LeftView, make_preview
 from navapp.tracking import make_tracker
 from navapp.values import FrameTimings, OverlayMode, OverlayPicture
 
@@ -72,7 +72,7 @@ class SessionController:
         rig, plan = specification.rig, specification.plan
         self._overlay_valid_ms = specification.overlay_valid_ms
         self._devices = devices
-        self._rig = rig
+        self._viewpoint = LeftView(rig)
         self._depth_marks = DepthMarks(rig)
         self._plan = plan
         self._executor = executor
@@ -199,7 +199,9 @@ class SessionController:
         """Compose, show until it expires, keep a preview; also how long composing took."""
         started_ns = time.perf_counter_ns()
         mark = "SIMULATED" if snapshot.is_simulated else ""
-        image = compose(frame.left, snapshot, self._rig, self._plan, mark)
+        tracked = self._session.tracked
+        foreground = None if tracked is None else tracked.foreground
+        image = compose(frame.left, snapshot, self._viewpoint, self._plan, mark, foreground)
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
@@ -209,8 +211,8 @@ class SessionController:
         if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
         preview = make_preview(image)
-        if self._session.shows_depth and self._session.tracked is not None:
-            preview = self._depth_marks.draw(preview, self._session.tracked.foreground)
+        if self._session.shows_depth:
+            preview = self._depth_marks.draw(preview, foreground)
         self._session.keep_preview(preview)
         age_ns = self._session.now_ns - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
@@ -239,4 +241,5 @@ def _make_session(
         RegistrationJob(trackers, executor),
         OtherBones(tracks, plan, specification.others),
         specification.stage,
+        specification.layers,
     )

@@ -4,25 +4,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.control.states import SessionState, Snapshot
-from navapp.geometry.rig import StereoRig
-from navapp.overlay import compose_video
-from navapp.overlay.layers import Scene
-from navapp.values import Plan, Status
+from navapp.overlay import Scene, Viewpoint, compose_video
+from navapp.values import Foreground, Plan, Status
 
 Image = NDArray[np.uint8]
 
 
-def compose(left: Image, snapshot: Snapshot, rig: StereoRig, plan: Plan, mark: str) -> Image:
+def compose(
+    left: Image,
+    snapshot: Snapshot,
+    viewpoint: Viewpoint,
+    plan: Plan,
+    mark: str,
+    foreground: Foreground | None = None,
+) -> Image:
     """The left picture with guides, a marked candidate, or the reason why there are none.
 
     Args:
         left: picture of the frame that the snapshot's pose belongs to.
         snapshot: its `reasons` decide; nothing else does.
-        rig: whose left camera took the picture.
+        viewpoint: the left camera's.
         plan: what to draw.
         mark: words for the corner.
+        foreground: what was measured of the depth around the bone in that frame.
     """
-    return compose_video(left, _scene(snapshot, rig, plan), banner(snapshot), mark)
+    scene = _scene(snapshot, viewpoint, plan, foreground)
+    return compose_video(left, scene, banner(snapshot), mark)
 
 
 def banner(snapshot: Snapshot) -> str:
@@ -40,16 +47,19 @@ def banner(snapshot: Snapshot) -> str:
     return f"{stage} - NO GUIDES: {why}"
 
 
-def _scene(snapshot: Snapshot, rig: StereoRig, plan: Plan) -> Scene | None:
+def _scene(
+    snapshot: Snapshot, viewpoint: Viewpoint, plan: Plan, foreground: Foreground | None
+) -> Scene | None:
     """What may be drawn; None for no guides."""
     is_reviewed = snapshot.state is SessionState.REVIEW and not snapshot.is_blanked
     is_candidate = is_reviewed and not _is_lost(snapshot)
-    bone = plan.bones.get(snapshot.stage.bone)
-    if bone is None or snapshot.left_from_bone is None:
+    pose = snapshot.left_from_bone
+    if pose is None or snapshot.stage.bone not in plan.bones:
         return None
     if not (snapshot.is_navigable or is_candidate):
         return None
-    return Scene(plan, snapshot.stage, bone.mesh, snapshot.left_from_bone, rig.left, is_candidate)
+    layers = snapshot.layers
+    return Scene(plan, snapshot.stage, pose, viewpoint, is_candidate, foreground, layers)
 
 
 def _is_lost(snapshot: Snapshot) -> bool:

@@ -20,6 +20,7 @@ from navapp.control.states import (
 )
 from navapp.errors import RigError
 from navapp.geometry.transform import RigidTransform
+from navapp.overlay import LAYERS
 from navapp.values import Reason, StageSpec, Status, TrackedFrame, Verdict
 
 
@@ -33,6 +34,7 @@ class Session:
         registration: searches for the stage's bone.
         others: the other bones that are followed.
         stage: to start in.
+        layers: drawn in every stage; None: the stage's own.
     """
 
     def __init__(
@@ -43,6 +45,7 @@ class Session:
         registration: RegistrationJob,
         others: OtherBones,
         stage: StageSpec,
+        layers: tuple[str, ...] | None = None,
     ) -> None:
         self._clock = clock
         self._log = log
@@ -52,6 +55,8 @@ class Session:
         self._state = SessionState.STARTING
         self._tracked: TrackedFrame | None = None
         self._shows_depth = False
+        self._only_layers = layers
+        self._switched_layers: frozenset[str] = frozenset()
         self._tracked_at_ns = 0
         self._preview: Image | None = None
         self._meter = RateMeter()
@@ -170,6 +175,17 @@ class Session:
         """Colour the operator's picture by what is known of the depth, or no longer."""
         self._shows_depth = not self._shows_depth
         self.add_event("depth", f"depth {'marked' if self._shows_depth else 'no longer marked'}")
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the layers drawn: the stage's, but for what the operator has switched."""
+        drawn = self._only_layers if self._only_layers is not None else self._stage.layers
+        return tuple(name for name in LAYERS if (name in drawn) != (name in self._switched_layers))
+
+    def toggle_layer(self, name: str) -> None:
+        """Draw a layer, or no longer, in the stage in force and until it is left."""
+        self._switched_layers ^= {name}
+        self.add_event("layer", f"layer {name} {'on' if name in self.layers else 'off'}")
 
     def keep_preview(self, preview: Image) -> None:
         """The newest picture, made small."""
@@ -305,6 +321,7 @@ class Session:
 
     def _put_in_force(self, stage: StageSpec) -> None:
         self._stage = stage
+        self._switched_layers = frozenset()
         # What was judged by the old stage's targets and tolerance says nothing in the new one.
         self._tracked = None
         self._tracks.forget_verdicts()

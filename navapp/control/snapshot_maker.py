@@ -52,6 +52,7 @@ class SnapshotMaker:
             others=session.other_bones(now_ns),
             preview=session.preview,
             shows_depth=session.shows_depth,
+            layers=session.layers,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
             events=session.events,

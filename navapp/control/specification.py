@@ -28,6 +28,7 @@ class SessionSpecification:
     overlay_valid_ms: float = 500.0
     mirror_deg: float = 45.0  # where the mirror stood when the display was calibrated
     is_recording: bool = False  # the session is kept in a folder
+    layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
 
     @property
     def tracker_settings(self) -> TrackerSettings:
@@ -46,6 +47,7 @@ def specify_session(
     method: Method | None = None,
     follows_refused: bool | None = None,
     others: tuple[str, ...] = (),
+    layers: tuple[str, ...] | None = None,
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -60,6 +62,7 @@ def specify_session(
         method: of pose estimation; None: the configured one.
         follows_refused: poses that the judge refuses are carried on; None: as configured.
         others: bones that are registered and followed unasked.
+        layers: drawn in every stage; None: the stage's own.
     """
     display = configuration.display
     return SessionSpecification(
@@ -74,4 +77,5 @@ def specify_session(
         display.withdrawn_ms if is_live else display.valid_ms,
         configuration.mirror.calibrated_deg,
         is_live and configuration.recording.folder is not None,
+        layers,
     )

@@ -1,7 +1,7 @@
 """The five surgical stages: one declarative table.
 
 Tolerances are those of the plan's targets at that stage. Layers (`navapp.overlay.layers`) are drawn
-in the order given. Gates are what the operator confirms by entering the next stage.
+whatever the order given. Gates are what the operator confirms by entering the next stage.
 Source: the paper, section 4 (opening, drilling, implant, patella, spacer).
 """
 
@@ -16,7 +16,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_mm=2.0,
         tolerance_deg=2.0,
         targets=("femur/medial_condyle", "femur/lateral_condyle", "femur/notch"),
-        layers=("bone", "defects", "curves", "targets"),
+        layers=("bone", "defects", "risks", "targets", "scale"),
         gates=("bone exposed", "registration accepted"),
     ),
     StageSpec(
@@ -26,7 +26,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_mm=1.0,
         tolerance_deg=1.0,
         targets=("femur/notch",),
-        layers=("bone", "curves", "targets"),
+        layers=("bone", "risks", "drills", "targets", "scale"),
         gates=("entry point checked with the tip",),
         measurements=("drill angle", "drill offset", "drill depth"),
     ),
@@ -37,7 +37,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_mm=1.0,
         tolerance_deg=1.0,
         targets=("femur/medial_condyle", "femur/lateral_condyle"),
-        layers=("bone", "targets"),
+        layers=("bone", "removal", "risks", "parts", "planes", "scale"),
         gates=("cuts checked", "component size confirmed"),
         measurements=("varus or valgus", "flexion", "rotation", "resection"),
     ),
@@ -48,7 +48,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_mm=1.0,
         tolerance_deg=2.0,
         targets=("patella/centre",),
-        layers=("bone", "targets"),
+        layers=("bone", "removal", "parts", "planes", "scale"),
         gates=("thickness measured",),
         measurements=("thickness", "tilt"),
     ),
@@ -59,7 +59,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_mm=1.0,
         tolerance_deg=1.0,
         targets=("tibia/medial_plateau", "tibia/lateral_plateau"),
-        layers=("bone", "targets"),
+        layers=("bone", "removal", "parts", "planes", "scale"),
         gates=("gaps measured",),
         measurements=("medial gap", "lateral gap", "slope"),
     ),

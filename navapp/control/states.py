@@ -73,6 +73,13 @@ class ToggleDepth:
 
 
 @dataclass(frozen=True, slots=True)
+class ToggleLayer:
+    """Draw a layer of the overlay that is not drawn, or no longer draw it."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class EnterStage:
     """Go to a stage by its number, 1 to 5."""
 
@@ -110,6 +117,7 @@ Command = (
     | Blank
     | Show
     | ToggleDepth
+    | ToggleLayer
     | EnterStage
     | Reconnect
     | Interrupt
@@ -213,6 +221,7 @@ class Snapshot:
     # frame.
     preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
+    layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()
     events: tuple[Event, ...] = ()  # the newest, oldest first

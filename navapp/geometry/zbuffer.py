@@ -55,13 +55,25 @@ def render(
         is_closed: as for `render_rectified`.
     """
     points_mm = camera_from_mesh.apply(mesh.vertices_mm)
+    return render_points(points_mm, mesh.faces, camera, is_whole=is_whole, is_closed=is_closed)
+
+
+def render_points(
+    points_mm: FloatArray,
+    faces: NDArray[np.int32],
+    camera: Camera,
+    *,
+    is_whole: bool = False,
+    is_closed: bool = False,
+) -> RenderedView:
+    """Triangles (F, 3) of points (N, 3) in a camera's frame; options as of `render`."""
     pixels = camera.project(points_mm)
     box = Box(0, 0, camera.width, camera.height)
     if not is_whole:
         around = Box.around(pixels)
         box = Box(0, 0, 0, 0) if around is None else around.clip(camera.width, camera.height)
     pixels -= (box.x, box.y)
-    return _raster(pixels, points_mm[:, 2].copy(), mesh.faces, box, is_closed)
+    return _raster(pixels, points_mm[:, 2].copy(), faces, box, is_closed)
 
 
 def render_rectified(

@@ -1,16 +1,22 @@
-"""Composes a picture from the video, the layers of a stage and a banner."""
+"""Composes a picture from the video, the layers of a scene and a banner."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.overlay.layers import GUIDE_COLOUR, LAYERS, Scene, put_text
+from navapp.geometry.box import Box
+from navapp.overlay.colours import CANDIDATE, GUIDE
+from navapp.overlay.labels import LabelBoard, put_text, text_size
+from navapp.overlay.layers import LAYERS
+from navapp.overlay.scene import Scene
 
 Image = NDArray[np.uint8]
 
 PREVIEW_WIDTH, PREVIEW_HEIGHT = 160, 96
 
-_AMBER = (40, 180, 255)
 _MARK = "research - not for clinical use"
+# Of a picture of 1280 columns.
+_TEXT_SIZE, _LEAST_TEXT_SIZE = 0.7, 0.45
+_BANNER_PX, _MARK_PX = 48, 34
 
 
 def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "") -> Image:
@@ -26,22 +32,35 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
         ValueError: a picture of another size than the scene's camera takes.
     """
     image = np.repeat(left[:, :, None], 3, axis=2) if left.ndim == 2 else left.copy()
+    height, width = image.shape[:2]
+    size = max(_LEAST_TEXT_SIZE, _TEXT_SIZE * width / 1280.0)
     if scene is not None:
-        if image.shape[:2] != (scene.camera.height, scene.camera.width):
+        if (height, width) != (scene.camera.height, scene.camera.width):
             raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
-        for name in scene.stage.layers:
-            layer = LAYERS.get(name)
-            if layer is not None:
-                layer(image, scene)
+        rims = [Box(0, 0, width, _BANNER_PX), Box(0, height - _MARK_PX, width, _MARK_PX)]
+        draw_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, rims))
     is_guiding = scene is not None and not scene.is_candidate
-    scale = image.shape[1] / 1280.0
-    size = max(0.45, 0.7 * scale)
-    put_text(
-        image, banner, (12, round(12 + 26 * size)), size, GUIDE_COLOUR if is_guiding else _AMBER
-    )
+    put_text(image, banner, (12, round(12 + 26 * size)), size, GUIDE if is_guiding else CANDIDATE)
     text = " - ".join(part for part in (mark, _MARK) if part)
-    put_text(image, text, (12, image.shape[0] - 12), 0.7 * size, (230, 230, 230))
+    put_text(image, text, (12, height - 12), 0.7 * size, (230, 230, 230))
     return image
+
+
+def put_mark(image: Image, text: str) -> Image:
+    """A copy of a picture with a line in its upper right corner."""
+    marked = image.copy()
+    size = max(_LEAST_TEXT_SIZE, 0.7 * _TEXT_SIZE * image.shape[1] / 1280.0)
+    width, height = text_size(text, size)
+    put_text(marked, text, (image.shape[1] - width - 12, 10 + height), size, (230, 230, 230))
+    return marked
+
+
+def draw_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
+    """The scene's layers in the order of their table, and their words."""
+    for name, layer in LAYERS.items():
+        if name in scene.layers:
+            layer(image, scene, labels)
+    labels.draw(image)
 
 
 def make_preview(image: Image) -> Image:

@@ -70,14 +70,15 @@ def fill_surroundings(coarse: CoarseMap) -> Surroundings:
     matched = coarse.matched
     if matched is None:
         unknown = np.full_like(coarse.disparity_px, np.nan)
-        return Surroundings(unknown, np.zeros(unknown.shape, dtype=np.uint8), coarse.box, False)
+        nothing = np.zeros(unknown.shape, dtype=np.uint8)
+        return Surroundings(unknown, nothing, coarse.box, False, nothing)
     pair, found = matched.pair, matched.found
     # The half of an odd picture lacks its last column or row, the half of a box has it.
     picture = Crop.of(pair.left, pair.box, (0, 0)).inner
     classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
     disparity_px, origin = fill_gaps(found.left, picture, found.confidence, classes, _FILL)
     drop_beyond_bound(disparity_px, origin, _EDGE_PX, _LAYER_PX)
-    return Surroundings(disparity_px, origin, coarse.box, matched.is_half)
+    return Surroundings(disparity_px, origin, coarse.box, matched.is_half, picture)
 
 
 def _find_wide_gaps(left: DisparityMap) -> Box | None:

@@ -7,11 +7,14 @@ from navapp.geometry.box import Box
 from navapp.geometry.halves import double, half_box
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
+from navapp.tracking.foreground_kernels import vote_on_guesses
 from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 
 # Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
 NEAR_PX, IN_FRONT_MM = 4, 5.0
+# Guesses follow what is matched beside them, then guesses beside those.
+_N_VOTES = 2
 
 
 def find_foreground(
@@ -41,6 +44,10 @@ def find_foreground(
     limit_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
     limit_px[here] = bone_px[there]
     is_in_front = surroundings.disparity_px > limit_px
+    speaks, is_asked = surroundings.origin == Origin.MATCHED, limit_px < np.inf
+    for _ in range(_N_VOTES):
+        vote_on_guesses(surroundings.picture, speaks, is_asked, is_in_front)
+        speaks |= is_in_front
     if is_half:
         is_in_front = double(is_in_front.view(np.uint8), box).view(np.bool_)
         limit_px = np.float32(2.0) * double(limit_px, box)

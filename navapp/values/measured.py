@@ -110,6 +110,7 @@ class Surroundings:
     origin: NDArray[np.uint8]  # of `Origin`: unless MATCHED, the disparity is a guess
     box: Box  # of the rectified left view
     is_half: bool
+    picture: NDArray[np.uint8]  # (h, w) grey, of the same resolution
 
     @property
     def whole(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:

@@ -1,0 +1,96 @@
+"""Words beside what they name, placed so that none lies over another."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.box import Box
+from navapp.overlay.colours import Colour
+
+Image = NDArray[np.uint8]
+
+# Places of a label around its point, nearest first: directions, and how far away.
+_DIRECTIONS = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
+_DISTANCES_PX = (14, 34, 60, 92)
+_PADDING_PX = 3
+_RIM = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, 2))
+
+
+@dataclass
+class LabelBoard:
+    """Keeps words until all guides are drawn, then places them."""
+
+    size: float  # of the letters, OpenCV's scale
+    # boxes that no label may lie over; those of placed labels come in.
+    taken: list[Box] = field(default_factory=list)
+    _asked: list[tuple[str, tuple[float, float], Colour]] = field(default_factory=list)
+
+    def add(self, text: str, at_px: NDArray[np.float64], colour: Colour) -> None:
+        """Ask for a label beside a point; one that is not in any picture is left out."""
+        if np.isfinite(at_px).all():
+            self._asked.append((text, (float(at_px[0]), float(at_px[1])), colour))
+
+    def draw(self, image: Image) -> list[Box]:
+        """Place and draw what was asked for; where nothing is free, a label is left out."""
+        import cv2
+
+        height, width = image.shape[:2]
+        placed = []
+        for text, at, colour in self._asked:
+            if not (0 <= at[0] < width and 0 <= at[1] < height):
+                continue
+            box = self._find_place(text, at, width, height)
+            if box is None:
+                continue
+            self.taken.append(box)
+            placed.append(box)
+            nearest = (
+                int(np.clip(at[0], box.x, box.x + box.width)),
+                int(np.clip(at[1], box.y, box.y + box.height)),
+            )
+            if np.hypot(nearest[0] - at[0], nearest[1] - at[1]) > 1.5 * _DISTANCES_PX[0]:
+                start = round(at[0]), round(at[1])
+                cv2.line(image, start, nearest, colour, 1, cv2.LINE_AA)
+            baseline = box.y + box.height - _PADDING_PX - round(8 * self.size)
+            put_text(image, text, (box.x + _PADDING_PX, baseline), self.size, colour)
+        self._asked.clear()
+        return placed
+
+    def _find_place(
+        self, text: str, at: tuple[float, float], width: int, height: int
+    ) -> Box | None:
+        w, h = text_size(text, self.size)
+        w, h = w + 2 * _PADDING_PX, h + 2 * _PADDING_PX
+        for distance in _DISTANCES_PX:
+            for right, down in _DIRECTIONS:
+                x = at[0] + right * distance - (0.5 * w if right == 0 else w * (right < 0))
+                y = at[1] + down * distance - (0.5 * h if down == 0 else h * (down < 0))
+                box = Box(round(x), round(y), w, h)
+                inside = box.clip(width, height)
+                if inside == box and not any(_overlap(box, other) for other in self.taken):
+                    return box
+        return None
+
+
+def text_size(text: str, size: float) -> tuple[int, int]:
+    """Width and height of a line in px, with what hangs below it."""
+    import cv2
+
+    (width, height), below = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
+    return width, height + below
+
+
+def put_text(image: Image, text: str, at: tuple[int, int], size: float, colour: Colour) -> None:
+    """Text with a dark rim, readable on any picture."""
+    import cv2
+
+    # A thicker stroke would have other letter widths: the rim is the same text, moved.
+    for dx, dy in _RIM:
+        moved = (at[0] + dx, at[1] + dy)
+        cv2.putText(image, text, moved, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 1, cv2.LINE_AA)
+    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA)
+
+
+def _overlap(one: Box, other: Box) -> bool:
+    return not one.intersect(other).is_empty

@@ -1,0 +1,100 @@
+"""The bone itself: its outline and shape, what is to be removed of it, damaged cartilage."""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.box import Box
+from navapp.geometry.mesh import TriangleMesh
+from navapp.overlay.blend_kernels import compute_face_tints
+from navapp.overlay.colours import DEFECT, REMOVAL_RAMP
+from navapp.overlay.labels import Image, LabelBoard, put_text
+from navapp.overlay.plane_sections import depth_beyond
+from navapp.overlay.scene import Order, Scene
+from navapp.overlay.shading import one_colour, outline, outline_box, tint
+from navapp.values import ResectionPlane
+
+# Of the bone's colour over a part that faces the camera, and how much more over a steep one.
+_LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
+# Bone to be removed is covered so far; the ramp of its colours ends at this depth.
+_REMOVAL_SHARE, _REMOVAL_FULL_MM = 0.5, 15.0
+_LEGEND_PX = (14, 120)  # width and height of the ramp
+_DOT = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
+
+
+def draw_bone(image: Image, scene: Scene, labels: LabelBoard) -> None:
+    """Outline, and creases and shape as a light veil, so that the bone beneath stays visible."""
+    view, mesh = scene.view, scene.drawn_mesh
+    if view.box.is_empty:
+        return
+    # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
+    share = compute_face_tints(
+        mesh.normals, mesh.faces, scene.axis_in_bone, _LEAST_SHARE, _STEEP_SHARE
+    )
+    tint(image, view, share, one_colour(scene.colour), scene.weight_over(view.box))
+    outline(image, scene, view, scene.weight_over(outline_box(view, scene)), scene.colour)
+
+
+def draw_removal(image: Image, scene: Scene, labels: LabelBoard) -> None:
+    """The bone beyond the stage's planes, coloured by how far it lies beyond, with a legend."""
+    planes = tuple(scene.planes.values())
+    if not planes or scene.view.box.is_empty:
+        return
+    share, colours = _removal_tints(scene.drawn_mesh, planes)
+    if not share.any():
+        return
+    view = scene.view
+    tint(image, view, share, colours, scene.weight_over(view.box))
+    _draw_removal_legend(image, labels)
+
+
+def draw_defects(image: Image, scene: Scene, labels: LabelBoard) -> None:
+    """Damaged cartilage of the stage's bone as dots, where nothing hides it."""
+    height, width = image.shape[:2]
+    for defect in scene.plan.content.defects.values():
+        if defect.bone != scene.stage.bone:
+            continue
+        in_camera = scene.to_camera(scene.mesh.vertices_mm[defect.vertices])
+        pixels = scene.camera.project(in_camera)
+        is_seen = scene.order_of(pixels, in_camera[:, 2]) == Order.ON_TOP
+        with np.errstate(invalid="ignore"):
+            is_seen &= ((pixels >= 2) & (pixels < (width - 2, height - 2))).all(axis=1)
+        u, v = np.round(pixels[is_seen]).astype(np.intp).T
+        for down, right in _DOT:
+            image[v + down, u + right] = DEFECT
+
+
+@lru_cache(maxsize=16)
+def _removal_tints(
+    mesh: TriangleMesh, planes: tuple[ResectionPlane, ...]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Share (F,) and colour (F, 3) of each triangle."""
+    beyond_mm = depth_beyond(mesh, planes)[mesh.faces]
+    share = np.where((beyond_mm > 0.0).all(axis=1), _REMOVAL_SHARE, 0.0)
+    return share.astype(np.float32), ramp_colours(beyond_mm.mean(axis=1))
+
+
+def ramp_colours(depth_mm: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(N, 3) colours of depths (N,) of bone to be removed."""
+    ramp = np.array(REMOVAL_RAMP, dtype=np.float64)
+    at = np.clip(depth_mm / _REMOVAL_FULL_MM, 0.0, 1.0) * (len(ramp) - 1)
+    places = np.arange(len(ramp))
+    return np.column_stack([np.interp(at, places, ramp[:, k]) for k in range(3)]).astype(np.float32)
+
+
+def _draw_removal_legend(image: Image, labels: LabelBoard) -> None:
+    """The ramp with its ends in mm, at the right of the picture."""
+    height, width = image.shape[:2]
+    w, h = _LEGEND_PX
+    x, y = width - w - 76, max(80, height // 2 - h // 2)
+    if y + h + 30 > height or x < 0:
+        return
+    depth_mm = np.linspace(_REMOVAL_FULL_MM, 0.0, h)
+    image[y : y + h, x : x + w] = np.round(ramp_colours(depth_mm))[:, None].astype(np.uint8)
+    size = labels.size
+    for share, text in ((0.0, f">{_REMOVAL_FULL_MM:.0f} mm"), (1.0, "0 mm")):
+        at = (x + w + 5, y + round(share * h) + 5)
+        put_text(image, text, at, size, (235, 235, 235))
+    put_text(image, "to remove", (x - 14, y - 14), size, (235, 235, 235))
+    labels.taken.append(Box(x - 16, y - 32, w + 92, h + 50))

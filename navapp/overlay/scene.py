@@ -1,0 +1,218 @@
+"""What the layers draw: one bone at one pose, seen from somewhere, and what stands before it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.box import Box
+from navapp.geometry.camera import Camera
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.simplify import drawn, is_closed
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.zbuffer import RenderedView, render_points
+from navapp.overlay.blend_kernels import find_weights
+from navapp.overlay.colours import CANDIDATE, GUIDE, Colour
+from navapp.overlay.viewpoints import FloatMap, SeenDepth, Viewpoint
+from navapp.values import (
+    DrillAxis,
+    Foreground,
+    Part,
+    Plan,
+    ResectionPlane,
+    RiskStructure,
+    StageSpec,
+)
+
+# Guides on the bone are drawn over this margin around its picture: lines beside it as well.
+_MARGIN_PX = 48
+# Chosen on simulated knees. What is matched nearer than the bone by more than this lies on it: less
+# is within the error of the coarse map.
+TISSUE_MM = 2.5
+# A guide this far behind the bone's surface is beneath it; what is drawn simplified, and cut into
+# straight pieces, lies as near.
+_SKIN_MM = 1.0
+# Beside the bone, what stands off by more than this from its nearest point hides guides.
+_ASIDE_MM = 5.0
+# Of what is drawn beneath something, or where that is not known.
+BENEATH_WEIGHT = 0.55
+
+
+class _OfBone(Protocol):
+    @property
+    def bone(self) -> str: ...
+
+
+T = TypeVar("T", bound=_OfBone)
+
+
+class Order(IntEnum):
+    """Where a guide stands against what is seen."""
+
+    ON_TOP = 0
+    BENEATH = 1  # beneath bone or tissue, or that is not known
+    HIDDEN = 2  # behind a hand, an instrument, or tissue that stands off the bone
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One bone at one pose, the guides of its stage, and what is known of the depth."""
+
+    plan: Plan
+    stage: StageSpec
+    left_from_bone: RigidTransform
+    viewpoint: Viewpoint
+    is_candidate: bool  # nobody has accepted the pose
+    # None: nothing is known of what stands in front of the bone.
+    foreground: Foreground | None = None
+    layers: tuple[str, ...] = ()  # to be drawn, in the order of the table of layers
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """Of the bone, as planned."""
+        return self.plan.bones[self.stage.bone].mesh
+
+    @property
+    def drawn_mesh(self) -> TriangleMesh:
+        """The bone in as many triangles as a picture can show."""
+        return drawn(self.mesh)
+
+    @property
+    def camera(self) -> Camera:
+        """That the picture is drawn for."""
+        return self.viewpoint.camera
+
+    @property
+    def colour(self) -> Colour:
+        """Of the bone's outline."""
+        return CANDIDATE if self.is_candidate else GUIDE
+
+    def to_camera(self, points_mm: FloatArray) -> FloatArray:
+        """(N, 3) points of the bone in the frame of the picture's camera."""
+        return self.viewpoint.to_camera(self.left_from_bone.apply(points_mm))
+
+    def pixel_of(self, point_mm: FloatArray) -> FloatArray:
+        """(2,) place in the picture of a point of the bone; NaN where it is not seen."""
+        pixel: FloatArray = self.camera.project(self.to_camera(point_mm[None]))[0]
+        return pixel
+
+    @property
+    def picture_axes_in_bone(self) -> FloatArray:
+        """(2, 3) unit directions of the picture's columns and rows, in the bone's coordinates."""
+        axes: FloatArray = self.viewpoint.axes_in_left[:2] @ self.left_from_bone.rotation
+        return axes
+
+    @property
+    def axis_in_bone(self) -> FloatArray:
+        """(3,) unit direction in which the picture is seen, in the bone's coordinates."""
+        axis: FloatArray = self.viewpoint.axes_in_left[2] @ self.left_from_bone.rotation
+        return axis
+
+    @property
+    def planes(self) -> Mapping[str, ResectionPlane]:
+        """The stage's, by name."""
+        return self._of_stage(self.plan.content.planes, "planes")
+
+    @property
+    def drills(self) -> Mapping[str, DrillAxis]:
+        """The stage's, by name."""
+        return self._of_stage(self.plan.content.drills, "drills")
+
+    @property
+    def parts(self) -> Mapping[str, Part]:
+        """The stage's, by name."""
+        return self._of_stage(self.plan.content.parts, "parts")
+
+    @property
+    def risks(self) -> Mapping[str, RiskStructure]:
+        """The stage's, by name."""
+        return self._of_stage(self.plan.content.risks, "risks")
+
+    def _of_stage(self, known: Mapping[str, T], kind: str) -> Mapping[str, T]:
+        """What the plan names for the stage; where it names nothing of a kind, all of the bone."""
+        bone = self.stage.bone
+        content = self.plan.content.stages.get(self.stage.name)
+        named = () if content is None else getattr(content, kind)
+        return {
+            name: one
+            for name, one in known.items()
+            if one.bone == bone and (name in named or not named)
+        }
+
+    def render(self, mesh: TriangleMesh) -> RenderedView:
+        """A mesh in the bone's coordinates; only the box around it."""
+        points_mm = self.to_camera(mesh.vertices_mm)
+        return render_points(points_mm, mesh.faces, self.camera, is_closed=is_closed(mesh))
+
+    @cached_property
+    def view(self) -> RenderedView:
+        """The bone's part of the picture; rendered once."""
+        return self.render(self.drawn_mesh)
+
+    @cached_property
+    def box(self) -> Box:
+        """Where the order of things is known: the bone's box and a margin, in the picture."""
+        if self.view.box.is_empty:
+            return self.view.box
+        return self.view.box.grow(_MARGIN_PX).clip(self.camera.width, self.camera.height)
+
+    @cached_property
+    def bone_mm(self) -> FloatMap:
+        """(h, w) depth of the bone over `box`, NaN beside it."""
+        depth_mm = np.full((self.box.height, self.box.width), np.nan, dtype=np.float32)
+        depth_mm[self.view.box.relative_to(self.box).slices] = self.view.depth_mm
+        return depth_mm
+
+    @cached_property
+    def seen(self) -> SeenDepth | None:
+        """What was measured of the depth, over `box`; None when nothing was."""
+        if self.foreground is None or self.box.is_empty:
+            return None
+        return self.viewpoint.see(self.foreground, self.box)
+
+    @cached_property
+    def weight(self) -> FloatMap:
+        """(h, w) over `box`: 0 to 1, how strongly a guide on the bone is drawn in each pixel."""
+        weight = np.empty(self.bone_mm.shape, dtype=np.float32)
+        if self.seen is None:
+            weight.fill(BENEATH_WEIGHT)
+            return weight
+        find_weights(
+            self.bone_mm, self.seen.depth_mm, self.seen.is_guess, self.seen.in_front, TISSUE_MM,
+            self._aside_mm, BENEATH_WEIGHT, weight,
+        )  # fmt: skip
+        return weight
+
+    def weight_over(self, box: Box) -> FloatMap:
+        """The weights over another box, where nothing is known those of what lies beneath."""
+        weight = np.full((box.height, box.width), BENEATH_WEIGHT, dtype=np.float32)
+        here, there = box.shared_slices(self.box)
+        weight[here] = self.weight[there]
+        return weight
+
+    def order_of(self, pixels: FloatArray, depth_mm: FloatArray) -> NDArray[np.uint8]:
+        """(N,) `Order` of points of guides at pixels (N, 2) and depths (N,) in the picture."""
+        order = np.full(len(pixels), Order.BENEATH, dtype=np.uint8)
+        with np.errstate(invalid="ignore"):
+            places = np.nan_to_num(np.round(pixels) - (self.box.x, self.box.y), nan=-1.0)
+        inside = ((places >= 0) & (places < (self.box.width, self.box.height))).all(axis=1)
+        columns, rows = places[inside].astype(np.intp).T
+        weight, bone_mm = self.weight[rows, columns], self.bone_mm[rows, columns]
+        nearest_mm = bone_mm
+        if self.seen is not None:
+            matched_mm = np.where(self.seen.is_guess, np.nan, self.seen.depth_mm)[rows, columns]
+            nearest_mm = np.fmin(bone_mm, matched_mm)
+        # A comparison with an unknown depth is False.
+        is_beneath = (depth_mm[inside] > nearest_mm + _SKIN_MM) | (weight < 1.0)
+        order[inside] = np.where(is_beneath, Order.BENEATH, Order.ON_TOP)
+        order[inside] = np.where(weight < 0.5 * BENEATH_WEIGHT, Order.HIDDEN, order[inside])
+        return order
+
+    @property
+    def _aside_mm(self) -> float:
+        nearest_mm = np.fmin.reduce(self.view.depth_mm, axis=None, initial=np.inf)
+        return float(nearest_mm) - _ASIDE_MM
