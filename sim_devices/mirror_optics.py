@@ -99,4 +99,5 @@ class MirrorSetup:
         share = eye_height / (eye_height + heights)
         met = eye_foot + share[:, None] * (feet - eye_foot)
         directions: FloatArray = met - eye_mm
-        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        return directions

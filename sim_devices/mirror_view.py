@@ -131,4 +131,5 @@ def expose(
     if noise > 0.0:
         drawn = np.random.default_rng(seed).standard_normal(values.shape, dtype=np.float32)
         values = values + np.float32(noise) * drawn
-    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    picture: NDArray[np.uint8] = np.clip(np.rint(values), 0, 255).astype(np.uint8)
+    return picture

@@ -145,7 +145,8 @@ def _eye_views(views: list[SeenView], centres_mm: FloatArray) -> FloatArray:
     marked = np.array([view.is_eye for view in views])
     if not marked.any():
         marked = np.linalg.norm(centres_mm - centres_mm[0], axis=1) <= _SAME_EYE_MM
-    return marked / marked.sum()
+    weights: FloatArray = marked / marked.sum()
+    return weights
 
 
 def _make_model(views: list[SeenView], solved: Bundle) -> DisplayModel:

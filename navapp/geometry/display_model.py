@@ -10,7 +10,13 @@ from numpy.typing import ArrayLike
 
 from navapp.geometry import display_model_errors as errors
 from navapp.geometry.display_model_optics import Glass, VirtualScreen
-from navapp.geometry.display_model_view import EyeView, make_view, project
+from navapp.geometry.display_model_view import (
+    LEAST_DISTANCE_MM,
+    WRONG_SIDE,
+    EyeView,
+    make_view,
+    project,
+)
 from navapp.geometry.transform import FloatArray, read_only, rotation_from_vector
 
 ViewingEye = Literal["left", "right", "camera"]
@@ -80,7 +86,13 @@ class DisplayModel:
         covariance = None if self.quality is None else self.quality.covariance
         if covariance is not None and np.shape(covariance) != (N_PARAMETERS, N_PARAMETERS):
             raise ValueError(f"the covariance of a display is {N_PARAMETERS}x{N_PARAMETERS}")
-        self.view()
+        if self.distance_mm() < LEAST_DISTANCE_MM:
+            raise ValueError(WRONG_SIDE)
+
+    def distance_mm(self) -> float:
+        """Of the eye from the screen's plane; negative where the flips show all mirrored."""
+        sign = -1.0 if self.flips_columns ^ self.flips_rows else 1.0
+        return sign * float(self.screen.normal @ (self.screen.origin_mm - self.eye_mm))
 
     def project(self, points_left_mm: ArrayLike, eye_mm: ArrayLike | None = None) -> FloatArray:
         """(N, 2) px of the display's picture where points (N, 3) mm are drawn for an eye.
@@ -113,12 +125,12 @@ class DisplayModel:
         (mm). Without glass its numbers change nothing.
         """
         d = np.asarray(change, dtype=np.float64)
-        screen = self.screen.move(d[:3], d[3:6])
-        screen = screen.resize(
-            self.screen.pitch_mm * (1.0 + float(d[6])), self.screen.bulge_mm + float(d[7])
-        )
-        glass = self.glass
-        if glass is not None:
+        screen, glass = self.screen, self.glass
+        if d[:8].any():
+            screen = screen.move(d[:3], d[3:6]).resize(
+                screen.pitch_mm * (1.0 + float(d[6])), screen.bulge_mm + float(d[7])
+            )
+        if glass is not None and d[8:11].any():
             axes = errors.perpendicular_axes(glass.normal[None])[0]
             normal = rotation_from_vector(d[9:11] @ axes) @ glass.normal
             thickness = abs(glass.thickness_mm + float(d[8]))

@@ -4,6 +4,7 @@ Seen from an eye, what is drawn for a point appears beside it; the error is the 
 two, perpendicular to the line of sight, at the point's own depth.
 """
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,16 +19,20 @@ if TYPE_CHECKING:
 _STEPS = np.array(
     [1e-5, 1e-5, 1e-5, 1e-2, 1e-2, 1e-2, 1e-5, 1e-3, 1e-3, 1e-5, 1e-5, 1e-2, 1e-2, 1e-2]
 )
+EYE_NUMBERS = (11, 12, 13)  # those of the eye's place, of `DisplayModel.move`
 _BEYOND = 0.05
 EYE_DISTANCE_MM = 63.0  # between the pupils of an adult, the mean
 
 
-def pixels_by_parameters(model: "DisplayModel", points_mm: FloatArray) -> FloatArray:
-    """(N, 2, 14) px by the numbers of `DisplayModel.move`, for the model's eye."""
-    slopes = np.empty((len(points_mm), 2, len(_STEPS)))
-    for k, step in enumerate(_STEPS):
+def pixels_by_parameters(
+    model: "DisplayModel", points_mm: FloatArray, numbers: Sequence[int] = range(14)
+) -> FloatArray:
+    """(N, 2, n) px by some numbers of `DisplayModel.move`, for the model's eye."""
+    slopes = np.empty((len(points_mm), 2, len(numbers)))
+    for k, number in enumerate(numbers):
+        step = _STEPS[number]
         change = np.zeros(len(_STEPS))
-        change[k] = step
+        change[number] = step
         ahead, back = model.move(change), model.move(-change)
         slopes[:, :, k] = (ahead.project(points_mm) - back.project(points_mm)) / (2.0 * step)
     return slopes
@@ -46,10 +51,8 @@ def pixels_by_points(model: "DisplayModel", points_mm: FloatArray) -> FloatArray
 def millimetres_by_pixels(model: "DisplayModel", points_mm: FloatArray) -> FloatArray:
     """(N, 2, 2) displacement at the points, perpendicular to the line of sight, by px."""
     across = perpendicular_axes(points_mm - model.eye_mm)
-    inverse: FloatArray = np.linalg.inv(
-        pixels_by_points(model, points_mm) @ across.transpose(0, 2, 1)
-    )
-    return inverse
+    in_plane = pixels_by_points(model, points_mm) @ across.transpose(0, 2, 1)
+    return np.asarray(np.linalg.inv(in_plane), dtype=np.float64)
 
 
 def predict_error_mm(
@@ -69,7 +72,7 @@ def predict_error_mm(
         slopes = to_mm @ pixels_by_parameters(model, points_mm)
         spread += slopes @ covariance @ slopes.transpose(0, 2, 1)
     if eye_sd_mm > 0.0:
-        slopes = to_mm @ _pixels_by_eye(model, points_mm)
+        slopes = to_mm @ pixels_by_parameters(model, points_mm, EYE_NUMBERS)
         spread += eye_sd_mm**2 * slopes @ slopes.transpose(0, 2, 1)
     if point_covariance is not None:
         slopes = to_mm @ by_points
@@ -129,15 +132,3 @@ def perpendicular_axes(directions: FloatArray) -> FloatArray:
     first = np.cross(ahead, np.eye(3)[least])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(ahead, first)], axis=1)
-
-
-def _pixels_by_eye(model: "DisplayModel", points_mm: FloatArray) -> FloatArray:
-    """(N, 2, 3) px by the eye's place, mm."""
-    step = 1e-2
-    slopes = np.empty((len(points_mm), 2, 3))
-    for k, axis in enumerate(np.eye(3)):
-        ahead = model.project(points_mm, model.eye_mm + step * axis)
-        slopes[:, :, k] = (ahead - model.project(points_mm, model.eye_mm - step * axis)) / (
-            2.0 * step
-        )
-    return slopes

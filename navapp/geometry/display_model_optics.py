@@ -1,6 +1,6 @@
 """The parts of a display in a mirror: the panel as it is seen, and the glass before the site."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +9,7 @@ from navapp.geometry.transform import FloatArray, read_only, rotation_from_vecto
 
 _UNIT = 1e-6
 # The displacement hardly depends on the angle: each turn gains more than two digits.
-_N_TURNS = 6
+_N_TURNS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +33,7 @@ class VirtualScreen:
     height_px: int
     # by how much the middle stands out against the corners, along across x down; a paraboloid.
     bulge_mm: float = 0.0
+    axes: FloatArray = field(init=False)  # (3, 3) rows across, down, across x down
 
     def __post_init__(self) -> None:
         for name in ("origin_mm", "across", "down"):
@@ -40,24 +41,23 @@ class VirtualScreen:
             if values.shape != (3,) or not np.isfinite(values).all():
                 raise ValueError(f"{name} of a screen is three finite numbers")
             object.__setattr__(self, name, values)
-        lengths = np.abs([np.linalg.norm(self.across) - 1.0, np.linalg.norm(self.down) - 1.0])
-        if max(*lengths, abs(float(self.across @ self.down))) > _UNIT:
+        a, d = self.across.tolist(), self.down.tolist()
+        off = (_dot(a, a) - 1.0, _dot(d, d) - 1.0, _dot(a, d))
+        if max(off) > _UNIT or min(off) < -_UNIT:
             raise ValueError("across and down of a screen are orthogonal unit directions")
         if not (self.pitch_mm > 0.0 and np.isfinite([self.pitch_mm, self.bulge_mm]).all()):
             raise ValueError("the pitch of a screen is a positive length, its bulge a finite one")
         if self.width_px <= 0 or self.height_px <= 0:
             raise ValueError("a screen has at least one column and one row")
+        # Plain numbers are sooner done with than arrays of three.
+        normal = [a[1] * d[2] - a[2] * d[1], a[2] * d[0] - a[0] * d[2], a[0] * d[1] - a[1] * d[0]]
+        object.__setattr__(self, "axes", read_only(np.array([a, d, normal])))
 
     @property
     def normal(self) -> FloatArray:
         """(3,) across x down: towards the eye when the picture is seen mirrored, else away."""
-        normal: FloatArray = np.cross(self.across, self.down)
+        normal: FloatArray = self.axes[2]
         return normal
-
-    @property
-    def axes(self) -> FloatArray:
-        """(3, 3) rows across, down, normal."""
-        return np.vstack([self.across, self.down, self.normal])
 
     @property
     def half_mm(self) -> FloatArray:
@@ -87,7 +87,8 @@ class VirtualScreen:
         """
         start = (from_mm - self.middle_mm) @ self.axes.T
         step = (through_mm - from_mm) @ self.axes.T
-        curve = self.bulge_mm / (self.half_mm**2).sum()
+        half = self.half_mm
+        curve = self.bulge_mm / float(half @ half)
         a = curve * (step[..., :2] ** 2).sum(axis=-1)
         b = step[..., 2] + 2.0 * curve * (start[..., :2] * step[..., :2]).sum(axis=-1)
         c = start[..., 2] - self.bulge_mm + curve * (start[..., :2] ** 2).sum(axis=-1)
@@ -96,7 +97,7 @@ class VirtualScreen:
             reach = -2.0 * c / (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
         reach = np.where(reach > 0.0, reach, np.nan)
         flat = start[..., :2] + reach[..., None] * step[..., :2]
-        pixels: FloatArray = (flat + self.half_mm) / self.pitch_mm
+        pixels: FloatArray = (flat + half) / self.pitch_mm
         return pixels
 
     def move(self, turn_rad: ArrayLike, shift_mm: ArrayLike) -> "VirtualScreen":
@@ -162,3 +163,7 @@ class Glass:
             shift = self.displacements_mm(apparent - eye_mm)
             apparent = points_mm - shift[..., None] * self.normal
         return apparent
+
+
+def _dot(a: list[float], b: list[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -10,6 +10,9 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.display_model_optics import Glass, VirtualScreen
 from navapp.geometry.transform import FloatArray, RigidTransform
 
+LEAST_DISTANCE_MM = 1e-6
+WRONG_SIDE = "the eye is not on the side of the screen from which it is calibrated"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EyeView:
@@ -93,8 +96,8 @@ def make_view(
     below = screen.down * (-1.0 if flips[1] else 1.0)
     ahead = np.cross(right, below)
     distance_mm = float(ahead @ (screen.origin_mm - eye_mm))
-    if distance_mm < 1e-6:
-        raise ValueError("the eye is not on the side of the screen from which it is calibrated")
+    if distance_mm < LEAST_DISTANCE_MM:
+        raise ValueError(WRONG_SIDE)
     focal_px = distance_mm / screen.pitch_mm
     centre_px = np.array(
         [screen.across @ (eye_mm - screen.origin_mm), screen.down @ (eye_mm - screen.origin_mm)]
