@@ -114,7 +114,12 @@ def count_solved(
     told = np.zeros(N_PARAMETERS)
     for k, sd in _TOLD_SDS.items():
         told[k] = 1.0 / sd**2
-    return float(len(normal) - np.diag(np.linalg.inv(normal)) @ told[priors.free])
+    return float(len(normal) - np.diag(invert(normal)) @ told[priors.free])
+
+
+def invert(normal: FloatArray) -> FloatArray:
+    """(n, n) covariance of a normal matrix."""
+    return np.asarray(np.linalg.inv(normal), dtype=np.float64)
 
 
 def estimate_sd_px(
@@ -160,7 +165,8 @@ def _cost(
     lengths = np.linalg.norm(np.nan_to_num(residual, nan=1e3), axis=1)
     robust = np.where(lengths < _HUBER, 0.5 * lengths**2, _HUBER * (lengths - 0.5 * _HUBER))
     off = priors.deviations(model)
-    return float(robust.sum()) + sum(0.5 * (off[k] / sd) ** 2 for k, sd in _TOLD_SDS.items())
+    known = [0.5 * float(off[k] / sd) ** 2 for k, sd in _TOLD_SDS.items()]
+    return float(robust.sum()) + sum(known)
 
 
 def fit_model(

@@ -21,6 +21,7 @@ from calibration.mirror.alignment_fit import (
     count_solved,
     estimate_sd_px,
     fit_model,
+    invert,
     make_normal,
     scale_of,
     spread_out,
@@ -88,7 +89,7 @@ def solve_alignments(
     freedom = max(2.0 * float(is_used.sum()) - n_solved, 1.0)
     # The noise is estimated from few residuals: it counts as large as it may well be.
     factor = freedom / float(chdtri(freedom, _SURELY))
-    covariance = spread_out(np.linalg.inv(normal), priors) * factor
+    covariance = spread_out(invert(normal), priors) * factor
     model = replace(model, quality=DisplayQuality(False, covariance=covariance))
     anatomy = given.points_mm[is_used] if anatomy_mm is None else anatomy_mm
     predicted = model.predict_error(anatomy)
