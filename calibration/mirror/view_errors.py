@@ -9,7 +9,9 @@ from calibration.mirror.first_state import Told, make_first_state
 from calibration.mirror.seen_views import Scene, SeenView, gather
 from calibration.mirror.view_bundle import Bundle, Priors, solve
 from calibration.mirror.view_state import ViewState, on_board_mm, predict
+from navapp.geometry.camera import Camera
 from navapp.geometry.display_model import DisplayModel
+from navapp.geometry.display_model_optics import Glass
 from navapp.geometry.transform import FloatArray
 
 N_FOLDS = 4
@@ -86,11 +88,14 @@ def look_at(scene: Scene, views: list[SeenView], start: ViewState, priors: Prior
     return ViewErrors(np.concatenate(mm), np.concatenate(arcmin), np.concatenate(numbers))
 
 
-def look_with(scene: Scene, views: list[SeenView], model: DisplayModel, lens: object) -> ViewErrors:
+def look_with(
+    scene: Scene, views: list[SeenView], model: DisplayModel, lens: Camera | None
+) -> ViewErrors:
     """Errors of new views under a display as its file has it; the eye's camera is solved anew."""
-    first = make_first_state(scene, views, Told(model.screen.pitch_mm), lens)  # type: ignore[arg-type]
+    first = make_first_state(scene, views, Told(model.screen.pitch_mm), lens)
+    glass = model.glass or Glass(0.0, first.glass.normal)
     start = ViewState(
-        first.lens, model.screen, model.glass or first.glass, first.eye_turn, first.eye_shift,
+        first.lens, model.screen, glass, first.eye_turn, first.eye_shift,
         first.board_turn, first.board_shift,
     )  # fmt: skip
     return look_at(scene, views, start, Priors(start, has_lens=True))

@@ -28,15 +28,16 @@ def scene() -> Scene:
     return Scene(BOARD, PATTERN, make_default_rig(), EYE_SIZE)
 
 
-def eye_camera(rng: np.random.Generator) -> Camera:
-    """A camera that nobody knows beforehand."""
-    camera = make_eye_camera(*EYE_SIZE, EYE_FOCAL_PX * rng.uniform(0.95, 1.05))
+def eye_camera(rng: np.random.Generator, factor: float = 1.0) -> Camera:
+    """A camera that nobody knows beforehand; its pictures so many times as large."""
+    size = (round(factor * EYE_SIZE[0]), round(factor * EYE_SIZE[1]))
+    camera = make_eye_camera(*size, factor * EYE_FOCAL_PX * rng.uniform(0.95, 1.05))
     matrix = np.array(camera.matrix)
     matrix[:2, 2] += rng.normal(0.0, 8.0, 2)
     distortion = np.array(
         [rng.normal(-0.08, 0.02), rng.normal(0.05, 0.02), *rng.normal(0, 3e-4, 2)]
     )
-    return Camera(matrix, distortion, *EYE_SIZE)  # fmt: skip
+    return Camera(matrix, distortion, *size)  # fmt: skip
 
 
 def board_pose(
