@@ -46,6 +46,76 @@ def tangents(
 
 
 @njit(cache=True, nogil=True)
+def meet(
+    start: NDArray[np.float64], direction: NDArray[np.float64], plane: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Where a ray meets a plane, px; NaN when it does not.
+
+    Args:
+        start: (3,) of the ray.
+        direction: (3,) of it, of any length.
+        plane: (4, 3) the centre of its first pixel; directions in which columns and rows rise, over
+            their distance; normal.
+    """
+    x, y, height, speed = 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        height += (start[k] - plane[0, k]) * plane[3, k]
+        speed += direction[k] * plane[3, k]
+    far = -height / speed if speed != 0.0 else -1.0
+    if far <= 0.0:
+        return math.nan, math.nan
+    for k in range(3):
+        offset = start[k] - plane[0, k] + far * direction[k]
+        x += offset * plane[1, k]
+        y += offset * plane[2, k]
+    return x, y
+
+
+@njit(cache=True, nogil=True)
+def reflect(
+    eye: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    plate: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    back: NDArray[np.float64],
+) -> bool:
+    """Write where a ray of an eye leaves the plate again, and its direction (3,); False: never.
+
+    Two places, (2, 3): from the front face and from the back face.
+    """
+    along, before_glass, in_glass = tangents(direction, plate[1], plate[2, 1])
+    if along <= 0.0:
+        return False
+    height = 0.0
+    for k in range(3):
+        height += (plate[0, k] - eye[k]) * plate[1, k]
+    # In the glass it goes there and back, and comes out so much further on.
+    further = 2.0 * plate[2, 0] * in_glass / (along * before_glass) if before_glass > 0.0 else 0.0
+    for k in range(3):
+        back[k] = direction[k] - 2.0 * along * plate[1, k]
+        starts[0, k] = eye[k] + height / along * direction[k]
+        starts[1, k] = starts[0, k] + further * (direction[k] - along * plate[1, k])
+    return True
+
+
+@njit(cache=True, nogil=True)
+def pass_through(
+    eye: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    plate: NDArray[np.float64],
+    start: NDArray[np.float64],
+) -> None:
+    """Write (3,) where a ray of an eye seems to come from, behind the plate."""
+    along, before_glass, in_glass = tangents(direction, plate[1], plate[2, 1])
+    for k in range(3):
+        start[k] = eye[k]
+        if before_glass > 0.0:
+            # The glass takes so much from the way aside that the ray would have gone.
+            tangential = (direction[k] - along * plate[1, k]) / (along * before_glass)
+            start[k] -= plate[2, 0] * (before_glass - in_glass) * tangential
+
+
+@njit(cache=True, nogil=True)
 def reflect_screen(
     rays: NDArray[np.float64],
     left_from_eye: NDArray[np.float64],
@@ -64,19 +134,12 @@ def reflect_screen(
         eye: (3,) its place.
         plate: (4, 3) point of the front face; normal; thickness, index, 0; shares of light that
             the front face, and the back face, send to the eye, 0.
-        panel: (4, 3) centre of its first pixel; directions in which columns and rows rise, over
-            the pitch; its normal.
+        panel: (4, 3) its plane, as `meet` takes it.
         luminance: (h, w, C) of its pixels; each is a square that is lit evenly.
         n_samples: places along each side of a pixel of the picture.
         picture: (H, W, C) is added to.
     """
-    normal = plate[1]
-    thickness, index = plate[2, 0], plate[2, 1]
-    height, width, channels = luminance.shape
-    direction = np.empty(3)
-    before = 0.0
-    for k in range(3):
-        before += (plate[0, k] - eye[k]) * normal[k]
+    direction, starts, back = np.empty(3), np.empty((2, 3)), np.empty(3)
     shares = plate[3] / (n_samples * n_samples)
     for row in range(picture.shape[0]):
         for column in range(picture.shape[1]):
@@ -84,36 +147,31 @@ def reflect_screen(
                 v = (sample // n_samples + 0.5) / n_samples
                 u = (sample % n_samples + 0.5) / n_samples
                 aim(rays, left_from_eye, row, column, v, u, direction)
-                along, before_glass, in_glass = tangents(direction, normal, index)
-                if along <= 0.0:
+                if not reflect(eye, direction, plate, starts, back):
                     continue
-                reach = before / along
-                # In the glass the ray goes there and back, and comes out so much further on.
-                further = 2.0 * thickness * in_glass
                 for face in range(2):
-                    x, y, z, speed = 0.0, 0.0, 0.0, 0.0
-                    for k in range(3):
-                        tangential = direction[k] - along * normal[k]
-                        start = eye[k] + reach * direction[k]
-                        if face == 1 and before_glass > 0.0:
-                            start += further * tangential / (along * before_glass)
-                        back = tangential - along * normal[k]
-                        offset = start - panel[0, k]
-                        x += offset * panel[1, k]
-                        y += offset * panel[2, k]
-                        z += offset * panel[3, k]
-                        speed += back * panel[3, k]
-                    far = -z / speed if speed != 0.0 else -1.0
-                    if far <= 0.0:
-                        continue
-                    for k in range(3):
-                        back = direction[k] - 2.0 * along * normal[k]
-                        x += far * back * panel[1, k]
-                        y += far * back * panel[2, k]
-                    i, j = math.floor(x + 0.5), math.floor(y + 0.5)
-                    if 0 <= i < width and 0 <= j < height:
-                        for c in range(channels):
+                    x, y = meet(starts[face], back, panel)
+                    if (
+                        -0.5 <= x < luminance.shape[1] - 0.5
+                        and -0.5 <= y < luminance.shape[0] - 0.5
+                    ):
+                        i, j = math.floor(x + 0.5), math.floor(y + 0.5)
+                        for c in range(luminance.shape[2]):
                             picture[row, column, c] += shares[face] * luminance[j, i, c]
+
+
+@njit(cache=True, nogil=True)
+def look_up(texture: NDArray[np.float32], x: float, y: float, ground: float) -> float:
+    """A texture between its pixels' centres; the ground beside it."""
+    height, width = texture.shape
+    if not (-0.5 < x < width - 0.5 and -0.5 < y < height - 0.5):
+        return ground
+    x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
+    i, j = min(int(x), width - 2), min(int(y), height - 2)
+    x, y = x - i, y - j
+    upper = (1.0 - x) * texture[j, i] + x * texture[j, i + 1]
+    lower = (1.0 - x) * texture[j + 1, i] + x * texture[j + 1, i + 1]
+    return (1.0 - y) * upper + y * lower
 
 
 @njit(cache=True, nogil=True)
@@ -135,17 +193,13 @@ def see_sheet(
         left_from_eye: (3, 3) rotation.
         eye: (3,) its place.
         plate: as `reflect_screen` takes it.
-        sheet: (4, 3) centre of the texture's first pixel; directions in which its columns and rows
-            rise, over their distance; its normal.
+        sheet: (4, 3) its plane, as `meet` takes it, by the texture's pixels.
         texture: (h, w) reflectance.
         n_samples: places along each side of a pixel of the picture.
         ground: reflectance of what is not the sheet.
         picture: (H, W), written.
     """
-    normal = plate[1]
-    thickness, index = plate[2, 0], plate[2, 1]
-    height, width = texture.shape
-    direction = np.empty(3)
+    direction, start = np.empty(3), np.empty(3)
     for row in range(picture.shape[0]):
         for column in range(picture.shape[1]):
             total = 0.0
@@ -153,30 +207,7 @@ def see_sheet(
                 v = (sample // n_samples + 0.5) / n_samples
                 u = (sample % n_samples + 0.5) / n_samples
                 aim(rays, left_from_eye, row, column, v, u, direction)
-                along, before_glass, in_glass = tangents(direction, normal, index)
-                x, y, z, speed = 0.0, 0.0, 0.0, 0.0
-                for k in range(3):
-                    start = eye[k]
-                    if before_glass > 0.0:
-                        # The glass takes so much from the way aside that the ray would have gone.
-                        tangential = (direction[k] - along * normal[k]) / (along * before_glass)
-                        start -= thickness * (before_glass - in_glass) * tangential
-                    offset = start - sheet[0, k]
-                    x += offset * sheet[1, k]
-                    y += offset * sheet[2, k]
-                    z += offset * sheet[3, k]
-                    speed += direction[k] * sheet[3, k]
-                far = -z / speed if speed != 0.0 else -1.0
-                for k in range(3):
-                    x += far * direction[k] * sheet[1, k]
-                    y += far * direction[k] * sheet[2, k]
-                if not (far > 0.0 and -0.5 < x < width - 0.5 and -0.5 < y < height - 0.5):
-                    total += ground
-                    continue
-                x, y = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
-                i, j = min(int(x), width - 2), min(int(y), height - 2)
-                x, y = x - i, y - j
-                upper = (1.0 - x) * texture[j, i] + x * texture[j, i + 1]
-                lower = (1.0 - x) * texture[j + 1, i] + x * texture[j + 1, i + 1]
-                total += (1.0 - y) * upper + y * lower
+                pass_through(eye, direction, plate, start)
+                x, y = meet(start, direction, sheet)
+                total += look_up(texture, x, y, ground)
             picture[row, column] = total / (n_samples * n_samples)

@@ -76,9 +76,7 @@ def solve_display(
         )
     views, mixed = _of_one_handedness(views)
     first = make_first_state(scene, views, told, lens)
-    priors = Priors(first, bulge_sd_mm=_BULGE_SD_MM * with_bulge, has_lens=lens is not None)
-    if told.pitch_mm is None:
-        priors = replace(priors, pitch_sd_share=np.inf)
+    priors = _make_priors(first, told, with_bulge, lens is not None)
     solved, views, dropped = _solve_without_strays(scene, views, first, priors)
     on_progress(0.3)
     done = iter(range(1, N_FOLDS + 1))
@@ -89,6 +87,12 @@ def solve_display(
     return _judged(
         scene, views, [*mixed, *dropped], solved, model, held_out, limits or DisplayLimits()
     )
+
+
+def _make_priors(first: ViewState, told: Told, with_bulge: bool, has_lens: bool) -> Priors:
+    """What is known before any view."""
+    priors = Priors(first, bulge_sd_mm=_BULGE_SD_MM * with_bulge, has_lens=has_lens)
+    return priors if told.pitch_mm is not None else replace(priors, pitch_sd_share=np.inf)
 
 
 def _of_one_handedness(views: list[SeenView]) -> tuple[list[SeenView], list[DroppedView]]:
@@ -185,6 +189,11 @@ def _covariance(solved: Bundle, weights: FloatArray) -> FloatArray:
     return covariance
 
 
+def _thin_out(points_mm: FloatArray) -> FloatArray:
+    """Some of the points (n, 3), evenly."""
+    return points_mm[:: max(1, len(points_mm) // _N_ANATOMY)]
+
+
 def _judged(
     scene: Scene,
     views: list[SeenView],
@@ -195,8 +204,7 @@ def _judged(
     limits: DisplayLimits,
 ) -> DisplayCalibration:
     """With its verdict."""
-    points = on_board_mm(solved.state, gather(scene, views)["eye_site"])
-    anatomy = points[:: max(1, len(points) // _N_ANATOMY)]
+    anatomy = _thin_out(on_board_mm(solved.state, gather(scene, views)["eye_site"]))
     predicted = model.predict_error(anatomy)
     distances = np.linalg.norm(anatomy - model.eye_mm, axis=1)
     error_mm = float(np.quantile(predicted, 0.95))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mirror.seen_views import KINDS, Marks
-from calibration.mirror.view_state import N_SHARED, N_VIEW, ViewState, predict
+from calibration.mirror.view_state import N_LENS, N_SHARED, N_VIEW, ViewState, predict
 from calibration.rig.equilibration import compute_unit_sizes, equilibrate
 from navapp.geometry.display_model_errors import perpendicular_axes
 from navapp.geometry.rig import StereoRig
@@ -32,11 +32,15 @@ class Priors:
     bulge_sd_mm: float = 0.0
     glass_sd_mm: float = 0.5
     normal_sd_rad: float = 0.15
-    has_lens: bool = False  # the eye's camera is calibrated: its numbers are held
+    # has_lens, has_screen: the eye's camera, or screen and glass, are calibrated and held.
+    has_lens: bool = False
+    has_screen: bool = False
 
     def sds(self) -> FloatArray:
         """(19,) of every shared number."""
-        lens = [0.0] * 8 if self.has_lens else [np.inf] * 8
+        lens = [0.0 if self.has_lens else np.inf] * N_LENS
+        if self.has_screen:
+            return np.array([*lens, *[0.0] * (N_SHARED - N_LENS)])
         return np.array(
             [*lens, *[np.inf] * 6, self.pitch_sd_share, self.bulge_sd_mm, self.glass_sd_mm,
              self.normal_sd_rad, self.normal_sd_rad]
@@ -88,37 +92,46 @@ def solve(
     used = {kind: marks[kind] for kind in kinds}
     sds = priors.sds()
     is_free = np.r_[(sds > 0.0) & (not shared_held), np.ones(N_VIEW * len(start.eye_shift), bool)]
-    state, damping, growth, is_settled = start, _FIRST_DAMPING, 2.0, False
+    state, is_settled = _come_to_rest(used, rig, start, priors, is_free)
     residual, sigma = _residuals(state, used, rig)
     scale = _scale(residual, sigma)
-    for _ in range(_MOST_STEPS):
-        weights = _weights(residual, sigma, scale)
-        normal, right = _normal(state, used, rig, residual, weights)
-        _add_priors(normal, right, sds, priors.deviations(state))
-        cost = _cost(residual, sigma, scale, priors, state)
-        moved, promised = _descend(normal, right, is_free, damping, state)
-        trial, _ = _residuals(moved, used, rig)
-        gain = cost - _cost(trial, sigma, scale, priors, moved)
-        if not gain > 0.0:
-            is_settled = promised < _SETTLED
-            damping, growth = damping * growth, 2.0 * growth
-        else:
-            state, residual = moved, trial
-            scale = _scale(residual, sigma)
-            is_settled = max(gain, promised) < _SETTLED
-            # Nielsen's rule: the better the step was foreseen, the less the next one is damped.
-            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain / promised - 1.0) ** 3)
-            growth = 2.0
-        if is_settled:
-            break
-    normal, right = _normal(state, used, rig, residual, _weights(residual, sigma, scale))
-    _add_priors(normal, right, sds, np.zeros(N_SHARED))
+    normal, _ = _normal(state, used, rig, residual, _weights(residual, sigma, scale))
+    _add_priors(normal, np.zeros(len(normal)), sds, np.zeros(N_SHARED))
     free = normal[np.ix_(is_free, is_free)]
     sizes = compute_unit_sizes(free)
     covariance = equilibrate(np.linalg.pinv(equilibrate(free, sizes), hermitian=True), sizes)
-    return Bundle(
-        state, _by_kind(residual, used), scale, covariance, is_free, is_settled
-    )  # fmt: skip
+    return Bundle(state, _by_kind(residual, used), scale, covariance, is_free, is_settled)
+
+
+def _come_to_rest(
+    marks: dict[str, Marks],
+    rig: StereoRig,
+    state: ViewState,
+    priors: Priors,
+    is_free: NDArray[np.bool_],
+) -> tuple[ViewState, bool]:
+    """Damped steps until they gain nothing; whether they came so far."""
+    damping, growth = _FIRST_DAMPING, 2.0
+    residual, sigma = _residuals(state, marks, rig)
+    for _ in range(_MOST_STEPS):
+        scale = _scale(residual, sigma)
+        normal, right = _normal(state, marks, rig, residual, _weights(residual, sigma, scale))
+        _add_priors(normal, right, priors.sds(), priors.deviations(state))
+        moved, promised = _descend(normal, right, is_free, damping, state)
+        trial, _ = _residuals(moved, marks, rig)
+        gain = _cost(residual, sigma, scale, priors, state) - _cost(
+            trial, sigma, scale, priors, moved
+        )
+        if max(gain, promised) < _SETTLED:
+            return (moved if gain > 0.0 else state), True
+        if gain > 0.0:
+            state, residual = moved, trial
+            # Nielsen's rule: the better the step was foreseen, the less the next one is damped.
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain / promised - 1.0) ** 3)
+            growth = 2.0
+        else:
+            damping, growth = damping * growth, 2.0 * growth
+    return state, False
 
 
 def _residuals(

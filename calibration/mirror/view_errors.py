@@ -98,7 +98,10 @@ def look_with(
         first.lens, model.screen, glass, first.eye_turn, first.eye_shift,
         first.board_turn, first.board_shift,
     )  # fmt: skip
-    return look_at(scene, views, start, Priors(start, has_lens=True))
+    priors = Priors(start, has_lens=lens is not None, has_screen=True)
+    # A lens that shows board and pattern side by side cannot hide that one of them has moved.
+    posed = solve(gather(scene, views), scene.rig, start, priors).state
+    return look_at(scene, views, posed, priors)
 
 
 def _with_shared(views: ViewState, shared: ViewState) -> ViewState:

@@ -36,9 +36,9 @@ def read_views(
     Args:
         folder: of `eye_site_N`, `eye_screen_N`, `left_N` and `right_N`.
         board: at the site.
-        rig: that took left and right pictures.
-        display_size: width and height of the display's picture, px.
-        eye_views: numbers of the views whose camera stood where the eye will be.
+        rig: that took left and right.
+        display_size: of its picture, px.
+        eye_views: numbers of views whose camera stood where the eye will be.
         diagnostics: told of the progress.
 
     Raises:
@@ -49,20 +49,14 @@ def read_views(
     from calibration.mirror.seen_views import Scene, SeenView
     from calibration.mirror.view_detection import find_view
 
-    files = _find_files(Path(folder))
-    if unknown := sorted(eye_views - set(files)):
-        raise InputError(
-            f"folder {folder} has no view {', '.join(map(str, unknown))}",
-            subject=folder,
-            remedy="name views of the folder with --eye-views",
-        )
+    files = _find_files(Path(folder), eye_views)
     scene: Scene | None = None
     seen: list[SeenView] = []
     dropped: list[DroppedView] = []
     for place, (number, paths) in enumerate(sorted(files.items())):
         pictures = _load(number, paths, number in eye_views)
-        size = (pictures.eye_site.shape[1], pictures.eye_site.shape[0])
         if scene is None:
+            size = (pictures.eye_site.shape[1], pictures.eye_site.shape[0])
             scene = Scene(board, make_pattern(*display_size, board), rig, size)
         _check_sizes(pictures, scene, folder)
         found = find_view(scene, pictures)
@@ -108,8 +102,8 @@ def read_lens(path: str, size: tuple[int, int]) -> "Camera":
     )
 
 
-def _find_files(folder: Path) -> dict[int, dict[str, Path]]:
-    """The four files of every view, by its number."""
+def _find_files(folder: Path, eye_views: set[int]) -> dict[int, dict[str, Path]]:
+    """The four files of every view, by its number; those named as the eye's must be there."""
     if not folder.is_dir():
         raise InputError(
             f"folder {folder} does not exist",
@@ -135,6 +129,12 @@ def _find_files(folder: Path) -> dict[int, dict[str, Path]]:
                 subject=str(folder),
                 remedy="add it, or remove the other pictures of this view",
             )
+    if unknown := sorted(eye_views - set(files)):
+        raise InputError(
+            f"folder {folder} has no view {', '.join(map(str, unknown))}",
+            subject=str(folder),
+            remedy="name views of the folder with --eye-views",
+        )
     return files
 
 

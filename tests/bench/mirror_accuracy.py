@@ -42,7 +42,7 @@ from tests.mirrors import true_display
 
 N_VIEWS = 8
 _FIRST_SEED, _FIRST_COMPUTED, _FIRST_OPERATOR = 3100, 31000, 310000
-_EYE_PX, _EYE_FOCAL_PX = 1000, 5000.0
+_EYE_PX, _EYE_FOCAL_PX = 1500, 5000.0
 _CROSS_PX, _STROKE_PX = 25.0, 3.0
 # The ghost of the plate's second face is a fiftieth of the picture.
 _READ_ABOVE = 0.06
