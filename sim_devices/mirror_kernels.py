@@ -171,7 +171,7 @@ def look_up(texture: NDArray[np.float32], x: float, y: float, ground: float) -> 
     x, y = x - i, y - j
     upper = (1.0 - x) * texture[j, i] + x * texture[j, i + 1]
     lower = (1.0 - x) * texture[j + 1, i] + x * texture[j + 1, i + 1]
-    return (1.0 - y) * upper + y * lower
+    return float((1.0 - y) * upper + y * lower)
 
 
 @njit(cache=True, nogil=True)

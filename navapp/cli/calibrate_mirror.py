@@ -10,13 +10,14 @@ from navapp.cli.alignment_files import read_alignments
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.mirror_views import read_lens, read_views
 from navapp.errors import ResultError, UsageError
-from navapp.geometry.display_model import VIEWING_EYES
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.geometry.display_model import DisplayModel
 
 _MM_PER_INCH = 25.4
+# Those of `DisplayModel`, which takes long to import.
+_EYES = ("left", "right", "camera")
 _EXAMPLE = """\
 examples:
   navapp calibrate mirror --pattern pattern.png --size 1920x1080 --board board.json
@@ -57,7 +58,7 @@ def add_parser(subparsers: Any) -> None:
         "--eye-views", default="", metavar="N,...",
         help="views whose camera stood where the eye will be (those within 5 mm of the first)",
     )  # fmt: skip
-    parser.add_argument("--viewing-eye", choices=VIEWING_EYES, default="camera")
+    parser.add_argument("--viewing-eye", choices=_EYES, default="camera")
     parser.add_argument("--report", metavar="R.html", help="what a person needs to trust it")
     parser.add_argument("--force", action="store_true", help="write what is not accepted")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
