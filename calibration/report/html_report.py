@@ -6,21 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from calibration.report import plots
+from calibration.report.page import make_html, make_note, make_table, make_verdict
 from calibration.rig.acceptance import Limits
 from calibration.rig.rig_solution import Calibration
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.whole_files import write_whole
-
-_STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #1a202c; max-width: 62em; margin: 2em auto;
-  padding: 0 1em; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; }
-table { border-collapse: collapse; } td, th { padding: .2em .9em .2em 0; text-align: left;
-  vertical-align: top; border-bottom: 1px solid #e2e8f0; }
-.verdict { padding: .7em 1em; border-left: .5em solid; background: #f7fafc; }
-.good { border-color: #2f855a; } .bad { border-color: #c53030; }
-svg { max-width: 100%; height: auto; } p.note { color: #4a5568; max-width: 48em; }
-"""
 
 _NOT_SEEN = (
     "All lengths hang on the board's: a board that is printed 0.1 % too large makes "
@@ -42,12 +32,12 @@ def make_page(found: Calibration, limits: Limits) -> str:
         f"<h1>Calibration of {name}</h1>",
         _verdict(found),
         "<h2>What it measures</h2>",
-        _table(_figures(found, limits)),
+        make_table(_figures(found, limits)),
         "<h2>What a point in space is worth</h2>",
         _uncertainty(found),
         "<h2>What is left at the marks</h2>",
         plots.draw_residuals(found),
-        _note(
+        make_note(
             "Arrows should point anywhere. Arrows of a common direction in one part of a picture "
             "say that the lens, or the board, is not as it was modelled."
         ),
@@ -55,7 +45,7 @@ def make_page(found: Calibration, limits: Limits) -> str:
         plots.draw_epipolar(found),
         "<h2>Where the board was shown</h2>",
         plots.draw_coverage(found),
-        _note(
+        make_note(
             "Cells without a mark, where the working volume is seen, are orange. "
             f"Marks lay between {found.covered.depth_mm[0]:.0f} and "
             f"{found.covered.depth_mm[1]:.0f} mm; the board was tilted by "
@@ -65,32 +55,28 @@ def make_page(found: Calibration, limits: Limits) -> str:
         "<h2>Pairs that are not used</h2>",
         _make_dropped_table(found),
         "<h2>The rig</h2>",
-        _table(_numbers(found)),
+        make_table(_numbers(found)),
         "<h2>What this cannot see</h2>",
-        _note(_NOT_SEEN),
+        make_note(_NOT_SEEN),
     ]
-    return (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name}</title>'
-        f"<style>{_STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
-    )
+    return make_html(name, parts)
 
 
 def _verdict(found: Calibration) -> str:
     quality = found.rig.quality
     if quality is None or quality.is_accepted:
         bound = float(np.median(found.bounds_mm))
-        return (
-            f'<p class="verdict good"><b>Accepted.</b> 95 % of points in the middle of the working '
-            f"volume are right to {bound:.2f} mm.</p>"
+        return make_verdict(
+            True,
+            f"95 % of points in the middle of the working volume are right to {bound:.2f} mm.",
         )
-    reasons = "".join(f"<li>{escape(reason)}</li>" for reason in quality.reasons)
-    return f'<div class="verdict bad"><b>Not accepted.</b><ul>{reasons}</ul></div>'
+    return make_verdict(False, "", quality.reasons)
 
 
 def _uncertainty(found: Calibration) -> str:
     if len(found.bounds_mm) == 0:
-        return _note("Nothing: no part of the working volume is seen by both cameras.")
-    return plots.draw_uncertainty(found, float(np.mean(found.depth_mm))) + _note(
+        return make_note("Nothing: no part of the working volume is seen by both cameras.")
+    return plots.draw_uncertainty(found, float(np.mean(found.depth_mm))) + make_note(
         "Predicted error that 95 % of triangulated points stay below, from the covariance of "
         "the solved rig. Most of it is one common shift of everything that is seen."
     )
@@ -159,15 +145,6 @@ def _record(rig: StereoRig) -> list[tuple[str, str, str]]:
 
 def _make_dropped_table(found: Calibration) -> str:
     if not found.dropped:
-        return _note("None.")
+        return make_note("None.")
     rows = [(f"pair {one.index}", escape(one.reason), "") for one in found.dropped]
-    return _table(rows)
-
-
-def _table(rows: list[tuple[str, str, str]]) -> str:
-    lines = "".join(f"<tr><th>{a}</th><td>{b}</td><td>{c}</td></tr>" for a, b, c in rows)
-    return f"<table>{lines}</table>"
-
-
-def _note(text: str) -> str:
-    return f'<p class="note">{text}</p>'
+    return make_table(rows)

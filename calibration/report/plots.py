@@ -15,7 +15,7 @@ from calibration.rig.rig_solution import Calibration
 from calibration.rig.uncertainty import compute_bounds_mm
 from navapp.geometry.transform import FloatArray
 
-_BLUE, _ORANGE, _PALE, _GREY = "#2b6cb0", "#c05621", "#fbd38d", "#718096"
+BLUE, ORANGE, _PALE, GREY = "#2b6cb0", "#c05621", "#fbd38d", "#718096"
 _MAP_COLUMNS, _MAP_ROWS = 48, 27
 
 
@@ -31,7 +31,7 @@ def draw_residuals(found: Calibration) -> str:
                 marks, arrows = getattr(pair, side).pixels, left[number] * factor
                 axes.quiver(
                     marks[:, 0], marks[:, 1], arrows[:, 0], arrows[:, 1],
-                    angles="xy", scale_units="xy", scale=1.0, color=_BLUE, width=0.0015,
+                    angles="xy", scale_units="xy", scale=1.0, color=BLUE, width=0.0015,
                 )  # fmt: skip
         figure.suptitle(
             f"what is left at every mark, {factor:.0f} times as long as it is "
@@ -39,7 +39,7 @@ def draw_residuals(found: Calibration) -> str:
             fontsize=9,
         )
 
-    return _svg(draw, (9.6, 3.1))
+    return draw_svg(draw, (9.6, 3.1))
 
 
 def draw_coverage(found: Calibration) -> str:
@@ -60,9 +60,9 @@ def draw_coverage(found: Calibration) -> str:
             ]
             shade = np.ma.masked_where(~bare, np.ones(bare.shape))
             axes.pcolormesh(*edges, shade, cmap=ListedColormap([_PALE]))
-            axes.plot(marks[:, 0], marks[:, 1], ".", color=_BLUE, markersize=1.5)
+            axes.plot(marks[:, 0], marks[:, 1], ".", color=BLUE, markersize=1.5)
 
-    return _svg(draw, (9.6, 3.1))
+    return draw_svg(draw, (9.6, 3.1))
 
 
 def draw_views(found: Calibration) -> str:
@@ -74,13 +74,13 @@ def draw_views(found: Calibration) -> str:
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()
         place = np.arange(len(names))
-        axes.bar(place - 0.2, solved, 0.4, color=_BLUE, label="solved with")
-        axes.bar(place + 0.2, held, 0.4, color=_ORANGE, label="held out")
+        axes.bar(place - 0.2, solved, 0.4, color=BLUE, label="solved with")
+        axes.bar(place + 0.2, held, 0.4, color=ORANGE, label="held out")
         axes.set_xticks(place, names, fontsize=7)
         axes.set(xlabel="pair", ylabel="rms, px")
         axes.legend(frameon=False)
 
-    return _svg(draw, (9.6, 2.4))
+    return draw_svg(draw, (9.6, 2.4))
 
 
 def draw_epipolar(found: Calibration) -> str:
@@ -89,11 +89,11 @@ def draw_epipolar(found: Calibration) -> str:
 
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()
-        axes.hist(across, bins=60, color=_BLUE)
-        axes.axvline(0.0, color=_GREY, linewidth=0.8)
+        axes.hist(across, bins=60, color=BLUE)
+        axes.axvline(0.0, color=GREY, linewidth=0.8)
         axes.set(xlabel="distance from the epipolar line, px", ylabel="marks")
 
-    return _svg(draw, (4.7, 2.4))
+    return draw_svg(draw, (4.7, 2.4))
 
 
 def draw_uncertainty(found: Calibration, depth_mm: float) -> str:
@@ -120,7 +120,7 @@ def draw_uncertainty(found: Calibration, depth_mm: float) -> str:
         axes.set(xlim=(0, model.width), ylim=(model.height, 0), aspect="equal")
         axes.set_title(f"at {depth_mm:.0f} mm, where both cameras see it", fontsize=9)
 
-    return _svg(draw, (4.7, 2.8))
+    return draw_svg(draw, (4.7, 2.8))
 
 
 def _rms(residual_px: FloatArray) -> float:
@@ -135,7 +135,7 @@ def _picture_axes(figure: Any, number: int, found: Calibration, title: str) -> A
     return axes
 
 
-def _svg(draw: Callable[[Any], None], size_inch: tuple[float, float]) -> str:
+def draw_svg(draw: Callable[[Any], None], size_inch: tuple[float, float]) -> str:
     """A figure without a window, as the text of an SVG element."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""`navapp calibrate`: a stereo rig that knows how good it is, delays, the tip of a tool."""
+"""`navapp calibrate`: a stereo rig that knows how good it is, a mirror, delays, a tool's tip."""
 
 import argparse
 import importlib
@@ -12,6 +12,7 @@ _PARTS = {
     "capture": "calibrate_capture",
     "stereo": "calibrate_stereo",
     "check": "calibrate_check",
+    "mirror": "calibrate_mirror",
     "latency": "calibrate_latency",
     "pivot": "calibrate_pivot",
 }
@@ -22,6 +23,7 @@ examples:
   navapp calibrate capture --board board.json --out capture/
   navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
   navapp calibrate check rig.yml today/ --board board.json
+  navapp calibrate mirror --out display.yml --views views/ --board board.json --rig rig.yml
   navapp calibrate latency
   navapp calibrate pivot poses.csv
 """
@@ -31,7 +33,7 @@ def add_parser(subparsers: Any) -> None:
     """Declare the verb and its parts."""
     parser = subparsers.add_parser(
         "calibrate",
-        help="a board, its pictures, a stereo rig from them, its check; delays; a tool's tip",
+        help="boards, their pictures, a stereo rig, a mirror, checks; delays; a tool's tip",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

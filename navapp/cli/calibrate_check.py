@@ -1,4 +1,4 @@
-"""`navapp calibrate check`: how good a rig is today, on new pictures of the board."""
+"""`navapp calibrate check`: how good a rig, or a display in a mirror, is today."""
 
 import argparse
 from dataclasses import replace
@@ -9,14 +9,16 @@ import numpy as np
 
 from navapp.cli.board_pairs import read_pairs
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import ResultError, RigError
+from navapp.errors import ResultError, RigError, UsageError
 
 if TYPE_CHECKING:
     from calibration.rig.rig_check import RigCheck
     from navapp.geometry.rig import StereoRig
 
 _EXAMPLE = """\
-example: navapp calibrate check rig.yml today/ --board board.json
+examples:
+  navapp calibrate check rig.yml today/ --board board.json
+  navapp calibrate check --display display.yml --views today/ --board board.json --rig rig.yml
 
 A few pairs are enough: the board near and far, tilted, in the middle and at the edges.
 """
@@ -26,12 +28,16 @@ def add_parser(subparsers: Any) -> None:
     """Declare the part."""
     parser = subparsers.add_parser(
         "check",
-        help="how good a rig is today, on new pictures of the board",
+        help="how good a rig, or a display in a mirror, is today, on new pictures",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("rig", metavar="RIG", help="rig file")
-    parser.add_argument("images", metavar="IMAGES", help="folder of new pairs")
+    parser.add_argument("rig", nargs="?", metavar="RIG", help="rig file")
+    parser.add_argument("images", nargs="?", metavar="IMAGES", help="folder of new pairs")
+    parser.add_argument("--display", metavar="DISPLAY.yml", help="check this instead of a rig")
+    parser.add_argument("--views", metavar="DIR", help="new views, as calibrate mirror takes them")
+    parser.add_argument("--rig", dest="views_rig", metavar="R", help="rig that took the views")
+    parser.add_argument("--lens", metavar="FILE", help="of the eye's camera, calibrated")
     parser.add_argument("--board", required=True, metavar="BOARD.json", help="what they show")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
@@ -44,6 +50,15 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.geometry.rig_files import read_rig
 
     check_writable(options.json)
+    if options.display is not None or options.views is not None:
+        from navapp.cli.mirror_check import check_mirror
+
+        return check_mirror(options, diagnostics)
+    if options.rig is None or options.images is None:
+        raise UsageError(
+            "calibrate check needs a rig and a folder of pairs",
+            remedy="give RIG and IMAGES, or --display DISPLAY.yml and --views DIR",
+        )
     rig, board = read_rig(options.rig), read_board(options.board)
     pairs = read_pairs(options.images, board, diagnostics)
     if pairs.size != (rig.width, rig.height):

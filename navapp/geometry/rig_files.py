@@ -1,8 +1,6 @@
 """The file of a stereo rig: OpenCV's YAML (or XML, or JSON) with a quality record of ours."""
 
-import hashlib
 import math
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +9,21 @@ import numpy as np
 from navapp.errors import RigError
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import RigQuality, StereoRig
+from navapp.geometry.sealed_storage import (
+    ChangedFileError,
+    day,
+    is_sealed,
+    number,
+    read_matrix,
+    read_numbers,
+    read_record,
+    read_texts,
+    write_days,
+    write_figures,
+    write_sealed,
+    write_texts,
+)
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.whole_files import write_whole
 
 # What other programs call the same thing; the first name is ours.
 _SYNONYMS = {
@@ -26,7 +37,6 @@ _SYNONYMS = {
 _TEXTS = (
     "serial_left", "serial_right", "rig_name", "rig_id", "made_on", "expires_on", "length_unit",
 )  # fmt: skip
-_HASH_KEY = "file_sha256"
 
 
 def read_rig(path: str | Path) -> StereoRig:
@@ -42,7 +52,7 @@ def read_rig(path: str | Path) -> StereoRig:
             subject=str(path),
             remedy="give the OpenCV YAML file that the calibration wrote",
         )
-    is_sealed = _is_sealed(path)
+    has_seal = _has_seal(path)
     values = _read_storage(path)
     width, height = values.get("image_width"), values.get("image_height")
     missing = [key for key in _SYNONYMS if key not in values]
@@ -70,7 +80,7 @@ def read_rig(path: str | Path) -> StereoRig:
             remedy="calibrate again or restore the file",
         ) from error
     # Only our own files name their rig, and they all end with a hash.
-    if "rig_id" in values and not (is_sealed and values["rig_id"] == rig.rig_id):
+    if "rig_id" in values and not (has_seal and values["rig_id"] == rig.rig_id):
         raise _changed(path)
     return rig
 
@@ -81,13 +91,10 @@ def write_rig(path: str | Path, rig: StereoRig) -> None:
     The quality record comes first: a file that is cut short later on loses numbers that it cannot
     be read without, never just the verdict. The last line is a hash of all lines before.
     """
-    import cv2
+    write_sealed(path, lambda storage: _write_entries(storage, rig))
 
-    is_xml = Path(path).suffix.lower() == ".xml"
-    # OpenCV 5 writes YAML 1.2 unless asked; older readers know 1.0 only.
-    yaml_format = getattr(cv2, "FILE_STORAGE_FORMAT_YAML_1_0", cv2.FILE_STORAGE_FORMAT_YAML)
-    form = cv2.FILE_STORAGE_FORMAT_XML if is_xml else yaml_format
-    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | form)
+
+def _write_entries(storage: Any, rig: StereoRig) -> None:
     storage.write("rig_name", rig.name)
     storage.write("rig_id", rig.rig_id)
     storage.write("serial_left", rig.serials[0])
@@ -105,21 +112,14 @@ def write_rig(path: str | Path, rig: StereoRig) -> None:
         )
     storage.write("R", np.array(rig.right_from_left.rotation))
     storage.write("T", np.array(rig.right_from_left.translation_mm).reshape(3, 1))
-    content = storage.releaseAndGetString().encode("utf-8")
-    seal = f'{_HASH_KEY}: "{hashlib.sha256(content).hexdigest()}"'
-    write_whole(path, content + (f"<!-- {seal} -->\n" if is_xml else f"{seal}\n").encode())
 
 
-def _is_sealed(path: Path) -> bool:
+def _has_seal(path: Path) -> bool:
     """Whether the last line is a hash; refused when it does not fit the lines before."""
-    # Line ends change on the way through mail and other systems, which alters nothing.
-    lines = path.read_bytes().replace(b"\r\n", b"\n").splitlines(keepends=True)
-    if not lines or _HASH_KEY.encode() not in lines[-1]:
-        return False
-    found = hashlib.sha256(b"".join(lines[:-1])).hexdigest()
-    if found.encode() not in lines[-1]:
-        raise _changed(path)
-    return True
+    try:
+        return is_sealed(path)
+    except ChangedFileError:
+        raise _changed(path) from None
 
 
 def _changed(path: Path) -> RigError:
@@ -131,24 +131,13 @@ def _changed(path: Path) -> RigError:
 
 
 def _write_quality(storage: Any, quality: RigQuality) -> None:
-    import cv2
-
     storage.write("accepted", int(quality.is_accepted))
-    storage.startWriteStruct("reasons", cv2.FILE_NODE_SEQ)
-    for reason in quality.reasons:
-        storage.write("", reason)
-    storage.endWriteStruct()
+    write_texts(storage, "reasons", quality.reasons)
     storage.write(
         "uncertainty_mm", -1.0 if quality.uncertainty_mm is None else quality.uncertainty_mm
     )
-    for name, day in (("made_on", quality.made_on), ("expires_on", quality.expires_on)):
-        if day is not None:
-            storage.write(name, day.isoformat())
-    if quality.figures:
-        storage.startWriteStruct("figures", cv2.FILE_NODE_MAP)
-        for name, value in quality.figures.items():
-            storage.write(name, float(value))
-        storage.endWriteStruct()
+    write_days(storage, quality.made_on, quality.expires_on)
+    write_figures(storage, quality.figures)
     if quality.length_unit != "mm":
         storage.write("length_unit", quality.length_unit)
     if quality.covariance is not None:
@@ -164,16 +153,12 @@ def _quality(values: dict[str, Any]) -> RigQuality | None:
         int(values["accepted"]) == 1,
         tuple(values.get("reasons", ())),
         uncertainty_mm if known else None,
-        _day(values.get("made_on", "")),
-        _day(values.get("expires_on", "")),
+        day(values.get("made_on", "")),
+        day(values.get("expires_on", "")),
         values.get("figures", {}),
         values.get("covariance"),
         str(values.get("length_unit", "mm")),
     )
-
-
-def _day(text: str) -> date | None:
-    return date.fromisoformat(text) if text else None
 
 
 def _read_storage(path: Path) -> dict[str, Any]:
@@ -195,63 +180,27 @@ def _read_storage(path: Path) -> dict[str, Any]:
     return values
 
 
-# A node must stay in a variable: the storage frees the ones that nobody holds.
-
-
 def _read_matrices(storage: Any) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    for name, synonyms in _SYNONYMS.items():
-        for synonym in synonyms:
-            node = storage.getNode(synonym)
-            if not node.empty() and node.mat() is not None:
-                values[name] = np.asarray(node.mat(), dtype=np.float64)
-                break
-    node = storage.getNode("covariance")
-    if not node.empty() and node.mat() is not None:
-        values["covariance"] = np.asarray(node.mat(), dtype=np.float64)
+    for name, synonyms in {**_SYNONYMS, "covariance": ("covariance",)}.items():
+        found = [matrix for key in synonyms if (matrix := read_matrix(storage, key)) is not None]
+        if found:
+            values[name] = found[0]
     return values
 
 
 def _read_scalars(storage: Any) -> dict[str, Any]:
     values: dict[str, Any] = {}
+    # A node must stay in a variable: the storage frees the ones that nobody holds.
     for name in ("size", "image_size"):
         node = storage.getNode(name)
         if node.empty():
             continue
-        size = [_number(node.at(i)) for i in range(node.size())] if node.isSeq() else node.mat()
+        size = [number(node.at(i)) for i in range(node.size())] if node.isSeq() else node.mat()
         size = np.asarray(size, dtype=np.float64).reshape(-1)
         if size.size != 2:
             raise ValueError(f"{name} is not a width and a height")
         values["image_width"], values["image_height"] = size
-    for name in ("image_width", "image_height", "accepted", "uncertainty_mm"):
-        node = storage.getNode(name)
-        if not node.empty():
-            values[name] = _number(node)
-    for name in (
-        "serial_left",
-        "serial_right",
-        "rig_name",
-        "rig_id",
-        "made_on",
-        "expires_on",
-        "length_unit",
-    ):
-        node = storage.getNode(name)
-        if not node.empty() and node.isString():
-            values[name] = node.string()
-    node = storage.getNode("figures")
-    if not node.empty() and node.isMap():
-        values["figures"] = {name: _number(node.getNode(name)) for name in node.keys()}  # noqa: SIM118 (OpenCV's)
-    node = storage.getNode("reasons")
-    if not node.empty() and node.isSeq():
-        values["reasons"] = [node.at(i).string() for i in range(node.size())]
-    elif node.isString():
-        # A sequence of one is no sequence in XML.
-        values["reasons"] = [node.string()]
-    return values
-
-
-def _number(node: Any) -> float:
-    if not (node.isInt() or node.isReal()):
-        raise ValueError("a number was expected")
-    return float(node.real())
+    names = ("image_width", "image_height", "accepted", "uncertainty_mm")
+    values |= read_numbers(storage, names)
+    return values | read_texts(storage, _TEXTS) | read_record(storage)

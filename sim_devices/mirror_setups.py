@@ -1,0 +1,81 @@
+"""Set-ups of a display in a mirror beside the simulated rig, drawn at random."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from navapp.geometry.camera import Camera
+from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from sim_devices.mirror_optics import MirrorSetup, Panel, Plate
+from sim_devices.rigs import WORKING_DISTANCE_MM
+
+WIDTH_PX, HEIGHT_PX = 1920, 1080
+_DIAGONAL_MM = 24.0 * 25.4
+PITCH_MM = _DIAGONAL_MM / math.hypot(WIDTH_PX, HEIGHT_PX)
+
+
+def draw_setup(rng: np.random.Generator) -> MirrorSetup:
+    """A 24 inch monitor seen near the bone's depth from an eye 350 to 550 mm away.
+
+    The plate stands at some 45 degrees between eye and site; the monitor is where its reflection
+    is wanted, the right way round or upside down, with or without flips of its own.
+    """
+    site = np.array([0.0, 0.0, WORKING_DISTANCE_MM]) + rng.uniform(-15.0, 15.0, 3)
+    # The eye stands beside the cameras: they must not see the site through the plate.
+    leaning = math.radians(rng.uniform(25.0, 45.0))
+    turn = rotation_from_vector((leaning, 0.0, 0.0)) @ rotation_from_vector(
+        (0.0, 0.0, rng.uniform(-0.3, 0.3))
+    )
+    right, down, ahead = (turn @ rotation_from_vector(rng.normal(0.0, 0.05, 3))).T
+    distance = rng.uniform(350.0, 550.0)
+    eye = site - distance * ahead
+    slope = math.radians(rng.uniform(40.0, 50.0))
+    normal = math.cos(slope) * ahead + math.sin(slope) * down
+    front = eye + rng.uniform(0.3, 0.38) * distance * ahead
+    plate = Plate(front, normal, rng.uniform(1.0, 4.0))
+    seen = rotation_from_vector(rng.normal(0.0, 0.03, 3)) @ np.column_stack([right, down, ahead])
+    middle = site + rng.uniform(-30.0, 30.0) * ahead + rng.uniform(-15.0, 15.0) * right
+    setup = MirrorSetup(eye, right, site, plate, _place_panel(plate, middle, seen, rng))
+    return replace(setup, site_lx=rng.uniform(200.0, 800.0))
+
+
+def _place_panel(
+    plate: Plate, middle: FloatArray, seen: FloatArray, rng: np.random.Generator
+) -> Panel:
+    """The monitor whose middle and axes (columns right, down, ahead) are to be seen there."""
+    n = plate.normal
+    turned = seen - 2.0 * np.outer(n, n @ seen)
+    place = middle - 2.0 * float((middle - plate.front_mm) @ n) * n
+    # From its front a monitor's picture is not mirrored; from there, right is left.
+    sign = 1.0 if rng.random() < 0.5 else -1.0
+    across, down = -sign * turned[:, 0], sign * turned[:, 1]
+    half = 0.5 * PITCH_MM * np.array([WIDTH_PX - 1, HEIGHT_PX - 1])
+    origin = place - half[0] * across - half[1] * down
+    flips = rng.random(2) < 0.5
+    return Panel(
+        origin, across, down, PITCH_MM, WIDTH_PX, HEIGHT_PX, bool(flips[0]), bool(flips[1])
+    )
+
+
+def make_eye_camera(
+    width: int, height: int, focal_px: float, distortion: tuple[float, ...] = ()
+) -> Camera:
+    """A camera of an eye, its axis through the picture's middle."""
+    middle = (0.5 * (width - 1), 0.5 * (height - 1))
+    matrix = np.array([[focal_px, 0.0, middle[0]], [0.0, focal_px, middle[1]], [0, 0, 1.0]])
+    return Camera(matrix, np.array(distortion), width, height)
+
+
+def look_at_site(
+    setup: MirrorSetup, shift_mm: FloatArray | None = None, roll_rad: float = 0.0
+) -> RigidTransform:
+    """`eye_from_left` of a camera at the eye's place, or beside it, aimed at the site upright."""
+    eye = setup.eye_mm if shift_mm is None else setup.eye_mm + shift_mm
+    ahead = setup.site_mm - eye
+    ahead = ahead / np.linalg.norm(ahead)
+    right = setup.right - (setup.right @ ahead) * ahead
+    right /= np.linalg.norm(right)
+    axes = np.vstack([right, np.cross(ahead, right), ahead])
+    axes = rotation_from_vector((0.0, 0.0, roll_rad)) @ axes
+    return RigidTransform.from_parts("eye", "left", axes, -axes @ eye)
