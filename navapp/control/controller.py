@@ -26,8 +26,9 @@ from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
 from navapp.control.frame_result import FrameResult
+from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.other_bones import OtherBones
-from navapp.control.pictures import compose
+from navapp.control.pictures import Composer
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
@@ -36,7 +37,7 @@ from navapp.control.specification import SessionSpecification
 from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
-from navapp.overlay import DepthMarks, LeftView, make_preview
+from navapp.overlay import DepthMarks, make_preview
 from navapp.tracking import make_tracker
 from navapp.values import FrameTimings, OverlayMode, OverlayPicture
 
@@ -72,9 +73,9 @@ class SessionController:
         rig, plan = specification.rig, specification.plan
         self._overlay_valid_ms = specification.overlay_valid_ms
         self._devices = devices
-        self._viewpoint = LeftView(rig)
+        self._mirror_checking = MirrorChecking(specification.display, plan)
+        self._composer = Composer(rig, plan, self._mirror_checking.view)
         self._depth_marks = DepthMarks(rig)
-        self._plan = plan
         self._executor = executor
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
         self._display = DisplayLink(devices.display)
@@ -84,15 +85,16 @@ class SessionController:
         self._session = _make_session(devices.clock, specification, hooks, executor, make_tracker)
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._monitored = MonitoredDevices(
-            ProjectorHandler(devices.projector),
+            ProjectorHandler(devices.projector, specification.display_model),
             MirrorHandler(devices.mirror, specification.mirror_deg),
         )
         self._commands = CommandHandler(
-            self._session, self._camera, self._display, self._rig_watch, self._monitored, plan
-        )
+            self._session, self._camera, self._display, self._rig_watch, self._monitored,
+            self._mirror_checking, plan,
+        )  # fmt: skip
         self._maker = SnapshotMaker(
-            self._session, self._camera, self._display, self._monitored, rig, self._rig_watch, plan,
-            specification.is_recording,
+            self._session, self._camera, self._display, self._monitored, self._mirror_checking,
+            specification, self._rig_watch,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -201,21 +203,29 @@ class SessionController:
         mark = "SIMULATED" if snapshot.is_simulated else ""
         tracked = self._session.tracked
         foreground = None if tracked is None else tracked.foreground
-        image = compose(frame.left, snapshot, self._viewpoint, self._plan, mark, foreground)
+        video = self._composer.compose_video(frame.left, snapshot, mark, foreground)
+        image = video
+        if self._composer.mode is OverlayMode.MIRROR:
+            pose = snapshot.left_from_bone
+            cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
+            image = self._composer.compose_mirror(snapshot, foreground, cross_px)
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
+        is_scaled = self._composer.mode is OverlayMode.VIDEO
         # The screen shows the live picture in a fault as well, the display shows nothing; nor does
         # it when what would be seen on it is not what is shown.
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
-        if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
+        if is_shown and self._display.show(
+            image, valid_until_ns, has_guides=has_guides, is_scaled=is_scaled
+        ):
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
-        preview = make_preview(image)
+        preview = make_preview(video)
         if self._session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
         self._session.keep_preview(preview)
         age_ns = self._session.now_ns - frame.captured_ns
-        return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
+        return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
 
 
 def _make_session(

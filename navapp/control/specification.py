@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 from navapp.config import Configuration
+from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.stages import STAGES
+from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.rig import StereoRig
 from navapp.tracking import Method, TrackerSettings
 from navapp.values import Plan, Prior, StageSpec
@@ -29,6 +31,12 @@ class SessionSpecification:
     mirror_deg: float = 45.0  # where the mirror stood when the display was calibrated
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
+    display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
+
+    @property
+    def display_model(self) -> DisplayModel | None:
+        """Of the display in the mirror."""
+        return None if self.display is None else self.display.model
 
     @property
     def tracker_settings(self) -> TrackerSettings:
@@ -48,6 +56,7 @@ def specify_session(
     follows_refused: bool | None = None,
     others: tuple[str, ...] = (),
     layers: tuple[str, ...] | None = None,
+    calibrated_display: CalibratedDisplay | None = None,
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -63,6 +72,7 @@ def specify_session(
         follows_refused: poses that the judge refuses are carried on; None: as configured.
         others: bones that are registered and followed unasked.
         layers: drawn in every stage; None: the stage's own.
+        calibrated_display: in the mirror; None: the display shows the video.
     """
     display = configuration.display
     return SessionSpecification(
@@ -75,7 +85,14 @@ def specify_session(
         configuration.camera.depth_mm,
         others,
         display.withdrawn_ms if is_live else display.valid_ms,
-        configuration.mirror.calibrated_deg,
+        _mirror_deg(configuration, calibrated_display),
         is_live and configuration.recording.folder is not None,
         layers,
+        calibrated_display,
     )
+
+
+def _mirror_deg(configuration: Configuration, display: CalibratedDisplay | None) -> float:
+    """Where the mirror must stand: as calibrated with the display, else as configured."""
+    calibrated_deg = None if display is None else display.model.mirror_deg
+    return configuration.mirror.calibrated_deg if calibrated_deg is None else calibrated_deg

@@ -87,6 +87,11 @@ class Scene:
         return self.viewpoint.camera
 
     @property
+    def guess_weight(self) -> float:
+        """Of guides where the depth is not known: as beneath over video, unlit in the mirror."""
+        return BENEATH_WEIGHT if self.viewpoint.is_video else 0.0
+
+    @property
     def colour(self) -> Colour:
         """Of the bone's outline."""
         return CANDIDATE if self.is_candidate else GUIDE
@@ -179,24 +184,25 @@ class Scene:
         """(h, w) over `box`: 0 to 1, how strongly a guide on the bone is drawn in each pixel."""
         weight = np.empty(self.bone_mm.shape, dtype=np.float32)
         if self.seen is None:
-            weight.fill(BENEATH_WEIGHT)
+            weight.fill(self.guess_weight)
             return weight
         find_weights(
             self.bone_mm, self.seen.depth_mm, self.seen.is_guess, self.seen.in_front, TISSUE_MM,
-            self._aside_mm, BENEATH_WEIGHT, weight,
+            self._aside_mm, BENEATH_WEIGHT, self.guess_weight, weight,
         )  # fmt: skip
         return weight
 
     def weight_over(self, box: Box) -> FloatMap:
-        """The weights over another box, where nothing is known those of what lies beneath."""
-        weight = np.full((box.height, box.width), BENEATH_WEIGHT, dtype=np.float32)
+        """The weights over another box; beyond `box` nothing is known."""
+        weight = np.full((box.height, box.width), self.guess_weight, dtype=np.float32)
         here, there = box.shared_slices(self.box)
         weight[here] = self.weight[there]
         return weight
 
     def order_of(self, pixels: FloatArray, depth_mm: FloatArray) -> NDArray[np.uint8]:
         """(N,) `Order` of points of guides at pixels (N, 2) and depths (N,) in the picture."""
-        order = np.full(len(pixels), Order.BENEATH, dtype=np.uint8)
+        beyond = Order.BENEATH if self.guess_weight > 0.0 else Order.HIDDEN
+        order = np.full(len(pixels), beyond, dtype=np.uint8)
         with np.errstate(invalid="ignore"):
             places = np.nan_to_num(np.round(pixels) - (self.box.x, self.box.y), nan=-1.0)
         inside = ((places >= 0) & (places < (self.box.width, self.box.height))).all(axis=1)

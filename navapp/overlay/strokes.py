@@ -67,6 +67,22 @@ def draw_cross(
         draw_line(image, scene, sample_line(ends), colour)
 
 
+def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: float = 14.0) -> None:
+    """A thin cross at a place (2,) of the picture, its middle left open."""
+    arms = [
+        at_px
+        + np.array(
+            [
+                [sign * 0.25 * half_px * x, sign * 0.25 * half_px * y],
+                [sign * half_px * x, sign * half_px * y],
+            ]
+        )
+        for x, y in ((1, 0), (0, 1))
+        for sign in (-1.0, 1.0)
+    ]
+    _draw_pixels(image, arms, colour, 1, has_rim=False)
+
+
 def _runs(pixels: FloatArray, piece_order: NDArray[np.uint8]) -> list[tuple[FloatArray, bool]]:
     """Pieces of one order in a row, as polylines; hidden ones are left out."""
     ends = np.flatnonzero(np.diff(piece_order)) + 1
