@@ -158,11 +158,10 @@ class CommandHandler:
             self._session.add_event("mirror", "check of the mirror given up", EventLevel.WARNING)
             return
         tracked = self._session.tracked
-        pose = None if tracked is None else tracked.left_from_bone
-        if tracked is None or pose is None or tracked.verdict.status is not Status.OK:
+        if tracked is None or tracked.verdict.status is not Status.OK:
             self._refuse("mirror", "the check needs a bone whose pose is OK")
             return
-        why = self._mirror.begin(self._session.stage.bone, pose)
+        why = self._mirror.begin(tracked)
         if why:
             self._refuse("mirror", why)
             return

@@ -37,6 +37,7 @@ from navapp.control.specification import SessionSpecification
 from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
+from navapp.geometry.rectification import Rectifier
 from navapp.overlay import DepthMarks, make_preview
 from navapp.tracking import make_tracker
 from navapp.values import FrameTimings, OverlayMode, OverlayPicture
@@ -73,7 +74,7 @@ class SessionController:
         rig, plan = specification.rig, specification.plan
         self._overlay_valid_ms = specification.overlay_valid_ms
         self._devices = devices
-        self._mirror_checking = MirrorChecking(specification.display, plan)
+        self._mirror_checking = MirrorChecking(specification.display, Rectifier(rig).geometry)
         self._composer = Composer(rig, plan, self._mirror_checking.view)
         self._depth_marks = DepthMarks(rig)
         self._executor = executor
@@ -86,7 +87,7 @@ class SessionController:
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._monitored = MonitoredDevices(
             ProjectorHandler(devices.projector, specification.display_model),
-            MirrorHandler(devices.mirror, specification.mirror_deg),
+            MirrorHandler(devices.mirror, specification.calibrated_mirror_deg),
         )
         self._commands = CommandHandler(
             self._session, self._camera, self._display, self._rig_watch, self._monitored,

@@ -1,30 +1,28 @@
-"""The surgeon's check of the mirror: crosses on points of the bone, moved until they fit.
+"""The surgeon's check of the mirror: crosses on the bone, moved until they lie where they should.
 
-Three points that the stereo camera locates in that moment and that took no part in the calibration.
-What the crosses had to be moved by is the error of the whole chain as the eye sees it.
+Three points of the bone's surface that the cameras have measured in that moment, marked on the
+operator's screen too; none of them took part in the calibration. What the crosses had to be moved
+by is the error of the whole chain as the eye sees it.
 """
 
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
 from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.states import CrossCheck, MirrorCheck
 from navapp.geometry.display_model_view import EyeView
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.values import Plan, Reason
+from navapp.values import Reason, TrackedFrame
 
 N_POINTS, LEAST_APART_MM = 3, 40.0
-# A landmark further from the surface is not seen on the bone (the middle of the hip).
-_ON_SURFACE_MM = 4.0
-# Of a candidate triple: the best few points are tried in all combinations.
-_MOST_CANDIDATES = 24
+# Of the measured pixels every so many is a candidate; crosses stay so far from the picture's rim.
+_STRIDE_PX, _RIM_PX = 8, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cross:
-    name: str
     point_mm: FloatArray  # (3,) of the bone
     nudge_px: tuple[int, int] = (0, 0)
 
@@ -34,12 +32,13 @@ class MirrorChecking:
 
     Args:
         display: that is checked; None: guides lie over video, and nothing is asked.
-        plan: whose landmarks and targets the crosses lie on.
+        geometry: of the rectified pair in which points are measured.
     """
 
-    def __init__(self, display: CalibratedDisplay | None, plan: Plan) -> None:
-        self._display, self._plan = display, plan
+    def __init__(self, display: CalibratedDisplay | None, geometry: RectifiedGeometry) -> None:
+        self._display = display
         self._view = None if display is None else display.model.view()
+        self._geometry = geometry
         self._crosses: list[_Cross] = []
         self._number = 0
         self._finished: MirrorCheck | None = None
@@ -54,8 +53,12 @@ class MirrorChecking:
         """Of the check that is under way."""
         if not self._crosses:
             return None
-        cross = self._crosses[self._number]
-        return CrossCheck(self._number, len(self._crosses), cross.name, cross.nudge_px)
+        return CrossCheck(self._number, len(self._crosses), self._crosses[self._number].nudge_px)
+
+    @property
+    def point_mm(self) -> FloatArray | None:
+        """(3,) of the bone, where the cross belongs; None without a check."""
+        return self._crosses[self._number].point_mm if self._crosses else None
 
     def find_reason(self, now_ns: int) -> Reason | None:
         """What the check has against guides."""
@@ -65,18 +68,16 @@ class MirrorChecking:
             return Reason.MIRROR_UNCHECKED
         return self._display.find_check_reason(self._finished, now_ns)
 
-    def begin(self, bone: str, left_from_bone: RigidTransform) -> str:
-        """Choose points of a bone at a pose; what is wrong, empty when the check has begun."""
+    def begin(self, tracked: TrackedFrame) -> str:
+        """Choose points that were measured in a frame; what is wrong, empty when it has begun."""
         if self._view is None:
             return "no display in the mirror is configured"
-        points = self._visible_points(bone, left_from_bone)
+        points = self._candidates(self._view, tracked)
         chosen = _furthest_apart(points)
-        if chosen is None:
-            return (
-                f"fewer than {N_POINTS} landmarks or targets of the {bone} are in view, "
-                f"{LEAST_APART_MM:.0f} mm apart"
-            )
-        self._crosses = [_Cross(name, points[name]) for name in chosen]
+        pose = tracked.left_from_bone
+        if chosen is None or pose is None:
+            return f"no three points {LEAST_APART_MM:.0f} mm apart are measured on the bone"
+        self._crosses = [_Cross(point) for point in pose.inverse().apply(chosen)]
         self._number, self._finished = 0, None
         return ""
 
@@ -95,7 +96,7 @@ class MirrorChecking:
         if not self._crosses or self._view is None:
             return None
         cross = self._crosses[self._number]
-        pixel: FloatArray = self._pixels(cross.point_mm[None], left_from_bone)[0]
+        pixel = _pixels(self._view, left_from_bone.apply(cross.point_mm[None]))[0]
         moved: FloatArray = pixel + np.array(cross.nudge_px)
         return moved
 
@@ -112,46 +113,31 @@ class MirrorChecking:
         self._finished = MirrorCheck(now_ns, float(residual_mm.max()))
         return self._finished
 
-    def _pixels(self, points_mm: FloatArray, left_from_bone: RigidTransform) -> FloatArray:
-        view = self._view
-        if view is None:
-            return np.full((len(points_mm), 2), np.nan)
-        pixels: FloatArray = view.camera.project(view.warp(left_from_bone.apply(points_mm)))
-        return pixels
-
-    def _visible_points(self, bone: str, left_from_bone: RigidTransform) -> dict[str, FloatArray]:
-        """Landmarks and targets that lie on the bone's surface, face both eye and camera."""
-        from scipy.spatial import cKDTree
-
-        named = {name: one.point_mm for name, one in self._plan.content.landmarks.items()}
-        for name, points in self._plan.targets.items():
-            for number, point in enumerate(points.reshape(-1, 3)):
-                named[f"{name} {number + 1}" if points.size > 3 else name] = point
-        named = {name: one for name, one in named.items() if name.startswith(f"{bone}/")}
-        if not named or self._view is None:
-            return {}
-        mesh = self._plan.bones[bone].mesh
-        points_mm = np.array(list(named.values()))
-        distance_mm, nearest = cKDTree(mesh.vertices_mm).query(points_mm)
-        pixels = self._pixels(points_mm, left_from_bone)
-        camera = self._view.camera
-        is_faced = mesh.visible_vertices(left_from_bone)
-        eye_from_bone = self._view.eye_from_left @ left_from_bone
-        is_faced &= mesh.visible_vertices(eye_from_bone)
-        with np.errstate(invalid="ignore"):
-            is_shown = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)
-        good = (distance_mm < _ON_SURFACE_MM) & is_faced[nearest] & is_shown
-        return {name: named[name] for name, is_good in zip(named, good, strict=True) if is_good}
+    def _candidates(self, view: EyeView, tracked: TrackedFrame) -> FloatArray:
+        """(N, 3) points measured on the bone that the display can show, in the left camera."""
+        if tracked.foreground is None:
+            return np.empty((0, 3))
+        cloud = tracked.foreground.measured.reproject(self._geometry, _STRIDE_PX)
+        points = self._geometry.rectified_from_left.inverse().apply(cloud.points_mm)
+        last = np.array([view.camera.width, view.camera.height]) - _RIM_PX
+        pixels = _pixels(view, points)
+        # Unknown places compare as outside.
+        return points[((pixels > _RIM_PX) & (pixels < last)).all(axis=1)]
 
 
-def _furthest_apart(points: dict[str, FloatArray]) -> tuple[str, ...] | None:
-    """The names of the three whose nearest two lie furthest apart; None when that is too near."""
-    names = list(points)[:_MOST_CANDIDATES]
-    best, best_mm = None, LEAST_APART_MM
-    for triple in combinations(names, N_POINTS):
-        apart_mm = min(
-            float(np.linalg.norm(points[a] - points[b])) for a, b in combinations(triple, 2)
-        )
-        if apart_mm >= best_mm:
-            best, best_mm = triple, apart_mm
-    return best
+def _pixels(view: EyeView, points_mm: FloatArray) -> FloatArray:
+    """(N, 2) where points (N, 3) of the left camera's frame are drawn, as the eye reads them."""
+    pixels: FloatArray = view.camera.project(view.warp(points_mm))
+    return pixels
+
+
+def _furthest_apart(points: FloatArray) -> FloatArray | None:
+    """(3, 3) of points (N, 3): a triangle whose sides are long; None when one is too short."""
+    if len(points) < N_POINTS:
+        return None
+    first = points[np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1))]
+    second = points[np.argmax(np.linalg.norm(points - first, axis=1))]
+    to_both = np.minimum(*(np.linalg.norm(points - one, axis=1) for one in (first, second)))
+    chosen = np.stack([first, second, points[np.argmax(to_both)]])
+    sides_mm = np.linalg.norm(chosen - np.roll(chosen, 1, axis=0), axis=1)
+    return chosen if sides_mm.min() >= LEAST_APART_MM else None

@@ -82,7 +82,7 @@ def banner(snapshot: Snapshot) -> str:
         return f"{stage} - NAVIGATING{error} - not verified on the patient"
     if snapshot.cross_check is not None:
         check = snapshot.cross_check
-        return f"{stage} - CHECK {check.number + 1} of {check.count}: {check.name}"
+        return f"{stage} - CHECK OF THE MIRROR: cross {check.number + 1} of {check.count}"
     if snapshot.is_candidate and _is_lost(snapshot):
         return f"{stage} - CANDIDATE refused by the judge"
     if snapshot.is_candidate:

@@ -28,7 +28,8 @@ class SessionSpecification:
     others: tuple[str, ...] = ()
     # how long a picture may stay on the display without a newer one.
     overlay_valid_ms: float = 500.0
-    mirror_deg: float = 45.0  # where the mirror stood when the display was calibrated
+    # where the mirror stood when the display was calibrated, if the display's model does not say.
+    mirror_deg: float = 45.0
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
     display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
@@ -37,6 +38,12 @@ class SessionSpecification:
     def display_model(self) -> DisplayModel | None:
         """Of the display in the mirror."""
         return None if self.display is None else self.display.model
+
+    @property
+    def calibrated_mirror_deg(self) -> float:
+        """Where the mirror must stand."""
+        known_deg = None if self.display is None else self.display.model.mirror_deg
+        return self.mirror_deg if known_deg is None else known_deg
 
     @property
     def tracker_settings(self) -> TrackerSettings:
@@ -85,14 +92,8 @@ def specify_session(
         configuration.camera.depth_mm,
         others,
         display.withdrawn_ms if is_live else display.valid_ms,
-        _mirror_deg(configuration, calibrated_display),
+        configuration.mirror.calibrated_deg,
         is_live and configuration.recording.folder is not None,
         layers,
         calibrated_display,
     )
-
-
-def _mirror_deg(configuration: Configuration, display: CalibratedDisplay | None) -> float:
-    """Where the mirror must stand: as calibrated with the display, else as configured."""
-    calibrated_deg = None if display is None else display.model.mirror_deg
-    return configuration.mirror.calibrated_deg if calibrated_deg is None else calibrated_deg

@@ -224,7 +224,6 @@ class CrossCheck:
 
     number: int  # of the cross that is shown, from 0
     count: int  # of all crosses
-    name: str  # of its point
     nudge_px: tuple[int, int]  # to the right and downwards, as the eye sees it
 
 

@@ -13,7 +13,7 @@ Image = NDArray[np.uint8]
 # Places of a label around its point, nearest first: directions, and how far away.
 _DIRECTIONS = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
 _DISTANCES_PX = (14, 34, 60, 92)
-_PADDING_PX = 3
+_PADDING_PX, _ROUND_PX = 3, 9
 _RIM = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, 2))
 
 
@@ -36,6 +36,10 @@ class LabelBoard:
         import cv2
 
         height, width = image.shape[:2]
+        # Not over what the words name.
+        self.taken += [
+            Box(round(u), round(v), 0, 0).grow(_ROUND_PX) for _, (u, v), _ in self._asked
+        ]
         placed = []
         for text, at, colour in self._asked:
             if not (0 <= at[0] < width and 0 <= at[1] < height):
