@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
@@ -17,6 +15,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_points
 from navapp.overlay.blend_kernels import find_weights
 from navapp.overlay.colours import CANDIDATE, GUIDE, Colour
+from navapp.overlay.stroke_kernels import Ground, weigh_points
 from navapp.overlay.viewpoints import FloatMap, SeenDepth, Viewpoint
 from navapp.values import (
     DrillAxis,
@@ -48,14 +47,6 @@ class _OfBone(Protocol):
 
 
 T = TypeVar("T", bound=_OfBone)
-
-
-class Order(IntEnum):
-    """Where a guide stands against what is seen."""
-
-    ON_TOP = 0
-    BENEATH = 1  # beneath bone or tissue, or that is not known
-    HIDDEN = 2  # behind a hand, an instrument, or tissue that stands off the bone
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,24 +190,23 @@ class Scene:
         weight[here] = self.weight[there]
         return weight
 
-    def order_of(self, pixels: FloatArray, depth_mm: FloatArray) -> NDArray[np.uint8]:
-        """(N,) `Order` of points of guides at pixels (N, 2) and depths (N,) in the picture."""
-        beyond = Order.BENEATH if self.guess_weight > 0.0 else Order.HIDDEN
-        order = np.full(len(pixels), beyond, dtype=np.uint8)
-        with np.errstate(invalid="ignore"):
-            places = np.nan_to_num(np.round(pixels) - (self.box.x, self.box.y), nan=-1.0)
-        inside = ((places >= 0) & (places < (self.box.width, self.box.height))).all(axis=1)
-        columns, rows = places[inside].astype(np.intp).T
-        weight, bone_mm = self.weight[rows, columns], self.bone_mm[rows, columns]
-        nearest_mm = bone_mm
+    @cached_property
+    def ground(self) -> Ground:
+        """What lines and points of guides are compared with."""
+        nearest_mm = self.bone_mm
         if self.seen is not None:
-            matched_mm = np.where(self.seen.is_guess, np.nan, self.seen.depth_mm)[rows, columns]
-            nearest_mm = np.fmin(bone_mm, matched_mm)
-        # A comparison with an unknown depth is False.
-        is_beneath = (depth_mm[inside] > nearest_mm + _SKIN_MM) | (weight < 1.0)
-        order[inside] = np.where(is_beneath, Order.BENEATH, Order.ON_TOP)
-        order[inside] = np.where(weight < 0.5 * BENEATH_WEIGHT, Order.HIDDEN, order[inside])
-        return order
+            matched_mm = np.where(self.seen.is_guess, np.float32(np.nan), self.seen.depth_mm)
+            nearest_mm = np.fmin(nearest_mm, matched_mm)
+        skin_mm, beneath, beyond = (
+            np.float32(value) for value in (_SKIN_MM, BENEATH_WEIGHT, self.guess_weight)
+        )
+        return Ground(self.box.x, self.box.y, self.weight, nearest_mm, skin_mm, beneath, beyond)
+
+    def weights_of(self, pixels: FloatArray, depth_mm: FloatArray) -> FloatMap:
+        """(N,) 0 (hidden) to 1 (on top), of points of guides at pixels (N, 2), depths (N,)."""
+        weights = np.empty(len(pixels), dtype=np.float32)
+        weigh_points(pixels, np.ascontiguousarray(depth_mm), self.ground, weights)
+        return weights
 
     @property
     def _aside_mm(self) -> float:

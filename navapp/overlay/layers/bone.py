@@ -11,7 +11,7 @@ from navapp.overlay.blend_kernels import compute_face_tints
 from navapp.overlay.colours import DEFECT, REMOVAL_RAMP
 from navapp.overlay.labels import Image, LabelBoard, put_text
 from navapp.overlay.plane_sections import depth_beyond
-from navapp.overlay.scene import Order, Scene
+from navapp.overlay.scene import BENEATH_WEIGHT, Scene
 from navapp.overlay.shading import one_colour, outline, outline_box, tint
 from navapp.values import ResectionPlane
 
@@ -57,7 +57,7 @@ def draw_defects(image: Image, scene: Scene, labels: LabelBoard) -> None:
             continue
         in_camera = scene.to_camera(scene.mesh.vertices_mm[defect.vertices])
         pixels = scene.camera.project(in_camera)
-        is_seen = scene.order_of(pixels, in_camera[:, 2]) == Order.ON_TOP
+        is_seen = scene.weights_of(pixels, in_camera[:, 2]) > BENEATH_WEIGHT
         with np.errstate(invalid="ignore"):
             is_seen &= ((pixels >= 2) & (pixels < (width - 2, height - 2))).all(axis=1)
         u, v = np.round(pixels[is_seen]).astype(np.intp).T

@@ -27,7 +27,7 @@ def draw_risks(image: Image, scene: Scene, labels: LabelBoard) -> None:
                 weight = scene.weight_over(scene.view.box)
                 tint(image, scene.view, share, one_colour(SAFETY), weight)
         if mesh is None:
-            draw_line(image, scene, sample_line(structure_mm, 2.0), colour, 2)
+            draw_line(image, scene, sample_line(structure_mm), colour, 2)
         else:
             _draw_surface(image, scene, mesh, colour)
         pixels = scene.camera.project(scene.to_camera(structure_mm))
