@@ -28,7 +28,7 @@ from navapp.control.executors import Executor
 from navapp.control.frame_result import FrameResult
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.other_bones import OtherBones
-from navapp.control.pictures import Composer
+from navapp.control.pictures import Composer, Image
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
@@ -40,7 +40,7 @@ from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import Rectifier
 from navapp.overlay import DepthMarks, make_preview
 from navapp.tracking import make_tracker
-from navapp.values import FrameTimings, OverlayMode, OverlayPicture
+from navapp.values import Foreground, FrameTimings, OverlayMode, OverlayPicture
 
 
 class SessionController:
@@ -73,6 +73,7 @@ class SessionController:
         hooks = hooks or SessionHooks()
         rig, plan = specification.rig, specification.plan
         self._overlay_valid_ms = specification.overlay_valid_ms
+        self._display_delay_ns = round(specification.display_delay_ms * 1e6)
         self._devices = devices
         self._mirror_checking = MirrorChecking(specification.display, Rectifier(rig).geometry)
         self._composer = Composer(rig, plan, self._mirror_checking.view)
@@ -207,9 +208,7 @@ class SessionController:
         video = self._composer.compose_video(frame.left, snapshot, mark, foreground)
         image = video
         if self._composer.mode is OverlayMode.MIRROR:
-            pose = snapshot.left_from_bone
-            cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
-            image = self._composer.compose_mirror(snapshot, foreground, cross_px)
+            image = self._compose_mirror(snapshot, foreground)
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
@@ -227,6 +226,17 @@ class SessionController:
         self._session.keep_preview(preview)
         age_ns = self._session.now_ns - frame.captured_ns
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
+
+    def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
+        """Guides where the bone will be when their light is seen; measured where that is unsure."""
+        if snapshot.is_navigable:
+            light_ns = self._session.now_ns + self._display_delay_ns
+            predicted = self._session.predict_pose(light_ns)
+            if predicted is not None:
+                snapshot = replace(snapshot, left_from_bone=predicted)
+        pose = snapshot.left_from_bone
+        cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
+        return self._composer.compose_mirror(snapshot, foreground, cross_px)
 
 
 def _make_session(

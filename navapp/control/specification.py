@@ -30,6 +30,7 @@ class SessionSpecification:
     overlay_valid_ms: float = 500.0
     # where the mirror stood when the display was calibrated, if the display's model does not say.
     mirror_deg: float = 45.0
+    display_delay_ms: float = 0.0  # from showing a picture until its light
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
     display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
@@ -93,6 +94,7 @@ def specify_session(
         others,
         display.withdrawn_ms if is_live else display.valid_ms,
         configuration.mirror.calibrated_deg,
+        display.delay_ms if is_live else 0.0,
         is_live and configuration.recording.folder is not None,
         layers,
         calibrated_display,

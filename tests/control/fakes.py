@@ -206,6 +206,7 @@ class Bench:
         board_watch: BoardWatch | None = None,
         make_display: Callable[[Clock, int, int], SimulatedDisplay] = SimulatedDisplay,
         calibrated_display: CalibratedDisplay | None = None,
+        display_delay_ms: float = 0.0,
     ) -> None:
         self.script = Script()
         self.trackers: dict[str, FakeTracker] = {}
@@ -232,6 +233,7 @@ class Bench:
                 others=others,
                 overlay_valid_ms=overlay_valid_ms,
                 display=calibrated_display,
+                display_delay_ms=display_delay_ms,
             ),
             executor=executor or InlineExecutor(),
             board_watch=board_watch,

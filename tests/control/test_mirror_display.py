@@ -33,7 +33,7 @@ from navapp.values import (
     TrackedFrame,
 )
 from sim_devices.display import SimulatedDisplay
-from tests.control.fakes import Bench, a_rig, answer, navigating
+from tests.control.fakes import PERIOD_NS, Bench, a_pose, a_rig, answer, navigating
 
 WIDTH, HEIGHT, PITCH_MM = 400, 300, 0.5
 DEPTH_MM, EYE_MM = 300.0, np.array([20.0, -60.0, -150.0])
@@ -70,9 +70,10 @@ def a_bench(
     make_display: Callable[..., SimulatedDisplay] = lambda clock, w, h: SimulatedDisplay(
         clock, WIDTH, HEIGHT
     ),
+    delay_ms: float = 0.0,
 ) -> Bench:
     display = CalibratedDisplay(model or a_model(), check_minutes=1.0)
-    bench = Bench(calibrated_display=display, make_display=make_display)
+    bench = Bench(calibrated_display=display, make_display=make_display, display_delay_ms=delay_ms)
     bench.script.tracked = measured_bone()
     return bench
 
@@ -259,6 +260,23 @@ def test_nothing_is_lit_where_the_depth_is_a_guess() -> None:
     bench.frames()
     bone = guides(bench)[60:240, 60:340]
     assert bone.mean() < 0.01
+
+
+def test_guides_are_where_the_bone_will_be_when_their_light_is_seen() -> None:
+    """A bone that moves by 1 mm a frame, and a display that is 66 ms late: one frame."""
+    middles = []
+    for delay_ms in (0.0, PERIOD_NS / 1e6):
+        bench = a_bench(delay_ms=delay_ms)
+        navigating(bench)
+        check(bench)
+        for x_mm in (1.0, 2.0, 3.0):
+            told = measured_bone()
+            moved = replace(told.estimate, camera_from_bone=a_pose(x_mm=x_mm))
+            bench.script.tracked = replace(told, estimate=moved)
+            bench.frames()
+        middles.append(np.argwhere(guides(bench)).mean(axis=0)[1])
+    # The eye's columns rise to the left: 0.7 mm (damped) of 0.5 mm a pixel.
+    assert middles[1] - middles[0] == pytest.approx(-0.7 / PITCH_MM, abs=0.4)
 
 
 class KeystoneProjector:
