@@ -35,7 +35,7 @@ _MARGIN_PX = 48
 TISSUE_MM = 2.5
 # A guide this far behind the bone's surface is beneath it; what is drawn simplified, and cut into
 # straight pieces, lies as near.
-_SKIN_MM = 1.0
+SKIN_MM = 1.0
 # Beside the bone, what stands off by more than this from its nearest point hides guides.
 _ASIDE_MM = 5.0
 # Of what is drawn beneath something, or where that is not known.
@@ -129,8 +129,9 @@ class Scene:
 
     @property
     def risks(self) -> Mapping[str, RiskStructure]:
-        """The stage's, by name."""
-        return self._of_stage(self.plan.content.risks, "risks")
+        """The stage's, by name; curves without a safety distance move with the femur."""
+        alone = {name: RiskStructure("femur", 0.0) for name in self.plan.curves}
+        return self._of_stage({**alone, **self.plan.content.risks}, "risks")
 
     def _of_stage(self, known: Mapping[str, T], kind: str) -> Mapping[str, T]:
         """What the plan names for the stage; where it names nothing of a kind, all of the bone."""
@@ -194,6 +195,17 @@ class Scene:
         weight[here] = self.weight[there]
         return weight
 
+    def weight_of(self, view: RenderedView, box: Box) -> FloatMap:
+        """The weights over a box of another mesh: those of beneath where the bone is nearer."""
+        weight = self.weight_over(box)
+        here, there = box.shared_slices(self.box)
+        mesh_mm = np.full(weight.shape, np.nan, dtype=np.float32)
+        mesh_mm[view.box.relative_to(box).slices] = view.depth_mm
+        # A comparison with an unknown depth is False.
+        is_beneath = mesh_mm[here] > self.bone_mm[there] + np.float32(SKIN_MM)
+        np.minimum(weight[here], np.float32(BENEATH_WEIGHT), out=weight[here], where=is_beneath)
+        return weight
+
     def order_of(self, pixels: FloatArray, depth_mm: FloatArray) -> NDArray[np.uint8]:
         """(N,) `Order` of points of guides at pixels (N, 2) and depths (N,) in the picture."""
         order = np.full(len(pixels), Order.BENEATH, dtype=np.uint8)
@@ -207,7 +219,7 @@ class Scene:
             matched_mm = np.where(self.seen.is_guess, np.nan, self.seen.depth_mm)[rows, columns]
             nearest_mm = np.fmin(bone_mm, matched_mm)
         # A comparison with an unknown depth is False.
-        is_beneath = (depth_mm[inside] > nearest_mm + _SKIN_MM) | (weight < 1.0)
+        is_beneath = (depth_mm[inside] > nearest_mm + SKIN_MM) | (weight < 1.0)
         order[inside] = np.where(is_beneath, Order.BENEATH, Order.ON_TOP)
         order[inside] = np.where(weight < 0.5 * BENEATH_WEIGHT, Order.HIDDEN, order[inside])
         return order

@@ -39,18 +39,7 @@ def draw_line(
     Dashed where it lies beneath something or where that is not known, left out where a hand or an
     instrument hides it.
     """
-    if len(points_mm) < 2:
-        return
-    in_camera = scene.to_camera(points_mm)
-    pixels = scene.camera.project(in_camera)
-    order = scene.order_of(pixels, in_camera[:, 2])
-    # A piece is as visible as its less visible end.
-    piece_order = np.maximum(order[:-1], order[1:])
-    can_draw = np.all(np.abs(pixels) < _FARTHEST_PX, axis=1)
-    piece_order[~(can_draw[:-1] & can_draw[1:])] = Order.HIDDEN
-    for run, is_beneath in _runs(pixels, piece_order):
-        lines = _dashes(run) if is_beneath else [run]
-        _draw_pixels(image, lines, colour, width_px, has_rim=not is_beneath)
+    _draw_lines(image, scene, [points_mm], colour, width_px)
 
 
 def draw_cross(
@@ -62,13 +51,36 @@ def draw_cross(
     colour: Colour,
 ) -> None:
     """Two strokes through a point of the bone's frame, along two axes (2, 3)."""
-    for axis in axes:
-        ends = np.stack([point_mm - half_mm * axis, point_mm + half_mm * axis])
-        draw_line(image, scene, sample_line(ends), colour)
+    ends = [np.stack([point_mm - half_mm * axis, point_mm + half_mm * axis]) for axis in axes]
+    _draw_lines(image, scene, [sample_line(stroke) for stroke in ends], colour, 2)
 
 
-def _runs(pixels: FloatArray, piece_order: NDArray[np.uint8]) -> list[tuple[FloatArray, bool]]:
-    """Pieces of one order in a row, as polylines; hidden ones are left out."""
+def _draw_lines(
+    image: Image, scene: Scene, lines: list[FloatArray], colour: Colour, width_px: int
+) -> None:
+    """All at once: the rim of one line does not cut another."""
+    whole, dashes = [], []
+    for points_mm in lines:
+        for run, is_beneath in _runs(scene, points_mm):
+            if is_beneath:
+                dashes += _dashes(run)
+            else:
+                whole.append(run)
+    _draw_pixels(image, whole, colour, width_px, has_rim=width_px > 1)
+    _draw_pixels(image, dashes, colour, width_px, has_rim=False)
+
+
+def _runs(scene: Scene, points_mm: FloatArray) -> list[tuple[FloatArray, bool]]:
+    """Polylines in pixels of one order each, and whether beneath; hidden ones are left out."""
+    if len(points_mm) < 2:
+        return []
+    in_camera = scene.to_camera(points_mm)
+    pixels = scene.camera.project(in_camera)
+    order = scene.order_of(pixels, in_camera[:, 2])
+    # A piece is as visible as its less visible end.
+    piece_order = np.maximum(order[:-1], order[1:])
+    can_draw = np.all(np.abs(pixels) < _FARTHEST_PX, axis=1)
+    piece_order[~(can_draw[:-1] & can_draw[1:])] = Order.HIDDEN
     ends = np.flatnonzero(np.diff(piece_order)) + 1
     runs = []
     for begin, end in zip((0, *ends), (*ends, len(piece_order)), strict=True):
@@ -96,6 +108,6 @@ def _draw_pixels(
     import cv2
 
     told = [np.round(line * _FRACTIONS).astype(np.int32) for line in lines]
-    if has_rim and width_px > 1:
+    if has_rim:
         cv2.polylines(image, told, False, _RIM, width_px + 2, cv2.LINE_AA, _SHIFT)
     cv2.polylines(image, told, False, colour, width_px, cv2.LINE_AA, _SHIFT)
