@@ -24,7 +24,7 @@ KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
     tests/sim_devices/test_sensor.py tests/sim_devices/test_sheet.py tests/geometry/test_resampling.py \
     tests/stereo tests/tracking/test_agreement.py tests/tracking/test_edge_kernels.py \
-    tests/tracking/test_outline_kernels.py tests/overlay/test_tint.py tests/preop/test_aspects.py \
+    tests/tracking/test_outline_kernels.py tests/overlay/test_blend_kernels.py tests/preop/test_aspects.py \
     tests/calibration/targets/test_detection.py tests/calibration/targets/test_mark_kernels.py
 
 # The window's libraries: SDL draws into nothing without them. Then screens for the tests.

@@ -95,6 +95,8 @@ class OverlayVideo:
         self._rate_hz = rate_hz
         self._unfinished = self._path.with_name(f".{self._path.stem}.unfinished.mp4")
         try:
+            if self._path.is_dir():
+                raise IsADirectoryError(21, "it is a folder")
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self._unfinished.write_bytes(b"")
         except OSError as error:

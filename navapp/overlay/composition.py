@@ -21,7 +21,9 @@ _MARK = "research - not for clinical use"
 _MIRROR_TEXT_SIZE, _STRIP_SHARE = 0.85, 0.04
 # Of a picture of 1280 columns.
 _TEXT_SIZE, _LEAST_TEXT_SIZE = 0.7, 0.45
-_BANNER_PX, _MARK_PX = 48, 34
+_RIM_PX = 12
+# Of letters of size 1, with what hangs below the line.
+_LETTER_PX, _BELOW_PX = 26, 12
 
 
 def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "") -> Image:
@@ -38,16 +40,16 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
     """
     image = np.repeat(left[:, :, None], 3, axis=2) if left.ndim == 2 else left.copy()
     height, width = image.shape[:2]
-    size = max(_LEAST_TEXT_SIZE, _TEXT_SIZE * width / 1280.0)
+    size = _text_size(width)
     if scene is not None:
         if (height, width) != (scene.camera.height, scene.camera.width):
             raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
-        rims = [Box(0, 0, width, _BANNER_PX), Box(0, height - _MARK_PX, width, _MARK_PX)]
-        draw_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, rims))
+        draw_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height)))
     is_guiding = scene is not None and not scene.is_candidate
-    put_text(image, banner, (12, round(12 + 26 * size)), size, GUIDE if is_guiding else CANDIDATE)
+    at = _RIM_PX, round(_RIM_PX + _LETTER_PX * size)
+    put_text(image, banner, at, size, GUIDE if is_guiding else CANDIDATE)
     text = " - ".join(part for part in (mark, _MARK) if part)
-    put_text(image, text, (12, height - 12), 0.7 * size, (230, 230, 230))
+    put_text(image, text, (_RIM_PX, height - _RIM_PX), 0.7 * size, (230, 230, 230))
     return image
 
 
@@ -82,12 +84,25 @@ def compose_mirror(
     return view.to_display(image)
 
 
+def text_boxes(width: int, height: int) -> list[Box]:
+    """Rows of a picture that belong to the banner and to the mark."""
+    size = _text_size(width)
+    banner_px = round(_RIM_PX + (_LETTER_PX + _BELOW_PX) * size)
+    mark_px = round(_RIM_PX + 3 + 0.7 * _LETTER_PX * size)
+    return [Box(0, 0, width, banner_px), Box(0, height - mark_px, width, mark_px)]
+
+
+def _text_size(width: int) -> float:
+    return max(_LEAST_TEXT_SIZE, _TEXT_SIZE * width / 1280.0)
+
+
 def put_mark(image: Image, text: str) -> Image:
     """A copy of a picture with a line in its upper right corner."""
     marked = image.copy()
-    size = max(_LEAST_TEXT_SIZE, 0.7 * _TEXT_SIZE * image.shape[1] / 1280.0)
+    size = max(_LEAST_TEXT_SIZE, 0.7 * _text_size(image.shape[1]))
     width, height = text_size(text, size)
-    put_text(marked, text, (image.shape[1] - width - 12, 10 + height), size, (230, 230, 230))
+    at = image.shape[1] - width - _RIM_PX, 10 + height
+    put_text(marked, text, at, size, (230, 230, 230))
     return marked
 
 

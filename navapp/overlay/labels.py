@@ -39,14 +39,12 @@ class LabelBoard:
 
         height, width = image.shape[:2]
         # Not over what the words name.
-        self.taken += [
-            Box(round(u), round(v), 0, 0).grow(_ROUND_PX) for _, (u, v), _ in self._asked
-        ]
+        named = [Box(round(u), round(v), 0, 0).grow(_ROUND_PX) for _, (u, v), _ in self._asked]
         placed = []
         for text, at, colour in self._asked:
             if not (0 <= at[0] < width and 0 <= at[1] < height):
                 continue
-            box = self._find_place(text, at, width, height)
+            box = self._find_place(text, at, (width, height), named)
             if box is None:
                 continue
             self.taken.append(box)
@@ -64,7 +62,7 @@ class LabelBoard:
         return placed
 
     def _find_place(
-        self, text: str, at: tuple[float, float], width: int, height: int
+        self, text: str, at: tuple[float, float], size_px: tuple[int, int], named: list[Box]
     ) -> Box | None:
         w, h = text_size(text, self.size)
         w, h = w + 2 * _PADDING_PX, h + 2 * _PADDING_PX
@@ -73,8 +71,10 @@ class LabelBoard:
                 x = at[0] + right * distance - (0.5 * w if right == 0 else w * (right < 0))
                 y = at[1] + down * distance - (0.5 * h if down == 0 else h * (down < 0))
                 box = Box(round(x), round(y), w, h)
-                inside = box.clip(width, height)
-                if inside == box and not any(_overlap(box, other) for other in self.taken):
+                inside = box.clip(*size_px)
+                if inside == box and not any(
+                    _overlap(box, other) for other in (*self.taken, *named)
+                ):
                     return box
         return None
 

@@ -15,7 +15,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_points
 from navapp.overlay.blend_kernels import find_weights
 from navapp.overlay.colours import CANDIDATE, GUIDE, Colour
-from navapp.overlay.stroke_kernels import Ground, weigh_points
+from navapp.overlay.stroke_kernels import Ground
 from navapp.overlay.viewpoints import FloatMap, SeenDepth, Viewpoint
 from navapp.values import (
     DrillAxis,
@@ -34,7 +34,7 @@ _MARGIN_PX = 48
 TISSUE_MM = 2.5
 # A guide this far behind the bone's surface is beneath it; what is drawn simplified, and cut into
 # straight pieces, lies as near.
-_SKIN_MM = 1.0
+SKIN_MM = 1.0
 # Beside the bone, what stands off by more than this from its nearest point hides guides.
 _ASIDE_MM = 5.0
 # Of what is drawn beneath something, or where that is not known.
@@ -125,8 +125,9 @@ class Scene:
 
     @property
     def risks(self) -> Mapping[str, RiskStructure]:
-        """The stage's, by name."""
-        return self._of_stage(self.plan.content.risks, "risks")
+        """The stage's, by name; curves without a safety distance move with the femur."""
+        alone = {name: RiskStructure("femur", 0.0) for name in self.plan.curves}
+        return self._of_stage({**alone, **self.plan.content.risks}, "risks")
 
     def _of_stage(self, known: Mapping[str, T], kind: str) -> Mapping[str, T]:
         """What the plan names for the stage; where it names nothing of a kind, all of the bone."""
@@ -198,15 +199,20 @@ class Scene:
             matched_mm = np.where(self.seen.is_guess, np.float32(np.nan), self.seen.depth_mm)
             nearest_mm = np.fmin(nearest_mm, matched_mm)
         skin_mm, beneath, beyond = (
-            np.float32(value) for value in (_SKIN_MM, BENEATH_WEIGHT, self.guess_weight)
+            np.float32(value) for value in (SKIN_MM, BENEATH_WEIGHT, self.guess_weight)
         )
         return Ground(self.box.x, self.box.y, self.weight, nearest_mm, skin_mm, beneath, beyond)
 
-    def weights_of(self, pixels: FloatArray, depth_mm: FloatArray) -> FloatMap:
-        """(N,) 0 (hidden) to 1 (on top), of points of guides at pixels (N, 2), depths (N,)."""
-        weights = np.empty(len(pixels), dtype=np.float32)
-        weigh_points(pixels, np.ascontiguousarray(depth_mm), self.ground, weights)
-        return weights
+    def weight_of(self, view: RenderedView, box: Box) -> FloatMap:
+        """The weights over a box of another mesh: those of beneath where the bone is nearer."""
+        weight = self.weight_over(box)
+        here, there = box.shared_slices(self.box)
+        mesh_mm = np.full(weight.shape, np.nan, dtype=np.float32)
+        mesh_mm[view.box.relative_to(box).slices] = view.depth_mm
+        # A comparison with an unknown depth is False.
+        is_beneath = mesh_mm[here] > self.bone_mm[there] + np.float32(SKIN_MM)
+        np.minimum(weight[here], np.float32(BENEATH_WEIGHT), out=weight[here], where=is_beneath)
+        return weight
 
     @property
     def _aside_mm(self) -> float:

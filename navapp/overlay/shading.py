@@ -21,6 +21,23 @@ _OUTLINE_SIGMA_PX, _OUTLINE_MARGIN_PX = 0.9, 4
 _STRIPE_PX = 6
 
 
+def draw_surface(
+    image: Image,
+    scene: Scene,
+    view: RenderedView,
+    share_of_face: NDArray[np.float32],
+    colour: Colour,
+    weight: FloatMap,
+) -> None:
+    """One colour over a rendered mesh by share (F,), and its outline.
+
+    The weight (h, w) is over `outline_box`.
+    """
+    inner = view.box.relative_to(outline_box(view, scene)).slices
+    tint(image, view, share_of_face, one_colour(colour), weight[inner])
+    outline(image, scene, view, weight, colour)
+
+
 def tint(
     image: Image,
     view: RenderedView,

@@ -120,24 +120,3 @@ def _cover(
             covered = np.float32(min(max(reach - off, 0.0), 1.0))
             if covered > share[row, column]:
                 share[row, column] = covered
-
-
-@njit(cache=True, nogil=True)
-def weigh_points(
-    pixels: NDArray[np.float64],
-    depth_mm: NDArray[np.float64],
-    ground: Ground,
-    weight: NDArray[np.float32],
-) -> None:
-    """How strongly points of guides are drawn.
-
-    Args:
-        pixels: (N, 2).
-        depth_mm: (N,).
-        ground: what is seen.
-        weight: (N,) in place.
-    """
-    for k in range(len(pixels)):
-        u, v = pixels[k, 0], pixels[k, 1]
-        is_near = abs(u) < _FARTHEST_PX and abs(v) < _FARTHEST_PX
-        weight[k] = weigh(u, v, depth_mm[k], ground) if is_near else np.float32(0.0)

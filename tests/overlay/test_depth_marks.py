@@ -19,7 +19,8 @@ def foreground(origin: Origin, in_front: np.ndarray | None = None) -> Foreground
     disparity_px = np.full(shape, 200.0, np.float32)
     is_in_front = np.zeros(shape, dtype=np.bool_) if in_front is None else in_front
     box = Box(X, Y, WIDTH, HEIGHT)
-    surroundings = Surroundings(disparity_px, np.full(shape, origin, np.uint8), box, is_half=False)
+    origins, picture = np.full(shape, origin, np.uint8), np.zeros(shape, np.uint8)
+    surroundings = Surroundings(disparity_px, origins, box, False, picture)
     nothing = DisparityMap(*(np.empty((0, 0), np.float32),) * 2, np.empty((0, 0), np.uint8), 0, 0)
     return Foreground(surroundings, nothing, is_in_front)
 

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
-from navapp.overlay.blend_kernels import compute_face_tints
+from navapp.overlay.blend_kernels import blend_colour, compute_face_tints
 from navapp.overlay.colours import DEFECT, REMOVAL_RAMP
 from navapp.overlay.labels import Image, LabelBoard, put_text
 from navapp.overlay.plane_sections import depth_beyond
-from navapp.overlay.scene import BENEATH_WEIGHT, Scene
-from navapp.overlay.shading import one_colour, outline, outline_box, tint
+from navapp.overlay.scene import SKIN_MM, Scene
+from navapp.overlay.shading import draw_surface, outline_box, tint
 from navapp.values import ResectionPlane
 
 # Of the bone's colour over a part that faces the camera, and how much more over a steep one.
@@ -32,8 +32,8 @@ def draw_bone(image: Image, scene: Scene, labels: LabelBoard) -> None:
     share = compute_face_tints(
         mesh.normals, mesh.faces, scene.axis_in_bone, _LEAST_SHARE, _STEEP_SHARE
     )
-    tint(image, view, share, one_colour(scene.colour), scene.weight_over(view.box))
-    outline(image, scene, view, scene.weight_over(outline_box(view, scene)), scene.colour)
+    weight = scene.weight_over(outline_box(view, scene))
+    draw_surface(image, scene, view, share, scene.colour, weight)
 
 
 def draw_removal(image: Image, scene: Scene, labels: LabelBoard) -> None:
@@ -50,19 +50,23 @@ def draw_removal(image: Image, scene: Scene, labels: LabelBoard) -> None:
 
 
 def draw_defects(image: Image, scene: Scene, labels: LabelBoard) -> None:
-    """Damaged cartilage of the stage's bone as dots, where nothing hides it."""
-    height, width = image.shape[:2]
+    """Damaged cartilage as dots on the side of the stage's bone that is seen."""
+    box, part = scene.box, image[scene.box.slices]
+    share = np.zeros(scene.bone_mm.shape, dtype=np.float32)
     for defect in scene.plan.content.defects.values():
         if defect.bone != scene.stage.bone:
             continue
         in_camera = scene.to_camera(scene.mesh.vertices_mm[defect.vertices])
-        pixels = scene.camera.project(in_camera)
-        is_seen = scene.weights_of(pixels, in_camera[:, 2]) > BENEATH_WEIGHT
         with np.errstate(invalid="ignore"):
-            is_seen &= ((pixels >= 2) & (pixels < (width - 2, height - 2))).all(axis=1)
-        u, v = np.round(pixels[is_seen]).astype(np.intp).T
+            at = np.round(scene.camera.project(in_camera)) - (box.x, box.y)
+            is_inside = ((at >= 1) & (at < (box.width - 1, box.height - 1))).all(axis=1)
+        u, v = at[is_inside].astype(np.intp).T
+        # A comparison with an unknown depth is False.
+        is_far = in_camera[is_inside, 2] > scene.bone_mm[v, u] + SKIN_MM
+        u, v = u[~is_far], v[~is_far]
         for down, right in _DOT:
-            image[v + down, u + right] = DEFECT
+            share[v + down, u + right] = scene.weight[v, u]
+    blend_colour(part, share, DEFECT)
 
 
 @lru_cache(maxsize=16)
