@@ -205,7 +205,8 @@ class SessionController:
         mark = "SIMULATED" if snapshot.is_simulated else ""
         tracked = self._session.tracked
         foreground = None if tracked is None else tracked.foreground
-        video = self._composer.compose_video(frame.left, snapshot, mark, foreground)
+        point_mm = self._mirror_checking.point_mm
+        video = self._composer.compose_video(frame.left, snapshot, mark, foreground, point_mm)
         image = video
         if self._composer.mode is OverlayMode.MIRROR:
             image = self._compose_mirror(snapshot, foreground)

@@ -33,7 +33,12 @@ class Composer:
         return OverlayMode.VIDEO if self._mirror_view is None else OverlayMode.MIRROR
 
     def compose_video(
-        self, left: Image, snapshot: Snapshot, mark: str, foreground: Foreground | None = None
+        self,
+        left: Image,
+        snapshot: Snapshot,
+        mark: str,
+        foreground: Foreground | None = None,
+        point_mm: FloatArray | None = None,
     ) -> Image:
         """The left picture with guides, a marked candidate, or the reason why there are none.
 
@@ -42,9 +47,13 @@ class Composer:
             snapshot: its `reasons` decide; nothing else does.
             mark: words for the corner.
             foreground: what was measured of the depth around the bone in that frame.
+            point_mm: (3,) of the bone, where the cross of a check of the mirror belongs.
         """
         scene = _scene(snapshot, self._left_view, self._plan, foreground)
-        return compose_video(left, scene, banner(snapshot), mark)
+        pose, cross_px = snapshot.left_from_bone, None
+        if pose is not None and point_mm is not None:
+            cross_px = self._left_view.camera.project(pose.apply(point_mm[None]))[0]
+        return compose_video(left, scene, banner(snapshot), mark, cross_px)
 
     def compose_mirror(
         self, snapshot: Snapshot, foreground: Foreground | None, cross_px: FloatArray | None

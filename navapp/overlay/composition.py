@@ -26,7 +26,13 @@ _RIM_PX = 12
 _LETTER_PX, _BELOW_PX = 26, 12
 
 
-def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "") -> Image:
+def compose_video(
+    left: Image,
+    scene: Scene | None,
+    banner: str,
+    mark: str = "",
+    cross_px: FloatArray | None = None,
+) -> Image:
     """The left picture with guides, or without any when `scene` is None.
 
     Args:
@@ -34,6 +40,7 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
         scene: what to draw; None draws no guide.
         banner: one line at the top, for example why there are no guides.
         mark: further words for the corner, for example that the devices are simulated.
+        cross_px: (2,) of a point to be marked.
 
     Raises:
         ValueError: a picture of another size than the scene's camera takes.
@@ -45,6 +52,8 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
         if (height, width) != (scene.camera.height, scene.camera.width):
             raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
         draw_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height)))
+    if cross_px is not None and np.isfinite(cross_px).all():
+        draw_cross_px(image, cross_px, TARGET)
     is_guiding = scene is not None and not scene.is_candidate
     at = _RIM_PX, round(_RIM_PX + _LETTER_PX * size)
     put_text(image, banner, at, size, GUIDE if is_guiding else CANDIDATE)
