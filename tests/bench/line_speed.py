@@ -7,9 +7,9 @@ what one would take from well-known libraries: rectification of the bone's box, 
 (three-way, block 5, 96 disparities from where the bone begins) for both views with the contributed
 WLS filter where the running OpenCV has it (`make bench-peers`), and Open3D's point-to-plane ICP
 with a Tukey loss and its own limits (30 steps) on 3,000 points, from the pose before. Both draw the
-same layer of the bone; ours also hides it behind what stands in front, and judges. They take turns frame by frame, after a pass that warms up; the
-best run of each counts. Besides the wall time there is that of the processors: others disturb it
-less.
+same layer of the bone; ours also hides it behind what stands in front, and judges. They take turns
+frame by frame, after a pass that warms up; the best run of each counts. Besides the wall time there
+is that of the processors: others disturb it less.
 """
 
 import argparse

@@ -22,6 +22,12 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
+def fail_after(writer: OverlayFolder | OverlayVideo) -> None:
+    """One frame, then an error."""
+    writer.add(result(1))
+    raise RuntimeError
+
+
 class TestFolder:
     def test_names_hold_the_frame_and_the_picture_of_the_sequence(self, tmp_path: Path) -> None:
         with OverlayFolder(tmp_path / "o", is_lossless=True) as folder:
@@ -49,9 +55,9 @@ class TestFolder:
         assert names(tmp_path / "o") == ["notes.txt", "overlay_00000_0001.jpg"]
 
     def test_an_error_leaves_nothing_behind(self, tmp_path: Path) -> None:
-        with pytest.raises(RuntimeError), OverlayFolder(tmp_path / "o") as folder:
-            folder.add(result(1))
-            raise RuntimeError
+        folder = OverlayFolder(tmp_path / "o")
+        with pytest.raises(RuntimeError), folder:
+            fail_after(folder)
         assert names(tmp_path) == []
 
     @pytest.mark.parametrize("target", ["file", "file/inside"])
@@ -106,9 +112,9 @@ class TestVideo:
     def test_an_error_leaves_nothing_behind_and_the_old_one_in_place(self, tmp_path: Path) -> None:
         path = tmp_path / "o.mp4"
         path.write_bytes(b"old")
-        with pytest.raises(RuntimeError), OverlayVideo(path, 15.0) as video:
-            video.add(result(1))
-            raise RuntimeError
+        video = OverlayVideo(path, 15.0)
+        with pytest.raises(RuntimeError), video:
+            fail_after(video)
         assert names(tmp_path) == ["o.mp4"]
         assert path.read_bytes() == b"old"
 
