@@ -167,6 +167,7 @@ def _check(options: argparse.Namespace) -> None:
         )
     if options.png and options.overlay is None:
         raise UsageError("--png is of the pictures of --overlay", remedy="add --overlay DIR")
+    _layers(options.layers)
     check_writable(options.json)
 
 

@@ -13,7 +13,7 @@ from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 # Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
 NEAR_PX, IN_FRONT_MM = 4, 5.0
-# Guesses follow what is matched beside them, then guesses beside those.
+# Guesses follow what is matched beside them, then those that a vote has marked.
 _N_VOTES = 2
 
 
@@ -46,8 +46,9 @@ def find_foreground(
     is_in_front = surroundings.disparity_px > limit_px
     speaks, is_asked = surroundings.origin == Origin.MATCHED, limit_px < np.inf
     for _ in range(_N_VOTES):
+        before = is_in_front.copy()
         vote_on_guesses(surroundings.picture, speaks, is_asked, is_in_front)
-        speaks |= is_in_front
+        speaks |= is_in_front & ~before
     if is_half:
         is_in_front = double(is_in_front.view(np.uint8), box).view(np.bool_)
         limit_px = np.float32(2.0) * double(limit_px, box)

@@ -203,6 +203,15 @@ ACTIONS: tuple[Action, ...] = (
         slot="depth",
         needs_width=True,
     ),
+    Action(
+        "layers",
+        "l",
+        "layers",
+        "see the layers of the overlay, switch them on and off",
+        _always,
+        slot="layers",
+        needs_width=True,
+    ),
     Action("devices", "d", "devices", "see the devices in detail", _always, slot="devices"),
     Action(
         "events",
@@ -213,7 +222,9 @@ ACTIONS: tuple[Action, ...] = (
         slot="events",
         needs_width=True,
     ),
-    Action("help", "?", "help", "see all keys", _always, slot="help"),
+    Action(
+        "help", "?", "help", "see all keys, and the legend of the overlay", _always, slot="help"
+    ),
     Action(
         "quit",
         "q",

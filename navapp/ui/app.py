@@ -11,9 +11,17 @@ from textual import events
 from textual.binding import BindingType
 from textual.screen import Screen
 
-from navapp.control.states import DeviceHealth, EventLevel, Quit, SessionState, Snapshot
+from navapp.control.states import (
+    DeviceHealth,
+    EventLevel,
+    Quit,
+    SessionState,
+    Snapshot,
+    ToggleLayer,
+)
 from navapp.errors import DeviceError, NavappError, RigError
 from navapp.ui.actions import ACTION_OF_KEY_EVERYWHERE, ACTION_OF_NAME, bindings, is_possible
+from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
@@ -35,7 +43,12 @@ _SILENT_AFTER_POLLS = 16
 _SILENT_AFTER_POLLS_AT_START = 60 * POLLS_PER_S
 _START_STATES = (SessionState.OFFLINE, SessionState.STARTING)
 _ASKING_STATES = (SessionState.NAVIGATING, SessionState.SUSPENDED)
-_PAGES = {"help": HelpPage, "devices": DevicesPage, "events": EventsPage}
+_PAGES = {
+    "help": HelpPage,
+    "layers": LayersPage,
+    "devices": DevicesPage,
+    "events": EventsPage,
+}
 
 
 class NavigationApp(QuietApp):
@@ -122,6 +135,10 @@ class NavigationApp(QuietApp):
             self.push_screen(_PAGES[name](view))
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
+
+    def action_toggle_layer(self, name: str) -> None:
+        """Draw a layer, or no longer: from the page that lists them."""
+        self._session.submit(ToggleLayer(name))
 
     def _ask_to_quit(self, view: View) -> None:
         def finish(is_sure: bool | None) -> None:

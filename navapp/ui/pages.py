@@ -14,27 +14,13 @@ from textual.widgets import Static
 from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
 from navapp.ui.devices_panel import format_device_line
 from navapp.ui.event_list import format_event_line
+from navapp.ui.layers_page import OverlayLegend
+from navapp.ui.page_keys import PageKeys
 from navapp.ui.picture_view import NOTICE
 from navapp.ui.screens import PageScreen, ViewScreen
 from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
-
-
-class PageKeys(TextView):
-    """The last line of a page."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__("footer")
-        self._text = text
-
-    def build(self, view: View, width: int, height: int) -> list[Content]:
-        """How to leave, and that the display can still be blanked."""
-        return [
-            Content.assemble(
-                (" SPACE", "bold $primary"), " blank  ", ("ESC", "bold $primary"), self._text
-            )
-        ]
 
 
 class KeyTable(TextView):
@@ -61,19 +47,20 @@ class KeyTable(TextView):
 
 
 class HelpPage(PageScreen):
-    """All keys, from the action table."""
+    """All keys, from the action table, and the legend of the overlay."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("question_mark", "dismiss", "back", show=False)
     ]
 
     def compose(self) -> ComposeResult:
-        """Title, keys, last line."""
+        """Title, keys and legend, last line."""
         yield TitleLine()
-        with Vertical(classes="page") as page:
+        with VerticalScroll(classes="page") as page:
             page.border_title = "keys"
             yield KeyTable("keys")
-        yield PageKeys(" back")
+            yield OverlayLegend("legend")
+        yield PageKeys(" back  arrows, PgDn: the legend of the overlay")
 
 
 class DeviceDetails(TextView):

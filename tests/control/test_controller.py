@@ -21,6 +21,7 @@ from navapp.control.states import (
     Reject,
     Show,
     ToggleDepth,
+    ToggleLayer,
 )
 from navapp.errors import DeviceLost, DeviceNotFound
 from navapp.values import Prior, Reason, Status
@@ -212,7 +213,7 @@ ACTIONS = st.lists(
             *["frame"] * 8, "ok", "doubted", "lost", "nowhere", "late", "silent", "speaks",
             "unplug", "plug", Register(), Register(), Accept(None), Accept(None), Reject(None),
             Cancel(), Propose(a_pose(x_mm=2.0)), Blank(), Show(), Show(), ToggleDepth(),
-            EnterStage(1),
+            ToggleLayer("bone"), ToggleLayer("scale"), EnterStage(1),
             EnterStage(2), EnterStage(4), EnterStage(5), Reconnect(),
         ]
     ),

@@ -17,7 +17,7 @@ def with_foreground() -> Foreground:
     origin = np.full(shape, Origin.FILLED_INTERIOR, np.uint8)
     is_in_front = np.zeros(shape, dtype=np.bool_)
     box = Box(-1000, -1000, 4000, 4000)
-    surroundings = Surroundings(disparity_px, origin, box, is_half=False)
+    surroundings = Surroundings(disparity_px, origin, box, False, np.zeros(shape, np.uint8))
     nothing = DisparityMap(*(np.empty((0, 0), np.float32),) * 2, np.empty((0, 0), np.uint8), 0, 0)
     return Foreground(surroundings, nothing, is_in_front)
 

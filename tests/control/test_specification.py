@@ -39,7 +39,9 @@ def test_only_live_pictures_are_seen_late_and_only_live_sessions_are_recorded() 
     assert (live.is_recording, replayed.is_recording) == (True, False)
 
 
-def test_a_replay_may_choose_the_method_and_further_bones() -> None:
-    specification = specified(is_live=False, method="bimcc", others=("tibia",))
+def test_a_replay_may_choose_the_method_further_bones_and_layers() -> None:
+    assert specified(is_live=False).layers is None
+    specification = specified(is_live=False, method="bimcc", others=("tibia",), layers=("bone",))
+    assert specification.layers == ("bone",)
     assert specification.method == "bimcc"
     assert specification.others == ("tibia",)

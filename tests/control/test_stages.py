@@ -8,11 +8,20 @@ import pytest
 from navapp.control.stages import STAGES, stage_by_name, stage_by_number, stage_of
 from navapp.control.states import EnterStage
 from navapp.errors import UsageError
+from navapp.overlay import LAYERS
 from navapp.preop.contents_file_tables import StagesTable
 from navapp.preop.default_targets import with_defaults
 from navapp.values import Plan, StageContent, SurgicalContent
 from tests.control.fakes import Bench, a_plan
 from tests.preop.knees import bones_of, knees
+
+
+def test_every_stage_shows_the_bone_and_names_only_layers_that_exist() -> None:
+    for stage in STAGES:
+        assert set(stage.layers) <= set(LAYERS)
+        assert {"bone", "scale"} <= set(stage.layers)
+    assert set(LAYERS) == {name for stage in STAGES for name in stage.layers}
+
 
 TARGETS = {"tibia/mine": np.array([[1.0, 2.0, 3.0]])}
 

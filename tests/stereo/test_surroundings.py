@@ -158,6 +158,22 @@ def test_pictures_that_disagree_tell_nothing(band_px: tuple[float, float]) -> No
     assert (found.origin == Origin.UNKNOWN).all()
 
 
+@pytest.mark.parametrize(("band_px", "step"), [(FULL, 1), (HALF, 2)])
+def test_the_picture_comes_along_in_the_resolution_of_the_map(
+    band_px: tuple[float, float], step: int
+) -> None:
+    pair = scene(INSIDE)
+    found = fill_surroundings(match_coarsely(pair, band_px))
+    assert found.is_half is (step == 2)
+    assert found.picture.shape == found.origin.shape
+    left = pair.left[INSIDE.slices].astype(float)
+    height, width = (step * (n // step) for n in left.shape)
+    blocks = left[:height, :width].reshape(height // step, step, width // step, step)
+    means = blocks.mean(axis=(1, 3))
+    own = found.picture[: means.shape[0], : means.shape[1]].astype(float)
+    assert np.corrcoef(own.ravel(), means.ravel())[0, 1] > (0.999 if step == 1 else 0.6)
+
+
 @pytest.mark.parametrize(("rows", "columns"), [(1, 0), (0, 1), (1, 1)])
 def test_pictures_of_odd_size_are_filled_to_their_rim(rows: int, columns: int) -> None:
     whole = scene(INSIDE)

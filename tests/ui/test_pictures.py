@@ -55,7 +55,15 @@ def test_plain_terminal(snap_compare: Callable[..., bool]) -> None:
     assert snap_compare(NavigationApp(session, symbols=ASCII, polls_per_s=0))
 
 
-@pytest.mark.parametrize("key", ["question_mark", "d", "q"], ids=["help", "devices", "quit"])
+@pytest.mark.parametrize(
+    "key", ["question_mark", "d", "l", "q"], ids=["help", "devices", "layers", "quit"]
+)
 def test_page(key: str, snap_compare: Callable[..., bool]) -> None:
-    app = NavigationApp(snapshots.ScriptedSession(snapshots.navigating()), polls_per_s=0)
+    shown = snapshots.navigating(layers=snapshots.navigating().stage.layers)
+    app = NavigationApp(snapshots.ScriptedSession(shown), polls_per_s=0)
     assert snap_compare(app, press=[key])
+
+
+def test_the_legend_on_a_tall_terminal(snap_compare: Callable[..., bool]) -> None:
+    app = NavigationApp(snapshots.ScriptedSession(snapshots.navigating()), polls_per_s=0)
+    assert snap_compare(app, press=["question_mark"], terminal_size=(160, 48))
