@@ -68,6 +68,7 @@ class SnapshotMaker:
             sequence=session.sequence,
             is_bone_planned=bone is not None,
             device_reasons=self._device_reasons(reports),
+            has_mirror=self.specification.display is not None,
             mirror_reason=self.mirror_checking.find_reason(now_ns),
             cross_check=self.mirror_checking.state,
             is_camera_silent=self.camera.is_silent,

@@ -278,6 +278,7 @@ class Snapshot:
     length_check: LengthCheck | None = None
     # what projector and mirror have against guides; nothing at all is shown then.
     device_reasons: tuple[Reason, ...] = ()
+    has_mirror: bool = False  # the display is seen in the mirror
     mirror_reason: Reason | None = None  # what the check of the mirror has against guides
     cross_check: CrossCheck | None = None  # that is under way; no guide is shown meanwhile
     is_simulated: bool = False  # the pictures are not of this world
