@@ -48,9 +48,9 @@ class Reason(Enum):
     MIRROR_AWAY = "the mirror does not stand where the display was calibrated"
     PROJECTOR_ALTERS = "the projector alters the picture"
     PROJECTOR_LOST = "the projector does not answer"
-    DISPLAY_DIFFERS = "the display is not the one that was calibrated in the mirror"
-    DISPLAY_NOT_ACCEPTED = "the calibration of the display in the mirror was not accepted"
-    DISPLAY_EXPIRED = "the calibration of the display in the mirror has expired"
+    DISPLAY_DIFFERS = "the display is not as calibrated in the mirror"
+    DISPLAY_NOT_ACCEPTED = "the calibration of the mirror was not accepted"
+    DISPLAY_EXPIRED = "the calibration of the mirror has expired"
     MIRROR_UNCHECKED = "nobody has checked what is seen in the mirror"
     MIRROR_CHECK_FAILED = "the check of the mirror has failed"
     MIRROR_CHECK_OLD = "the check of the mirror is too old"
@@ -96,7 +96,7 @@ _REMEDIES = {
     Reason.MIRROR_AWAY: "reopen brings it back; keep hands off, see the devices",
     Reason.PROJECTOR_ALTERS: "set flips, keystone, freeze and source back on the projector",
     Reason.PROJECTOR_LOST: "check its mains, its lamp and its control cable",
-    Reason.DISPLAY_DIFFERS: "use the calibrated display, its size and its flips, or calibrate it",
+    Reason.DISPLAY_DIFFERS: "set its size and flips back, or calibrate",
     Reason.DISPLAY_NOT_ACCEPTED: "calibrate the mirror again",
     Reason.DISPLAY_EXPIRED: "calibrate the mirror again",
     Reason.MIRROR_UNCHECKED: "check it on three points of the bone",
