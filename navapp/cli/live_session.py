@@ -90,9 +90,12 @@ def _read_display(
     path = configuration.display.model
     if path is None:
         return None
-    minutes = configuration.mirror.check_minutes
+    mirror = configuration.mirror
     return CalibratedDisplay(
-        read_display_model(path), minutes, allows_unaccepted=options.allow_unaccepted
+        read_display_model(path),
+        mirror.check_minutes,
+        allows_unaccepted=options.allow_unaccepted,
+        eyes=mirror.eyes,
     )
 
 

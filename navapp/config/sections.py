@@ -93,6 +93,8 @@ class MirrorSection(Section):
     """fixed, or zaber: a rotary stage that speaks Zaber's ASCII protocol."""
     calibrated_deg: float = 45.0
     """Angle at which the display was calibrated; of a stage from its home position."""
+    eyes: Literal["both", "left", "right"] = "both"
+    """That look into the mirror; with both, guides 1 mm off for the other eye are refused."""
     check_minutes: Positive = 30.0
     """What is seen in the mirror is checked again after this."""
     port: str = ""

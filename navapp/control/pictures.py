@@ -8,7 +8,7 @@ from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.overlay import LeftView, MirrorView, Scene, Viewpoint, compose_mirror, compose_video
-from navapp.values import Foreground, OverlayMode, Plan, Status
+from navapp.values import Foreground, OverlayMode, Plan, Reason, Status
 
 Image = NDArray[np.uint8]
 
@@ -97,6 +97,10 @@ def banner(snapshot: Snapshot) -> str:
     if snapshot.is_candidate:
         return f"{stage} - CANDIDATE, not accepted"
     why = snapshot.reasons[0].value if snapshot.reasons else ""
+    if snapshot.reasons[:1] == (Reason.OTHER_EYE,) and snapshot.other_eye is not None:
+        shift_mm = snapshot.other_eye.screen_shift_mm
+        way = "away" if shift_mm > 0.0 else "nearer"
+        why = f"{why}: cover it, or bring the picture {abs(shift_mm):.0f} mm {way}"
     return f"{stage} - NO GUIDES: {why}"
 
 

@@ -10,12 +10,16 @@ from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.interlocks import check_interlocks
 from navapp.control.mirror_checking import MirrorChecking
+from navapp.control.other_eye import OtherEye
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
 from navapp.control.stages import STAGES
 from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
-from navapp.values import Reason
+from navapp.values import BoneModel, Reason, TrackedFrame
+
+# Of the bone's vertices so many tell what the other eye sees.
+_N_OTHER_EYE = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +73,7 @@ class SnapshotMaker:
             is_bone_planned=bone is not None,
             device_reasons=self._device_reasons(reports),
             has_mirror=self.specification.display is not None,
+            other_eye=self._see_with_other_eye(bone, tracked),
             mirror_reason=self.mirror_checking.find_reason(now_ns),
             cross_check=self.mirror_checking.state,
             is_camera_silent=self.camera.is_silent,
@@ -86,6 +91,20 @@ class SnapshotMaker:
             of_display = calibrated.find_reason(self.display.display.info, date.today())
             reasons += [] if of_display is None else [of_display]
         return tuple(reasons)
+
+    def _see_with_other_eye(
+        self, bone: BoneModel | None, tracked: TrackedFrame | None
+    ) -> OtherEye | None:
+        """Guides on what of the bone faces the cameras; None over video or without a pose."""
+        calibrated = self.specification.display
+        pose = None if tracked is None else tracked.left_from_bone
+        if calibrated is None or bone is None or pose is None:
+            return None
+        vertices = bone.mesh.vertices_mm
+        step = max(1, len(vertices) // _N_OTHER_EYE)
+        is_faced = bone.mesh.visible_vertices(pose)[::step]
+        points_mm = pose.apply(vertices[::step][is_faced])
+        return calibrated.see_with_other_eye(points_mm) if len(points_mm) else None
 
     @property
     def _is_simulated(self) -> bool:

@@ -22,7 +22,6 @@ from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 
-
 # The first of several actions -> their keys and what they do, in one line.
 _SHARED = {
     "stage-1": ("1 - 5", "go to that stage"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.interfaces import PowerState, ProjectorStatus
-from navapp.control.calibrated_display import CalibratedDisplay
+from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.device_handlers import ProjectorHandler
 from navapp.control.mirror_checking import LEAST_APART_MM
@@ -71,8 +71,9 @@ def a_bench(
         clock, WIDTH, HEIGHT
     ),
     delay_ms: float = 0.0,
+    eyes: Eyes = "left",
 ) -> Bench:
-    display = CalibratedDisplay(model or a_model(), check_minutes=1.0)
+    display = CalibratedDisplay(model or a_model(), check_minutes=1.0, eyes=eyes)
     bench = Bench(calibrated_display=display, make_display=make_display, display_delay_ms=delay_ms)
     bench.script.tracked = measured_bone()
     return bench
@@ -280,6 +281,23 @@ def test_guides_are_where_the_bone_will_be_when_their_light_is_seen() -> None:
         middles.append(np.argwhere(guides(bench)).mean(axis=0)[1])
     # The eye's columns rise to the left: 0.7 mm (damped) of 0.5 mm a pixel.
     assert middles[1] - middles[0] == pytest.approx(-0.7 / PITCH_MM, abs=0.4)
+
+
+def test_two_eyes_are_refused_where_guides_are_off_for_the_other() -> None:
+    """The bone reaches from the screen's plane to 32 mm behind it, 450 mm from the eye."""
+    bench = a_bench(eyes="both")
+    navigating(bench)
+    check(bench)
+    assert bench.snapshot.reasons == (Reason.OTHER_EYE,)
+    other = bench.snapshot.other_eye
+    assert other is not None
+    assert 2.0 < other.error_mm < 6.0
+    assert 5.0 < other.screen_shift_mm < 32.0
+    assert not guides(bench).any()
+    alone = a_bench(eyes="left")
+    navigating(alone)
+    check(alone)
+    assert alone.snapshot.is_navigable
 
 
 class KeystoneProjector:
