@@ -90,7 +90,7 @@ def find_weights(
             if np.isnan(bone):
                 # A comparison with an unknown depth is False.
                 is_beneath = False
-                if depth < aside_mm and not is_guess[y, x]:
+                if depth < aside_mm:
                     seen = np.float32(0.0)
             else:
                 is_beneath = depth < bone - tissue_mm

@@ -146,6 +146,9 @@ def test_what_lies_before_the_bone_covers_it_by_how_near_it_is(nearer_mm, weight
 def test_beside_the_bone_what_is_nearer_than_all_of_it_hides() -> None:
     given = seen(scene(), occluder=Occluder(nearer_mm=60.0))
     assert given.weight[beside(given)].max() < 1e-3
+    # A tool without texture is filled from its own rim.
+    guessed = seen(scene(), occluder=Occluder(nearer_mm=60.0), origin=Origin.FILLED_INTERIOR)
+    assert guessed.weight[beside(guessed)].max() < 1e-3
     lower = seen(scene(), occluder=Occluder(nearer_mm=-30.0))
     assert (lower.weight[beside(lower)] == 1.0).all()
 

@@ -4,22 +4,13 @@ import pytest
 
 from navapp.control.stages import STAGES
 from navapp.control.states import SessionState
-from navapp.overlay import LAYERS
 from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
-from navapp.ui.layers_page import LAYER_KEYS
 from navapp.values import Status, Verdict
 from tests.ui import snapshots
 
 
 def test_every_key_has_one_action() -> None:
     assert Counter(action.key for action in ACTIONS).most_common(1)[0][1] == 1
-
-
-def test_every_layer_has_a_letter_that_neither_leaves_its_page_nor_decides_elsewhere() -> None:
-    assert [layer.name for layer in LAYER_KEYS] == list(LAYERS)
-    assert len({layer.key for layer in LAYER_KEYS}) == len(LAYER_KEYS)
-    keys = {ACTION_OF_NAME[name].key for name in ("layers", "quit", "accept", "reject", "register")}
-    assert not keys & {layer.key for layer in LAYER_KEYS}
 
 
 @pytest.mark.parametrize("state", list(SessionState))

@@ -28,10 +28,9 @@ from navapp.control.states import (
     Show,
     Snapshot,
     ToggleDepth,
-    ToggleLayer,
 )
 from navapp.ui.app import NavigationApp
-from navapp.ui.layers_page import LAYER_KEYS, LEGEND, LayersPage, LayerTable, OverlayLegend
+from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen, SmallNotice
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
 from navapp.ui.picture_view import PictureView
@@ -109,9 +108,8 @@ def test_a_key_submits_its_command(snapshot: Snapshot, key: str, command: Comman
     assert play(snapshot, press(key)).session.commands == [command]
 
 
-def test_digits_go_to_their_stage() -> None:
+def test_digits_go_to_their_stage_but_not_to_the_second_which_is_in_force() -> None:
     commands = play(snapshots.navigating(), press("1", "2", "3", "4", "5")).session.commands
-    # Stage 2 is in force.
     assert commands == [EnterStage(1), EnterStage(3), EnterStage(4), EnterStage(5)]
 
 
@@ -175,45 +173,6 @@ def test_a_page_closes_by_its_own_key_and_by_q_without_quitting(key: str) -> Non
 
 def test_devices_are_reopened_from_their_page() -> None:
     assert play(snapshots.suspended(), press("d", "o")).session.commands == [Reconnect()]
-
-
-@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
-def test_layers_are_switched_by_their_letters(size: tuple[int, int]) -> None:
-    drawn = STAGES[2].layers
-
-    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
-        await pilot.press("l", *(layer.key for layer in LAYER_KEYS))
-        lines = app.text_of(LayerTable).splitlines()
-        for layer, line in zip(LAYER_KEYS, lines, strict=False):
-            state = "on" if layer.name in drawn else "off"
-            assert line.split()[:3] == [layer.key, state, layer.name]
-            assert line.rstrip().endswith(layer.shows)
-            assert len(line) <= size[0] - 4
-        # What the session says is shown, not what was asked for.
-        app.session.current = snapshots.navigating(layers=("scale",))
-        app.poll()
-        app.poll()
-        await pilot.pause()
-        shown = app.text_of(LayerTable).splitlines()
-        assert [line.split()[1] for line in shown[: len(LAYER_KEYS)]].count("on") == 1
-        assert isinstance(app.screen, LayersPage)
-
-    app = play(snapshots.navigating(layers=drawn), script, size)
-    assert app.session.commands == [ToggleLayer(layer.name) for layer in LAYER_KEYS]
-
-
-def test_the_help_page_has_the_legend_of_the_overlay() -> None:
-    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
-        await pilot.press("question_mark")
-        legend = app.screen.query_one(OverlayLegend)
-        assert not app.screen.can_view_entire(legend)
-        await pilot.press("end")
-        await pilot.pause(0.5)
-        assert app.screen.can_view_entire(legend)
-        text = str(legend.render())
-        assert all(sign in text and meaning in text for sign, meaning in LEGEND)
-
-    play(snapshots.navigating(), script)
 
 
 def test_the_palette_offers_actions_of_the_table() -> None:
