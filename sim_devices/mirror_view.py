@@ -1,6 +1,7 @@
 """What a camera at the eye's place sees: the site through the plate, the monitor by its faces."""
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,16 @@ class MirrorView:
 
     def __init__(self, setup: MirrorSetup, camera: Camera, eye_from_left: RigidTransform) -> None:
         self.setup, self.camera, self.eye_from_left = setup, camera, eye_from_left
-        u, v = np.meshgrid(np.arange(camera.width + 1) - 0.5, np.arange(camera.height + 1) - 0.5)
-        rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
-        self._rays = np.ascontiguousarray(rays.reshape(*u.shape, 2))
         turn, self._eye_mm = eye_from_left.inverse_parts()
         self._turn = np.ascontiguousarray(turn)
+
+    @cached_property
+    def _rays(self) -> FloatArray:
+        """(H + 1, W + 1, 2) directions through the pixels' corners; only pictures need them."""
+        width, height = self.camera.width, self.camera.height
+        u, v = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
+        rays = self.camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
+        return np.ascontiguousarray(rays.reshape(*u.shape, 2))
 
     def render(
         self,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mirror.seen_views import KINDS, Marks
-from calibration.mirror.view_state import N_LENS, N_SHARED, N_VIEW, ViewState, predict
+from calibration.mirror.view_state import N_LENS, N_SCREEN, N_SHARED, N_VIEW, ViewState, predict
 from calibration.rig.equilibration import compute_unit_sizes, equilibrate
 from navapp.geometry.display_model_errors import perpendicular_axes
 from navapp.geometry.rig import StereoRig
@@ -205,7 +205,9 @@ def _slopes(
 ) -> FloatArray:
     """(M, 2, 19 + 12) of the predictions, by shared numbers and by those of a mark's own view."""
     n_views = len(state.eye_shift)
-    slopes = np.empty((*residual.shape, N_SHARED + N_VIEW))
+    slopes = np.zeros((*residual.shape, N_SHARED + N_VIEW))
+    ends = np.cumsum([0, *(len(table.view) for table in marks.values())])
+    rows = {kind: slice(ends[k], ends[k + 1]) for k, kind in enumerate(marks)}
     none, still = np.zeros(N_SHARED), np.zeros((n_views, N_VIEW))
     for k, step in enumerate(np.r_[_SHARED_STEPS, _VIEW_STEPS]):
         shared, views = none.copy(), still.copy()
@@ -213,9 +215,25 @@ def _slopes(
             shared[k] = step
         else:
             views[:, k - N_SHARED] = step
-        moved, _ = _residuals(state.move(shared, views), marks, rig)
-        slopes[:, :, k] = (residual - moved) / step
+        moved = {kind: marks[kind] for kind in _moved_by(k) if kind in marks}
+        found = predict(state.move(shared, views), moved, rig)
+        for kind, table in moved.items():
+            left = table.pixels - found[kind]
+            slopes[rows[kind], :, k] = (residual[rows[kind]] - left) / step
     return slopes
+
+
+def _moved_by(number: int) -> tuple[str, ...]:
+    """Kinds of marks that a number moves: lens, screen, glass; eye's camera, board."""
+    if number < N_LENS:
+        return ("eye_screen", "eye_site")
+    if number < N_SCREEN:
+        return ("eye_screen",)
+    if number < N_SHARED:
+        return ("eye_site",)
+    if number < N_SHARED + N_VIEW // 2:
+        return ("eye_screen", "eye_site")
+    return ("eye_site", "left", "right")
 
 
 def _add_priors(

@@ -14,7 +14,7 @@ from navapp.geometry.transform import FloatArray, rotation_from_vector
 
 # Numbers that all views share: fx fy cx cy k1 k2 p1 p2 of the eye's camera; of the screen a turn
 # (rad), a shift (mm), relative pitch, bulge (mm); of the glass thickness (mm) and two tilts (rad).
-N_LENS, N_SHARED = 8, 19
+N_LENS, N_SCREEN, N_SHARED = 8, 16, 19
 # Numbers of a view: turn and shift of the eye's camera, turn and shift of the board.
 N_VIEW = 12
 
@@ -47,19 +47,19 @@ class ViewState:
 
     def move(self, shared: FloatArray, views: FloatArray) -> "ViewState":
         """Changed by (19,) and (V, 12), in the order of the numbers above."""
-        axes = perpendicular_axes(self.glass.normal[None])[0]
-        glass = Glass(
-            max(0.0, self.glass.thickness_mm + float(shared[16])),
-            rotation_from_vector(shared[17:19] @ axes) @ self.glass.normal,
-            self.glass.refractive_index,
-        )
-        screen = self.screen
+        screen, glass = self.screen, self.glass
+        if shared[16:].any():
+            axes = perpendicular_axes(glass.normal[None])[0]
+            glass = Glass(
+                max(0.0, glass.thickness_mm + float(shared[16])),
+                rotation_from_vector(shared[17:19] @ axes) @ glass.normal,
+                glass.refractive_index,
+            )
         if shared[8:16].any():
             screen = screen.move(shared[8:11], shared[11:14]).resize(
                 screen.pitch_mm * (1.0 + float(shared[14])), screen.bulge_mm + float(shared[15])
             )
-        turns = np.array([rotation_from_vector(one) for one in views[:, :3]])
-        board_turns = np.array([rotation_from_vector(one) for one in views[:, 6:9]])
+        turns, board_turns = _turns(views[:, :3]), _turns(views[:, 6:9])
         return ViewState(
             self.lens + shared[:N_LENS],
             screen,
@@ -79,6 +79,13 @@ class ViewState:
             board_turn=self.board_turn[kept],
             board_shift=self.board_shift[kept],
         )
+
+
+def _turns(vectors_rad: FloatArray) -> FloatArray:
+    """(V, 3, 3) of rotation vectors (V, 3)."""
+    if not vectors_rad.any():
+        return np.repeat(np.eye(3)[None], len(vectors_rad), axis=0)
+    return np.array([rotation_from_vector(one) for one in vectors_rad])
 
 
 def predict(state: ViewState, marks: dict[str, Marks], rig: StereoRig) -> dict[str, FloatArray]:
