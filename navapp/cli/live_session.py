@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from calibration.targets.boards import Board
     from navapp.config import Configuration
     from navapp.control.board_watch import BoardWatch
+    from navapp.control.calibrated_display import CalibratedDisplay
     from navapp.control.controller import SessionController
     from navapp.control.event_log import SessionHooks
     from navapp.control.frame_result import FrameListener
@@ -53,6 +54,7 @@ def prepare_session(
     plan = None if given.path is None else read_plan(given.path)
     prior = None if given.prior is None else read_prior(given.prior)
     board = _read_board(configuration)
+    display = _read_display(configuration, options)
     opened = open_live(configuration, is_headless=options.headless, board=board)
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
@@ -68,8 +70,33 @@ def prepare_session(
         if options.headless:
             check_start(prior, stage.bone)
         undo.pop_all()
-    specification = specify_session(configuration, opened.rig, plan, prior, stage, is_live=True)
+    specification = specify_session(
+        configuration, opened.rig, plan, prior, stage, is_live=True, calibrated_display=display
+    )
     return LiveSession(configuration, opened, specification, board)
+
+
+def _read_display(
+    configuration: "Configuration", options: argparse.Namespace
+) -> "CalibratedDisplay | None":
+    """The display in the mirror that the configuration names.
+
+    Raises:
+        NavappError: its file.
+    """
+    from navapp.control.calibrated_display import CalibratedDisplay
+    from navapp.geometry.display_model_files import read_display_model
+
+    path = configuration.display.model
+    if path is None:
+        return None
+    mirror = configuration.mirror
+    return CalibratedDisplay(
+        read_display_model(path),
+        mirror.check_minutes,
+        allows_unaccepted=options.allow_unaccepted,
+        eyes=mirror.eyes,
+    )
 
 
 def _read_board(configuration: "Configuration") -> "Board | None":

@@ -33,11 +33,13 @@ class DisplaySection(Section):
     output: str = ""
     """Name of the window's monitor or projector; empty: the only one."""
     size_px: tuple[Pixels, Pixels] | None = None
-    """Width and height of that output; a window needs it."""
+    """Width and height of that output, or of the simulated one; a window needs it."""
     flip_horizontally: bool = False
     """The window shows every picture with left and right exchanged."""
     flip_vertically: bool = False
     """The window shows every picture upside down."""
+    model: str | None = None
+    """File of the display in the half-silvered mirror (calibrate mirror): guides are for it."""
     valid_ms: Positive = 500.0
     """A picture without a newer one turns black after this."""
     delay_ms: NotNegative = 0.0
@@ -49,6 +51,8 @@ class DisplaySection(Section):
     def _is_possible(self) -> Self:
         if self.backend == "window" and self.size_px is None:
             raise ValueError("a window needs size_px")
+        if self.model is not None and (self.flip_horizontally or self.flip_vertically):
+            raise ValueError("a display with a model is not flipped: the model knows its flips")
         if self.delay_ms >= self.valid_ms:
             raise ValueError("delay_ms must be smaller than valid_ms")
         return self
@@ -89,6 +93,10 @@ class MirrorSection(Section):
     """fixed, or zaber: a rotary stage that speaks Zaber's ASCII protocol."""
     calibrated_deg: float = 45.0
     """Angle at which the display was calibrated; of a stage from its home position."""
+    eyes: Literal["both", "left", "right"] = "both"
+    """That look into the mirror; with both, guides 1 mm off for the other eye are refused."""
+    check_minutes: Positive = 30.0
+    """What is seen in the mirror is checked again after this."""
     port: str = ""
     """Serial port (/dev/serial/by-id/...) or socket://host:port."""
     serial: str = ""

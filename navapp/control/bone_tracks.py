@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from drivers.frames import StereoFrame
 from navapp.control.registration_job import Registration
 from navapp.control.trackers import Trackers
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import TrackState
 from navapp.values import FrameTimings, StageSpec, Status, TrackedFrame, Verdict
+
+# Further than that within one delay of the display a patient does not move: chosen.
+_FARTHEST_PREDICTED_MM = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,6 +139,20 @@ class BoneTracks:
         tracked, track = tracker.track(frame.left, frame.right, frame.captured_ns, track, goal)
         self._tracks[stage.bone] = track
         return tracked
+
+    def predict(self, stage: StageSpec, time_ns: int) -> RigidTransform | None:
+        """Where the accepted bone will be at a moment, by its motion; None where that is unsure.
+
+        A bone that was lost, or moves further than `_FARTHEST_PREDICTED_MM` until then, is not
+        predicted.
+        """
+        track = self._tracks.get(stage.bone)
+        if track is None or track.n_lost > 0 or track.n_doubted > 0:
+            return None
+        centre_mm = self._trackers.centre_mm(stage.bone)[None]
+        pose = track.predict(time_ns, centre_mm[0])
+        moved = pose.apply(centre_mm) - track.left_from_bone.apply(centre_mm)
+        return pose if np.linalg.norm(moved) <= _FARTHEST_PREDICTED_MM else None
 
     def glance(
         self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None

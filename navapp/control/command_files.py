@@ -7,10 +7,13 @@ from navapp.control.states import (
     Accept,
     Blank,
     Cancel,
+    CheckMirror,
     Command,
+    ConfirmCross,
     DistrustRig,
     EnterStage,
     Interrupt,
+    NudgeCross,
     Propose,
     Quit,
     Reconnect,
@@ -29,6 +32,8 @@ _PLAIN: dict[str, type] = {
     "blank": Blank,
     "show": Show,
     "depth": ToggleDepth,
+    "check_mirror": CheckMirror,
+    "confirm_cross": ConfirmCross,
     "reconnect": Reconnect,
     "interrupt": Interrupt,
     "quit": Quit,
@@ -44,6 +49,9 @@ def command_to_json(command: Command) -> dict[str, Any]:
         return {"command": "stage", "number": command.number}
     if isinstance(command, ToggleLayer):
         return {"command": "layer", "name": command.name}
+    if isinstance(command, NudgeCross):
+        nudge_px = [command.right_px, command.down_px]
+        return {"command": "nudge_cross", "nudge_px": nudge_px}
     if isinstance(command, Propose):
         pose = command.left_from_bone
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
@@ -66,6 +74,9 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return EnterStage(int(value["number"]))
         if name == "layer":
             return ToggleLayer(str(value["name"]))
+        if name == "nudge_cross":
+            right_px, down_px = value["nudge_px"]
+            return NudgeCross(int(right_px), int(down_px))
         if name == "propose":
             matrix = value["camera_from_model"]
             return Propose(RigidTransform("left", str(value["bone"]), matrix))

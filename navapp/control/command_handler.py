@@ -4,6 +4,7 @@ from navapp.control.bone_tracks import Candidate
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
+from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.stages import stage_by_number
@@ -11,11 +12,14 @@ from navapp.control.states import (
     Accept,
     Blank,
     Cancel,
+    CheckMirror,
     Command,
+    ConfirmCross,
     DistrustRig,
     EnterStage,
     EventLevel,
     Interrupt,
+    NudgeCross,
     Propose,
     Quit,
     Reconnect,
@@ -41,6 +45,7 @@ class CommandHandler:
         display: DisplayLink,
         rig: RigWatch,
         monitored: MonitoredDevices,
+        mirror: MirrorChecking,
         plan: Plan,
     ) -> None:
         self._session = session
@@ -48,6 +53,7 @@ class CommandHandler:
         self._display = display
         self._rig = rig
         self._monitored = monitored
+        self._mirror = mirror
         self._plan = plan
 
     def handle(self, command: Command) -> None:
@@ -71,6 +77,10 @@ class CommandHandler:
                 self._session.toggle_depth()
             case ToggleLayer():
                 self._on_toggle_layer(command)
+            case CheckMirror():
+                self._on_check_mirror()
+            case NudgeCross() | ConfirmCross():
+                self._on_cross(command)
             case EnterStage():
                 self._on_enter_stage(command)
             case Reconnect():
@@ -141,6 +151,35 @@ class CommandHandler:
             self._refuse("layer", f"there is no layer '{command.name}'")
             return
         self._session.toggle_layer(command.name)
+
+    def _on_check_mirror(self) -> None:
+        if self._mirror.state is not None:
+            self._mirror.give_up()
+            self._session.add_event("mirror", "check of the mirror given up", EventLevel.WARNING)
+            return
+        tracked = self._session.tracked
+        if tracked is None or tracked.verdict.status is not Status.OK:
+            self._refuse("mirror", "the check needs a bone whose pose is OK")
+            return
+        why = self._mirror.begin(tracked)
+        if why:
+            self._refuse("mirror", why)
+            return
+        self._session.add_event("mirror", "check of the mirror: move each cross onto its point")
+
+    def _on_cross(self, command: NudgeCross | ConfirmCross) -> None:
+        tracked = self._session.tracked
+        pose = None if tracked is None else tracked.left_from_bone
+        if self._mirror.state is None or pose is None:
+            self._refuse("mirror", "no check of the mirror is under way")
+            return
+        if isinstance(command, NudgeCross):
+            self._mirror.nudge(command.right_px, command.down_px)
+            return
+        found = self._mirror.confirm(pose, self._session.now_ns)
+        if found is not None:
+            text = f"mirror checked: off by {found.residual_mm:.2f} mm"
+            self._session.add_event("mirror", text)
 
     def _on_enter_stage(self, command: EnterStage) -> None:
         try:

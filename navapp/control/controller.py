@@ -26,8 +26,9 @@ from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
 from navapp.control.frame_result import FrameResult
+from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.other_bones import OtherBones
-from navapp.control.pictures import compose
+from navapp.control.pictures import Composer, Image
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
@@ -36,9 +37,10 @@ from navapp.control.specification import SessionSpecification
 from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
-from navapp.overlay import DepthMarks, LeftView, make_preview
+from navapp.geometry.rectification import Rectifier
+from navapp.overlay import DepthMarks, make_preview
 from navapp.tracking import make_tracker
-from navapp.values import FrameTimings, OverlayMode, OverlayPicture
+from navapp.values import Foreground, FrameTimings, OverlayMode, OverlayPicture
 
 
 class SessionController:
@@ -71,10 +73,11 @@ class SessionController:
         hooks = hooks or SessionHooks()
         rig, plan = specification.rig, specification.plan
         self._overlay_valid_ms = specification.overlay_valid_ms
+        self._display_delay_ns = round(specification.display_delay_ms * 1e6)
         self._devices = devices
-        self._viewpoint = LeftView(rig)
+        self._mirror_checking = MirrorChecking(specification.display, Rectifier(rig).geometry)
+        self._composer = Composer(rig, plan, self._mirror_checking.view)
         self._depth_marks = DepthMarks(rig)
-        self._plan = plan
         self._executor = executor
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
         self._display = DisplayLink(devices.display)
@@ -84,15 +87,16 @@ class SessionController:
         self._session = _make_session(devices.clock, specification, hooks, executor, make_tracker)
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._monitored = MonitoredDevices(
-            ProjectorHandler(devices.projector),
-            MirrorHandler(devices.mirror, specification.mirror_deg),
+            ProjectorHandler(devices.projector, specification.display_model),
+            MirrorHandler(devices.mirror, specification.calibrated_mirror_deg),
         )
         self._commands = CommandHandler(
-            self._session, self._camera, self._display, self._rig_watch, self._monitored, plan
-        )
+            self._session, self._camera, self._display, self._rig_watch, self._monitored,
+            self._mirror_checking, plan,
+        )  # fmt: skip
         self._maker = SnapshotMaker(
-            self._session, self._camera, self._display, self._monitored, rig, self._rig_watch, plan,
-            specification.is_recording,
+            self._session, self._camera, self._display, self._monitored, self._mirror_checking,
+            specification, self._rig_watch,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -201,21 +205,39 @@ class SessionController:
         mark = "SIMULATED" if snapshot.is_simulated else ""
         tracked = self._session.tracked
         foreground = None if tracked is None else tracked.foreground
-        image = compose(frame.left, snapshot, self._viewpoint, self._plan, mark, foreground)
+        point_mm = self._mirror_checking.point_mm
+        video = self._composer.compose_video(frame.left, snapshot, mark, foreground, point_mm)
+        image = video
+        if self._composer.mode is OverlayMode.MIRROR:
+            image = self._compose_mirror(snapshot, foreground)
         overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
+        is_scaled = self._composer.mode is OverlayMode.VIDEO
         # The screen shows the live picture in a fault as well, the display shows nothing; nor does
         # it when what would be seen on it is not what is shown.
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
-        if is_shown and self._display.show(image, valid_until_ns, has_guides=has_guides):
+        if is_shown and self._display.show(
+            image, valid_until_ns, has_guides=has_guides, is_scaled=is_scaled
+        ):
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
-        preview = make_preview(image)
+        preview = make_preview(video)
         if self._session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
         self._session.keep_preview(preview)
         age_ns = self._session.now_ns - frame.captured_ns
-        return OverlayPicture(image, valid_until_ns, OverlayMode.VIDEO, age_ns), overlay_ms
+        return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
+
+    def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
+        """Guides where the bone will be when their light is seen; measured where that is unsure."""
+        if snapshot.is_navigable:
+            light_ns = self._session.now_ns + self._display_delay_ns
+            predicted = self._session.predict_pose(light_ns)
+            if predicted is not None:
+                snapshot = replace(snapshot, left_from_bone=predicted)
+        pose = snapshot.left_from_bone
+        cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
+        return self._composer.compose_mirror(snapshot, foreground, cross_px)
 
 
 def _make_session(

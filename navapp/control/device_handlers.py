@@ -6,12 +6,14 @@ from typing import Protocol
 from drivers.interfaces import MirrorMount, PowerState, ProjectorControl, ProjectorStatus
 from navapp.control.states import DeviceHealth, DeviceLine
 from navapp.errors import DeviceError
+from navapp.geometry.display_model import DisplayModel
 from navapp.values import Reason
 
 # A mirror turned by an angle turns what is seen in it by twice that: at half a metre this moves a
 # guide by 0.5 mm, half of what the strictest stage tolerates.
 MIRROR_TOLERANCE_DEG = 0.028
 _MOTION_S = 60.0
+_NO_KEYSTONE = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +72,11 @@ class ProjectorHandler:
     reason = Reason.PROJECTOR_LOST
     restoring = ""
 
-    def __init__(self, projector: ProjectorControl) -> None:
+    def __init__(self, projector: ProjectorControl, calibrated: DisplayModel | None = None) -> None:
         self._projector = projector
-        self._keystone: tuple[int, int] | None = None
+        # A display in the mirror was calibrated as it is: without keystone, with these flips.
+        self._keystone = None if calibrated is None else _NO_KEYSTONE
+        self._flips = None if calibrated is None else calibrated.projector_flips
         self._source: str | None = None
         self.is_slow = True
 
@@ -114,12 +118,17 @@ class ProjectorHandler:
         is_other = status.source is not None and status.source != self._source
         is_bent = status.keystone is not None and status.keystone != self._keystone
         found = {
-            "flipped": status.flips_horizontally or status.flips_vertically,
+            "flipped": self._is_flipped(status),
             "frozen": status.is_frozen,
             "with another keystone": is_bent,
             "of another source": is_other,
         }
         return ", ".join(name for name, is_found in found.items() if is_found)
+
+    def _is_flipped(self, status: ProjectorStatus) -> bool:
+        """Otherwise than calibrated, or at all where no flip was calibrated."""
+        found = (bool(status.flips_horizontally), bool(status.flips_vertically))
+        return found != (self._flips or (False, False))
 
 
 class MirrorHandler:

@@ -44,15 +44,22 @@ class DisplayLink:
         self._display.blank()
         self._has_guides = False
 
-    def show(self, image: Image, valid_until_ns: int, *, has_guides: bool) -> bool:
-        """Show a picture, fitted to the display; whether there is a new trouble to tell."""
+    def show(
+        self, image: Image, valid_until_ns: int, *, has_guides: bool, is_scaled: bool = True
+    ) -> bool:
+        """Show a picture; whether there is a new trouble to tell.
+
+        It is fitted to the display, unless one pixel of it must be one of the display
+        (`is_scaled`).
+        """
         if self.is_blanked or self._reopener.is_under_way:
             return False
         is_new = False
         self._has_guides = has_guides
         try:
             info = self._display.info
-            self._display.show(fit_to_display(image, info.width, info.height), valid_until_ns)
+            fitted = fit_to_display(image, info.width, info.height) if is_scaled else image
+            self._display.show(fitted, valid_until_ns)
             self.trouble = ""
             self._reopener.note_success()
         except DeviceError as error:

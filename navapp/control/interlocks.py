@@ -22,6 +22,10 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
     if snapshot.is_camera_silent:
         reasons.append(Reason.CAMERA_SILENT)
     reasons += snapshot.device_reasons
+    if snapshot.other_eye is not None and snapshot.other_eye.is_off:
+        reasons.append(Reason.OTHER_EYE)
+    if snapshot.mirror_reason is not None:
+        reasons.append(snapshot.mirror_reason)
     if not snapshot.is_bone_planned:
         reasons.append(Reason.STAGE_WITHOUT_BONE)
     if snapshot.state is SessionState.SUSPENDED:

@@ -1,35 +1,85 @@
-"""The picture for the display, from what the session knows."""
+"""The pictures for the screen and for the display, from what the session knows."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.control.states import SessionState, Snapshot
-from navapp.overlay import Scene, Viewpoint, compose_video
-from navapp.values import Foreground, Plan, Status
+from navapp.geometry.display_model_view import EyeView
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray
+from navapp.overlay import LeftView, MirrorView, Scene, Viewpoint, compose_mirror, compose_video
+from navapp.values import Foreground, OverlayMode, Plan, Reason, Status
 
 Image = NDArray[np.uint8]
 
 
-def compose(
-    left: Image,
-    snapshot: Snapshot,
-    viewpoint: Viewpoint,
-    plan: Plan,
-    mark: str,
-    foreground: Foreground | None = None,
-) -> Image:
-    """The left picture with guides, a marked candidate, or the reason why there are none.
+class Composer:
+    """Composes the pictures of a session.
 
     Args:
-        left: picture of the frame that the snapshot's pose belongs to.
-        snapshot: its `reasons` decide; nothing else does.
-        viewpoint: the left camera's.
+        rig: whose left camera takes the pictures.
         plan: what to draw.
-        mark: words for the corner.
-        foreground: what was measured of the depth around the bone in that frame.
+        eye_view: of a display in the mirror; None: the display shows the video.
     """
-    scene = _scene(snapshot, viewpoint, plan, foreground)
-    return compose_video(left, scene, banner(snapshot), mark)
+
+    def __init__(self, rig: StereoRig, plan: Plan, eye_view: EyeView | None = None) -> None:
+        self._plan = plan
+        self._left_view = LeftView(rig)
+        self._mirror_view = None if eye_view is None else MirrorView(eye_view, rig)
+
+    @property
+    def mode(self) -> OverlayMode:
+        """What the display shows."""
+        return OverlayMode.VIDEO if self._mirror_view is None else OverlayMode.MIRROR
+
+    def compose_video(
+        self,
+        left: Image,
+        snapshot: Snapshot,
+        mark: str,
+        foreground: Foreground | None = None,
+        point_mm: FloatArray | None = None,
+    ) -> Image:
+        """The left picture with guides, a marked candidate, or the reason why there are none.
+
+        Args:
+            left: picture of the frame that the snapshot's pose belongs to.
+            snapshot: its `reasons` decide; nothing else does.
+            mark: words for the corner.
+            foreground: what was measured of the depth around the bone in that frame.
+            point_mm: (3,) of the bone, where the cross of a check of the mirror belongs.
+        """
+        scene = _scene(snapshot, self._left_view, self._plan, foreground)
+        pose, cross_px = snapshot.left_from_bone, None
+        if pose is not None and point_mm is not None:
+            cross_px = self._left_view.camera.project(pose.apply(point_mm[None]))[0]
+        return compose_video(left, scene, banner(snapshot), mark, cross_px)
+
+    def compose_mirror(
+        self, snapshot: Snapshot, foreground: Foreground | None, cross_px: FloatArray | None
+    ) -> Image:
+        """Guides, or the cross of a check, and status on black, for the display in the mirror.
+
+        Args:
+            snapshot: as of `compose_video`; candidates are not shown.
+            foreground: as of `compose_video`.
+            cross_px: (2,) where the cross of a check lies as the eye reads the picture; it is shown
+                when nothing but the check is against guides.
+        """
+        view = self._mirror_view
+        if view is None:
+            raise ValueError("no display in the mirror")
+        is_checkable = snapshot.reasons == (snapshot.mirror_reason,)
+        scene = None
+        if snapshot.is_navigable:
+            scene = _scene(snapshot, view, self._plan, foreground)
+        return compose_mirror(
+            scene,
+            view.eye_view,
+            banner(snapshot),
+            is_guiding=snapshot.is_navigable,
+            cross_px=cross_px if is_checkable else None,
+        )
 
 
 def banner(snapshot: Snapshot) -> str:
@@ -38,12 +88,19 @@ def banner(snapshot: Snapshot) -> str:
     if snapshot.is_navigable and snapshot.verdict is not None:
         bound_mm = snapshot.verdict.predicted_tre_mm
         error = "" if bound_mm is None else f" - error <= {bound_mm:.2f} mm"
-        return f"{stage} - NAVIGATING{error}"
+        return f"{stage} - NAVIGATING{error} - not verified on the patient"
+    if snapshot.cross_check is not None:
+        check = snapshot.cross_check
+        return f"{stage} - CHECK OF THE MIRROR: cross {check.number + 1} of {check.count}"
     if snapshot.is_candidate and _is_lost(snapshot):
         return f"{stage} - CANDIDATE refused by the judge"
     if snapshot.is_candidate:
         return f"{stage} - CANDIDATE, not accepted"
     why = snapshot.reasons[0].value if snapshot.reasons else ""
+    if snapshot.reasons[:1] == (Reason.OTHER_EYE,) and snapshot.other_eye is not None:
+        shift_mm = snapshot.other_eye.screen_shift_mm
+        way = "away" if shift_mm > 0.0 else "nearer"
+        why = f"{why}: cover it, or bring the picture {abs(shift_mm):.0f} mm {way}"
     return f"{stage} - NO GUIDES: {why}"
 
 

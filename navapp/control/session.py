@@ -129,6 +129,10 @@ class Session:
         """Since the capture of the frame that `tracked` belongs to; None without an answer."""
         return None if self._tracked is None else (now_ns - self._tracked_at_ns) / 1e6
 
+    def predict_pose(self, time_ns: int) -> RigidTransform | None:
+        """Where the stage's bone will be at a moment; None where its motion is unsure."""
+        return self._tracks.predict(self._stage, time_ns)
+
     def other_bones(self, now_ns: int) -> tuple[OtherBone, ...]:
         """The other bones that are followed, as of now."""
         return self._others.describe(self._stage, now_ns)

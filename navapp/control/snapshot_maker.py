@@ -1,6 +1,7 @@
 """The snapshot of a session, with the interlocks' answer in it."""
 
 from dataclasses import dataclass, replace
+from datetime import date
 
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_handlers import DeviceReport
@@ -8,12 +9,17 @@ from navapp.control.device_lines import camera_line, display_line, rig_line
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.interlocks import check_interlocks
+from navapp.control.mirror_checking import MirrorChecking
+from navapp.control.other_eye import OtherEye
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
+from navapp.control.specification import SessionSpecification
 from navapp.control.stages import STAGES
 from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
-from navapp.geometry.rig import StereoRig
-from navapp.values import Plan
+from navapp.values import BoneModel, Reason, TrackedFrame
+
+# Of the bone's vertices so many tell what the other eye sees.
+_N_OTHER_EYE = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,10 +30,9 @@ class SnapshotMaker:
     camera: CameraLink  # in use
     display: DisplayLink  # in use
     monitored: MonitoredDevices  # projector and mirror
-    rig: StereoRig  # of the camera
-    rig_watch: RigWatch  # that watches it
-    plan: Plan  # of the operation
-    is_recording: bool  # the session is kept in a folder
+    mirror_checking: MirrorChecking  # of what is seen in the mirror
+    specification: SessionSpecification  # of the session
+    rig_watch: RigWatch  # that watches the rig
 
     def make(self) -> Snapshot:
         """As of now."""
@@ -37,7 +42,8 @@ class SnapshotMaker:
         # A candidate that was not followed into a frame yet is not on the screen.
         is_candidate = session.state is SessionState.REVIEW and tracked is not None
         reports = self.monitored.reports
-        bone = self.plan.bones.get(session.stage.bone)
+        rig, plan = self.specification.rig, self.specification.plan
+        bone = plan.bones.get(session.stage.bone)
         draft = Snapshot(
             time_ns=now_ns,
             state=session.state,
@@ -57,15 +63,19 @@ class SnapshotMaker:
             devices=self._device_lines(reports),
             events=session.events,
             progress=self._progress(),
-            rig_name=self.rig.name,
+            rig_name=rig.name,
             is_simulated=self._is_simulated,
-            is_recording=self.is_recording,
-            plan_name=self.plan.name,
-            plan_digest=self.plan.digest,
+            is_recording=self.specification.is_recording,
+            plan_name=plan.name,
+            plan_digest=plan.digest,
             side="" if bone is None or bone.side is None else bone.side,
             sequence=session.sequence,
             is_bone_planned=bone is not None,
-            device_reasons=tuple(report.reason for report in reports if report.reason is not None),
+            device_reasons=self._device_reasons(reports),
+            has_mirror=self.specification.display is not None,
+            other_eye=self._see_with_other_eye(bone, tracked),
+            mirror_reason=self.mirror_checking.find_reason(now_ns),
+            cross_check=self.mirror_checking.state,
             is_camera_silent=self.camera.is_silent,
             rig_alarm="" if session.rig_error is None else session.rig_error.problem,
             length_check=self.rig_watch.length_check,
@@ -73,10 +83,35 @@ class SnapshotMaker:
         )
         return replace(draft, reasons=check_interlocks(draft))
 
+    def _device_reasons(self, reports: tuple[DeviceReport, ...]) -> tuple[Reason, ...]:
+        """Of projector, mirror and a display that is seen in it."""
+        reasons = [report.reason for report in reports if report.reason is not None]
+        calibrated = self.specification.display
+        if calibrated is not None:
+            of_display = calibrated.find_reason(self.display.display.info, date.today())
+            reasons += [] if of_display is None else [of_display]
+        return tuple(reasons)
+
+    def _see_with_other_eye(
+        self, bone: BoneModel | None, tracked: TrackedFrame | None
+    ) -> OtherEye | None:
+        """Guides on what of the bone faces the cameras; None over video or without a pose."""
+        calibrated = self.specification.display
+        pose = None if tracked is None else tracked.left_from_bone
+        if calibrated is None or bone is None or pose is None:
+            return None
+        vertices = bone.mesh.vertices_mm
+        step = max(1, len(vertices) // _N_OTHER_EYE)
+        is_faced = bone.mesh.visible_vertices(pose)[::step]
+        points_mm = pose.apply(vertices[::step][is_faced])
+        return calibrated.see_with_other_eye(points_mm) if len(points_mm) else None
+
     @property
     def _is_simulated(self) -> bool:
         """The pictures are not of this world; a replayed rig still says so by its name."""
-        return self.camera.camera.info.is_simulated or self.rig.name.startswith("sim:")
+        return self.camera.camera.info.is_simulated or self.specification.rig.name.startswith(
+            "sim:"
+        )
 
     def _device_lines(self, reports: tuple[DeviceReport, ...]) -> tuple[DeviceLine, ...]:
         lines = (
@@ -88,7 +123,9 @@ class SnapshotMaker:
             return lines
         problem = "" if self.session.rig_error is None else self.session.rig_error.problem
         watch, now_ns = self.rig_watch, self.session.now_ns
-        line = rig_line(self.rig.name, problem, watch.length_check, now_ns, watch.unjudged)
+        line = rig_line(
+            self.specification.rig.name, problem, watch.length_check, now_ns, watch.unjudged
+        )
         return (*lines, line)
 
     def _progress(self) -> Progress | None:

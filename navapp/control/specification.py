@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 
 from navapp.config import Configuration
+from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.stages import STAGES
+from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.rig import StereoRig
 from navapp.tracking import Method, TrackerSettings
 from navapp.values import Plan, Prior, StageSpec
@@ -26,9 +28,23 @@ class SessionSpecification:
     others: tuple[str, ...] = ()
     # how long a picture may stay on the display without a newer one.
     overlay_valid_ms: float = 500.0
-    mirror_deg: float = 45.0  # where the mirror stood when the display was calibrated
+    # where the mirror stood when the display was calibrated, if the display's model does not say.
+    mirror_deg: float = 45.0
+    display_delay_ms: float = 0.0  # from showing a picture until its light
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
+    display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
+
+    @property
+    def display_model(self) -> DisplayModel | None:
+        """Of the display in the mirror."""
+        return None if self.display is None else self.display.model
+
+    @property
+    def calibrated_mirror_deg(self) -> float:
+        """Where the mirror must stand."""
+        known_deg = None if self.display is None else self.display.model.mirror_deg
+        return self.mirror_deg if known_deg is None else known_deg
 
     @property
     def tracker_settings(self) -> TrackerSettings:
@@ -48,6 +64,7 @@ def specify_session(
     follows_refused: bool | None = None,
     others: tuple[str, ...] = (),
     layers: tuple[str, ...] | None = None,
+    calibrated_display: CalibratedDisplay | None = None,
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -63,6 +80,7 @@ def specify_session(
         follows_refused: poses that the judge refuses are carried on; None: as configured.
         others: bones that are registered and followed unasked.
         layers: drawn in every stage; None: the stage's own.
+        calibrated_display: in the mirror; None: the display shows the video.
     """
     display = configuration.display
     return SessionSpecification(
@@ -76,6 +94,8 @@ def specify_session(
         others,
         display.withdrawn_ms if is_live else display.valid_ms,
         configuration.mirror.calibrated_deg,
+        display.delay_ms if is_live else 0.0,
         is_live and configuration.recording.folder is not None,
         layers,
+        calibrated_display,
     )

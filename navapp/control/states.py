@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.control.length_check import LengthCheck
+from navapp.control.other_eye import OtherEye
 from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, StageSpec, Verdict
 
@@ -80,6 +81,24 @@ class ToggleLayer:
 
 
 @dataclass(frozen=True, slots=True)
+class CheckMirror:
+    """Begin the check of the mirror, or give up the one that is under way."""
+
+
+@dataclass(frozen=True, slots=True)
+class NudgeCross:
+    """Move the cross of the check, as the eye sees it."""
+
+    right_px: int
+    down_px: int
+
+
+@dataclass(frozen=True, slots=True)
+class ConfirmCross:
+    """The cross lies on its point: go to the next one, or end the check after the last."""
+
+
+@dataclass(frozen=True, slots=True)
 class EnterStage:
     """Go to a stage by its number, 1 to 5."""
 
@@ -118,6 +137,9 @@ Command = (
     | Show
     | ToggleDepth
     | ToggleLayer
+    | CheckMirror
+    | NudgeCross
+    | ConfirmCross
     | EnterStage
     | Reconnect
     | Interrupt
@@ -190,6 +212,23 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
+class MirrorCheck:
+    """The surgeon's check of what is seen in the mirror."""
+
+    time_ns: int  # when it was finished
+    residual_mm: float  # the largest distance of a cross from its point, at the bone
+
+
+@dataclass(frozen=True, slots=True)
+class CrossCheck:
+    """A check of the mirror that is under way."""
+
+    number: int  # of the cross that is shown, from 0
+    count: int  # of all crosses
+    nudge_px: tuple[int, int]  # to the right and downwards, as the eye sees it
+
+
+@dataclass(frozen=True, slots=True)
 class OtherBone:
     """Another bone than the stage's that is followed; never drawn."""
 
@@ -240,6 +279,10 @@ class Snapshot:
     length_check: LengthCheck | None = None
     # what projector and mirror have against guides; nothing at all is shown then.
     device_reasons: tuple[Reason, ...] = ()
+    has_mirror: bool = False  # the display is seen in the mirror
+    other_eye: OtherEye | None = None  # what guides are for it; None when nobody looks with it
+    mirror_reason: Reason | None = None  # what the check of the mirror has against guides
+    cross_check: CrossCheck | None = None  # that is under way; no guide is shown meanwhile
     is_simulated: bool = False  # the pictures are not of this world
     is_recording: bool = False  # the session is kept in a folder
     is_over: bool = False

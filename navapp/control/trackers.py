@@ -6,6 +6,7 @@ from collections.abc import Callable
 from drivers.frames import StereoFrame
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray
 from navapp.preop import build_aspects
 from navapp.tracking import Goal, Tracker, TrackerSettings, make_tracker
 from navapp.values import AspectGraph, BoneModel, Plan, Prior, StageSpec, TrackedFrame
@@ -54,6 +55,10 @@ class Trackers:
         made = self._make(bone, None if is_ours else self._plan.aspects.get(bone))
         with self._lock:
             return self._with_aspects.get(bone) or self._trackers.setdefault(bone, made)
+
+    def centre_mm(self, bone: str) -> FloatArray:
+        """(3,) mean of the vertices of a bone's model."""
+        return self._plan.bones[bone].mesh.centroid_mm
 
     @property
     def follows_refused(self) -> bool:

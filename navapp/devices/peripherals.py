@@ -52,7 +52,8 @@ def make_device_set(
 
 def _display(settings: DisplaySection, clock: Clock, rig: StereoRig) -> Display:
     window = make_window_display(settings, clock)
-    return SimulatedDisplay(clock, rig.width, rig.height) if window is None else window
+    size_px = settings.size_px or (rig.width, rig.height)
+    return SimulatedDisplay(clock, *size_px) if window is None else window
 
 
 def make_window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay | None:

@@ -9,7 +9,7 @@ from navapp.geometry.transform import FloatArray, read_only, rotation_from_vecto
 
 _UNIT = 1e-6
 # The displacement hardly depends on the angle: each turn gains more than two digits.
-_N_TURNS = 4
+N_TURNS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -159,7 +159,7 @@ class Glass:
     def apparent_mm(self, points_mm: FloatArray, eye_mm: FloatArray) -> FloatArray:
         """(N, 3) where an eye at (3,) or (N, 3) sees points (N, 3) behind the plate."""
         apparent = points_mm
-        for _ in range(_N_TURNS):
+        for _ in range(N_TURNS):
             shift = self.displacements_mm(apparent - eye_mm)
             apparent = points_mm - shift[..., None] * self.normal
         return apparent

@@ -1,20 +1,25 @@
 """What an eye sees in the mirror, as a camera that everything can be drawn in."""
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from navapp.geometry.camera import Camera
-from navapp.geometry.display_model_optics import Glass, VirtualScreen
+from navapp.geometry.display_model_optics import N_TURNS, Glass, VirtualScreen
 from navapp.geometry.transform import FloatArray, RigidTransform
+
+if TYPE_CHECKING:
+    # What is compiled is loaded at first use.
+    from navapp.geometry.display_view_kernels import Optics
 
 LEAST_DISTANCE_MM = 1e-6
 WRONG_SIDE = "the eye is not on the side of the screen from which it is calibrated"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class EyeView:
     """The screen in the mirror as one eye sees it.
 
@@ -30,12 +35,33 @@ class EyeView:
     flips_columns: bool
     flips_rows: bool
 
+    @cached_property
+    def _optics(self) -> "Optics":
+        from navapp.geometry.display_view_kernels import Optics
+
+        screen, glass = self.screen, self.glass
+        return Optics(
+            np.array(self.eye_from_left.inverse().translation_mm),
+            np.array(screen.middle_mm),
+            np.array(screen.axes),
+            np.array(screen.half_mm),
+            float(screen.pitch_mm),
+            float(screen.bulge_mm),
+            np.array([0.0, 0.0, 1.0] if glass is None else glass.normal),
+            0.0 if glass is None else float(glass.thickness_mm),
+            1.0 if glass is None else float(glass.refractive_index),
+            N_TURNS,
+        )
+
     def to_display(self, image: NDArray[Any]) -> NDArray[Any]:
         """A picture (H, W, ...) as the eye reads it, turned for the display; contiguous."""
-        rows = slice(None, None, -1 if self.flips_rows else 1)
-        columns = slice(None, None, -1 if self.flips_columns else 1)
+        import cv2
+
         # A copy even when nothing is flipped: the display keeps it while the next one is drawn.
-        return np.array(image[rows, columns], order="C")
+        if not (self.flips_columns or self.flips_rows):
+            return np.array(image, order="C")
+        both = self.flips_columns and self.flips_rows
+        return np.asarray(cv2.flip(image, -1 if both else 1 if self.flips_columns else 0))
 
     def to_display_px(self, pixels: ArrayLike) -> FloatArray:
         """(N, 2) of a picture as the eye reads it, in the display's picture; and back again."""
@@ -52,9 +78,12 @@ class EyeView:
         The glass and the screen's bulge are in the direction; the depth is that of the point
         itself. NaN at and behind the eye.
         """
-        points = np.asarray(points_left_mm, dtype=np.float64).reshape(-1, 3)
-        eye = self.eye_from_left.inverse().translation_mm
-        pixels = self.to_display_px(project(self.screen, self.glass, eye, points))
+        points = np.ascontiguousarray(points_left_mm, dtype=np.float64).reshape(-1, 3)
+        pixels = np.empty((len(points), 2))
+        from navapp.geometry.display_view_kernels import project_to_screen
+
+        project_to_screen(points, self._optics, pixels)
+        pixels = self.to_display_px(pixels)
         K = self.camera.matrix
         warped = np.empty_like(points)
         warped[:, 2] = self.eye_from_left.apply(points)[:, 2]

@@ -67,6 +67,7 @@ def find_weights(
     tissue_mm: float,
     aside_mm: float,
     beneath: float,
+    guess: float,
     weight: NDArray[np.float32],
 ) -> None:
     """How strongly a guide on the bone's surface is drawn in each pixel.
@@ -78,7 +79,8 @@ def find_weights(
         in_front: (h, w) 0 to 1, share of the pixel that hides the bone.
         tissue_mm: what is nearer than the bone by more lies on it.
         aside_mm: beside the bone, what is nearer than this depth hides guides.
-        beneath: weight of what lies beneath something, or where that is not known.
+        beneath: weight of what lies beneath something.
+        guess: weight where that is not known.
         weight: (h, w) in place, 0 (hidden) to 1 (on top).
     """
     for y in range(bone_mm.shape[0]):
@@ -87,12 +89,15 @@ def find_weights(
             bone, depth = bone_mm[y, x], depth_mm[y, x]
             if np.isnan(bone):
                 # A comparison with an unknown depth is False.
-                is_beneath = is_guess[y, x]
+                is_beneath = False
                 if depth < aside_mm:
                     seen = np.float32(0.0)
             else:
-                is_beneath = is_guess[y, x] or depth < bone - tissue_mm
-            weight[y, x] = seen * np.float32(beneath) if is_beneath else seen
+                is_beneath = depth < bone - tissue_mm
+            if is_guess[y, x]:
+                weight[y, x] = seen * np.float32(guess)
+            else:
+                weight[y, x] = seen * np.float32(beneath) if is_beneath else seen
 
 
 @njit(cache=True, nogil=True)

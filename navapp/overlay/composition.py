@@ -4,16 +4,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.overlay.colours import CANDIDATE, GUIDE
+from navapp.geometry.display_model_view import EyeView
+from navapp.geometry.transform import FloatArray
+from navapp.overlay.colours import CANDIDATE, GUIDE, TARGET
 from navapp.overlay.labels import LabelBoard, put_text, text_size
 from navapp.overlay.layers import LAYERS
 from navapp.overlay.scene import Scene
+from navapp.overlay.strokes import draw_cross_px
 
 Image = NDArray[np.uint8]
 
 PREVIEW_WIDTH, PREVIEW_HEIGHT = 160, 96
 
 _MARK = "research - not for clinical use"
+# In the mirror letters are 18 px high on a display of 1080 rows.
+_MIRROR_TEXT_SIZE, _STRIP_SHARE = 0.85, 0.04
 # Of a picture of 1280 columns.
 _TEXT_SIZE, _LEAST_TEXT_SIZE = 0.7, 0.45
 _RIM_PX = 12
@@ -21,7 +26,13 @@ _RIM_PX = 12
 _LETTER_PX, _BELOW_PX = 26, 12
 
 
-def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "") -> Image:
+def compose_video(
+    left: Image,
+    scene: Scene | None,
+    banner: str,
+    mark: str = "",
+    cross_px: FloatArray | None = None,
+) -> Image:
     """The left picture with guides, or without any when `scene` is None.
 
     Args:
@@ -29,6 +40,7 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
         scene: what to draw; None draws no guide.
         banner: one line at the top, for example why there are no guides.
         mark: further words for the corner, for example that the devices are simulated.
+        cross_px: (2,) of a point to be marked.
 
     Raises:
         ValueError: a picture of another size than the scene's camera takes.
@@ -40,12 +52,45 @@ def compose_video(left: Image, scene: Scene | None, banner: str, mark: str = "")
         if (height, width) != (scene.camera.height, scene.camera.width):
             raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
         draw_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height)))
+    if cross_px is not None and np.isfinite(cross_px).all():
+        draw_cross_px(image, cross_px, TARGET)
     is_guiding = scene is not None and not scene.is_candidate
     at = _RIM_PX, round(_RIM_PX + _LETTER_PX * size)
     put_text(image, banner, at, size, GUIDE if is_guiding else CANDIDATE)
     text = " - ".join(part for part in (mark, _MARK) if part)
     put_text(image, text, (_RIM_PX, height - _RIM_PX), 0.7 * size, (230, 230, 230))
     return image
+
+
+def compose_mirror(
+    scene: Scene | None,
+    view: EyeView,
+    status: str,
+    *,
+    is_guiding: bool,
+    cross_px: FloatArray | None = None,
+) -> Image:
+    """The picture for a display seen in the half-silvered mirror: guides and status on black.
+
+    Args:
+        scene: seen from the calibrated eye; None draws no guide.
+        view: of that eye; it turns the picture for the display.
+        status: one line at the bottom.
+        is_guiding: guides may be shown.
+        cross_px: (2,) of a cross to be compared with its point, as the eye reads the picture.
+    """
+    height, width = view.camera.height, view.camera.width
+    image = np.zeros((height, width, 3), dtype=np.uint8)
+    strip_px = round(_STRIP_SHARE * height)
+    if scene is not None:
+        rims = [Box(0, height - strip_px, width, strip_px)]
+        draw_layers(image, scene, LabelBoard(_MIRROR_TEXT_SIZE * height / 1080.0, rims))
+    if cross_px is not None and np.isfinite(cross_px).all():
+        draw_cross_px(image, cross_px, TARGET)
+    size = _MIRROR_TEXT_SIZE * height / 1080.0
+    colour = GUIDE if is_guiding else CANDIDATE
+    put_text(image, status, (12, height - round(0.3 * strip_px)), size, colour)
+    return view.to_display(image)
 
 
 def text_boxes(width: int, height: int) -> list[Box]:

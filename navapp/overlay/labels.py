@@ -1,11 +1,13 @@
 """Words beside what they name, placed so that none lies over another."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.overlay.blend_kernels import blend_colour
 from navapp.overlay.colours import Colour
 
 Image = NDArray[np.uint8]
@@ -13,8 +15,8 @@ Image = NDArray[np.uint8]
 # Places of a label around its point, nearest first: directions, and how far away.
 _DIRECTIONS = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
 _DISTANCES_PX = (14, 34, 60, 92)
-_PADDING_PX = 3
-_RIM = ((-1, -1), (-1, 1), (1, -1), (1, 1), (0, 2))
+_PADDING_PX, _ROUND_PX = 3, 9
+_TEXT_RIM_PX = 2
 
 
 @dataclass
@@ -36,11 +38,13 @@ class LabelBoard:
         import cv2
 
         height, width = image.shape[:2]
+        # Not over what the words name.
+        named = [Box(round(u), round(v), 0, 0).grow(_ROUND_PX) for _, (u, v), _ in self._asked]
         placed = []
         for text, at, colour in self._asked:
             if not (0 <= at[0] < width and 0 <= at[1] < height):
                 continue
-            box = self._find_place(text, at, width, height)
+            box = self._find_place(text, at, (width, height), named)
             if box is None:
                 continue
             self.taken.append(box)
@@ -58,7 +62,7 @@ class LabelBoard:
         return placed
 
     def _find_place(
-        self, text: str, at: tuple[float, float], width: int, height: int
+        self, text: str, at: tuple[float, float], size_px: tuple[int, int], named: list[Box]
     ) -> Box | None:
         w, h = text_size(text, self.size)
         w, h = w + 2 * _PADDING_PX, h + 2 * _PADDING_PX
@@ -67,8 +71,10 @@ class LabelBoard:
                 x = at[0] + right * distance - (0.5 * w if right == 0 else w * (right < 0))
                 y = at[1] + down * distance - (0.5 * h if down == 0 else h * (down < 0))
                 box = Box(round(x), round(y), w, h)
-                inside = box.clip(width, height)
-                if inside == box and not any(_overlap(box, other) for other in self.taken):
+                inside = box.clip(*size_px)
+                if inside == box and not any(
+                    _overlap(box, other) for other in (*self.taken, *named)
+                ):
                     return box
         return None
 
@@ -82,15 +88,35 @@ def text_size(text: str, size: float) -> tuple[int, int]:
 
 
 def put_text(image: Image, text: str, at: tuple[int, int], size: float, colour: Colour) -> None:
-    """Text with a dark rim, readable on any picture."""
+    """Text with a dark rim, readable on any picture; its baseline begins at a place."""
+    letters, rim, above = _text_shares(text, size)
+    box = Box(at[0] - _TEXT_RIM_PX, at[1] - above, letters.shape[1], letters.shape[0])
+    here, there = Box(0, 0, image.shape[1], image.shape[0]).shared_slices(box)
+    part = image[here]
+    blend_colour(part, rim[there], (0, 0, 0))
+    blend_colour(part, letters[there], colour)
+
+
+@lru_cache(maxsize=256)
+def _text_shares(text: str, size: float) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
+    """Shares (h, w) of a line's letters and of their rim, and the rows above its baseline."""
     import cv2
 
-    # A thicker stroke would have other letter widths: the rim is the same text, moved.
-    for dx, dy in _RIM:
-        moved = (at[0] + dx, at[1] + dy)
-        cv2.putText(image, text, moved, cv2.FONT_HERSHEY_SIMPLEX, size, (0, 0, 0), 1, cv2.LINE_AA)
-    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, 1, cv2.LINE_AA)
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    (width, height), below = cv2.getTextSize(text, font, size, 1)
+    above = height + 2 * _TEXT_RIM_PX
+    shape = above + below + 2 * _TEXT_RIM_PX, width + 2 * _TEXT_RIM_PX + 2
+    drawn = np.zeros(shape, dtype=np.uint8)
+    cv2.putText(drawn, text, (_TEXT_RIM_PX, above), font, size, 255, 1, cv2.LINE_AA)
+    letters = drawn.astype(np.float32) / np.float32(255.0)
+    rim = np.asarray(cv2.dilate(letters, np.ones((3, 3), np.uint8)), dtype=np.float32)
+    return letters, rim, above
 
 
 def _overlap(one: Box, other: Box) -> bool:
-    return not one.intersect(other).is_empty
+    return (
+        one.x < other.x + other.width
+        and other.x < one.x + one.width
+        and one.y < other.y + other.height
+        and other.y < one.y + one.height
+    )

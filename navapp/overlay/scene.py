@@ -2,12 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
@@ -17,6 +15,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_points
 from navapp.overlay.blend_kernels import find_weights
 from navapp.overlay.colours import CANDIDATE, GUIDE, Colour
+from navapp.overlay.stroke_kernels import Ground
 from navapp.overlay.viewpoints import FloatMap, SeenDepth, Viewpoint
 from navapp.values import (
     DrillAxis,
@@ -50,14 +49,6 @@ class _OfBone(Protocol):
 T = TypeVar("T", bound=_OfBone)
 
 
-class Order(IntEnum):
-    """Where a guide stands against what is seen."""
-
-    ON_TOP = 0
-    BENEATH = 1  # beneath bone or tissue, or that is not known
-    HIDDEN = 2  # behind a hand, an instrument, or tissue that stands off the bone
-
-
 @dataclass(frozen=True, eq=False)
 class Scene:
     """One bone at one pose, the guides of its stage, and what is known of the depth."""
@@ -85,6 +76,11 @@ class Scene:
     def camera(self) -> Camera:
         """That the picture is drawn for."""
         return self.viewpoint.camera
+
+    @property
+    def guess_weight(self) -> float:
+        """Of guides where the depth is not known: as beneath over video, unlit in the mirror."""
+        return BENEATH_WEIGHT if self.viewpoint.is_video else 0.0
 
     @property
     def colour(self) -> Colour:
@@ -180,20 +176,32 @@ class Scene:
         """(h, w) over `box`: 0 to 1, how strongly a guide on the bone is drawn in each pixel."""
         weight = np.empty(self.bone_mm.shape, dtype=np.float32)
         if self.seen is None:
-            weight.fill(BENEATH_WEIGHT)
+            weight.fill(self.guess_weight)
             return weight
         find_weights(
             self.bone_mm, self.seen.depth_mm, self.seen.is_guess, self.seen.in_front, TISSUE_MM,
-            self._aside_mm, BENEATH_WEIGHT, weight,
+            self._aside_mm, BENEATH_WEIGHT, self.guess_weight, weight,
         )  # fmt: skip
         return weight
 
     def weight_over(self, box: Box) -> FloatMap:
-        """The weights over another box, where nothing is known those of what lies beneath."""
-        weight = np.full((box.height, box.width), BENEATH_WEIGHT, dtype=np.float32)
+        """The weights over another box; beyond `box` nothing is known."""
+        weight = np.full((box.height, box.width), self.guess_weight, dtype=np.float32)
         here, there = box.shared_slices(self.box)
         weight[here] = self.weight[there]
         return weight
+
+    @cached_property
+    def ground(self) -> Ground:
+        """What lines and points of guides are compared with."""
+        nearest_mm = self.bone_mm
+        if self.seen is not None:
+            matched_mm = np.where(self.seen.is_guess, np.float32(np.nan), self.seen.depth_mm)
+            nearest_mm = np.fmin(nearest_mm, matched_mm)
+        skin_mm, beneath, beyond = (
+            np.float32(value) for value in (SKIN_MM, BENEATH_WEIGHT, self.guess_weight)
+        )
+        return Ground(self.box.x, self.box.y, self.weight, nearest_mm, skin_mm, beneath, beyond)
 
     def weight_of(self, view: RenderedView, box: Box) -> FloatMap:
         """The weights over a box of another mesh: those of beneath where the bone is nearer."""
@@ -205,24 +213,6 @@ class Scene:
         is_beneath = mesh_mm[here] > self.bone_mm[there] + np.float32(SKIN_MM)
         np.minimum(weight[here], np.float32(BENEATH_WEIGHT), out=weight[here], where=is_beneath)
         return weight
-
-    def order_of(self, pixels: FloatArray, depth_mm: FloatArray) -> NDArray[np.uint8]:
-        """(N,) `Order` of points of guides at pixels (N, 2) and depths (N,) in the picture."""
-        order = np.full(len(pixels), Order.BENEATH, dtype=np.uint8)
-        with np.errstate(invalid="ignore"):
-            places = np.nan_to_num(np.round(pixels) - (self.box.x, self.box.y), nan=-1.0)
-        inside = ((places >= 0) & (places < (self.box.width, self.box.height))).all(axis=1)
-        columns, rows = places[inside].astype(np.intp).T
-        weight, bone_mm = self.weight[rows, columns], self.bone_mm[rows, columns]
-        nearest_mm = bone_mm
-        if self.seen is not None:
-            matched_mm = np.where(self.seen.is_guess, np.nan, self.seen.depth_mm)[rows, columns]
-            nearest_mm = np.fmin(bone_mm, matched_mm)
-        # A comparison with an unknown depth is False.
-        is_beneath = (depth_mm[inside] > nearest_mm + SKIN_MM) | (weight < 1.0)
-        order[inside] = np.where(is_beneath, Order.BENEATH, Order.ON_TOP)
-        order[inside] = np.where(weight < 0.5 * BENEATH_WEIGHT, Order.HIDDEN, order[inside])
-        return order
 
     @property
     def _aside_mm(self) -> float:

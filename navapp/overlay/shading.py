@@ -1,6 +1,6 @@
 """Areas: the surface of a mesh tinted, and its outline."""
 
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,7 @@ def outline_box(view: RenderedView, scene: Scene) -> Box:
     return view.box.grow(_OUTLINE_MARGIN_PX).clip(scene.camera.width, scene.camera.height)
 
 
+@lru_cache(maxsize=8)
 def _stripes(box: Box) -> NDArray[np.bool_]:
     """(h, w) every other stripe, slanted, the same at the same place of a picture."""
     rows = np.arange(box.y, box.y + box.height)[:, None]

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
+from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
+from navapp.overlay.splat_kernels import splat_points
 from navapp.values import Foreground, Origin
 
 FloatMap = NDArray[np.float32]
@@ -40,6 +42,11 @@ class Viewpoint(Protocol):
         """(3, 3) rows: unit directions of columns, rows and depth in the left camera's frame."""
         ...
 
+    @property
+    def is_video(self) -> bool:
+        """Guides lie over the camera's picture; otherwise they are all that is lit."""
+        ...
+
     def to_camera(self, points_mm: FloatArray) -> FloatArray:
         """(N, 3) points of the left camera's frame in the frame of `camera`."""
         ...
@@ -51,6 +58,8 @@ class Viewpoint(Protocol):
 
 class LeftView:
     """The left camera's own picture, distortion included."""
+
+    is_video = True
 
     def __init__(self, rig: StereoRig) -> None:
         self._camera = rig.left
@@ -93,7 +102,19 @@ class LeftView:
         with np.errstate(divide="ignore", invalid="ignore"):
             along_mm = np.float32(self._geometry.focal_px * self._geometry.baseline_mm) / seen_px
         depth_mm = along_mm * self._depth_share[box.slices]
-        return SeenDepth(box, depth_mm, origins != Origin.MATCHED, in_front)
+        return SeenDepth(box, depth_mm, is_wide_gap(origins != Origin.MATCHED), in_front)
+
+
+# Between matches a gap as narrow as this is no guess.
+_NARROW_PX = 5
+
+
+def is_wide_gap(is_guess: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """A mask (h, w) of guesses without its specks and narrow parts."""
+    import cv2
+
+    square = np.ones((_NARROW_PX, _NARROW_PX), np.uint8)
+    return np.asarray(cv2.morphologyEx(is_guess.view(np.uint8), cv2.MORPH_OPEN, square)) > 0
 
 
 # The marks are of every other pixel: their edge is made smooth over so much.
@@ -116,3 +137,86 @@ def _rectified_places(
     there = (pixels[:, 0], pixels[:, 1], share)
     u, v, depth_share = (part.reshape(shape).astype(np.float32) for part in there)
     return u, v, depth_share
+
+
+class MirrorView:
+    """The screen in the half-silvered mirror, as the calibrated eye sees it.
+
+    What was measured by the cameras is moved to the eye; what the eye sees and they do not is
+    unknown.
+    """
+
+    is_video = False
+
+    def __init__(self, eye_view: EyeView, rig: StereoRig) -> None:
+        self.eye_view = eye_view
+        self._geometry = Rectifier(rig).geometry
+
+    @property
+    def camera(self) -> Camera:
+        """At the eye, its picture in the plane of the screen."""
+        return self.eye_view.camera
+
+    @property
+    def axes_in_left(self) -> FloatArray:
+        """The screen's columns and rows, as the eye reads them, and the way it looks."""
+        return self.eye_view.eye_from_left.rotation
+
+    def to_camera(self, points_mm: FloatArray) -> FloatArray:
+        """So that they are seen where they are: with glass and bulge."""
+        return self.eye_view.warp(points_mm)
+
+    def see(self, foreground: Foreground, box: Box) -> SeenDepth:
+        """Every second measured point each way, drawn as large as the gap to the next one."""
+        around = foreground.box
+        disparity_px, origin = foreground.depth
+        sparse = np.s_[::_POINT_STEP, ::_POINT_STEP]
+        depth_mm = np.full((box.height, box.width), np.nan, dtype=np.float32)
+        mark = np.zeros(depth_mm.shape, dtype=np.uint8)
+        splat_points(
+            np.ascontiguousarray(disparity_px[sparse]),
+            np.ascontiguousarray(origin[sparse] == Origin.MATCHED),
+            np.ascontiguousarray(foreground.is_in_front[sparse]),
+            (around.x, around.y, _POINT_STEP),
+            self._lens_of_pair(),
+            self._eye_from_rectified(foreground),
+            self._lens_of_eye(box),
+            depth_mm,
+            mark,
+        )
+        return SeenDepth(box, depth_mm, is_wide_gap(mark & 1 == 0), self._soften(mark & 2 > 0))
+
+    def _soften(self, is_in_front: NDArray[np.bool_]) -> FloatMap:
+        import cv2
+
+        marks = is_in_front.astype(np.float32)
+        return np.asarray(cv2.GaussianBlur(marks, (0, 0), _EDGE_SIGMA_PX), dtype=np.float32)
+
+    def _lens_of_pair(self) -> tuple[float, float, float, float]:
+        one = self._geometry
+        return one.focal_px, one.centre_x_px, one.centre_y_px, one.baseline_mm
+
+    def _lens_of_eye(self, box: Box) -> tuple[float, float, float, float]:
+        matrix = self.camera.matrix
+        return matrix[0, 0], matrix[1, 1], matrix[0, 2] - box.x, matrix[1, 2] - box.y
+
+    def _eye_from_rectified(self, foreground: Foreground) -> FloatArray:
+        """(3, 4); what glass and bulge do in the middle of the bone they do everywhere near."""
+        left_from_rectified = self._geometry.rectified_from_left.inverse()
+        matrix = np.array((self.eye_view.eye_from_left @ left_from_rectified).matrix[:3])
+        middle = self._middle_mm(foreground)
+        if middle is not None:
+            exact = self.to_camera(left_from_rectified.apply(middle[None]))[0]
+            shift = exact - (matrix[:, :3] @ middle + matrix[:, 3])
+            if np.isfinite(shift).all():
+                matrix[:, 3] += shift
+        return matrix
+
+    def _middle_mm(self, foreground: Foreground) -> FloatArray | None:
+        """(3,) of what was matched, in the rectified camera; None when nothing was."""
+        cloud = foreground.measured.reproject(self._geometry, stride_px=16)
+        return None if len(cloud) == 0 else np.asarray(np.median(cloud.points_mm, axis=0))
+
+
+# Of the measured points in the rectified picture.
+_POINT_STEP = 2

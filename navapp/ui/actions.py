@@ -9,9 +9,12 @@ from navapp.control.states import (
     Accept,
     Blank,
     Cancel,
+    CheckMirror,
     Command,
+    ConfirmCross,
     DeviceHealth,
     EnterStage,
+    NudgeCross,
     Quit,
     Reconnect,
     Register,
@@ -23,7 +26,21 @@ from navapp.control.states import (
 )
 from navapp.values import Status
 
-_KEY_LABELS = {"space": "SPACE"}
+_KEY_LABELS = {
+    "space": "SPACE",
+    "enter": "ENTER",
+    "left": "LEFT",
+    "right": "RIGHT",
+    "up": "UP",
+    "down": "DOWN",
+    "shift+left": "SHIFT LEFT",
+    "shift+right": "SHIFT RIGHT",
+    "shift+up": "SHIFT UP",
+    "shift+down": "SHIFT DOWN",
+}
+# A step of a cross in the check of the mirror, and one with the shift key.
+_STEPS_PX = (("", 1), ("shift+", 10))
+_ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +108,22 @@ def _has_failed_device(snapshot: Snapshot) -> bool:
     healths = {device.health for device in snapshot.devices if device.kind != "rig"}
     is_failed = bool(healths & {DeviceHealth.TROUBLE, DeviceHealth.LOST})
     return is_failed or (snapshot.state is SessionState.FAULT and not snapshot.rig_alarm)
+
+
+def _is_checking(snapshot: Snapshot) -> bool:
+    return snapshot.cross_check is not None
+
+
+def _nudge_action(shift: str, arrow: str, step_px: int) -> Action:
+    right, down = _ARROWS[arrow]
+    return Action(
+        f"nudge-{shift}{arrow}",
+        f"{shift}{arrow}",
+        "move",
+        f"check of the mirror: move the cross by {step_px} px",
+        _is_checking,
+        lambda _: NudgeCross(right * step_px, down * step_px),
+    )
 
 
 def _stage_action(number: int) -> Action:
@@ -211,6 +244,23 @@ ACTIONS: tuple[Action, ...] = (
         _always,
         slot="layers",
         needs_width=True,
+    ),
+    Action(
+        "mirror",
+        "m",
+        "check",
+        "check what is seen in the mirror, or give the check up",
+        lambda snapshot: snapshot.has_mirror,
+        lambda _: CheckMirror(),
+    ),
+    *(_nudge_action(shift, arrow, step_px) for shift, step_px in _STEPS_PX for arrow in _ARROWS),
+    Action(
+        "confirm-cross",
+        "enter",
+        "confirm",
+        "check of the mirror: the cross lies on its point",
+        _is_checking,
+        lambda _: ConfirmCross(),
     ),
     Action("devices", "d", "devices", "see the devices in detail", _always, slot="devices"),
     Action(

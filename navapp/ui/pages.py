@@ -22,21 +22,27 @@ from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 
+# The first of several actions -> their keys and what they do, in one line.
+_SHARED = {
+    "stage-1": ("1 - 5", "go to that stage"),
+    "nudge-left": ("arrows", "check of the mirror: move the cross by 1 px, with SHIFT by 10"),
+}
+
 
 class KeyTable(TextView):
     """All actions with their keys."""
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
-        """A line an action; the five stages share one."""
+        """A line an action; the five stages share one, and so do the arrows."""
         lines = []
         for action in ACTIONS:
-            if action.name.startswith("stage-"):
-                if action.name != "stage-1":
-                    continue
-                key, text, is_now = "1 - 5", "go to that stage", True
-            else:
-                key, text = action.key_label, action.description
-                is_now = is_possible(action, view.snapshot, view.is_silent)
+            key, text = action.key_label, action.description
+            is_now = is_possible(action, view.snapshot, view.is_silent)
+            if action.name in _SHARED:
+                key, text = _SHARED[action.name]
+                is_now = is_now or action.name == "stage-1"
+            elif action.name.startswith(("stage-", "nudge-")):
+                continue
             text_style = "$foreground" if is_now else "$text-muted"
             note = "" if is_now else "  (not now)"
             lines.append(

@@ -48,6 +48,13 @@ class Reason(Enum):
     MIRROR_AWAY = "the mirror does not stand where the display was calibrated"
     PROJECTOR_ALTERS = "the projector alters the picture"
     PROJECTOR_LOST = "the projector does not answer"
+    DISPLAY_DIFFERS = "the display is not as calibrated in the mirror"
+    DISPLAY_NOT_ACCEPTED = "the calibration of the mirror was not accepted"
+    DISPLAY_EXPIRED = "the calibration of the mirror has expired"
+    OTHER_EYE = "guides are more than 1 mm off for the other eye"
+    MIRROR_UNCHECKED = "nobody has checked what is seen in the mirror"
+    MIRROR_CHECK_FAILED = "the check of the mirror has failed"
+    MIRROR_CHECK_OLD = "the check of the mirror is too old"
     POSE_TOO_OLD = "the pose is too old"
     STAGE_WITHOUT_BONE = "the plan has no model of this stage's bone"
 
@@ -90,6 +97,13 @@ _REMEDIES = {
     Reason.MIRROR_AWAY: "reopen brings it back; keep hands off, see the devices",
     Reason.PROJECTOR_ALTERS: "set flips, keystone, freeze and source back on the projector",
     Reason.PROJECTOR_LOST: "check its mains, its lamp and its control cable",
+    Reason.DISPLAY_DIFFERS: "set its size and flips back, or calibrate",
+    Reason.DISPLAY_NOT_ACCEPTED: "calibrate the mirror again",
+    Reason.DISPLAY_EXPIRED: "calibrate the mirror again",
+    Reason.OTHER_EYE: "cover it and say so ([mirror] eyes), or move the display",
+    Reason.MIRROR_UNCHECKED: "check it on three points of the bone",
+    Reason.MIRROR_CHECK_FAILED: "look from the calibrated place and check again, or calibrate",
+    Reason.MIRROR_CHECK_OLD: "check it again on three points of the bone",
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }

@@ -12,6 +12,8 @@ import pytest
 from calibration.mirror.seen_views import Scene
 from calibration.targets.boards import keys_of
 from navapp.cli.main import run
+from navapp.cli.mirror_views import read_lens
+from navapp.errors import InputError
 from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.display_model_files import read_display_model, write_display_model
 from navapp.geometry.rig_files import write_rig
@@ -117,6 +119,27 @@ def test_a_mirror_that_has_turned_is_told(
     refused(
         command, capsys, 4, "does not pass: guides appear", "have moved", "calibrate the mirror"
     )
+
+
+def lens_file(path: Path, width: int = 800) -> Path:
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    storage.write("camera_matrix", np.array([[900.0, 0, 400], [0, 901.0, 300], [0, 0, 1]]))
+    storage.write("distortion_coefficients", np.array([[-0.1, 0.02, 0.0, 0.001, 0.0]]))
+    storage.write("image_width", width)
+    storage.write("image_height", 600)
+    storage.release()
+    return path
+
+
+def test_the_lens_of_the_eyes_camera_is_read_or_refused(tmp_path: Path) -> None:
+    lens = read_lens(str(lens_file(tmp_path / "lens.yml")), (800, 600))
+    assert (lens.matrix[0, 0], lens.distortion[3]) == (900.0, 0.001)
+    (tmp_path / "bad.yml").write_text("nothing", encoding="utf-8")
+    for name, said in (("none.yml", "does not exist"), ("bad.yml", "damaged or lacks")):
+        with pytest.raises(InputError, match=said):
+            read_lens(str(tmp_path / name), (800, 600))
+    with pytest.raises(InputError, match="not of pictures of 800x600"):
+        read_lens(str(lens_file(tmp_path / "small.yml", 640)), (800, 600))
 
 
 def alignments_file(path: Path, sd_px: float) -> Path:

@@ -20,6 +20,7 @@ from drivers.interfaces import (
 )
 from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
+from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
@@ -205,6 +206,8 @@ class Bench:
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
         make_display: Callable[[Clock, int, int], SimulatedDisplay] = SimulatedDisplay,
+        calibrated_display: CalibratedDisplay | None = None,
+        display_delay_ms: float = 0.0,
     ) -> None:
         self.script = Script()
         self.trackers: dict[str, FakeTracker] = {}
@@ -230,6 +233,8 @@ class Bench:
                 prior or Prior({"femur": a_pose()}),
                 others=others,
                 overlay_valid_ms=overlay_valid_ms,
+                display=calibrated_display,
+                display_delay_ms=display_delay_ms,
                 layers=layers,
             ),
             executor=executor or InlineExecutor(),

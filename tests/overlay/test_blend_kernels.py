@@ -43,19 +43,22 @@ def test_one_colour_is_blended_by_its_share() -> None:
     np.testing.assert_array_equal(image[share <= 0.0], before[share <= 0.0])
 
 
-def test_weights_tell_what_hides_and_what_lies_on_the_bone() -> None:
+@pytest.mark.parametrize("guess", [0.55, 0.0])
+def test_weights_tell_what_hides_and_what_lies_on_the_bone(guess: float) -> None:
     rng = np.random.default_rng(5)
     bone = rng.choice([np.nan, 400.0, 405.0], SHAPE).astype(np.float32)
     depth = rng.choice([np.nan, 390.0, 399.0, 402.0, 500.0], SHAPE).astype(np.float32)
     is_guess = np.isnan(depth) | (rng.random(SHAPE) < 0.3)
     in_front = rng.choice([0.0, 0.4, 1.0], SHAPE).astype(np.float32)
     weight = np.empty(SHAPE, dtype=np.float32)
-    find_weights(bone, depth, is_guess, in_front, 2.5, 395.0, 0.55, weight)
+    find_weights(bone, depth, is_guess, in_front, 2.5, 395.0, 0.55, guess, weight)
     with np.errstate(invalid="ignore"):
         is_aside = np.isnan(bone) & (depth < 395.0)
-        is_beneath = is_guess | (depth < bone - 2.5)
+        is_beneath = depth < bone - 2.5
     seen = np.where(is_aside, 0.0, 1.0 - in_front)
-    np.testing.assert_allclose(weight, np.where(is_beneath, 0.55, 1.0) * seen, atol=1e-6)
+    np.testing.assert_allclose(
+        weight, np.where(is_guess, guess, np.where(is_beneath, 0.55, 1.0)) * seen, atol=1e-6
+    )
     assert {0.0, 0.55, 1.0} <= set(np.round(np.unique(weight).astype(float), 6))
 
 

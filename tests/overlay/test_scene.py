@@ -1,6 +1,7 @@
 """What belongs to a stage, and where guides stand against what is seen."""
 
 from dataclasses import replace
+from enum import IntEnum
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import pytest
 from navapp.geometry.box import Box
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render
-from navapp.overlay.scene import BENEATH_WEIGHT, TISSUE_MM, Order, Scene
+from navapp.overlay.scene import BENEATH_WEIGHT, TISSUE_MM, Scene
+from navapp.overlay.stroke_kernels import weigh
 from navapp.values import DrillAxis, Origin, ResectionPlane, StageContent, SurgicalContent
 from tests.geometry.shapes import sphere
 from tests.overlay.scenes import (
@@ -30,6 +32,24 @@ PLANES = {
     for name, bone in (("distal", "femur"), ("anterior", "femur"), ("proximal", "tibia"))
 }
 DRILLS = {"guide": DrillAxis("femur", np.zeros(3), np.array([0.0, 0.0, 1.0]), 20.0, 8.0)}
+
+
+class Order(IntEnum):
+    ON_TOP = 0
+    BENEATH = 1
+    HIDDEN = 2
+
+
+def order_of(given: Scene, pixels: np.ndarray, depth_mm: np.ndarray) -> np.ndarray:
+    """How points of guides are drawn, by the weights of lines."""
+    is_near = np.abs(pixels) < 1e5
+    told = [
+        weigh(u, v, z, given.ground) if near.all() else given.ground.beyond
+        for (u, v), z, near in zip(pixels, depth_mm, is_near, strict=True)
+    ]
+    weight = np.array(told)
+    beneath = np.where(weight <= np.float32(BENEATH_WEIGHT), Order.BENEATH, Order.ON_TOP)
+    return np.where(weight < 0.5 * BENEATH_WEIGHT, Order.HIDDEN, beneath)
 
 
 def inside(given: Scene) -> np.ndarray:
@@ -90,7 +110,7 @@ def test_where_nothing_is_known_all_is_beneath() -> None:
     given = scene()
     assert (given.weight == np.float32(BENEATH_WEIGHT)).all()
     pixels = CAMERA.project(POSE.apply(MESH.vertices_mm))
-    order = given.order_of(pixels, POSE.apply(MESH.vertices_mm)[:, 2])
+    order = order_of(given, pixels, POSE.apply(MESH.vertices_mm)[:, 2])
     assert (order == Order.BENEATH).all()
 
 
@@ -100,11 +120,11 @@ def test_a_bone_that_is_seen_has_guides_on_top() -> None:
     assert (given.weight[beside(given)] == 1.0).all()
     points = POSE.apply(MESH.vertices_mm)
     pixels = CAMERA.project(points)
-    order = given.order_of(pixels, points[:, 2])
+    order = order_of(given, pixels, points[:, 2])
     assert (order == Order.ON_TOP).mean() > 0.95
     # What lies within the bone is beneath it, what stands before it is on top.
-    assert (given.order_of(pixels, points[:, 2] + 3.0)[order == Order.ON_TOP] == 1).mean() > 0.95
-    assert (given.order_of(pixels, points[:, 2] - 30.0)[order == Order.ON_TOP] == 0).all()
+    assert (order_of(given, pixels, points[:, 2] + 3.0)[order == Order.ON_TOP] == 1).mean() > 0.95
+    assert (order_of(given, pixels, points[:, 2] - 30.0)[order == Order.ON_TOP] == 0).all()
 
 
 @pytest.mark.parametrize(
@@ -138,7 +158,7 @@ def test_a_guess_and_an_unknown_depth_are_beneath(origin: Origin) -> None:
     given = seen(scene(), origin=origin)
     assert (given.weight == np.float32(BENEATH_WEIGHT)).all()
     points = POSE.apply(MESH.vertices_mm)
-    order = given.order_of(CAMERA.project(points), points[:, 2] - 30.0)
+    order = order_of(given, CAMERA.project(points), points[:, 2] - 30.0)
     assert (order == Order.BENEATH).all()
 
 
@@ -146,7 +166,7 @@ def test_points_behind_a_hand_are_hidden() -> None:
     given = seen(scene(), occluder=Occluder(325.0))
     points = POSE.apply(MESH.vertices_mm)
     pixels = CAMERA.project(points)
-    order = given.order_of(pixels, points[:, 2])
+    order = order_of(given, pixels, points[:, 2])
     assert (order[pixels[:, 0] > 329.0] == Order.HIDDEN).all()
     assert (order[pixels[:, 0] < 321.0] != Order.HIDDEN).all()
 
@@ -154,7 +174,7 @@ def test_points_behind_a_hand_are_hidden() -> None:
 def test_pixels_beside_the_picture_are_beneath() -> None:
     given = seen(scene())
     far = np.array([[-5.0, 3.0], [np.nan, np.nan], [1e6, 20.0], [319.0, -1e9]])
-    assert (given.order_of(far, np.full(4, 100.0)) == Order.BENEATH).all()
+    assert (order_of(given, far, np.full(4, 100.0)) == Order.BENEATH).all()
 
 
 def test_over_another_box_what_is_not_known_is_beneath() -> None:
@@ -180,4 +200,4 @@ def test_a_bone_out_of_view_has_an_empty_box() -> None:
     assert given.box.is_empty
     assert given.weight.size == 0
     assert (given.weight_over(Box(3, 4, 5, 6)) == np.float32(BENEATH_WEIGHT)).all()
-    assert given.order_of(np.array([[5.0, 5.0]]), np.array([100.0])).tolist() == [Order.BENEATH]
+    assert order_of(given, np.array([[5.0, 5.0]]), np.array([100.0])).tolist() == [Order.BENEATH]

@@ -45,7 +45,8 @@ def test_a_sampled_line_keeps_its_corners_and_leaves_no_gap() -> None:
 def test_a_line_on_a_bone_that_is_seen_is_whole() -> None:
     image = black()
     draw_line(image, seen(scene()), ON_BONE, COLOUR)
-    assert drawn_at(image, ON_BONE).mean() > 0.97
+    # Places between two pixels are lit by a part.
+    assert drawn_at(image, ON_BONE).mean() > 0.93
 
 
 def test_a_line_of_which_nothing_is_known_is_dashed() -> None:

@@ -12,10 +12,14 @@ from navapp.control.states import (
     Accept,
     Blank,
     Cancel,
+    CheckMirror,
     Command,
+    ConfirmCross,
+    CrossCheck,
     EnterStage,
     Event,
     EventLevel,
+    NudgeCross,
     Quit,
     Reconnect,
     Register,
@@ -62,6 +66,14 @@ def play(snapshot: Snapshot, script: Script, size: tuple[int, int] = (80, 24)) -
     return app
 
 
+CHECKING = CrossCheck(1, 3, (4, -2))
+
+
+def mirror(check: CrossCheck | None = None) -> Snapshot:
+    """A session on a display in the mirror."""
+    return dataclasses.replace(snapshots.navigating(), has_mirror=True, cross_check=check)
+
+
 def press(*keys: str) -> Script:
     async def script(_app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press(*keys)
@@ -85,6 +97,11 @@ def press(*keys: str) -> Script:
         (snapshots.suspended(), "o", Reconnect()),
         (snapshots.navigating(), "z", ToggleDepth()),
         (snapshots.review(), "q", Quit()),
+        (mirror(), "m", CheckMirror()),
+        (mirror(CHECKING), "left", NudgeCross(-1, 0)),
+        (mirror(CHECKING), "down", NudgeCross(0, 1)),
+        (mirror(CHECKING), "shift+up", NudgeCross(0, -10)),
+        (mirror(CHECKING), "enter", ConfirmCross()),
     ],
 )
 def test_a_key_submits_its_command(snapshot: Snapshot, key: str, command: Command) -> None:
@@ -103,6 +120,8 @@ def test_digits_go_to_their_stage_but_not_to_the_second_which_is_in_force() -> N
         (snapshots.starting(), ("a", "r", "c", "v", "g", "1", "3", "right_square_bracket")),
         (snapshots.registering(), ("a", "r", "g", "v", "3", "left_square_bracket")),
         (snapshots.navigating(), ("o",)),
+        (snapshots.navigating(), ("m", "left", "shift+up", "enter")),
+        (mirror(), ("left", "shift+up", "enter")),
     ],
 )
 def test_keys_that_make_no_sense_now_submit_nothing(

@@ -6,7 +6,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import DRILL
 from navapp.overlay.labels import Image, LabelBoard
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import draw_cross, draw_line, sample_line
+from navapp.overlay.strokes import cross_lines, draw_lines, sample_line
 
 # The axis is drawn so far out of the bone, towards the hand that drills.
 _OUTSIDE_MM = 30.0
@@ -15,18 +15,21 @@ _N_AROUND = 48
 
 def draw_drills(image: Image, scene: Scene, labels: LabelBoard) -> None:
     """The stage's drill axes: a cross and the hole's rim at the entry, the axis, the end."""
+    thin: list[FloatArray] = []
+    thick: list[FloatArray] = []
     for name, drill in scene.drills.items():
         axes = _across(drill.direction)
         end = drill.entry_mm + drill.depth_mm * drill.direction
         start = drill.entry_mm - _OUTSIDE_MM * drill.direction
-        draw_line(image, scene, sample_line(np.stack([start, end])), DRILL, 1)
-        for centre in (drill.entry_mm, end):
-            rim = _circle(centre, axes, 0.5 * drill.diameter_mm)
-            draw_line(image, scene, rim, DRILL, 2 if centre is drill.entry_mm else 1)
-        draw_cross(image, scene, drill.entry_mm, axes, 0.9 * drill.diameter_mm, DRILL)
+        radius_mm = 0.5 * drill.diameter_mm
+        thin += [sample_line(np.stack([start, end])), _circle(end, axes, radius_mm)]
+        thick.append(_circle(drill.entry_mm, axes, radius_mm))
+        thick += cross_lines(drill.entry_mm, axes, 1.8 * radius_mm)
         words = name.replace("_", " ")
         text = f"{words}: {drill.depth_mm:.0f} mm deep, {drill.diameter_mm:g} mm wide"
         labels.add(text, scene.pixel_of(drill.entry_mm), DRILL)
+    draw_lines(image, scene, thin, DRILL, 1.0)
+    draw_lines(image, scene, thick, DRILL)
 
 
 def _across(direction: FloatArray) -> FloatArray:

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import TARGET
 from navapp.overlay.labels import Image, LabelBoard
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import draw_cross
+from navapp.overlay.strokes import cross_lines, draw_lines
 
 _HALF_MM = 3.0
 
@@ -13,11 +14,13 @@ _HALF_MM = 3.0
 def draw_targets(image: Image, scene: Scene, labels: LabelBoard) -> None:
     """The stage's targets of one point as crosses with their names."""
     axes = scene.picture_axes_in_bone
+    crosses: list[FloatArray] = []
     for name in scene.stage.targets:
         points = scene.plan.targets.get(name)
         # A group of points is where the error is judged, and no place for a tool.
         if points is None or points.size != 3 or not name.startswith(f"{scene.stage.bone}/"):
             continue
         point_mm = np.asarray(points, dtype=np.float64).reshape(3)
-        draw_cross(image, scene, point_mm, axes, _HALF_MM, TARGET)
+        crosses += cross_lines(point_mm, axes, _HALF_MM)
         labels.add(name.split("/", 1)[1].replace("_", " "), scene.pixel_of(point_mm), TARGET)
+    draw_lines(image, scene, crosses, TARGET)

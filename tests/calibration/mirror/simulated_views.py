@@ -7,6 +7,7 @@ from calibration.mirror.seen_views import Scene, SeenView
 from calibration.targets.boards import Board, parse_board
 from calibration.targets.detection import SeenBoard
 from navapp.geometry.camera import Camera
+from navapp.geometry.display_model_optics import VirtualScreen
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from sim_devices.mirror_optics import MirrorSetup
 from sim_devices.mirror_setups import HEIGHT_PX, WIDTH_PX, look_at_site, make_eye_camera
@@ -79,12 +80,13 @@ def seen(points_px: np.ndarray, camera: Camera, rng: np.random.Generator, sd: fl
 
 def drawn_views(
     rng: np.random.Generator, setup: MirrorSetup, n: int = 8, noise_px: float = 0.05,
-    every: int = 1,
+    every: int = 1, panel: VirtualScreen | None = None,
 ) -> tuple[list[SeenView], np.ndarray]:  # fmt: skip
     """Marks of n views, and (3,) the middle of those centres that are the eye's.
 
     Args:
         every: so many of the pattern's marks stand for one that is used.
+        panel: where the pattern is seen instead of in the set-up's flat one.
     """
     camera, rig = eye_camera(rng), make_default_rig()
     views, centres = [], []
@@ -94,7 +96,10 @@ def drawn_views(
             centres.append(view.eye_from_left.inverse().translation_mm)
         pose = board_pose(rng, setup)
         points = pose.apply(BOARD.points_mm)
-        screen = seen(view.screen_px(PATTERN.pixels), camera, rng, noise_px)
+        shown_px = view.screen_px(PATTERN.pixels)
+        if panel is not None:
+            shown_px = camera.project(view.eye_from_left.apply(panel.points_mm(PATTERN.pixels)))
+        screen = seen(shown_px, camera, rng, noise_px)
         thin = np.flatnonzero(rng.random(len(screen.ids)) < 1.0 / every)
         views.append(
             SeenView(

@@ -81,6 +81,21 @@ def test_the_pitch_is_found_when_it_is_not_told() -> None:
     assert found.model.screen.pitch_mm == pytest.approx(setup.panel.pitch_mm, rel=0.01)
 
 
+def test_a_curved_panel_is_found_when_it_is_asked_for() -> None:
+    rng = np.random.default_rng(9)
+    setup = draw_setup(rng)
+    true = true_display(setup)
+    panel = true.screen.resize(true.screen.pitch_mm, 6.0)
+    views, eye = drawn_views(rng, setup, 6, every=8, panel=panel)
+    found = solve_display(scene(), views, TOLD, with_bulge=True)
+    assert found.model.screen.bulge_mm == pytest.approx(6.0, abs=0.5)
+    true = dataclasses.replace(true, screen=panel, eye_mm=eye)
+    errors = seen_beside_mm(found.model, true, found.anatomy_mm, found.anatomy_mm)
+    assert np.quantile(errors, 0.95) < 0.03
+    flat = solve_display(scene(), views, TOLD)
+    assert flat.rms_px > 1.1 * found.rms_px
+
+
 def test_two_views_are_too_few() -> None:
     with pytest.raises(ResultError, match="only 2 views"):
         solve_display(scene(), some_views(6)[1][:2], TOLD)

@@ -1,0 +1,330 @@
+"""A session whose display is seen in the mirror: lit after the check, dark otherwise."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import date, timedelta
+
+import numpy as np
+import pytest
+
+from drivers.interfaces import PowerState, ProjectorStatus
+from navapp.control.calibrated_display import CalibratedDisplay, Eyes
+from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.device_handlers import ProjectorHandler
+from navapp.control.mirror_checking import LEAST_APART_MM
+from navapp.control.states import (
+    Blank,
+    CheckMirror,
+    ConfirmCross,
+    NudgeCross,
+    Show,
+)
+from navapp.geometry.display_model import DisplayModel, DisplayQuality
+from navapp.geometry.display_model_optics import VirtualScreen
+from navapp.geometry.rectification import Rectifier
+from navapp.values import (
+    DisparityMap,
+    Foreground,
+    Origin,
+    OverlayMode,
+    Reason,
+    Status,
+    Surroundings,
+    TrackedFrame,
+)
+from sim_devices.display import SimulatedDisplay
+from tests.control.fakes import PERIOD_NS, Bench, a_pose, a_rig, answer, navigating
+
+WIDTH, HEIGHT, PITCH_MM = 400, 300, 0.5
+DEPTH_MM, EYE_MM = 300.0, np.array([20.0, -60.0, -150.0])
+TODAY = date.today()
+GOOD = DisplayQuality(True, error_mm=0.2, expires_on=TODAY + timedelta(days=1))
+
+
+def a_model(**changes: object) -> DisplayModel:
+    """A screen in the plane of the bone's middle, its columns seen from right to left."""
+    half = 0.5 * PITCH_MM * np.array([WIDTH - 1, HEIGHT - 1])
+    screen = VirtualScreen(
+        np.array([half[0], -half[1], DEPTH_MM]), np.array([-1.0, 0, 0]), np.array([0, 1.0, 0]),
+        PITCH_MM, WIDTH, HEIGHT,
+    )  # fmt: skip
+    model = DisplayModel(screen, None, EYE_MM, True, False, quality=GOOD)
+    return replace(model, **changes)
+
+
+def measured_bone(half_px: int = 36) -> TrackedFrame:
+    """An answer that has measured a square of the bone's plane."""
+    geometry = Rectifier(a_rig()).geometry
+    size = 2 * half_px
+    disparity = np.full((size, size), geometry.disparity_px(DEPTH_MM), np.float32)
+    x, y = round(geometry.centre_x_px) - half_px, round(geometry.centre_y_px) - half_px
+    matched = np.full(disparity.shape, Origin.MATCHED, np.uint8)
+    found = DisparityMap(disparity, np.full_like(disparity, 0.1), matched, x, y)
+    around = Surroundings(disparity, matched, found.box, False, matched)
+    nothing = np.zeros(disparity.shape, dtype=bool)
+    return replace(answer(), foreground=Foreground(around, found, nothing))
+
+
+def a_bench(
+    model: DisplayModel | None = None,
+    make_display: Callable[..., SimulatedDisplay] = lambda clock, w, h: SimulatedDisplay(
+        clock, WIDTH, HEIGHT
+    ),
+    delay_ms: float = 0.0,
+    eyes: Eyes = "left",
+) -> Bench:
+    display = CalibratedDisplay(model or a_model(), check_minutes=1.0, eyes=eyes)
+    bench = Bench(calibrated_display=display, make_display=make_display, display_delay_ms=delay_ms)
+    bench.script.tracked = measured_bone()
+    return bench
+
+
+def check(bench: Bench, *nudges: tuple[int, int]) -> None:
+    """Begin the check and confirm its three crosses."""
+    bench.do(CheckMirror())
+    bench.frames()
+    for number in range(3):
+        if number < len(nudges):
+            bench.do(NudgeCross(*nudges[number]))
+        bench.do(ConfirmCross())
+    bench.frames()
+
+
+def guides(bench: Bench) -> np.ndarray:
+    """What of the display is lit, but for the status at the bottom; (h, w)."""
+    return bench.display.visible_image()[: round(0.93 * HEIGHT)].max(axis=2) > 0
+
+
+def test_guides_are_lit_after_the_check_on_black_and_where_they_are() -> None:
+    bench = a_bench()
+    navigating(bench)
+    bench.frames()
+    assert bench.snapshot.reasons == (Reason.MIRROR_UNCHECKED,)
+    assert not guides(bench).any()
+    assert bench.display.visible_image().any()  # the status
+    check(bench)
+    assert bench.snapshot.reasons == ()
+    lit = guides(bench)
+    assert 0.01 < lit.mean() < 0.5
+    assert bench.results[-1].picture.mode is OverlayMode.MIRROR
+    # The bone's middle lies on the left camera's axis.
+    u, v = a_model().project(np.array([[0.0, 0.0, DEPTH_MM]]))[0]
+    rows, columns = np.nonzero(lit)
+    assert abs(columns.mean() - u) < 12.0
+    assert abs(rows.mean() - v) < 30.0
+
+
+def test_the_cross_is_shown_where_its_point_is_seen_and_moves_with_the_keys() -> None:
+    bench = a_bench()
+    navigating(bench)
+    bench.do(CheckMirror())
+    bench.frames()
+    assert bench.snapshot.cross_check is not None
+    # The operator's screen marks the point as well: on black video nothing else is there.
+    assert bench.snapshot.preview is not None
+    assert bench.snapshot.preview[24:72].any()
+    before = np.argwhere(guides(bench)).mean(axis=0)
+    bench.do(NudgeCross(10, 4))
+    bench.frames()
+    moved = np.argwhere(guides(bench)).mean(axis=0) - before
+    # The eye's right is the display's left: the columns are seen from right to left.
+    np.testing.assert_allclose(moved, [4.0, -10.0], atol=0.2)
+    assert not bench.snapshot.is_navigable
+
+
+def test_a_check_that_is_off_keeps_the_display_dark() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench, (0, 0), (3, 0))  # 3 px of 0.5 mm in the bone's plane
+    assert bench.snapshot.reasons == (Reason.MIRROR_CHECK_FAILED,)
+    assert not guides(bench).any()
+    check(bench, (1, 0), (0, -1))
+    assert bench.snapshot.reasons == ()
+
+
+def test_a_check_grows_old() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    assert bench.snapshot.is_navigable
+    bench.clock.advance_ns(round(61e9))
+    bench.frames()
+    assert bench.snapshot.reasons == (Reason.MIRROR_CHECK_OLD,)
+    assert not guides(bench).any()
+
+
+def test_a_check_that_is_begun_again_or_given_up_counts_no_more() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    bench.do(CheckMirror())
+    bench.frames()
+    bench.do(CheckMirror())
+    bench.frames()
+    assert bench.snapshot.cross_check is None
+    assert bench.snapshot.reasons == (Reason.MIRROR_UNCHECKED,)
+
+
+def test_the_check_needs_a_pose_points_and_a_mirror() -> None:
+    bench = a_bench()
+    bench.do(CheckMirror())
+    assert "refused" in bench.events[-1].text
+    navigating(bench)
+    bench.script.tracked = measured_bone(half_px=8)
+    bench.frames()
+    bench.do(CheckMirror())
+    assert f"{LEAST_APART_MM:.0f} mm apart" in bench.events[-1].text
+    bench.do(ConfirmCross())
+    assert "no check" in bench.events[-1].text
+    video = Bench()
+    navigating(video)
+    video.do(CheckMirror())
+    assert "no display in the mirror" in video.events[-1].text
+
+
+DIFFERENT = {
+    "another size": (a_model(), {"width": WIDTH + 1}, Reason.DISPLAY_DIFFERS),
+    "another flip": (a_model(), {"flips_horizontally": True}, Reason.DISPLAY_DIFFERS),
+    "another name": (a_model(display_name="monitor 7"), {}, Reason.DISPLAY_DIFFERS),
+    "expired": (
+        a_model(quality=replace(GOOD, expires_on=TODAY - timedelta(days=1))), {},
+        Reason.DISPLAY_EXPIRED,
+    ),
+    "not accepted": (
+        a_model(quality=replace(GOOD, is_accepted=False)), {}, Reason.DISPLAY_NOT_ACCEPTED,
+    ),
+    "no record": (a_model(quality=None), {}, Reason.DISPLAY_NOT_ACCEPTED),
+    "mirror turned": (a_model(mirror_deg=44.0), {}, Reason.MIRROR_AWAY),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", DIFFERENT)
+def test_the_display_stays_dark_when_it_is_not_what_was_calibrated(what: str) -> None:
+    model, changes, reason = DIFFERENT[what]
+    given = {"width": WIDTH, "height": HEIGHT, **changes}
+    bench = a_bench(model, lambda clock, w, h: SimulatedDisplay(clock, **given))
+    navigating(bench)
+    check(bench)
+    assert reason in bench.snapshot.reasons
+    assert not bench.display.visible_image().any()
+
+
+def test_what_the_operator_blanks_stays_dark() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    bench.do(Blank())
+    bench.frames()
+    assert not bench.display.visible_image().any()
+    bench.do(Show())
+    bench.frames()
+    assert guides(bench).any()
+
+
+def test_guides_go_out_with_the_bone_and_when_no_picture_follows() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    bench.script.tracked = answer(Status.LOST, Reason.NO_SURFACE, has_pose=False)
+    bench.frames()
+    assert bench.state == "suspended"
+    assert not guides(bench).any()
+    bench.script.tracked = measured_bone()
+    bench.frames()
+    assert guides(bench).any()
+    bench.clock.advance_ns(501_000_000)
+    assert not bench.display.visible_image().any()
+
+
+def test_a_hand_in_front_takes_the_light_away() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    n_lit = guides(bench).sum()
+    told = measured_bone()
+    assert told.foreground is not None
+    hand = np.zeros_like(told.foreground.is_in_front)
+    hand[:, : hand.shape[1] // 2] = True
+    bench.script.tracked = replace(told, foreground=replace(told.foreground, is_in_front=hand))
+    bench.frames()
+    assert guides(bench).sum() < 0.7 * n_lit
+
+
+def test_nothing_is_lit_where_the_depth_is_a_guess() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    told = measured_bone()
+    assert told.foreground is not None
+    around = told.foreground.surroundings
+    guessed = np.full_like(around.origin, Origin.FILLED_BORDER)
+    unmatched = replace(told.foreground.measured, origin=np.zeros_like(guessed))
+    foreground = Foreground(replace(around, origin=guessed), unmatched, told.foreground.is_in_front)
+    bench.script.tracked = replace(told, foreground=foreground)
+    bench.frames()
+    bone = guides(bench)[60:240, 60:340]
+    assert bone.mean() < 0.01
+
+
+def test_guides_are_where_the_bone_will_be_when_their_light_is_seen() -> None:
+    """A bone that moves by 1 mm a frame, and a display that is 66 ms late: one frame."""
+    middles = []
+    for delay_ms in (0.0, PERIOD_NS / 1e6):
+        bench = a_bench(delay_ms=delay_ms)
+        navigating(bench)
+        check(bench)
+        for x_mm in (1.0, 2.0, 3.0):
+            told = measured_bone()
+            moved = replace(told.estimate, camera_from_bone=a_pose(x_mm=x_mm))
+            bench.script.tracked = replace(told, estimate=moved)
+            bench.frames()
+        middles.append(np.argwhere(guides(bench)).mean(axis=0)[1])
+    # The eye's columns rise to the left: 0.7 mm (damped) of 0.5 mm a pixel.
+    assert middles[1] - middles[0] == pytest.approx(-0.7 / PITCH_MM, abs=0.4)
+
+
+def test_two_eyes_are_refused_where_guides_are_off_for_the_other() -> None:
+    """The bone reaches from the screen's plane to 32 mm behind it, 450 mm from the eye."""
+    bench = a_bench(eyes="both")
+    navigating(bench)
+    check(bench)
+    assert bench.snapshot.reasons == (Reason.OTHER_EYE,)
+    other = bench.snapshot.other_eye
+    assert other is not None
+    assert 2.0 < other.error_mm < 6.0
+    assert 5.0 < other.screen_shift_mm < 32.0
+    assert not guides(bench).any()
+    alone = a_bench(eyes="left")
+    navigating(alone)
+    check(alone)
+    assert alone.snapshot.is_navigable
+
+
+class KeystoneProjector:
+    name = "fake projector"
+
+    def __init__(self, status: ProjectorStatus) -> None:
+        self._status = status
+
+    def status(self) -> ProjectorStatus:
+        return self._status
+
+
+@pytest.mark.parametrize(
+    ("status", "is_refused"),
+    [
+        (ProjectorStatus(PowerState.ON, keystone=(0, 0)), False),
+        (ProjectorStatus(PowerState.ON, keystone=(0, 3)), True),
+        (ProjectorStatus(PowerState.ON, keystone=(0, 0), flips_horizontally=True), True),
+    ],
+)
+def test_a_projector_with_keystone_or_another_flip_is_refused(status, is_refused: bool) -> None:
+    report = ProjectorHandler(KeystoneProjector(status), a_model()).report()
+    assert (report.reason is Reason.PROJECTOR_ALTERS) is is_refused
+    turned = ProjectorHandler(KeystoneProjector(status), a_model(projector_flips=(True, False)))
+    assert (turned.report().reason is None) is (status.flips_horizontally is True)
+
+
+@pytest.mark.parametrize("command", [CheckMirror(), NudgeCross(-3, 7), ConfirmCross()])
+def test_the_commands_of_the_check_are_recorded(command) -> None:
+    assert command_from_json(command_to_json(command)) == command
