@@ -44,7 +44,9 @@ def test_the_banner_says_what_the_picture_is() -> None:
     assert banner(bench.snapshot) == "1 opening - CANDIDATE, not accepted"
     bench.accept()
     bench.frames(1)
-    assert banner(bench.snapshot) == "1 opening - NAVIGATING - error <= 0.80 mm"
+    assert banner(bench.snapshot) == (
+        "1 opening - NAVIGATING - error <= 0.80 mm - not verified on the patient"
+    )
 
 
 def test_of_a_refused_candidate_nothing_is_drawn() -> None:
