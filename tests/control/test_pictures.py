@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from navapp.control.pictures import banner, compose, fit_to_display
+from navapp.control.pictures import Composer, banner, fit_to_display
 from navapp.control.states import Register
-from navapp.overlay import LeftView, compose_video
+from navapp.overlay import compose_video
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_plan, a_pose, a_rig, answer
 
@@ -44,7 +44,9 @@ def test_the_banner_says_what_the_picture_is() -> None:
     assert banner(bench.snapshot) == "1 opening - CANDIDATE, not accepted"
     bench.accept()
     bench.frames(1)
-    assert banner(bench.snapshot) == "1 opening - NAVIGATING - error <= 0.80 mm"
+    assert banner(bench.snapshot) == (
+        "1 opening - NAVIGATING - error <= 0.80 mm - not verified on the patient"
+    )
 
 
 def test_of_a_refused_candidate_nothing_is_drawn() -> None:
@@ -58,7 +60,7 @@ def test_of_a_refused_candidate_nothing_is_drawn() -> None:
         bench.script.tracked = answer(status, Reason.OUTLIERS, pose=a_pose())
         bench.frames(2)
         snapshot = bench.snapshot
-        picture = compose(left, snapshot, LeftView(a_rig()), a_plan(), "")
+        picture = Composer(a_rig(), a_plan()).compose_video(left, snapshot, "")
         plain = compose_video(left, None, banner(snapshot))
         drawn.append(bool((picture != plain).any()))
         assert snapshot.left_from_bone is not None
