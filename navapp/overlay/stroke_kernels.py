@@ -38,12 +38,11 @@ def trace_line(
     depth_mm: NDArray[np.float64],
     ground: Ground,
     pen: Pen,
-    x: int,
-    y: int,
     line: NDArray[np.float32],
     rim: NDArray[np.float32],
-) -> None:
-    """How much of each pixel a line covers, and its rim.
+    touched: NDArray[np.int32],
+) -> tuple[int, int]:
+    """How much of each pixel a line covers, and its rim; how many pixels of both are touched.
 
     Dashed where it lies beneath something or where that is not known, left out where it is hidden.
 
@@ -52,12 +51,13 @@ def trace_line(
         depth_mm: (N,).
         ground: what is seen.
         pen: of the line.
-        x: column of the first pixel of `line`.
-        y: row of it.
-        line: (h, w) in place, 0 to 1; the larger share stays.
-        rim: (h, w) in place.
+        line: (H, W) of the picture, in place, 0 to 1; the larger share stays.
+        rim: (H, W) in place.
+        touched: (2, n) in place, the pixels of the line and of the rim, counted row by row; those
+            beyond n are left out.
     """
     period, along = pen.dash_px + pen.gap_px, 0.0
+    n_line, n_rim = 0, 0
     for k in range(len(pixels) - 1):
         u0, v0, u1, v1 = pixels[k, 0], pixels[k, 1], pixels[k + 1, 0], pixels[k + 1, 1]
         # A comparison with NaN is False.
@@ -78,12 +78,38 @@ def trace_line(
             if weight < 0.5 * ground.beneath or (is_beneath and along % period > pen.dash_px):
                 continue
             ends = (
-                u0 + a * (u1 - u0) - x, v0 + a * (v1 - v0) - y,
-                u0 + b * (u1 - u0) - x, v0 + b * (v1 - v0) - y,
+                u0 + a * (u1 - u0), v0 + a * (v1 - v0), u0 + b * (u1 - u0), v0 + b * (v1 - v0)
             )  # fmt: skip
-            _cover(ends, pen.half_px, line)
+            n_line = _cover(ends, pen.half_px, line, touched[0], n_line)
             if pen.rim_px > 0.0 and not is_beneath:
-                _cover(ends, pen.half_px + pen.rim_px, rim)
+                n_rim = _cover(ends, pen.half_px + pen.rim_px, rim, touched[1], n_rim)
+    return n_line, n_rim
+
+
+@njit(cache=True, nogil=True)
+def blend_touched(
+    image: NDArray[np.uint8],
+    share: NDArray[np.float32],
+    touched: NDArray[np.int32],
+    colour: tuple[int, int, int],
+) -> None:
+    """Blend one colour into some pixels, and set their share back to 0.
+
+    Args:
+        image: (H, W, 3) in place.
+        share: (H, W) in place, of the colour, 0 to 1.
+        touched: (n,) the pixels, counted row by row.
+        colour: of the image's channels.
+    """
+    width = share.shape[1]
+    for place in touched:
+        row, column = place // width, place % width
+        part = share[row, column]
+        share[row, column] = np.float32(0.0)
+        for k in range(3):
+            before = np.float32(image[row, column, k])
+            after = before + part * (np.float32(colour[k]) - before)
+            image[row, column, k] = np.uint8(after + np.float32(0.5))
 
 
 @njit(cache=True, nogil=True)
@@ -101,9 +127,13 @@ def weigh(u: float, v: float, z: float, ground: Ground) -> np.float32:
 
 @njit(cache=True, nogil=True)
 def _cover(
-    ends: tuple[float, float, float, float], half_px: float, share: NDArray[np.float32]
-) -> None:
-    """Pixels of a stroke with round ends; their edge is one pixel wide."""
+    ends: tuple[float, float, float, float],
+    half_px: float,
+    share: NDArray[np.float32],
+    touched: NDArray[np.int32],
+    n: int,
+) -> int:
+    """Pixels of a stroke with round ends; their edge is one pixel wide. How many were touched."""
     u0, v0, u1, v1 = ends
     reach = half_px + 0.5
     du, dv = u1 - u0, v1 - v0
@@ -119,4 +149,10 @@ def _cover(
             off = np.hypot(column - u0 - along * du, row - v0 - along * dv)
             covered = np.float32(min(max(reach - off, 0.0), 1.0))
             if covered > share[row, column]:
+                if share[row, column] == 0.0:
+                    if n == len(touched):
+                        continue
+                    touched[n] = row * share.shape[1] + column
+                    n += 1
                 share[row, column] = covered
+    return n

@@ -1,16 +1,16 @@
 """Lines and crosses in space, drawn with soft edges at parts of a pixel."""
 
+import threading
 from collections.abc import Iterable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.box import Box
 from navapp.geometry.transform import FloatArray
-from navapp.overlay.blend_kernels import blend_colour
 from navapp.overlay.colours import Colour
 from navapp.overlay.scene import Scene
-from navapp.overlay.stroke_kernels import Ground, Pen, trace_line
+from navapp.overlay.stroke_kernels import Ground, Pen, blend_touched, trace_line
 
 Image = NDArray[np.uint8]
 
@@ -19,7 +19,6 @@ _STEP_MM = 8.0
 _DASH_PX, _GAP_PX, _RIM_PX = 7.0, 5.0, 1.0
 # A rim in black keeps a line visible on bone and on blood.
 _RIM: Colour = (0, 0, 0)
-_MARGIN_PX = 4
 _BETWEEN = np.full((1, 3), np.nan)
 
 
@@ -90,6 +89,15 @@ def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: floa
         _draw(image, arm, np.zeros(2), ground, 1.5, 0.0, colour)
 
 
+@lru_cache(maxsize=8)
+def _room(
+    height: int, width: int, _thread: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32]]:
+    """Room to draw a line in, of one thread: shares that are 0 before and after, and places."""
+    line, rim = np.zeros((2, height, width), dtype=np.float32)
+    return line, rim, np.empty((2, height * width), dtype=np.int32)
+
+
 def _draw(
     image: Image,
     pixels: FloatArray,
@@ -100,18 +108,9 @@ def _draw(
     colour: Colour,
 ) -> None:
     """A line through places (N, 2) of the picture at depths (N,)."""
-    around = Box.around(pixels)
-    if around is None:
-        return
-    box = around.grow(_MARGIN_PX).clip(image.shape[1], image.shape[0])
-    if box.is_empty:
-        return
-    line = np.zeros((box.height, box.width), dtype=np.float32)
-    rim = np.zeros_like(line) if rim_px > 0.0 else line[:0]
+    line, rim, touched = _room(image.shape[0], image.shape[1], threading.get_ident())
     pen = Pen(*(np.float32(n) for n in (0.5 * width_px, rim_px, _DASH_PX, _GAP_PX)))
     depth_mm = np.ascontiguousarray(depth_mm)
-    trace_line(pixels, depth_mm, ground, pen, box.x, box.y, line, rim)
-    part = image[box.slices]
-    if rim_px > 0.0:
-        blend_colour(part, rim, _RIM)
-    blend_colour(part, line, colour)
+    n_line, n_rim = trace_line(pixels, depth_mm, ground, pen, line, rim, touched)
+    blend_touched(image, rim, touched[1, :n_rim], _RIM)
+    blend_touched(image, line, touched[0, :n_line], colour)

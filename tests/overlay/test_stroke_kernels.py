@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from navapp.overlay.stroke_kernels import Ground, Pen, trace_line, weigh
+from navapp.overlay.stroke_kernels import Ground, Pen, blend_touched, trace_line, weigh
 
 HEIGHT, WIDTH, X, Y = 40, 60, 100, 50
 ONE = np.float32(1.0)
@@ -24,10 +24,14 @@ def trace(
     pixels: np.ndarray, given: Ground, depth_mm: float = 100.0, half_px: float = 1.0,
     rim_px: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    line, rim = np.zeros((2, HEIGHT, WIDTH), np.float32)
+    """What is drawn of a picture with `X` columns and `Y` rows before the part that is returned."""
+    line, rim = np.zeros((2, Y + HEIGHT, X + WIDTH), np.float32)
+    touched = np.empty((2, line.size), np.int32)
     pen = Pen(*(np.float32(n) for n in (half_px, rim_px, 7.0, 5.0)))
-    trace_line(pixels, np.full(len(pixels), depth_mm), given, pen, X, Y, line, rim)
-    return line, rim
+    n = trace_line(pixels, np.full(len(pixels), depth_mm), given, pen, line, rim, touched)
+    for share, places, count in zip((line, rim), touched, n, strict=True):
+        assert sorted(places[:count]) == list(np.flatnonzero(share))
+    return line[Y:, X:], rim[Y:, X:]
 
 
 def covered(pixels: np.ndarray, half_px: float) -> np.ndarray:
@@ -88,3 +92,19 @@ def test_a_point_beyond_the_ground_weighs_what_is_told_of_there() -> None:
     assert weigh(19.4, 3.0, 5.0, given) == 1.0
     for u, v in ((19.6, 3.0), (-0.6, 3.0), (3.0, 40.0)):
         assert weigh(u, v, 5.0, given) == BENEATH
+
+
+@pytest.mark.kernel
+def test_touched_pixels_are_blended_and_no_others() -> None:
+    rng = np.random.default_rng(5)
+    before = rng.integers(0, 256, (6, 7, 3), dtype=np.uint8)
+    share = rng.random((6, 7)).astype(np.float32)
+    touched = np.array([3, 8, 40], np.int32)
+    part = share.ravel()[touched, None]
+    image = before.copy()
+    blend_touched(image, share, touched, (10, 200, 250))
+    expected = before.astype(float)
+    flat = expected.reshape(-1, 3)
+    flat[touched] += part * (np.array([10.0, 200.0, 250.0]) - flat[touched])
+    np.testing.assert_allclose(image, expected, atol=0.51)
+    assert not share.ravel()[touched].any()
