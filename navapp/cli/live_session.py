@@ -90,9 +90,15 @@ def _read_display(
     path = configuration.display.model
     if path is None:
         return None
-    mirror = configuration.mirror
+    mirror, model = configuration.mirror, read_display_model(path)
+    if model.viewing_eye != "camera" and mirror.eyes not in ("both", model.viewing_eye):
+        raise ConfigurationError(
+            f"the display is calibrated for the {model.viewing_eye} eye",
+            subject="mirror.eyes",
+            remedy=f'set it to "{model.viewing_eye}" or "both", or calibrate the other eye',
+        )
     return CalibratedDisplay(
-        read_display_model(path),
+        model,
         mirror.check_minutes,
         allows_unaccepted=options.allow_unaccepted,
         eyes=mirror.eyes,

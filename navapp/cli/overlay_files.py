@@ -52,7 +52,11 @@ class OverlayFolder:
         import cv2
 
         quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if self._suffix == ".jpg" else []
-        _, encoded = cv2.imencode(self._suffix, result.picture.image, quality)
+        is_encoded, encoded = cv2.imencode(self._suffix, result.picture.image, quality)
+        if not is_encoded:
+            raise _cannot_write(
+                "overlay folder", self._folder, "no picture is encoded", "--overlay"
+            )
         name = f"overlay_{self._n_pictures:05d}_{result.frame.index:04d}{self._suffix}"
         (self._unfinished / name).write_bytes(encoded.tobytes())
         self._n_pictures += 1

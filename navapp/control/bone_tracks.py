@@ -141,18 +141,20 @@ class BoneTracks:
         return tracked
 
     def predict(self, stage: StageSpec, time_ns: int) -> RigidTransform | None:
-        """Where the accepted bone will be at a moment, by its motion; None where that is unsure.
+        """Where the accepted bone will be at a moment, by its motion.
 
-        A bone that was lost, or moves further than `_FARTHEST_PREDICTED_MM` until then, is not
-        predicted.
+        Where it was measured, when it was lost before or is in doubt; None when a corner of its box
+        moves further than `_FARTHEST_PREDICTED_MM` until then: nobody knows where it will be.
         """
         track = self._tracks.get(stage.bone)
-        if track is None or track.n_lost > 0 or track.n_doubted > 0:
+        if track is None:
             return None
-        centre_mm = self._trackers.centre_mm(stage.bone)[None]
-        pose = track.predict(time_ns, centre_mm[0])
-        moved = pose.apply(centre_mm) - track.left_from_bone.apply(centre_mm)
-        return pose if np.linalg.norm(moved) <= _FARTHEST_PREDICTED_MM else None
+        if track.n_lost > 0 or track.n_doubted > 0:
+            return track.left_from_bone
+        corners_mm = self._trackers.corners_mm(stage.bone)
+        pose = track.predict(time_ns, corners_mm.mean(axis=0))
+        moved = pose.apply(corners_mm) - track.left_from_bone.apply(corners_mm)
+        return pose if np.linalg.norm(moved, axis=1).max() <= _FARTHEST_PREDICTED_MM else None
 
     def glance(
         self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None

@@ -47,13 +47,16 @@ class CalibratedDisplay:
             return None
         error_mm = self.model.error_for_other_eye_mm(points_mm)
         shift_mm = self.model.screen_shift_mm(points_mm)
-        return OtherEye(float(np.nanmax(error_mm, initial=0.0)), shift_mm)
+        # Where the eye does not see a guide its error is not known.
+        known_mm = np.where(np.isfinite(error_mm), error_mm, np.inf)
+        return OtherEye(float(known_mm.max(initial=0.0)), shift_mm)
 
     def find_check_reason(self, check: MirrorCheck | None, now_ns: int) -> Reason | None:
         """What the surgeon's check has against guides; None when it was passed lately."""
         if check is None:
             return Reason.MIRROR_UNCHECKED
-        if check.residual_mm > self.check_mm:
+        # Not passed by what is no number.
+        if not 0.0 <= check.residual_mm <= self.check_mm:
             return Reason.MIRROR_CHECK_FAILED
         is_old = now_ns - check.time_ns > self.check_minutes * 60e9
         return Reason.MIRROR_CHECK_OLD if is_old else None

@@ -34,6 +34,8 @@ from navapp.errors import UsageError
 from navapp.overlay import LAYERS
 from navapp.values import Plan, Status
 
+_NAVIGATING = SessionState.NAVIGATING
+
 
 class CommandHandler:
     """Carries commands out, or refuses them with a reason that the operator reads."""
@@ -157,11 +159,11 @@ class CommandHandler:
             self._mirror.give_up()
             self._session.add_event("mirror", "check of the mirror given up", EventLevel.WARNING)
             return
-        tracked = self._session.tracked
-        if tracked is None or tracked.verdict.status is not Status.OK:
-            self._refuse("mirror", "the check needs a bone whose pose is OK")
+        tracked, is_navigating = self._session.tracked, self._session.state is _NAVIGATING
+        if tracked is None or tracked.verdict.status is not Status.OK or not is_navigating:
+            self._refuse("mirror", "the check needs an accepted bone whose pose is OK")
             return
-        why = self._mirror.begin(tracked)
+        why = self._mirror.begin(tracked, self._plan.bones[tracked.bone].mesh)
         if why:
             self._refuse("mirror", why)
             return
@@ -172,6 +174,10 @@ class CommandHandler:
         pose = None if tracked is None else tracked.left_from_bone
         if self._mirror.state is None or pose is None:
             self._refuse("mirror", "no check of the mirror is under way")
+            return
+        is_nudge = isinstance(command, NudgeCross)
+        if not (self._mirror.was_cross_seen if is_nudge else self._mirror.is_cross_shown):
+            self._refuse("mirror", "the cross is not shown yet")
             return
         if isinstance(command, NudgeCross):
             self._mirror.nudge(command.right_px, command.down_px)

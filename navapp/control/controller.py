@@ -40,7 +40,7 @@ from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import Rectifier
 from navapp.overlay import DepthMarks, make_preview
 from navapp.tracking import make_tracker
-from navapp.values import Foreground, FrameTimings, OverlayMode, OverlayPicture
+from navapp.values import Foreground, FrameTimings, OverlayMode, OverlayPicture, Reason
 
 
 class SessionController:
@@ -136,11 +136,13 @@ class SessionController:
             frame = self._next_frame(timeout_s)
             if frame is not None:
                 self._handle_frame(frame)
-        before, self._snapshot = self._snapshot, self._maker.make()
+        before, self._snapshot = self._snapshot, self._make_snapshot()
         if self._snapshot.device_reasons:
             self._display.darken()
         elif not (self._snapshot.is_navigable or self._snapshot.is_candidate):
-            self._display.withdraw_guides()
+            is_same_cross = self._snapshot.cross_check == before.cross_check is not None
+            if not is_same_cross:
+                self._display.withdraw_guides()
         tell_changes(session, before, self._snapshot)
         return self._snapshot
 
@@ -157,6 +159,14 @@ class SessionController:
         self._devices.close()
         self._session.go_offline()
         self._snapshot = self._maker.make()
+
+    def _make_snapshot(self) -> Snapshot:
+        """As of now; what it says may end a check of the mirror."""
+        snapshot = self._maker.make()
+        if not snapshot.has_mirror:
+            return snapshot
+        self._mirror_checking.check_session(snapshot)
+        return self._maker.make()
 
     def _next_frame(self, timeout_s: float) -> StereoFrame | None:
         session = self._session
@@ -180,7 +190,7 @@ class SessionController:
         session.begin_frame(frame)
         session.look_for_bone(frame)
         self._rig_watch.check_frame(frame)
-        snapshot = self._maker.make()
+        snapshot = self._make_snapshot()
         picture, overlay_ms = self._show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
@@ -214,13 +224,16 @@ class SessionController:
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
         is_scaled = self._composer.mode is OverlayMode.VIDEO
+        has_cross = snapshot.reasons == (snapshot.mirror_reason,) and snapshot.cross_check
         # The screen shows the live picture in a fault as well, the display shows nothing; nor does
         # it when what would be seen on it is not what is shown.
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
         if is_shown and self._display.show(
-            image, valid_until_ns, has_guides=has_guides, is_scaled=is_scaled
+            image, valid_until_ns, has_guides=has_guides or bool(has_cross), is_scaled=is_scaled
         ):
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
+        if is_shown and has_cross and not (self._display.is_blanked or self._display.trouble):
+            self._mirror_checking.note_shown()
         preview = make_preview(video)
         if self._session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
@@ -229,12 +242,13 @@ class SessionController:
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
-        """Guides where the bone will be when their light is seen; measured where that is unsure."""
+        """Guides where the bone will be when their light is seen; none if it moves too fast."""
         if snapshot.is_navigable:
             light_ns = self._session.now_ns + self._display_delay_ns
             predicted = self._session.predict_pose(light_ns)
-            if predicted is not None:
-                snapshot = replace(snapshot, left_from_bone=predicted)
+            snapshot = replace(snapshot, left_from_bone=predicted)
+            if predicted is None:
+                snapshot = replace(snapshot, reasons=(Reason.MOVES_TOO_FAST,))
         pose = snapshot.left_from_bone
         cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
         return self._composer.compose_mirror(snapshot, foreground, cross_px)

@@ -89,6 +89,10 @@ class ProjectorHandler:
             line = DeviceLine("projector", name, DeviceHealth.LOST, str(error))
             return DeviceReport(line, self.reason)
         self.is_slow = status.power is not PowerState.ABSENT
+        if status.power is PowerState.ABSENT and self._flips is not None:
+            detail = "not configured, but the display was calibrated with it"
+            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, detail)
+            return DeviceReport(line, self.reason)
         if status.power is PowerState.ABSENT:
             return DeviceReport(DeviceLine("projector", name, DeviceHealth.ABSENT, "not used"))
         if changes := self._changes(status):

@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navapp.control.calibrated_display import CalibratedDisplay
-from navapp.control.states import CrossCheck, MirrorCheck
+from navapp.control.states import CrossCheck, MirrorCheck, SessionState, Snapshot
 from navapp.geometry.display_model_view import EyeView
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Reason, TrackedFrame
@@ -19,6 +20,8 @@ from navapp.values import Reason, TrackedFrame
 N_POINTS, LEAST_APART_MM = 3, 40.0
 # Of the measured pixels every so many is a candidate; crosses stay so far from the picture's rim.
 _STRIDE_PX, _RIM_PX = 8, 20
+# From the plane through the nearest vertex of the model, and from that vertex.
+_ON_BONE_MM, _NEAR_VERTEX_MM = 2.0, 8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +44,9 @@ class MirrorChecking:
         self._geometry = geometry
         self._crosses: list[_Cross] = []
         self._number = 0
+        self._bone = ""
+        # Number and nudge of the cross that was shown last.
+        self._shown: tuple[int, tuple[int, int]] | None = None
         self._finished: MirrorCheck | None = None
 
     @property
@@ -68,22 +74,51 @@ class MirrorChecking:
             return Reason.MIRROR_UNCHECKED
         return self._display.find_check_reason(self._finished, now_ns)
 
-    def begin(self, tracked: TrackedFrame) -> str:
-        """Choose points that were measured in a frame; what is wrong, empty when it has begun."""
+    def note_shown(self) -> None:
+        """The cross is on the display as it lies now."""
+        if self._crosses:
+            self._shown = self._number, self._crosses[self._number].nudge_px
+
+    def check_session(self, snapshot: Snapshot) -> None:
+        """Give up what another bone, another state or a device has made worthless.
+
+        A device that was not as calibrated also ends the check that was finished.
+        """
+        if snapshot.device_reasons:
+            self._finished = None
+            self.give_up()
+        if self._bone != snapshot.stage.bone or snapshot.state is not SessionState.NAVIGATING:
+            self.give_up()
+
+    @property
+    def was_cross_seen(self) -> bool:
+        """The cross of now has been shown, wherever it was moved to since."""
+        return self._shown is not None and self._shown[0] == self._number
+
+    @property
+    def is_cross_shown(self) -> bool:
+        """The cross has been shown where it lies now."""
+        if not self._crosses:
+            return False
+        return self._shown == (self._number, self._crosses[self._number].nudge_px)
+
+    def begin(self, tracked: TrackedFrame, mesh: TriangleMesh) -> str:
+        """Choose points that were measured on a bone; what is wrong, empty when it has begun."""
         if self._view is None:
             return "no display in the mirror is configured"
-        points = self._candidates(self._view, tracked)
+        points = self._candidates(self._view, tracked, mesh)
         chosen = _furthest_apart(points)
         pose = tracked.left_from_bone
         if chosen is None or pose is None:
             return f"no three points {LEAST_APART_MM:.0f} mm apart are measured on the bone"
         self._crosses = [_Cross(point) for point in pose.inverse().apply(chosen)]
-        self._number, self._finished = 0, None
+        self._number, self._finished, self._shown = 0, None, None
+        self._bone = tracked.bone
         return ""
 
     def give_up(self) -> None:
         """End the check without a result: the mirror is unchecked."""
-        self._crosses = []
+        self._crosses, self._shown = [], None
 
     def nudge(self, right_px: int, down_px: int) -> None:
         """Move the cross that is shown."""
@@ -103,6 +138,7 @@ class MirrorChecking:
     def confirm(self, left_from_bone: RigidTransform, now_ns: int) -> MirrorCheck | None:
         """Take the cross as it lies; the result after the last one."""
         self._number += 1
+        self._shown = None
         if self._number < len(self._crosses) or self._view is None:
             return None
         points = np.array([cross.point_mm for cross in self._crosses])
@@ -113,16 +149,26 @@ class MirrorChecking:
         self._finished = MirrorCheck(now_ns, float(residual_mm.max()))
         return self._finished
 
-    def _candidates(self, view: EyeView, tracked: TrackedFrame) -> FloatArray:
+    def _candidates(self, view: EyeView, tracked: TrackedFrame, mesh: TriangleMesh) -> FloatArray:
         """(N, 3) points measured on the bone that the display can show, in the left camera."""
-        if tracked.foreground is None:
+        from scipy.spatial import cKDTree
+
+        pose, foreground = tracked.left_from_bone, tracked.foreground
+        if foreground is None or pose is None:
             return np.empty((0, 3))
-        cloud = tracked.foreground.measured.reproject(self._geometry, _STRIDE_PX)
+        cloud = foreground.measured.reproject(self._geometry, _STRIDE_PX)
         points = self._geometry.rectified_from_left.inverse().apply(cloud.points_mm)
+        # A hand, or what was matched wrongly, is not on the bone.
+        in_bone = pose.inverse().apply(points)
+        far_mm, nearest = cKDTree(mesh.vertices_mm).query(in_bone)
+        normals = mesh.normals[nearest]
+        off_mm = np.abs(np.sum((in_bone - mesh.vertices_mm[nearest]) * normals, axis=1))
+        points = points[(off_mm < _ON_BONE_MM) & (far_mm < _NEAR_VERTEX_MM)]
         last = np.array([view.camera.width, view.camera.height]) - _RIM_PX
         pixels = _pixels(view, points)
         # Unknown places compare as outside.
-        return points[((pixels > _RIM_PX) & (pixels < last)).all(axis=1)]
+        inside: FloatArray = points[((pixels > _RIM_PX) & (pixels < last)).all(axis=1)]
+        return inside
 
 
 def _pixels(view: EyeView, points_mm: FloatArray) -> FloatArray:

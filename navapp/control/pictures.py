@@ -51,7 +51,8 @@ class Composer:
         """
         scene = _scene(snapshot, self._left_view, self._plan, foreground)
         pose, cross_px = snapshot.left_from_bone, None
-        if pose is not None and point_mm is not None:
+        is_ok = snapshot.verdict is not None and snapshot.verdict.status is Status.OK
+        if pose is not None and point_mm is not None and is_ok:
             cross_px = self._left_view.camera.project(pose.apply(point_mm[None]))[0]
         return compose_video(left, scene, banner(snapshot), mark, cross_px)
 
@@ -86,10 +87,11 @@ def banner(snapshot: Snapshot) -> str:
     """One line: what the picture is."""
     stage = f"{snapshot.stage.number} {snapshot.stage.name}"
     if snapshot.is_navigable and snapshot.verdict is not None:
-        bound_mm = snapshot.verdict.predicted_tre_mm
+        # In the mirror the registration's bound is not the error of what is seen.
+        bound_mm = None if snapshot.has_mirror else snapshot.verdict.predicted_tre_mm
         error = "" if bound_mm is None else f" - error <= {bound_mm:.2f} mm"
         return f"{stage} - NAVIGATING{error} - not verified on the patient"
-    if snapshot.cross_check is not None:
+    if snapshot.cross_check is not None and snapshot.reasons == (snapshot.mirror_reason,):
         check = snapshot.cross_check
         return f"{stage} - CHECK OF THE MIRROR: cross {check.number + 1} of {check.count}"
     if snapshot.is_candidate and _is_lost(snapshot):

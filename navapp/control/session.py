@@ -130,7 +130,7 @@ class Session:
         return None if self._tracked is None else (now_ns - self._tracked_at_ns) / 1e6
 
     def predict_pose(self, time_ns: int) -> RigidTransform | None:
-        """Where the stage's bone will be at a moment; None where its motion is unsure."""
+        """Where the stage's bone will be at a moment; None when it moves too fast to know."""
         return self._tracks.predict(self._stage, time_ns)
 
     def other_bones(self, now_ns: int) -> tuple[OtherBone, ...]:

@@ -3,6 +3,8 @@
 import threading
 from collections.abc import Callable
 
+import numpy as np
+
 from drivers.frames import StereoFrame
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
@@ -56,9 +58,13 @@ class Trackers:
         with self._lock:
             return self._with_aspects.get(bone) or self._trackers.setdefault(bone, made)
 
-    def centre_mm(self, bone: str) -> FloatArray:
-        """(3,) mean of the vertices of a bone's model."""
-        return self._plan.bones[bone].mesh.centroid_mm
+    def corners_mm(self, bone: str) -> FloatArray:
+        """(8, 3) of the box around a bone's model."""
+        vertices = self._plan.bones[bone].mesh.vertices_mm
+        ends = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+        which = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+        corners: FloatArray = ends[which, np.arange(3)]
+        return corners
 
     @property
     def follows_refused(self) -> bool:

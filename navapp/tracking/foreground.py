@@ -75,6 +75,8 @@ def _limit_px(
     row, column = box.y % step, box.x % step
     depth_mm = view.depth_mm[row::step, column::step]
     limit_px = geometry.disparity_map_px(depth_mm - np.float32(in_front_mm)) / np.float32(step)
+    if limit_px.size == 0:
+        return limit_px, Box(0, 0, 0, 0)
     size = 2 * (near_px // step) + 1
     around_px = cv2.dilate(cv2.patchNaNs(limit_px, 0.0), np.ones((size, size), np.uint8))
     limit_px = np.where(around_px > 0.0, around_px, np.float32(np.inf))

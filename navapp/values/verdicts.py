@@ -51,6 +51,7 @@ class Reason(Enum):
     DISPLAY_DIFFERS = "the display is not as calibrated in the mirror"
     DISPLAY_NOT_ACCEPTED = "the calibration of the mirror was not accepted"
     DISPLAY_EXPIRED = "the calibration of the mirror has expired"
+    MOVES_TOO_FAST = "the bone moves too fast for the display"
     OTHER_EYE = "guides are more than 1 mm off for the other eye"
     MIRROR_UNCHECKED = "nobody has checked what is seen in the mirror"
     MIRROR_CHECK_FAILED = "the check of the mirror has failed"
@@ -100,6 +101,7 @@ _REMEDIES = {
     Reason.DISPLAY_DIFFERS: "set its size and flips back, or calibrate",
     Reason.DISPLAY_NOT_ACCEPTED: "calibrate the mirror again",
     Reason.DISPLAY_EXPIRED: "calibrate the mirror again",
+    Reason.MOVES_TOO_FAST: "hold still",
     Reason.OTHER_EYE: "cover it and say so ([mirror] eyes), or move the display",
     Reason.MIRROR_UNCHECKED: "check it on three points of the bone",
     Reason.MIRROR_CHECK_FAILED: "look from the calibrated place and check again, or calibrate",

@@ -81,6 +81,8 @@ CHANGED: dict[str, Any] = {
     "mirror": {
         "backend": "zaber",
         "calibrated_deg": 44.5,
+        "eyes": "left",
+        "check_minutes": 12.5,
         "port": "socket://stage:55550",
         "serial": "990123",
         "device": 2,
@@ -123,6 +125,10 @@ def value_at(content: Any, key: str) -> Any:
 
 
 KEYS = keys_of(Configuration)
+# A display with a model is not flipped.
+_MODEL = "display.model"
+_FLIPS = {"flip_horizontally": False, "flip_vertically": False}
+WITH_MODEL = {**CHANGED, "display": {**CHANGED["display"], **_FLIPS, "model": "display.yml"}}
 
 
 def nested(key: str, value: Any) -> dict[str, Any]:
@@ -140,11 +146,19 @@ def test_the_defaults_come_back(with_comments):
 
 @pytest.mark.parametrize("with_comments", [False, True])
 def test_every_key_of_every_section_comes_back(with_comments):
-    configuration = parse(CHANGED, "x")
-    for key in KEYS:
-        assert value_at(configuration, key) != value_at(Configuration(), key), key
-    again = parse(tomllib.loads(format_toml(configuration, with_comments)), "x")
-    assert again == configuration
+    for content, keys in ((CHANGED, set(KEYS) - {_MODEL}), (WITH_MODEL, {_MODEL})):
+        configuration = parse(content, "x")
+        for key in keys:
+            assert value_at(configuration, key) != value_at(Configuration(), key), key
+        again = parse(tomllib.loads(format_toml(configuration, with_comments)), "x")
+        assert again == configuration
+
+
+@pytest.mark.parametrize("flip", ["flip_horizontally", "flip_vertically"])
+def test_a_display_with_a_model_is_not_flipped(flip: str) -> None:
+    content = {**WITH_MODEL, "display": {**WITH_MODEL["display"], flip: True}}
+    with pytest.raises(ConfigurationError, match="model knows its flips"):
+        parse(content, "x")
 
 
 def test_a_file_to_start_from_explains_every_key_and_section():

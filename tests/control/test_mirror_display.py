@@ -7,6 +7,7 @@ from datetime import date, timedelta
 import numpy as np
 import pytest
 
+from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState, ProjectorStatus
 from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.command_files import command_from_json, command_to_json
@@ -16,6 +17,7 @@ from navapp.control.states import (
     Blank,
     CheckMirror,
     ConfirmCross,
+    EnterStage,
     NudgeCross,
     Show,
 )
@@ -53,11 +55,16 @@ def a_model(**changes: object) -> DisplayModel:
 
 
 def measured_bone(half_px: int = 36) -> TrackedFrame:
-    """An answer that has measured a square of the bone's plane."""
+    """An answer that has measured a square of the bone, a bowl."""
     geometry = Rectifier(a_rig()).geometry
     size = 2 * half_px
-    disparity = np.full((size, size), geometry.disparity_px(DEPTH_MM), np.float32)
     x, y = round(geometry.centre_x_px) - half_px, round(geometry.centre_y_px) - half_px
+    v, u = np.mgrid[y : y + size, x : x + size]
+    rays = (u - geometry.centre_x_px) ** 2 + (v - geometry.centre_y_px) ** 2
+    depth_mm = np.full((size, size), DEPTH_MM)
+    for _ in range(20):
+        depth_mm = DEPTH_MM + 0.01 * rays * (depth_mm / geometry.focal_px) ** 2
+    disparity = geometry.disparity_map_px(depth_mm)
     matched = np.full(disparity.shape, Origin.MATCHED, np.uint8)
     found = DisparityMap(disparity, np.full_like(disparity, 0.1), matched, x, y)
     around = Surroundings(disparity, matched, found.box, False, matched)
@@ -72,9 +79,15 @@ def a_bench(
     ),
     delay_ms: float = 0.0,
     eyes: Eyes = "left",
+    mirror: FixedMirror | None = None,
 ) -> Bench:
     display = CalibratedDisplay(model or a_model(), check_minutes=1.0, eyes=eyes)
-    bench = Bench(calibrated_display=display, make_display=make_display, display_delay_ms=delay_ms)
+    bench = Bench(
+        calibrated_display=display,
+        make_display=make_display,
+        display_delay_ms=delay_ms,
+        mirror=mirror,
+    )
     bench.script.tracked = measured_bone()
     return bench
 
@@ -86,8 +99,9 @@ def check(bench: Bench, *nudges: tuple[int, int]) -> None:
     for number in range(3):
         if number < len(nudges):
             bench.do(NudgeCross(*nudges[number]))
+            bench.frames()
         bench.do(ConfirmCross())
-    bench.frames()
+        bench.frames()
 
 
 def guides(bench: Bench) -> np.ndarray:
@@ -140,6 +154,69 @@ def test_a_check_that_is_off_keeps_the_display_dark() -> None:
     assert not guides(bench).any()
     check(bench, (1, 0), (0, -1))
     assert bench.snapshot.reasons == ()
+
+
+def test_a_cross_that_was_not_shown_cannot_be_confirmed() -> None:
+    bench = a_bench()
+    navigating(bench)
+    for command in (CheckMirror(), ConfirmCross(), ConfirmCross(), ConfirmCross()):
+        bench.do(command)
+    assert "not shown" in bench.refused()
+    assert bench.snapshot.cross_check is not None
+    bench.frames()
+    bench.do(NudgeCross(7, 0))
+    bench.do(ConfirmCross())  # it has moved since it was shown
+    assert bench.snapshot.cross_check.number == 0
+    bench.do(Blank())
+    bench.frames()
+    bench.do(ConfirmCross())
+    assert bench.snapshot.cross_check.number == 0
+    assert not bench.display.visible_image().any()
+
+
+def test_a_check_ends_with_its_bone_and_a_passed_one_with_a_device() -> None:
+    bench = a_bench()
+    navigating(bench)
+    bench.do(CheckMirror())
+    bench.frames()
+    assert guides(bench).any()
+    bench.do(EnterStage(5))
+    assert not guides(bench).any()
+    bench.frames()
+    assert bench.snapshot.cross_check is None
+    mirror = SlidingMirror()
+    bench = a_bench(mirror=mirror)
+    navigating(bench)
+    check(bench)
+    assert bench.snapshot.is_navigable
+    mirror.angle_deg = 44.0
+    bench.frames(2)
+    mirror.angle_deg = 45.0
+    bench.frames(2)
+    assert bench.snapshot.reasons == (Reason.MIRROR_UNCHECKED,)
+
+
+class SlidingMirror(FixedMirror):
+    """One that is not driven, and is pushed."""
+
+    def __init__(self) -> None:
+        super().__init__(45.0)
+        self.angle_deg = 45.0
+
+    def position_deg(self) -> float:
+        return self.angle_deg
+
+
+def test_nothing_is_lit_of_a_bone_that_moves_too_fast() -> None:
+    bench = a_bench(delay_ms=PERIOD_NS / 1e6)
+    navigating(bench)
+    check(bench)
+    for x_mm in (8.0, 16.0, 24.0):
+        told = measured_bone()
+        moved = replace(told.estimate, camera_from_bone=a_pose(x_mm=x_mm))
+        bench.script.tracked = replace(told, estimate=moved)
+        bench.frames()
+    assert not guides(bench).any()
 
 
 def test_a_check_grows_old() -> None:
@@ -287,8 +364,7 @@ def test_two_eyes_are_refused_where_guides_are_off_for_the_other() -> None:
     """The bone reaches from the screen's plane to 32 mm behind it, 450 mm from the eye."""
     bench = a_bench(eyes="both")
     navigating(bench)
-    check(bench)
-    assert bench.snapshot.reasons == (Reason.OTHER_EYE,)
+    assert bench.snapshot.reasons[0] is Reason.OTHER_EYE
     other = bench.snapshot.other_eye
     assert other is not None
     assert 2.0 < other.error_mm < 6.0

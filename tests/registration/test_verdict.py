@@ -169,6 +169,8 @@ def test_what_the_judge_may_say_is_all_in_the_table() -> None:
     assert {reason.name for reason in others} == {
         "NOT_NAVIGATING", "BLANKED", "CAMERA_SILENT", "DEVICE_FAULT", "RIG_MOVED", "MIRROR_AWAY",
         "PROJECTOR_ALTERS", "PROJECTOR_LOST", "POSE_TOO_OLD", "STAGE_WITHOUT_BONE",
+        "DISPLAY_DIFFERS", "DISPLAY_NOT_ACCEPTED", "DISPLAY_EXPIRED", "MOVES_TOO_FAST",
+        "OTHER_EYE", "MIRROR_UNCHECKED", "MIRROR_CHECK_FAILED", "MIRROR_CHECK_OLD",
     }  # fmt: skip
 
 
