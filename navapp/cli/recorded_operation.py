@@ -5,7 +5,7 @@ import argparse
 from navapp.cli.session_folder import RecordedSession
 from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
 from navapp.control.operators import CombinedOperator, Operator, RecordedOperator, ReplayOperator
-from navapp.control.states import DistrustRig
+from navapp.control.states import CheckMirror, DistrustRig
 
 # After which frame a session found its rig moved, and how.
 MovedRig = tuple[int, DistrustRig]
@@ -53,6 +53,13 @@ def list_warnings(session: RecordedSession | None, options: argparse.Namespace) 
     told = []
     if session is not None and not session.events.is_complete:
         told.append("the session was not recorded to its end; what there is will be replayed")
+    if session is not None and any(
+        isinstance(command, CheckMirror) for _, command in session.events.commands
+    ):
+        told.append(
+            "the session was seen in the mirror; its guides are replayed over the video, also "
+            "where the mirror was dark"
+        )
     moved = find_moved_rig(session, options)
     if moved is not None and options.order == "pingpong":
         told.append(

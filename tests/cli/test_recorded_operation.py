@@ -9,7 +9,7 @@ from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_
 from navapp.cli.session_folder import RecordedSession
 from navapp.control.operators import RecordedEvents
 from navapp.control.runner import run_headless
-from navapp.control.states import Accept, DistrustRig, Register
+from navapp.control.states import Accept, CheckMirror, DistrustRig, Register
 from tests.control.fakes import Bench, FakeCamera
 
 FOUND = DistrustRig("100 mm are 100.13 mm")
@@ -80,3 +80,11 @@ def test_to_and_fro_it_is_said_instead() -> None:
     assert list_warnings(session(is_moved=False), given) == ()
     assert list_warnings(session(), options(method="icp")) == ()
     assert list_warnings(None, given) == ()
+
+
+def test_a_session_in_the_mirror_is_said_to_show_more_than_was_lit() -> None:
+    in_mirror = session(is_moved=False)
+    in_mirror.events.commands.append((3, CheckMirror()))
+    (warning,) = list_warnings(in_mirror, options())
+    assert "seen in the mirror" in warning
+    assert list_warnings(session(is_moved=False), options()) == ()
