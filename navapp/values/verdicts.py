@@ -101,7 +101,7 @@ _REMEDIES = {
     Reason.DISPLAY_DIFFERS: "set its size and flips back, or calibrate",
     Reason.DISPLAY_NOT_ACCEPTED: "calibrate the mirror again",
     Reason.DISPLAY_EXPIRED: "calibrate the mirror again",
-    Reason.MOVES_TOO_FAST: "hold still",
+    Reason.MOVES_TOO_FAST: "hold the leg still until it is shown again",
     Reason.OTHER_EYE: "cover it and say so ([mirror] eyes), or move the display",
     Reason.MIRROR_UNCHECKED: "check it on three points of the bone",
     Reason.MIRROR_CHECK_FAILED: "look from the calibrated place and check again, or calibrate",
