@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from navapp.geometry.camera import Camera
 from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
+from navapp.overlay.viewpoints import rectify_rays
 from navapp.values import DEPTH_COLOURS, Foreground, Origin
 
 Image = NDArray[np.uint8]
@@ -52,7 +53,6 @@ def _find_places(
     rows, columns = np.mgrid[:height, :width]
     x = (columns.ravel() + 0.5) * camera.width / width - 0.5
     y = (rows.ravel() + 0.5) * camera.height / height - 0.5
-    rays = camera.rays(np.column_stack([x, y]))
-    pixels = geometry.project(geometry.rectified_from_left.rotate(rays))
+    pixels = geometry.project(rectify_rays(camera, geometry, x, y))
     there = np.nan_to_num(np.round(pixels), nan=-1.0).astype(np.intp)
     return there[:, 0].reshape(shape), there[:, 1].reshape(shape)

@@ -61,18 +61,6 @@ def draw_lines(
     _draw(image, pixels, in_camera[:, 2], scene.ground, width_px, rim_px, colour)
 
 
-def draw_cross(
-    image: Image,
-    scene: Scene,
-    point_mm: FloatArray,
-    axes: FloatArray,
-    half_mm: float,
-    colour: Colour,
-) -> None:
-    """Two strokes through a point of the bone's frame, along two axes (2, 3)."""
-    draw_lines(image, scene, cross_lines(point_mm, axes, half_mm), colour)
-
-
 def cross_lines(point_mm: FloatArray, axes: FloatArray, half_mm: float) -> list[FloatArray]:
     """Two lines (3, 3) through a point, along two axes (2, 3)."""
     return [np.stack([point_mm - half_mm * a, point_mm, point_mm + half_mm * a]) for a in axes]
@@ -80,10 +68,9 @@ def cross_lines(point_mm: FloatArray, axes: FloatArray, half_mm: float) -> list[
 
 def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: float = 14.0) -> None:
     """A thin cross at a place (2,) of the picture, its middle left open."""
-    everywhere = np.ones(image.shape[:2], dtype=np.float32)
-    nowhere = np.full((1, 1), np.nan, dtype=np.float32)
-    one = np.float32(1.0)
-    ground = Ground(0, 0, everywhere[:1, :1], nowhere, one, np.float32(0.5), one)
+    # Nothing is known of the depth, and all is drawn as on top.
+    nowhere, one = np.empty((0, 0), dtype=np.float32), np.float32(1.0)
+    ground = Ground(0, 0, nowhere, nowhere, one, np.float32(0.5), one)
     for x, y in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
         arm = at_px + half_px * np.array([[0.25 * x, 0.25 * y], [x, y]])
         _draw(image, arm, np.zeros(2), ground, 1.5, 0.0, colour)

@@ -1,7 +1,7 @@
 """Where a picture is seen from: the left camera, or the eye that looks into the mirror."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,17 @@ from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
-from navapp.overlay.splat_kernels import splat_points
+from navapp.overlay.splat_kernels import IN_FRONT, KNOWN, splat_points
 from navapp.values import Foreground, Origin
 
 FloatMap = NDArray[np.float32]
+
+# Between matches a gap as narrow as this is no guess.
+_NARROW_PX = 5
+# The marks are of every other pixel: their edge is made smooth over so much.
+_EDGE_SIGMA_PX = 1.2
+# Of the measured points in the rectified picture every so many is moved to the eye, each way.
+_POINT_STEP = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,20 +112,12 @@ class LeftView:
         return SeenDepth(box, depth_mm, is_wide_gap(origins != Origin.MATCHED), in_front)
 
 
-# Between matches a gap as narrow as this is no guess.
-_NARROW_PX = 5
-
-
 def is_wide_gap(is_guess: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """A mask (h, w) of guesses without its specks and narrow parts."""
     import cv2
 
     square = np.ones((_NARROW_PX, _NARROW_PX), np.uint8)
     return np.asarray(cv2.morphologyEx(is_guess.view(np.uint8), cv2.MORPH_OPEN, square)) > 0
-
-
-# The marks are of every other pixel: their edge is made smooth over so much.
-_EDGE_SIGMA_PX = 1.2
 
 
 def _rectified_places(
@@ -129,14 +128,21 @@ def _rectified_places(
     The depth in the camera is the rectified depth times that share.
     """
     rows, columns = np.mgrid[: camera.height, : camera.width]
-    rays = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]))
-    rectified = geometry.rectified_from_left.rotate(rays)
-    shape = camera.height, camera.width
+    rectified = rectify_rays(camera, geometry, columns.ravel(), rows.ravel())
     pixels = geometry.project(rectified)
-    share = rays[:, 2] / rectified[:, 2]
-    there = (pixels[:, 0], pixels[:, 1], share)
+    # The rays in the camera have the depth 1.
+    there = (pixels[:, 0], pixels[:, 1], 1.0 / rectified[:, 2])
+    shape = camera.height, camera.width
     u, v, depth_share = (part.reshape(shape).astype(np.float32) for part in there)
     return u, v, depth_share
+
+
+def rectify_rays(
+    camera: Camera, geometry: RectifiedGeometry, columns: NDArray[Any], rows: NDArray[Any]
+) -> FloatArray:
+    """(N, 3) rays through pixels of the left picture, turned into the rectified camera."""
+    rays = camera.rays(np.column_stack([columns, rows]))
+    return geometry.rectified_from_left.rotate(rays)
 
 
 class MirrorView:
@@ -184,7 +190,9 @@ class MirrorView:
             depth_mm,
             mark,
         )
-        return SeenDepth(box, depth_mm, is_wide_gap(mark & 1 == 0), self._soften(mark & 2 > 0))
+        return SeenDepth(
+            box, depth_mm, is_wide_gap(mark & KNOWN == 0), self._soften(mark & IN_FRONT > 0)
+        )
 
     def _soften(self, is_in_front: NDArray[np.bool_]) -> FloatMap:
         import cv2
@@ -216,7 +224,3 @@ class MirrorView:
         """(3,) of what was matched, in the rectified camera; None when nothing was."""
         cloud = foreground.measured.reproject(self._geometry, stride_px=16)
         return None if len(cloud) == 0 else np.asarray(np.median(cloud.points_mm, axis=0))
-
-
-# Of the measured points in the rectified picture.
-_POINT_STEP = 2

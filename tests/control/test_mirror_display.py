@@ -1,5 +1,6 @@
 """A session whose display is seen in the mirror: lit after the check, dark otherwise."""
 
+import argparse
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date, timedelta
@@ -9,6 +10,8 @@ import pytest
 
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState, ProjectorStatus
+from navapp.cli.live_session import _read_display
+from navapp.config import parse
 from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.device_handlers import ProjectorHandler
@@ -18,10 +21,13 @@ from navapp.control.states import (
     CheckMirror,
     ConfirmCross,
     EnterStage,
+    MirrorCheck,
     NudgeCross,
     Show,
 )
+from navapp.errors import ConfigurationError
 from navapp.geometry.display_model import DisplayModel, DisplayQuality
+from navapp.geometry.display_model_files import write_display_model
 from navapp.geometry.display_model_optics import VirtualScreen
 from navapp.geometry.rectification import Rectifier
 from navapp.values import (
@@ -399,6 +405,53 @@ def test_a_projector_with_keystone_or_another_flip_is_refused(status, is_refused
     assert (report.reason is Reason.PROJECTOR_ALTERS) is is_refused
     turned = ProjectorHandler(KeystoneProjector(status), a_model(projector_flips=(True, False)))
     assert (turned.report().reason is None) is (status.flips_horizontally is True)
+
+
+def test_a_projector_that_was_calibrated_must_answer() -> None:
+    absent = KeystoneProjector(ProjectorStatus(PowerState.ABSENT))
+    with_flips = ProjectorHandler(absent, a_model(projector_flips=(True, False)))
+    assert with_flips.report().reason is Reason.PROJECTOR_LOST
+    assert ProjectorHandler(absent, a_model()).report().reason is None
+
+
+@pytest.mark.parametrize("residual_mm", [np.nan, np.inf, -1.0, 1.01])
+def test_a_check_is_not_passed_by_what_is_no_small_distance(residual_mm: float) -> None:
+    display = CalibratedDisplay(a_model())
+    found = display.find_check_reason(MirrorCheck(0, residual_mm), 1)
+    assert found is Reason.MIRROR_CHECK_FAILED
+    assert display.find_check_reason(MirrorCheck(0, 1.0), 1) is None
+
+
+def test_a_hand_is_no_place_for_a_cross() -> None:
+    bench = a_bench()
+    navigating(bench)
+    told = measured_bone()
+    assert told.foreground is not None
+    # All that was matched lies 20 mm before the bone.
+    nearer = Rectifier(a_rig()).geometry
+    depth_mm = nearer.focal_px * nearer.baseline_mm / told.foreground.measured.disparity_px
+    hand = replace(told.foreground.measured, disparity_px=nearer.disparity_map_px(depth_mm - 20.0))
+    bench.script.tracked = replace(told, foreground=replace(told.foreground, measured=hand))
+    bench.frames()
+    bench.do(CheckMirror())
+    assert "mm apart" in bench.refused()
+
+
+@pytest.mark.parametrize(
+    ("eye", "eyes", "is_refused"),
+    [("right", "left", True), ("right", "right", False), ("right", "both", False),
+     ("camera", "left", False)],
+)  # fmt: skip
+def test_the_eye_that_looks_is_the_calibrated_one(tmp_path, eye, eyes, is_refused) -> None:
+    path = tmp_path / "display.yml"
+    write_display_model(path, a_model(viewing_eye=eye))
+    content = {"display": {"model": str(path)}, "mirror": {"eyes": eyes}}
+    given = parse(content, "x"), argparse.Namespace(allow_unaccepted=False)
+    if is_refused:
+        with pytest.raises(ConfigurationError, match="calibrated for the right eye"):
+            _read_display(*given)
+    else:
+        assert _read_display(*given).eyes == eyes
 
 
 @pytest.mark.parametrize("command", [CheckMirror(), NudgeCross(-3, 7), ConfirmCross()])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.overlay.strokes import draw_cross, draw_line, sample_line
+from navapp.overlay.strokes import cross_lines, draw_line, draw_lines, sample_line
 from tests.overlay.scenes import (
     BEHIND,
     CAMERA,
@@ -120,7 +120,7 @@ def test_a_dashed_line_is_still_seen() -> None:
 
 def test_a_cross_has_its_middle_at_its_point() -> None:
     given, image, point = seen(scene()), black(), TARGET - (0.0, 0.0, 10.0)
-    draw_cross(image, given, point, given.picture_axes_in_bone, 5.0, COLOUR)
+    draw_lines(image, given, cross_lines(point, given.picture_axes_in_bone, 5.0), COLOUR)
     (u, v), reach = pixels_of(point)[0], round(4.0 * 700 / 400)
     lit = is_colour(image, COLOUR)
     assert lit[v, u - reach : u + reach + 1].all()
