@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from navapp.cli.alignment_files import read_alignments
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.mirror_views import read_lens, read_views
-from navapp.errors import ResultError, UsageError
+from navapp.errors import ConfigurationError, ResultError, UsageError
 
 if TYPE_CHECKING:
-    from navapp.config import Configuration
+    from navapp.config import Configuration, DisplaySection
     from navapp.geometry.display_model import DisplayModel
 
 _MM_PER_INCH = 25.4
@@ -79,6 +79,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             "--pattern FILE.png alone",
         )
     configuration = load(find_file(options.config))
+    _check_flips(configuration)
     if given == ["pattern"]:
         return _write_pattern(options, configuration)
     solve = _solve_views if given == ["views"] else _solve_alignments
@@ -186,7 +187,7 @@ def _with_record(model: "DisplayModel", configuration: "Configuration") -> "Disp
     today, display = date.today(), configuration.display
     return replace(
         model,
-        display_name=display.output or display.backend,
+        display_name=_display_name(display),
         backend_flips=(display.flip_horizontally, display.flip_vertically),
         mirror_deg=configuration.mirror.calibrated_deg,
         quality=replace(
@@ -195,6 +196,28 @@ def _with_record(model: "DisplayModel", configuration: "Configuration") -> "Disp
             expires_on=today + timedelta(days=configuration.calibration.valid_days),
         ),
     )
+
+
+def _display_name(display: "DisplaySection") -> str:
+    """By which the opened display will be known."""
+    if display.backend == "simulated":
+        return "sim:display"
+    return display.output or display.backend
+
+
+def _check_flips(configuration: "Configuration") -> None:
+    """Refuse flips that no session on a display with a model can have.
+
+    Raises:
+        ConfigurationError: the display is configured to be flipped.
+    """
+    display = configuration.display
+    if display.flip_horizontally or display.flip_vertically:
+        raise ConfigurationError(
+            "a display that is calibrated in the mirror is not flipped",
+            subject="display.flip_horizontally, display.flip_vertically",
+            remedy="set both to false and take the pictures again: the model knows its flips",
+        )
 
 
 def _display_size(options: argparse.Namespace, configuration: "Configuration") -> tuple[int, int]:
