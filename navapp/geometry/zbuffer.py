@@ -54,26 +54,33 @@ def render(
         is_whole: the whole picture; otherwise only the box around the mesh, empty out of view.
         is_closed: as for `render_rectified`.
     """
-    points_mm = camera_from_mesh.apply(mesh.vertices_mm)
-    return render_points(points_mm, mesh.faces, camera, is_whole=is_whole, is_closed=is_closed)
+    projected = ProjectedMesh.of(camera_from_mesh.apply(mesh.vertices_mm), mesh.faces, camera)
+    return projected.render(is_whole=is_whole, is_closed=is_closed)
 
 
-def render_points(
-    points_mm: FloatArray,
-    faces: NDArray[np.int32],
-    camera: Camera,
-    *,
-    is_whole: bool = False,
-    is_closed: bool = False,
-) -> RenderedView:
-    """Triangles (F, 3) of points (N, 3) in a camera's frame; options as of `render`."""
-    pixels = camera.project(points_mm)
-    box = Box(0, 0, camera.width, camera.height)
-    if not is_whole:
+@dataclass(frozen=True, slots=True, eq=False)
+class ProjectedMesh:
+    """A mesh in a camera's picture: where it lies is known before it is drawn."""
+
+    pixels: FloatArray  # (V, 2)
+    depths_mm: FloatArray  # (V,)
+    faces: NDArray[np.int32]  # (F, 3)
+    box: Box  # around it, inside the picture; empty out of view
+    whole: Box  # the picture
+
+    @classmethod
+    def of(cls, points_mm: FloatArray, faces: NDArray[np.int32], camera: Camera) -> "ProjectedMesh":
+        """Triangles (F, 3) of points (N, 3) in the camera's frame."""
+        pixels = camera.project(points_mm)
         around = Box.around(pixels)
         box = Box(0, 0, 0, 0) if around is None else around.clip(camera.width, camera.height)
-    pixels -= (box.x, box.y)
-    return _raster(pixels, points_mm[:, 2].copy(), faces, box, is_closed)
+        whole = Box(0, 0, camera.width, camera.height)
+        return cls(pixels, points_mm[:, 2].copy(), faces, box, whole)
+
+    def render(self, *, is_whole: bool = False, is_closed: bool = False) -> RenderedView:
+        """Options as of the function `render`."""
+        box = self.whole if is_whole else self.box
+        return _raster(self.pixels - (box.x, box.y), self.depths_mm, self.faces, box, is_closed)
 
 
 def render_rectified(

@@ -59,45 +59,149 @@ def blend_colour(
 
 
 @njit(cache=True, nogil=True)
+def blend_outline(
+    image: NDArray[np.uint8],
+    soft: NDArray[np.uint8],
+    weight: NDArray[np.float32],
+    corner: tuple[int, int],
+    stripe_px: int,
+    beneath: float,
+    colour: tuple[int, int, int],
+) -> None:
+    """Blend a line along the edge of a mask, in slanted stripes where it lies beneath something.
+
+    Args:
+        image: (h, w, 3) in place.
+        soft: (h, w) the mask with a smooth edge, 0 to 255.
+        weight: (h, w) 0 to 1: full on top; beneath something faint in every other stripe, and less
+            towards what hides it.
+        corner: column and row of the first pixel in the picture, for the stripes.
+        stripe_px: their width.
+        beneath: weight of what lies beneath.
+        colour: of the image's channels.
+    """
+    for y in range(soft.shape[0]):
+        for x in range(soft.shape[1]):
+            if soft[y, x] == 0 or soft[y, x] == 255 or weight[y, x] <= 0.0:
+                continue
+            inside = np.float32(soft[y, x]) / np.float32(255.0)
+            share = min(np.float32(5.0) * inside * (np.float32(1.0) - inside), np.float32(1.0))
+            line = weight[y, x]
+            if line <= np.float32(beneath):
+                line = min(line / np.float32(beneath), np.float32(1.0))
+                if ((corner[0] + x + corner[1] + y) // stripe_px) % 2 == 1:
+                    line *= np.float32(0.25)
+            for k in range(3):
+                before = np.float32(image[y, x, k])
+                after = before + share * line * (np.float32(colour[k]) - before)
+                image[y, x, k] = np.uint8(after + np.float32(0.5))
+
+
+@njit(cache=True, nogil=True)
 def find_weights(
     bone_mm: NDArray[np.float32],
     depth_mm: NDArray[np.float32],
-    is_guess: NDArray[np.bool_],
-    in_front: NDArray[np.float32],
+    is_guess: NDArray[np.uint8],
+    in_front: NDArray[np.uint8],
     tissue_mm: float,
     aside_mm: float,
     beneath: float,
     guess: float,
     weight: NDArray[np.float32],
+    nearest_mm: NDArray[np.float32],
 ) -> None:
-    """How strongly a guide on the bone's surface is drawn in each pixel.
+    """How strongly a guide on the bone's surface is drawn in each pixel, and what is nearest.
 
     Args:
         bone_mm: (h, w) depth of the bone, NaN beside it.
         depth_mm: (h, w) of what is seen, NaN where unknown.
-        is_guess: (h, w) nothing was matched there.
-        in_front: (h, w) 0 to 1, share of the pixel that hides the bone.
+        is_guess: (h, w) 1 where nothing was matched.
+        in_front: (h, w) 0 to 255, how much of the pixel hides the bone.
         tissue_mm: what is nearer than the bone by more lies on it.
         aside_mm: beside the bone, what is nearer than this depth hides guides.
         beneath: weight of what lies beneath something.
         guess: weight where that is not known.
         weight: (h, w) in place, 0 (hidden) to 1 (on top).
+        nearest_mm: (h, w) in place, depth of bone or what was matched before it; NaN where unknown.
     """
     for y in range(bone_mm.shape[0]):
         for x in range(bone_mm.shape[1]):
-            seen = np.float32(1.0) - in_front[y, x]
             bone, depth = bone_mm[y, x], depth_mm[y, x]
+            is_known = is_guess[y, x] == 0
+            seen = np.float32(255 - in_front[y, x]) / np.float32(255.0)
+            # A comparison with an unknown depth is False.
             if np.isnan(bone):
-                # A comparison with an unknown depth is False.
                 is_beneath = False
                 if depth < aside_mm:
                     seen = np.float32(0.0)
             else:
                 is_beneath = depth < bone - tissue_mm
-            if is_guess[y, x]:
+            if not is_known:
                 weight[y, x] = seen * np.float32(guess)
             else:
                 weight[y, x] = seen * np.float32(beneath) if is_beneath else seen
+            nearest_mm[y, x] = depth if is_known and not depth > bone else bone
+
+
+@njit(cache=True, nogil=True)
+def mark_dots(
+    pixels: NDArray[np.float64],
+    depth_mm: NDArray[np.float64],
+    bone_mm: NDArray[np.float32],
+    weight: NDArray[np.float32],
+    skin_mm: float,
+    share: NDArray[np.float32],
+) -> tuple[int, int]:
+    """Mark five pixels for each point that the bone does not hide; the rows that hold them.
+
+    Args:
+        pixels: (N, 2) of the points, NaN where they are not seen.
+        depth_mm: (N,).
+        bone_mm: (h, w) depth of the bone, NaN beside it.
+        weight: (h, w) 0 to 1.
+        skin_mm: a point further behind the bone's surface is hidden.
+        share: (h, w) in place, 0 before: the weight at the point.
+    """
+    height, width = share.shape
+    first, last = height, 0
+    for k in range(len(pixels)):
+        # A comparison with NaN is False.
+        if not (0.5 <= pixels[k, 0] < width - 1.5 and 0.5 <= pixels[k, 1] < height - 1.5):
+            continue
+        u, v = int(np.floor(pixels[k, 0] + 0.5)), int(np.floor(pixels[k, 1] + 0.5))
+        if depth_mm[k] > bone_mm[v, u] + skin_mm:
+            continue
+        share[v, u - 1 : u + 2] = weight[v, u]
+        share[v - 1, u] = share[v + 1, u] = weight[v, u]
+        first, last = min(first, v - 1), max(last, v + 2)
+    return first, max(first, last)
+
+
+@njit(cache=True, nogil=True)
+def lay_over(
+    share: NDArray[np.float32],
+    colour: NDArray[np.float32],
+    over_share: NDArray[np.float32],
+    over_colour: NDArray[np.float32],
+) -> None:
+    """Join two colours of each triangle to one that blends as both do, one after the other.
+
+    Args:
+        share: (F,) in place, of the colour below.
+        colour: (F, 3) in place.
+        over_share: (F,) of the colour above.
+        over_colour: (F, 3), or (1, 3) for all of them.
+    """
+    is_one = over_colour.shape[0] == 1
+    for face in range(len(share)):
+        above = over_share[face]
+        if above <= 0.0:
+            continue
+        row = 0 if is_one else face
+        both = above + share[face] * (np.float32(1.0) - above)
+        for k in range(3):
+            colour[face, k] += above / both * (over_colour[row, k] - colour[face, k])
+        share[face] = both
 
 
 @njit(cache=True, nogil=True)

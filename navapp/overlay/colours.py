@@ -3,6 +3,9 @@
 Source: Okabe and Ito 2008, lightened for a picture of tissue.
 """
 
+import numpy as np
+from numpy.typing import NDArray
+
 Colour = tuple[int, int, int]
 
 # The bone's outline: navigable, or a candidate that nobody has accepted.
@@ -40,3 +43,8 @@ REMOVAL_RAMP: tuple[Colour, ...] = (
 def risk_colour(name: str) -> Colour:
     """Of a vessel or a nerve, by its name."""
     return next((colour for key, colour in _RISKS.items() if key in name), OTHER_RISK)
+
+
+def one_colour(colour: Colour) -> NDArray[np.float32]:
+    """(1, 3) for all triangles of a mesh."""
+    return np.array([colour], dtype=np.float32)

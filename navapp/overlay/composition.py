@@ -8,7 +8,7 @@ from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import CANDIDATE, GUIDE, TARGET
 from navapp.overlay.labels import LabelBoard, put_text, text_size
-from navapp.overlay.layers import LAYERS
+from navapp.overlay.painting import paint_layers
 from navapp.overlay.scene import Scene
 from navapp.overlay.strokes import draw_cross_px
 
@@ -51,7 +51,7 @@ def compose_video(
     if scene is not None:
         if (height, width) != (scene.camera.height, scene.camera.width):
             raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
-        draw_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height)))
+        paint_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height)))
     if cross_px is not None and np.isfinite(cross_px).all():
         draw_cross_px(image, cross_px, TARGET)
     is_guiding = scene is not None and not scene.is_candidate
@@ -84,7 +84,7 @@ def compose_mirror(
     strip_px = round(_STRIP_SHARE * height)
     if scene is not None:
         rims = [Box(0, height - strip_px, width, strip_px)]
-        draw_layers(image, scene, LabelBoard(_MIRROR_TEXT_SIZE * height / 1080.0, rims))
+        paint_layers(image, scene, LabelBoard(_MIRROR_TEXT_SIZE * height / 1080.0, rims))
     if cross_px is not None and np.isfinite(cross_px).all():
         draw_cross_px(image, cross_px, TARGET)
     size = _MIRROR_TEXT_SIZE * height / 1080.0
@@ -113,14 +113,6 @@ def put_mark(image: Image, text: str) -> Image:
     at = image.shape[1] - width - _RIM_PX, 10 + height
     put_text(marked, text, at, size, (230, 230, 230))
     return marked
-
-
-def draw_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
-    """The scene's layers in the order of their table, and their words."""
-    for name, layer in LAYERS.items():
-        if name in scene.layers:
-            layer(image, scene, labels)
-    labels.draw(image)
 
 
 def make_preview(image: Image) -> Image:

@@ -7,14 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.overlay.blend_kernels import blend_colour
 from navapp.overlay.colours import Colour
+from navapp.overlay.label_kernels import blend_text, find_free_place
 
 Image = NDArray[np.uint8]
 
 # Places of a label around its point, nearest first: directions, and how far away.
 _DIRECTIONS = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1))
 _DISTANCES_PX = (14, 34, 60, 92)
+# (32, 2) of the box from its point, in px, and shares of its own size.
+_OFFSETS_PX = np.array([np.multiply(one, d) for d in _DISTANCES_PX for one in _DIRECTIONS])
+_SHARES = np.array([np.subtract(one, 1) / 2.0 for _ in _DISTANCES_PX for one in _DIRECTIONS])
 _PADDING_PX, _ROUND_PX = 3, 9
 _TEXT_RIM_PX = 2
 
@@ -62,21 +65,16 @@ class LabelBoard:
         return placed
 
     def _find_place(
-        self, text: str, at: tuple[float, float], size_px: tuple[int, int], named: list[Box]
+        self, text: str, at: tuple[float, float], picture_px: tuple[int, int], named: list[Box]
     ) -> Box | None:
         w, h = text_size(text, self.size)
-        w, h = w + 2 * _PADDING_PX, h + 2 * _PADDING_PX
-        for distance in _DISTANCES_PX:
-            for right, down in _DIRECTIONS:
-                x = at[0] + right * distance - (0.5 * w if right == 0 else w * (right < 0))
-                y = at[1] + down * distance - (0.5 * h if down == 0 else h * (down < 0))
-                box = Box(round(x), round(y), w, h)
-                inside = box.clip(*size_px)
-                if inside == box and not any(
-                    _overlap(box, other) for other in (*self.taken, *named)
-                ):
-                    return box
-        return None
+        size = np.array([w, h]) + 2 * _PADDING_PX
+        # Beside the point on the left or above, the box ends where on the right it begins.
+        places = np.round(np.array(at) + _OFFSETS_PX + _SHARES * size).astype(np.int64)
+        others = np.array([(one.x, one.y, one.width, one.height) for one in (*self.taken, *named)])
+        w, h = int(size[0]), int(size[1])
+        number = find_free_place(places, (w, h), picture_px, others)
+        return None if number < 0 else Box(int(places[number, 0]), int(places[number, 1]), w, h)
 
 
 def text_size(text: str, size: float) -> tuple[int, int]:
@@ -90,11 +88,7 @@ def text_size(text: str, size: float) -> tuple[int, int]:
 def put_text(image: Image, text: str, at: tuple[int, int], size: float, colour: Colour) -> None:
     """Text with a dark rim, readable on any picture; its baseline begins at a place."""
     letters, rim, above = _text_shares(text, size)
-    box = Box(at[0] - _TEXT_RIM_PX, at[1] - above, letters.shape[1], letters.shape[0])
-    here, there = Box(0, 0, image.shape[1], image.shape[0]).shared_slices(box)
-    part = image[here]
-    blend_colour(part, rim[there], (0, 0, 0))
-    blend_colour(part, letters[there], colour)
+    blend_text(image, letters, rim, (at[0] - _TEXT_RIM_PX, at[1] - above), colour)
 
 
 @lru_cache(maxsize=256)
@@ -111,12 +105,3 @@ def _text_shares(text: str, size: float) -> tuple[NDArray[np.float32], NDArray[n
     letters = drawn.astype(np.float32) / np.float32(255.0)
     rim = np.asarray(cv2.dilate(letters, np.ones((3, 3), np.uint8)), dtype=np.float32)
     return letters, rim, above
-
-
-def _overlap(one: Box, other: Box) -> bool:
-    return (
-        one.x < other.x + other.width
-        and other.x < one.x + one.width
-        and one.y < other.y + other.height
-        and other.y < one.y + one.height
-    )

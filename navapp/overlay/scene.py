@@ -12,7 +12,7 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.geometry.zbuffer import RenderedView, render_points
+from navapp.geometry.zbuffer import ProjectedMesh, RenderedView, find_known_range
 from navapp.overlay.blend_kernels import find_weights
 from navapp.overlay.colours import CANDIDATE, GUIDE, Colour
 from navapp.overlay.stroke_kernels import Ground
@@ -142,20 +142,26 @@ class Scene:
 
     def render(self, mesh: TriangleMesh) -> RenderedView:
         """A mesh in the bone's coordinates; only the box around it."""
-        points_mm = self.to_camera(mesh.vertices_mm)
-        return render_points(points_mm, mesh.faces, self.camera, is_closed=is_closed(mesh))
+        return self._project(mesh).render(is_closed=is_closed(mesh))
+
+    def _project(self, mesh: TriangleMesh) -> ProjectedMesh:
+        return ProjectedMesh.of(self.to_camera(mesh.vertices_mm), mesh.faces, self.camera)
+
+    @cached_property
+    def _projected(self) -> ProjectedMesh:
+        return self._project(self.drawn_mesh)
 
     @cached_property
     def view(self) -> RenderedView:
         """The bone's part of the picture; rendered once."""
-        return self.render(self.drawn_mesh)
+        return self._projected.render(is_closed=is_closed(self.drawn_mesh))
 
     @cached_property
     def box(self) -> Box:
         """Where the order of things is known: the bone's box and a margin, in the picture."""
-        if self.view.box.is_empty:
-            return self.view.box
-        return self.view.box.grow(_MARGIN_PX).clip(self.camera.width, self.camera.height)
+        if self._projected.box.is_empty:
+            return self._projected.box
+        return self._projected.box.grow(_MARGIN_PX).clip(self.camera.width, self.camera.height)
 
     @cached_property
     def bone_mm(self) -> FloatMap:
@@ -172,17 +178,22 @@ class Scene:
         return self.viewpoint.see(self.foreground, self.box)
 
     @cached_property
-    def weight(self) -> FloatMap:
-        """(h, w) over `box`: 0 to 1, how strongly a guide on the bone is drawn in each pixel."""
-        weight = np.empty(self.bone_mm.shape, dtype=np.float32)
+    def _order(self) -> tuple[FloatMap, FloatMap]:
+        """(h, w) over `box`: weight of guides on the bone, and depth of what is nearest."""
+        weight = np.full(self.bone_mm.shape, self.guess_weight, dtype=np.float32)
         if self.seen is None:
-            weight.fill(self.guess_weight)
-            return weight
+            return weight, self.bone_mm
+        nearest_mm = np.empty_like(weight)
         find_weights(
             self.bone_mm, self.seen.depth_mm, self.seen.is_guess, self.seen.in_front, TISSUE_MM,
-            self._aside_mm, BENEATH_WEIGHT, self.guess_weight, weight,
+            self._aside_mm, BENEATH_WEIGHT, self.guess_weight, weight, nearest_mm,
         )  # fmt: skip
-        return weight
+        return weight, nearest_mm
+
+    @property
+    def weight(self) -> FloatMap:
+        """(h, w) over `box`: 0 to 1, how strongly a guide on the bone is drawn in each pixel."""
+        return self._order[0]
 
     def weight_over(self, box: Box) -> FloatMap:
         """The weights over another box; beyond `box` nothing is known."""
@@ -194,14 +205,11 @@ class Scene:
     @cached_property
     def ground(self) -> Ground:
         """What lines and points of guides are compared with."""
-        nearest_mm = self.bone_mm
-        if self.seen is not None:
-            matched_mm = np.where(self.seen.is_guess, np.float32(np.nan), self.seen.depth_mm)
-            nearest_mm = np.fmin(nearest_mm, matched_mm)
+        weight, nearest_mm = self._order
         skin_mm, beneath, beyond = (
             np.float32(value) for value in (SKIN_MM, BENEATH_WEIGHT, self.guess_weight)
         )
-        return Ground(self.box.x, self.box.y, self.weight, nearest_mm, skin_mm, beneath, beyond)
+        return Ground(self.box.x, self.box.y, weight, nearest_mm, skin_mm, beneath, beyond)
 
     def weight_of(self, view: RenderedView, box: Box) -> FloatMap:
         """The weights over a box of another mesh: those of beneath where the bone is nearer."""
@@ -216,5 +224,5 @@ class Scene:
 
     @property
     def _aside_mm(self) -> float:
-        nearest_mm = np.fmin.reduce(self.view.depth_mm, axis=None, initial=np.inf)
-        return float(nearest_mm) - _ASIDE_MM
+        nearest_mm, _ = find_known_range(self.view.depth_mm)
+        return nearest_mm - _ASIDE_MM

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 # A line is followed in steps of so many px; each is on top, beneath or hidden as a whole.
 _STEP_PX = 1.5
 _FARTHEST_PX = 20_000.0
+_DASH_PX, _GAP_PX = 7.0, 5.0
 
 
 class Ground(NamedTuple):
@@ -23,40 +24,104 @@ class Ground(NamedTuple):
     beyond: np.float32  # weight outside of the box
 
 
-class Pen(NamedTuple):
-    """How a line is drawn."""
+class Room(NamedTuple):
+    """Arrays that strokes are traced in; what is 0 before is 0 after."""
 
-    half_px: np.float32  # half of its width
-    rim_px: np.float32  # width of a dark rim on either side, where the line is on top
-    dash_px: np.float32
-    gap_px: np.float32
+    line: NDArray[np.float32]  # (H, W) of the picture, 0: share of a pixel that a line covers
+    rim: NDArray[np.float32]  # (H, W) 0: of its dark rim
+    touched: NDArray[np.int32]  # (2, H * W) pixels of both
+    place: NDArray[np.int32]  # (n,) pixels of all strokes, counted row by row
+    share: NDArray[np.float32]  # (n,) 0 to 1
+    colour: NDArray[np.int32]  # (n,) number of the stroke, or -1 of a rim
 
 
 @njit(cache=True, nogil=True)
-def trace_line(
+def trace_strokes(
+    pixels: NDArray[np.float64],
+    depth_mm: NDArray[np.float64],
+    firsts: NDArray[np.int64],
+    half_px: NDArray[np.float64],
+    rim_px: NDArray[np.float64],
+    ground: Ground,
+    room: Room,
+) -> int:
+    """How much of each pixel strokes cover, one stroke after the other; how many places there are.
+
+    Dashed where it lies beneath something or where that is not known, left out where it is hidden.
+    What does not fit into the room is left out.
+
+    Args:
+        pixels: (N, 2) of the points of all strokes; NaN where they are not seen.
+        depth_mm: (N,).
+        firsts: (S + 1,) number of each stroke's first point, and N.
+        half_px: (S,) half of the strokes' widths.
+        rim_px: (S,) width of a dark rim on either side, where the line is on top.
+        ground: what is seen.
+        room: in place; the first so many places, shares and numbers are those to be blended.
+    """
+    n = 0
+    for stroke in range(len(firsts) - 1):
+        first, last = firsts[stroke], firsts[stroke + 1]
+        n_line, n_rim = _trace_line(
+            pixels[first:last], depth_mm[first:last], ground, half_px[stroke], rim_px[stroke], room
+        )
+        n = _move(room.rim, room.touched[1, :n_rim], -1, room, n)
+        n = _move(room.line, room.touched[0, :n_line], stroke, room, n)
+    return n
+
+
+@njit(cache=True, nogil=True)
+def blend_places(
+    image: NDArray[np.uint8],
+    place: NDArray[np.int32],
+    share: NDArray[np.float32],
+    number: NDArray[np.int32],
+    colours: NDArray[np.float32],
+) -> None:
+    """Blend colours into some pixels, in their order.
+
+    Args:
+        image: (H, W, 3) in place.
+        place: (n,) pixels, counted row by row.
+        share: (n,) of the colour, 0 to 1.
+        number: (n,) row of `colours`, -1 for black.
+        colours: (S, 3) of the image's channels.
+    """
+    width = image.shape[1]
+    for k in range(len(place)):
+        row, column = place[k] // width, place[k] % width
+        for channel in range(3):
+            before = np.float32(image[row, column, channel])
+            colour = colours[number[k], channel] if number[k] >= 0 else np.float32(0.0)
+            after = before + share[k] * (colour - before)
+            image[row, column, channel] = np.uint8(after + np.float32(0.5))
+
+
+@njit(cache=True, nogil=True)
+def weigh(u: float, v: float, z: float, ground: Ground) -> np.float32:
+    """How strongly a point at a place and depth of the picture is drawn, 0 to 1."""
+    column, row = int(np.floor(u + 0.5)) - ground.x, int(np.floor(v + 0.5)) - ground.y
+    height, width = ground.weight.shape
+    if column < 0 or row < 0 or column >= width or row >= height:
+        return ground.beyond
+    weight: np.float32 = ground.weight[row, column]
+    # A comparison with an unknown depth is False.
+    if z > ground.nearest_mm[row, column] + ground.skin_mm:
+        return min(weight, ground.beneath)
+    return weight
+
+
+@njit(cache=True, nogil=True)
+def _trace_line(
     pixels: NDArray[np.float64],
     depth_mm: NDArray[np.float64],
     ground: Ground,
-    pen: Pen,
-    line: NDArray[np.float32],
-    rim: NDArray[np.float32],
-    touched: NDArray[np.int32],
+    half_px: float,
+    rim_px: float,
+    room: Room,
 ) -> tuple[int, int]:
-    """How much of each pixel a line covers, and its rim; how many pixels of both are touched.
-
-    Dashed where it lies beneath something or where that is not known, left out where it is hidden.
-
-    Args:
-        pixels: (N, 2) of its points; NaN where they are not seen.
-        depth_mm: (N,).
-        ground: what is seen.
-        pen: of the line.
-        line: (H, W) of the picture, in place, 0 to 1; the larger share stays.
-        rim: (H, W) in place.
-        touched: (2, n) in place, the pixels of the line and of the rim, counted row by row; those
-            beyond n are left out.
-    """
-    period, along = pen.dash_px + pen.gap_px, 0.0
+    """Cover a line and its rim in the room; how many pixels of both are touched."""
+    period, along = _DASH_PX + _GAP_PX, 0.0
     n_line, n_rim = 0, 0
     for k in range(len(pixels) - 1):
         u0, v0, u1, v1 = pixels[k, 0], pixels[k, 1], pixels[k + 1, 0], pixels[k + 1, 1]
@@ -65,7 +130,7 @@ def trace_line(
             continue
         if not (abs(u1) < _FARTHEST_PX and abs(v1) < _FARTHEST_PX):
             continue
-        length = np.hypot(u1 - u0, v1 - v0)
+        length = np.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2)
         n = int(length / _STEP_PX) + 1
         for step in range(n):
             a, b = step / n, (step + 1) / n
@@ -75,54 +140,15 @@ def trace_line(
             weight = weigh(u, v, z, ground)
             is_beneath = weight <= ground.beneath
             along += length / n
-            if weight < 0.5 * ground.beneath or (is_beneath and along % period > pen.dash_px):
+            if weight < 0.5 * ground.beneath or (is_beneath and along % period > _DASH_PX):
                 continue
             ends = (
                 u0 + a * (u1 - u0), v0 + a * (v1 - v0), u0 + b * (u1 - u0), v0 + b * (v1 - v0)
             )  # fmt: skip
-            n_line = _cover(ends, pen.half_px, line, touched[0], n_line)
-            if pen.rim_px > 0.0 and not is_beneath:
-                n_rim = _cover(ends, pen.half_px + pen.rim_px, rim, touched[1], n_rim)
+            n_line = _cover(ends, half_px, room.line, room.touched[0], n_line)
+            if rim_px > 0.0 and not is_beneath:
+                n_rim = _cover(ends, half_px + rim_px, room.rim, room.touched[1], n_rim)
     return n_line, n_rim
-
-
-@njit(cache=True, nogil=True)
-def blend_touched(
-    image: NDArray[np.uint8],
-    share: NDArray[np.float32],
-    touched: NDArray[np.int32],
-    colour: tuple[int, int, int],
-) -> None:
-    """Blend one colour into some pixels, and set their share back to 0.
-
-    Args:
-        image: (H, W, 3) in place.
-        share: (H, W) in place, of the colour, 0 to 1.
-        touched: (n,) the pixels, counted row by row.
-        colour: of the image's channels.
-    """
-    width = share.shape[1]
-    for place in touched:
-        row, column = place // width, place % width
-        part = share[row, column]
-        share[row, column] = np.float32(0.0)
-        for k in range(3):
-            before = np.float32(image[row, column, k])
-            after = before + part * (np.float32(colour[k]) - before)
-            image[row, column, k] = np.uint8(after + np.float32(0.5))
-
-
-@njit(cache=True, nogil=True)
-def weigh(u: float, v: float, z: float, ground: Ground) -> np.float32:
-    """How strongly a point of a guide is drawn at a place and depth: 0 hidden, 1 on top."""
-    row, column = int(np.floor(v + 0.5)) - ground.y, int(np.floor(u + 0.5)) - ground.x
-    if not (0 <= row < ground.weight.shape[0] and 0 <= column < ground.weight.shape[1]):
-        return ground.beyond
-    weight = ground.weight[row, column]
-    # A comparison with an unknown depth is False.
-    if z > ground.nearest_mm[row, column] + ground.skin_mm:
-        return np.float32(min(weight, ground.beneath))
-    return np.float32(weight)
 
 
 @njit(cache=True, nogil=True)
@@ -138,16 +164,18 @@ def _cover(
     reach = half_px + 0.5
     du, dv = u1 - u0, v1 - v0
     squared = du * du + dv * dv
+    per_px = 1.0 / squared if squared > 0.0 else 0.0
     first_row, last_row = int(np.ceil(min(v0, v1) - reach)), int(np.floor(max(v0, v1) + reach))
     first, last = int(np.ceil(min(u0, u1) - reach)), int(np.floor(max(u0, u1) + reach))
     for row in range(max(0, first_row), min(last_row + 1, share.shape[0])):
         for column in range(max(0, first), min(last + 1, share.shape[1])):
-            along = 0.0
-            if squared > 0.0:
-                along = ((column - u0) * du + (row - v0) * dv) / squared
-                along = min(max(along, 0.0), 1.0)
-            off = np.hypot(column - u0 - along * du, row - v0 - along * dv)
-            covered = np.float32(min(max(reach - off, 0.0), 1.0))
+            along = ((column - u0) * du + (row - v0) * dv) * per_px
+            along = min(max(along, 0.0), 1.0)
+            off_u, off_v = column - u0 - along * du, row - v0 - along * dv
+            off_squared = off_u * off_u + off_v * off_v
+            if off_squared >= reach * reach:
+                continue
+            covered = np.float32(min(reach - np.sqrt(off_squared), 1.0))
             if covered > share[row, column]:
                 if share[row, column] == 0.0:
                     if n == len(touched):
@@ -155,4 +183,20 @@ def _cover(
                     touched[n] = row * share.shape[1] + column
                     n += 1
                 share[row, column] = covered
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _move(
+    covered: NDArray[np.float32], touched: NDArray[np.int32], number: int, room: Room, n: int
+) -> int:
+    """From the pixels of one stroke to the list of all, whose length is returned."""
+    width = covered.shape[1]
+    for place in touched:
+        row, column = place // width, place % width
+        if n < len(room.place):
+            room.place[n], room.share[n] = place, covered[row, column]
+            room.colour[n] = number
+            n += 1
+        covered[row, column] = np.float32(0.0)
     return n

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.display_model_view import EyeView
+from navapp.geometry.halves import half_box
 from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
+from navapp.overlay.see_kernels import Measured, look_up_depth
 from navapp.overlay.splat_kernels import IN_FRONT, KNOWN, splat_points
 from navapp.values import Foreground, Origin
 
@@ -31,9 +33,9 @@ class SeenDepth:
 
     box: Box
     depth_mm: FloatMap  # (h, w) along the picture's axis, NaN where unknown
-    is_guess: NDArray[np.bool_]  # (h, w) unknown, or filled: nothing was matched there
-    # (h, w) 0 to 1: how much of a pixel stands in front of the bone; smooth at its edge.
-    in_front: FloatMap
+    is_guess: NDArray[np.uint8]  # (h, w) 1: unknown, or filled: nothing was matched there
+    # (h, w) 0 to 255: how much of a pixel stands in front of the bone; smooth at its edge.
+    in_front: NDArray[np.uint8]
 
 
 class Viewpoint(Protocol):
@@ -89,51 +91,64 @@ class LeftView:
 
     def see(self, foreground: Foreground, box: Box) -> SeenDepth:
         """What was measured in the rectified picture, at the places of the pixels of a box."""
-        import cv2
-
-        around = foreground.box
-        columns = self._columns[box.slices] - np.float32(around.x)
-        rows = self._rows[box.slices] - np.float32(around.y)
-        disparity_px, origin = foreground.depth
-        places = (columns, rows)
-        seen_px = cv2.remap(
-            disparity_px, *places, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT,
-            borderValue=np.nan,
+        shape = box.height, box.width
+        depth_mm = np.empty(shape, dtype=np.float32)
+        is_guess, in_front = np.empty((2, *shape), dtype=np.uint8)
+        geometry = self._geometry
+        look_up_depth(
+            self._columns[box.slices], self._rows[box.slices], self._depth_share[box.slices],
+            geometry.focal_px * geometry.baseline_mm, *_maps_of(foreground),
+            foreground.is_in_front, (foreground.box.x, foreground.box.y), depth_mm, is_guess,
+            in_front,
         )  # fmt: skip
-        origins = cv2.remap(
-            origin, *places, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=0
-        )
-        marks = foreground.is_in_front.astype(np.float32)
-        smooth = cv2.remap(marks, *places, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-        in_front = np.asarray(cv2.GaussianBlur(smooth, (0, 0), _EDGE_SIGMA_PX), dtype=np.float32)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            along_mm = np.float32(self._geometry.focal_px * self._geometry.baseline_mm) / seen_px
-        depth_mm = along_mm * self._depth_share[box.slices]
-        return SeenDepth(box, depth_mm, is_wide_gap(origins != Origin.MATCHED), in_front)
+        return SeenDepth(box, depth_mm, open_gaps(is_guess), soften(in_front))
 
 
-def is_wide_gap(is_guess: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A mask (h, w) of guesses without its specks and narrow parts."""
+def _maps_of(foreground: Foreground) -> tuple[Measured, Measured]:
+    """What lies around a bone, and what holds instead of it where it is matched."""
+    around, finer = foreground.surroundings, foreground.measured
+    box = half_box(around.box) if around.is_half else around.box
+    return (
+        Measured(
+            around.disparity_px, around.origin == Origin.MATCHED, box.x, box.y,
+            int(around.is_half),
+        ),
+        Measured(finer.disparity_px, finer.origin == Origin.MATCHED, finer.x, finer.y, 0),
+    )  # fmt: skip
+
+
+def open_gaps(is_guess: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """A mask (h, w) of guesses, 0 or 1, without its specks and narrow parts."""
     import cv2
 
     square = np.ones((_NARROW_PX, _NARROW_PX), np.uint8)
-    return np.asarray(cv2.morphologyEx(is_guess.view(np.uint8), cv2.MORPH_OPEN, square)) > 0
+    return np.asarray(cv2.morphologyEx(is_guess, cv2.MORPH_OPEN, square))
+
+
+def soften(marks: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Marks (h, w) of 0 and 255 with a smooth edge."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(marks, (0, 0), _EDGE_SIGMA_PX))
 
 
 def _rectified_places(
     camera: Camera, geometry: RectifiedGeometry
-) -> tuple[FloatMap, FloatMap, FloatMap]:
-    """Of each pixel (H, W): column and row in the rectified picture, and a share of depth.
+) -> tuple[NDArray[np.int16], NDArray[np.int16], FloatMap]:
+    """Of each pixel (H, W): nearest column and row in the rectified picture, and a share of depth.
 
-    The depth in the camera is the rectified depth times that share.
+    Columns and rows are negative where there is none. The depth in the camera is the rectified
+    depth times that share.
     """
     rows, columns = np.mgrid[: camera.height, : camera.width]
     rectified = rectify_rays(camera, geometry, columns.ravel(), rows.ravel())
-    pixels = geometry.project(rectified)
-    # The rays in the camera have the depth 1.
-    there = (pixels[:, 0], pixels[:, 1], 1.0 / rectified[:, 2])
+    places = np.nan_to_num(
+        np.round(geometry.project(rectified)), nan=-1.0, posinf=-1.0, neginf=-1.0
+    )
     shape = camera.height, camera.width
-    u, v, depth_share = (part.reshape(shape).astype(np.float32) for part in there)
+    # The rays in the camera have the depth 1.
+    depth_share = (1.0 / rectified[:, 2]).reshape(shape).astype(np.float32)
+    u, v = np.clip(places, -1.0, 32767.0).astype(np.int16).T.reshape(2, *shape)
     return u, v, depth_share
 
 
@@ -190,15 +205,9 @@ class MirrorView:
             depth_mm,
             mark,
         )
-        return SeenDepth(
-            box, depth_mm, is_wide_gap(mark & KNOWN == 0), self._soften(mark & IN_FRONT > 0)
-        )
-
-    def _soften(self, is_in_front: NDArray[np.bool_]) -> FloatMap:
-        import cv2
-
-        marks = is_in_front.astype(np.float32)
-        return np.asarray(cv2.GaussianBlur(marks, (0, 0), _EDGE_SIGMA_PX), dtype=np.float32)
+        is_guess = (mark & KNOWN == 0).view(np.uint8)
+        in_front = np.where(mark & IN_FRONT > 0, np.uint8(255), np.uint8(0))
+        return SeenDepth(box, depth_mm, open_gaps(is_guess), soften(in_front))
 
     def _lens_of_pair(self) -> tuple[float, float, float, float]:
         one = self._geometry

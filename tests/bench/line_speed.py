@@ -29,8 +29,9 @@ from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair, Rectifier, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.overlay import LAYERS, LeftView, Scene
+from navapp.overlay import LeftView, Scene
 from navapp.overlay.labels import LabelBoard
+from navapp.overlay.painting import paint_layers
 from navapp.registration import RegistrationModel
 from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Foreground, Plan, StageSpec, Status
@@ -77,8 +78,8 @@ class Recording:
         self, number: int, pose: RigidTransform, foreground: Foreground | None = None
     ) -> None:
         """Draw the bone over a copy of the left picture."""
-        scene = Scene(self._plan, _STAGE, pose, self._viewpoint, False, foreground)
-        LAYERS["bone"](self.frames[number].left.copy(), scene, LabelBoard(0.45))
+        scene = Scene(self._plan, _STAGE, pose, self._viewpoint, False, foreground, ("bone",))
+        paint_layers(self.frames[number].left.copy(), scene, LabelBoard(0.45))
 
 
 _STAGE = StageSpec(1, "opening", "femur", 2.0, 2.0, (), ("bone",), ())

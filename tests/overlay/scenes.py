@@ -14,7 +14,9 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.geometry.zbuffer import render_rectified
 from navapp.overlay import LAYERS, LeftView, Scene
+from navapp.overlay.drawing import Drawing
 from navapp.overlay.labels import LabelBoard
+from navapp.overlay.painting import ask_for_words, paint
 from navapp.values import (
     BoneModel,
     DisparityMap,
@@ -113,15 +115,33 @@ def seen(given: Scene, **options) -> Scene:
 
 def draw(layer: str, given: Scene, image: np.ndarray | None = None) -> np.ndarray:
     """One layer without its words, on black unless a picture is given."""
+    drawing = Drawing()
+    LAYERS[layer](given, drawing)
+    drawing.words.clear()
+    return painted(given, drawing, image)
+
+
+def painted(given: Scene, drawing: Drawing, image: np.ndarray | None = None) -> np.ndarray:
+    """On black unless a picture is given."""
     image = black() if image is None else image
-    LAYERS[layer](image, given, LabelBoard(0.45))
+    paint(image, given, drawing, LabelBoard(0.45))
     return image
+
+
+def panel_boxes(layer: str, given: Scene) -> list[Box]:
+    """Places that a layer's panels take."""
+    board, drawing = LabelBoard(0.45), Drawing()
+    LAYERS[layer](given, drawing)
+    for panel in drawing.panels:
+        panel(black(), board)
+    return board.taken
 
 
 def words(layer: str, given: Scene) -> list[str]:
     """What a layer asks the label board for."""
-    board = LabelBoard(0.45)
-    LAYERS[layer](black(), given, board)
+    board, drawing = LabelBoard(0.45), Drawing()
+    LAYERS[layer](given, drawing)
+    ask_for_words(given, drawing, board)
     return [text for text, *_ in board._asked]
 
 

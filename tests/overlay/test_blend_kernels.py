@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from navapp.overlay.blend_kernels import blend_colour, compute_face_tints, find_weights, tint_faces
+from navapp.overlay.blend_kernels import (
+    blend_colour,
+    blend_outline,
+    compute_face_tints,
+    find_weights,
+    lay_over,
+    mark_dots,
+    tint_faces,
+)
 
 pytestmark = pytest.mark.kernel
 
@@ -49,17 +57,75 @@ def test_weights_tell_what_hides_and_what_lies_on_the_bone(guess: float) -> None
     bone = rng.choice([np.nan, 400.0, 405.0], SHAPE).astype(np.float32)
     depth = rng.choice([np.nan, 390.0, 399.0, 402.0, 500.0], SHAPE).astype(np.float32)
     is_guess = np.isnan(depth) | (rng.random(SHAPE) < 0.3)
-    in_front = rng.choice([0.0, 0.4, 1.0], SHAPE).astype(np.float32)
-    weight = np.empty(SHAPE, dtype=np.float32)
-    find_weights(bone, depth, is_guess, in_front, 2.5, 395.0, 0.55, guess, weight)
+    in_front = rng.choice([0, 102, 255], SHAPE).astype(np.uint8)
+    weight, nearest = np.empty((2, *SHAPE), dtype=np.float32)
+    find_weights(
+        bone, depth, is_guess.view(np.uint8), in_front, 2.5, 395.0, 0.55, guess, weight, nearest
+    )
+    np.testing.assert_array_equal(nearest, np.fmin(bone, np.where(is_guess, np.nan, depth)))
     with np.errstate(invalid="ignore"):
         is_aside = np.isnan(bone) & (depth < 395.0)
         is_beneath = depth < bone - 2.5
-    seen = np.where(is_aside, 0.0, 1.0 - in_front)
+    seen = np.where(is_aside, 0.0, 1.0 - in_front / 255.0)
     np.testing.assert_allclose(
         weight, np.where(is_guess, guess, np.where(is_beneath, 0.55, 1.0)) * seen, atol=1e-6
     )
     assert {0.0, 0.55, 1.0} <= set(np.round(np.unique(weight).astype(float), 6))
+
+
+@pytest.mark.parametrize("n_colours", [1, 40])
+def test_colours_laid_over_each_other_blend_as_one_after_the_other(n_colours: int) -> None:
+    rng, n = np.random.default_rng(6), 40
+    layers = [
+        (rng.choice([0.0, 0.3, 0.8, 1.0], n).astype(np.float32),
+         rng.integers(0, 256, (n_colours, 3)).astype(np.float32))
+        for _ in range(3)
+    ]  # fmt: skip
+    share, colour = np.zeros(n, np.float32), np.zeros((n, 3), np.float32)
+    expected = before = rng.uniform(0.0, 255.0, (n, 3))
+    for over_share, over_colour in layers:
+        lay_over(share, colour, over_share, over_colour)
+        expected = blended(expected, over_share, over_colour)
+    np.testing.assert_allclose(blended(before, share, colour), expected, atol=1e-3)
+
+
+def outlined(before, soft, weight, corner) -> np.ndarray:
+    inside = soft / 255.0
+    share = np.minimum(5.0 * inside * (1.0 - inside), 1.0)
+    rows, columns = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    is_left_out = ((rows + corner[1] + columns + corner[0]) // 6) % 2 == 1
+    beneath = np.minimum(weight / 0.55, 1.0) * np.where(is_left_out, 0.25, 1.0)
+    line = np.where(weight <= np.float32(0.55), beneath, weight)
+    return blended(before, share * line, np.array([120, 230, 60]))
+
+
+def test_an_outline_lies_at_the_edge_of_a_mask_in_stripes_where_it_is_beneath() -> None:
+    rng, before = np.random.default_rng(7), picture(7)
+    soft = rng.choice([0, 30, 128, 250, 255], SHAPE).astype(np.uint8)
+    weight = rng.choice([0.0, 0.3, 0.55, 0.8, 1.0], SHAPE).astype(np.float32)
+    image = before.copy()
+    blend_outline(image, soft, weight, (7, 12), 6, 0.55, (120, 230, 60))
+    expected = outlined(before, soft, weight, (7, 12))
+    assert np.abs(image - expected).max() <= 0.5 + 1e-2
+
+
+def test_dots_mark_points_that_the_bone_does_not_hide() -> None:
+    bone = np.full(SHAPE, 400.0, dtype=np.float32)
+    bone[:, 20:] = np.nan
+    weight = np.full(SHAPE, 0.8, dtype=np.float32)
+    pixels = np.array(
+        [[3.3, 4.4], [10.0, 9.0], [24.0, 9.0], [0.4, 5.0], [28.6, 5.0], [np.nan, 2.0]]
+    )
+    share = np.zeros(SHAPE, dtype=np.float32)
+    depth = np.array([400.5, 402.0, 900.0, 1.0, 1.0, 1.0])
+    rows = mark_dots(pixels, depth, bone, weight, 1.0, share)
+    expected = np.zeros(SHAPE, dtype=np.float32)
+    for u, v in ((3, 4), (24, 9)):
+        expected[v, u - 1 : u + 2] = expected[v - 1 : v + 2, u] = 0.8
+    np.testing.assert_allclose(share, expected)
+    assert rows == (3, 11)
+    none = mark_dots(pixels[3:], depth[3:], bone, weight, 1.0, share)
+    assert none[0] == none[1]
 
 
 def test_a_steep_triangle_has_a_larger_share() -> None:

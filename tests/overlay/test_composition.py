@@ -9,8 +9,9 @@ import pytest
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import LAYERS, LeftView, compose_video, labels, make_preview, put_mark
 from navapp.overlay.colours import CANDIDATE, GUIDE
-from navapp.overlay.composition import draw_layers, text_boxes
+from navapp.overlay.composition import text_boxes
 from navapp.overlay.labels import LabelBoard
+from navapp.overlay.painting import paint_layers
 from tests.overlay.layers.test_layers import full
 from tests.overlay.scenes import (
     CAMERA,
@@ -95,7 +96,7 @@ def test_labels_lie_neither_over_each_other_nor_over_banner_and_mark(scale: floa
     image = np.zeros((height, width, 3), np.uint8)
     rims = text_boxes(width, height)
     board = LabelBoard(0.45, list(rims))
-    draw_layers(image, given, board)
+    paint_layers(image, given, board)
     assert len(board.taken) >= len(rims) + 5
     assert not any(not one.intersect(other).is_empty for one, other in combinations(board.taken, 2))
 

@@ -4,18 +4,20 @@ import numpy as np
 import pytest
 
 from navapp.geometry.zbuffer import render
-from navapp.overlay.blend_kernels import tint_faces
+from navapp.overlay.colours import one_colour
+from navapp.overlay.drawing import Body, Tint
 from navapp.overlay.scene import BENEATH_WEIGHT
-from navapp.overlay.shading import draw_surface, one_colour, outline, outline_box, tint
-from tests.overlay.scenes import CAMERA, MESH, POSE, black, grown, is_colour, scene, video
+from navapp.overlay.shading import draw_body, draw_bone, draw_outline, outline_box
+from tests.geometry.shapes import sphere
+from tests.overlay.scenes import CAMERA, MESH, POSE, black, grown, is_colour, scene, seen
 from tests.views import find_silhouette
 
 COLOUR = (10, 200, 250)
 VIEW = render(MESH, POSE, CAMERA, is_whole=False)
 
 
-def weight(value: float, margin: bool = True) -> np.ndarray:
-    box = outline_box(VIEW, scene()) if margin else VIEW.box
+def weight(value: float) -> np.ndarray:
+    box = outline_box(VIEW, scene())
     return np.full((box.height, box.width), value, dtype=np.float32)
 
 
@@ -25,7 +27,7 @@ def silhouette() -> np.ndarray:
 
 def test_the_outline_lies_at_the_edge_of_the_silhouette() -> None:
     image = black()
-    outline(image, scene(), VIEW, weight(1.0), COLOUR)
+    draw_outline(image, scene(), VIEW, weight(1.0), COLOUR)
     edge = silhouette()
     # Less than the colour itself only at corners.
     assert (image[edge][:, 1] > 0.75 * COLOUR[1]).mean() > 0.99
@@ -40,7 +42,7 @@ def test_the_outline_lies_at_the_edge_of_the_silhouette() -> None:
 
 def test_beneath_something_the_outline_is_in_stripes_that_are_seen() -> None:
     image = black()
-    outline(image, scene(), VIEW, weight(BENEATH_WEIGHT), COLOUR)
+    draw_outline(image, scene(), VIEW, weight(BENEATH_WEIGHT), COLOUR)
     on_edge = image[silhouette()].astype(int)
     is_full = (np.abs(on_edge - COLOUR) <= 12).all(axis=1)
     assert 0.35 < is_full.mean() < 0.65
@@ -51,28 +53,40 @@ def test_beneath_something_the_outline_is_in_stripes_that_are_seen() -> None:
 
 def test_a_hidden_outline_is_not_drawn() -> None:
     image = black()
-    outline(image, scene(), VIEW, weight(0.0), COLOUR)
+    draw_outline(image, scene(), VIEW, weight(0.0), COLOUR)
     assert not image.any()
 
 
-@pytest.mark.parametrize("share", [0.25, 1.0])
-def test_every_pixel_is_tinted_once(share: float) -> None:
-    """Two threads share the picture: a band that both did would be tinted twice."""
-    image, expected = video(), video()
-    shares = np.linspace(0.0, share, len(MESH.faces), dtype=np.float32)
-    tint(image, VIEW, shares, one_colour(COLOUR), weight(1.0, margin=False))
-    part = expected[VIEW.box.slices]
-    tint_faces(part, VIEW.face_index, shares, one_colour(COLOUR), weight(1.0, margin=False))
-    np.testing.assert_array_equal(image, expected)
-    assert (image != video()).any()
-
-
 def test_a_surface_is_tinted_inside_and_has_an_outline() -> None:
-    image = black()
-    shares = np.full(len(MESH.faces), 0.5, dtype=np.float32)
-    draw_surface(image, scene(), VIEW, shares, COLOUR, weight(1.0))
+    image, given = black(), seen(scene())
+    shares = np.full(len(given.drawn_mesh.faces), 0.5, dtype=np.float32)
+    draw_bone(image, given, [Tint(shares, one_colour(COLOUR))], COLOUR)
     mask, edge = render(MESH, POSE, CAMERA).mask, silhouette()
     inner = mask & ~grown(edge, 4)
-    assert (np.abs(image[inner].astype(int) - np.array(COLOUR) // 2) <= 1).all()
+    assert (np.abs(image[inner].astype(int) - np.array(COLOUR) // 2) <= 1).mean() > 0.99
     assert (image[edge][:, 1] > 0.75 * COLOUR[1]).mean() > 0.99
     assert not image[~grown(mask, 4)].any()
+
+
+def test_tints_lie_over_each_other_in_their_order() -> None:
+    image, given = black(), seen(scene())
+    n = len(given.drawn_mesh.faces)
+    tints = [
+        Tint(np.full(n, share, dtype=np.float32), one_colour(colour))
+        for share, colour in ((0.5, (200, 0, 0)), (0.25, (0, 200, 0)))
+    ]
+    draw_bone(image, given, tints, None)
+    inner = render(MESH, POSE, CAMERA).mask & ~grown(silhouette(), 4)
+    assert (np.abs(image[inner].astype(int) - (75, 50, 0)) <= 1).all(axis=1).mean() > 0.99
+
+
+def test_a_body_within_the_bone_is_fainter_than_before_it() -> None:
+    given, lit = seen(scene()), []
+    for z_mm in (-25.0, 30.0):
+        mesh = sphere(8.0, 24, (0.0, 0.0, z_mm))
+        image, view = black(), given.render(mesh)
+        body = Body(mesh, np.full(len(mesh.faces), 0.5, dtype=np.float32), COLOUR)
+        draw_body(image, given, view, body)
+        inner = render(mesh, POSE, CAMERA).mask
+        lit.append(float(np.median(image[inner][:, 1])))
+    assert lit == [100.0, pytest.approx(55.0, abs=1.0)]

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from navapp.overlay.stroke_kernels import Ground, Pen, blend_touched, trace_line, weigh
+from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_strokes, weigh
 
 HEIGHT, WIDTH, X, Y = 40, 60, 100, 50
 ONE = np.float32(1.0)
@@ -20,18 +20,32 @@ def ground(weight: float = 1.0, nearest_mm: float = np.nan, size: int = 200) -> 
     )  # fmt: skip
 
 
+def room(height: int = Y + HEIGHT, width: int = X + WIDTH, n: int = 50_000) -> Room:
+    line, rim = np.zeros((2, height, width), np.float32)
+    touched = np.empty((2, line.size), np.int32)
+    place, number = np.empty((2, n), np.int32)
+    return Room(line, rim, touched, place, np.empty(n, np.float32), number)
+
+
 def trace(
     pixels: np.ndarray, given: Ground, depth_mm: float = 100.0, half_px: float = 1.0,
     rim_px: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """What is drawn of a picture with `X` columns and `Y` rows before the part that is returned."""
-    line, rim = np.zeros((2, Y + HEIGHT, X + WIDTH), np.float32)
-    touched = np.empty((2, line.size), np.int32)
-    pen = Pen(*(np.float32(n) for n in (half_px, rim_px, 7.0, 5.0)))
-    n = trace_line(pixels, np.full(len(pixels), depth_mm), given, pen, line, rim, touched)
-    for share, places, count in zip((line, rim), touched, n, strict=True):
-        assert sorted(places[:count]) == list(np.flatnonzero(share))
-    return line[Y:, X:], rim[Y:, X:]
+    given_room, firsts = room(), np.array([0, len(pixels)])
+    depths = np.full(len(pixels), depth_mm)
+    pens = np.array([half_px]), np.array([rim_px])
+    n = trace_strokes(pixels, depths, firsts, *pens, given, given_room)
+    assert not given_room.line.any()
+    assert not given_room.rim.any()
+    found = []
+    for number in (0, -1):
+        of = given_room.colour[:n] == number
+        share = np.zeros((Y + HEIGHT, X + WIDTH), np.float32)
+        share.ravel()[given_room.place[:n][of]] = given_room.share[:n][of]
+        assert len(np.unique(given_room.place[:n][of])) == of.sum()
+        found.append(share[Y:, X:])
+    return found[0], found[1]
 
 
 def covered(pixels: np.ndarray, half_px: float) -> np.ndarray:
@@ -95,16 +109,44 @@ def test_a_point_beyond_the_ground_weighs_what_is_told_of_there() -> None:
 
 
 @pytest.mark.kernel
-def test_touched_pixels_are_blended_and_no_others() -> None:
+def test_strokes_are_traced_one_after_the_other_each_with_its_pen() -> None:
+    both, firsts = np.concatenate([LINE, LINE[::-1] + 3.0]), np.array([0, 4, 8])
+    given = room()
+    n = trace_strokes(
+        both, np.full(8, 50.0), firsts, np.array([0.5, 1.5]), np.array([0.0, 1.0]), ground(), given
+    )
+    order = given.colour[:n]
+    # The first stroke, the second one's rim, then the second one.
+    assert list(order[np.flatnonzero(np.diff(order, prepend=9))]) == [0, -1, 1]
+    for number, line, half_px in ((0, LINE, 0.5), (-1, LINE + 3.0, 2.5), (1, LINE + 3.0, 1.5)):
+        share = np.zeros(given.line.shape)
+        share.ravel()[given.place[:n][order == number]] = given.share[:n][order == number]
+        np.testing.assert_allclose(share[Y:, X:], covered(line, half_px), atol=1e-5)
+
+
+@pytest.mark.kernel
+def test_what_does_not_fit_into_the_room_is_left_out_and_leaves_no_trace() -> None:
+    given = room(n=40)
+    n = trace_strokes(
+        LINE, np.full(4, 50.0), np.array([0, 4]), np.array([1.0]), np.array([1.0]), ground(), given
+    )
+    assert n == 40
+    assert not given.line.any()
+    assert not given.rim.any()
+
+
+@pytest.mark.kernel
+def test_places_are_blended_in_their_order_and_no_others() -> None:
     rng = np.random.default_rng(5)
     before = rng.integers(0, 256, (6, 7, 3), dtype=np.uint8)
-    share = rng.random((6, 7)).astype(np.float32)
-    touched = np.array([3, 8, 40], np.int32)
-    part = share.ravel()[touched, None]
+    place = np.array([3, 8, 40, 8], np.int32)
+    share = rng.random(4).astype(np.float32)
+    number = np.array([-1, 0, 1, 1], np.int32)
+    colours = np.array([[10.0, 200.0, 250.0], [90.0, 5.0, 160.0]], np.float32)
     image = before.copy()
-    blend_touched(image, share, touched, (10, 200, 250))
-    expected = before.astype(float)
-    flat = expected.reshape(-1, 3)
-    flat[touched] += part * (np.array([10.0, 200.0, 250.0]) - flat[touched])
-    np.testing.assert_allclose(image, expected, atol=0.51)
-    assert not share.ravel()[touched].any()
+    blend_places(image, place, share, number, colours)
+    expected = before.astype(float).reshape(-1, 3)
+    for k, one, which in zip(place, share, number, strict=True):
+        colour = colours[which] if which >= 0 else np.zeros(3)
+        expected[k] += one * (colour - expected[k])
+    np.testing.assert_allclose(image.reshape(-1, 3), expected, atol=1.01)

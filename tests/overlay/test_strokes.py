@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from navapp.overlay.strokes import cross_lines, draw_line, draw_lines, sample_line
+from navapp.overlay.drawing import Drawing
+from navapp.overlay.scene import Scene
+from navapp.overlay.strokes import cross_lines, sample_line
 from tests.overlay.scenes import (
     BEHIND,
     CAMERA,
@@ -14,6 +16,7 @@ from tests.overlay.scenes import (
     black,
     change,
     is_colour,
+    painted,
     pixels_of,
     scene,
     seen,
@@ -24,6 +27,19 @@ COLOUR = (10, 200, 250)
 # On the bowl, through its middle.
 X = np.linspace(-40.0, 40.0, 81)
 ON_BONE = np.column_stack([X, np.zeros(81), 0.008 * X * X])
+
+
+def draw_lines(
+    image: np.ndarray, given: Scene, lines_mm: list[np.ndarray], width_px: float = 2.0,
+    colour=COLOUR,
+) -> None:  # fmt: skip
+    drawing = Drawing()
+    drawing.lines(lines_mm, colour, width_px)
+    painted(given, drawing, image)
+
+
+def draw_line(image: np.ndarray, given: Scene, points_mm: np.ndarray, *pen) -> None:
+    draw_lines(image, given, [points_mm], *pen)
 
 
 def drawn_at(image: np.ndarray, points_mm: np.ndarray) -> np.ndarray:
@@ -44,21 +60,21 @@ def test_a_sampled_line_keeps_its_corners_and_leaves_no_gap() -> None:
 
 def test_a_line_on_a_bone_that_is_seen_is_whole() -> None:
     image = black()
-    draw_line(image, seen(scene()), ON_BONE, COLOUR)
+    draw_line(image, seen(scene()), ON_BONE)
     # Places between two pixels are lit by a part.
     assert drawn_at(image, ON_BONE).mean() > 0.93
 
 
 def test_a_line_of_which_nothing_is_known_is_dashed() -> None:
     image = black()
-    draw_line(image, scene(), ON_BONE, COLOUR)
+    draw_line(image, scene(), ON_BONE)
     # Dashes of 7 px and gaps of 5 px, less the ends of a line two pixels wide.
     assert 0.5 < drawn_at(image, ON_BONE).mean() < 0.85
 
 
 def test_a_line_is_dashed_behind_the_bone_and_whole_beside_it() -> None:
     image, given = black(), seen(scene())
-    draw_line(image, given, BEHIND, COLOUR)
+    draw_line(image, given, BEHIND)
     fine = sample_line(BEHIND, 0.5)
     hidden = behind_bone(fine)
     on_line = drawn_at(image, fine)
@@ -85,13 +101,13 @@ def near_box(points_mm: np.ndarray) -> np.ndarray:
 def test_a_line_before_the_bone_is_whole() -> None:
     before = BEHIND * (0.4, 1.0, 1.0) - (0.0, 0.0, 90.0)
     image = black()
-    draw_line(image, seen(scene()), before, COLOUR)
+    draw_line(image, seen(scene()), before)
     assert drawn_at(image, before).all()
 
 
 def test_a_hand_leaves_nothing_of_a_line() -> None:
     image = black()
-    draw_line(image, seen(scene(), occluder=Occluder(325.0)), ON_BONE, COLOUR, 2)
+    draw_line(image, seen(scene(), occluder=Occluder(325.0)), ON_BONE)
     assert image[:, :320].any()
     assert not image[:, 329:].any()
 
@@ -105,7 +121,7 @@ def test_a_line_lies_at_parts_of_a_pixel(width_px: int) -> None:
         start = TARGET + part * 400.0 / 705.0 * axes[1] - (0.0, 0.0, 20.0)
         line = start + np.linspace(-10.0, 10.0, 21)[:, None] * axes[0]
         image = black()
-        draw_line(image, given, line, (255, 255, 255), width_px)
+        draw_line(image, given, line, width_px, (255, 255, 255))
         middle = CAMERA.project(POSE.apply(line[10:11]))[0]
         column = image[:, round(middle[0]), 0].astype(float)
         centre = (np.arange(len(column)) * column).sum() / column.sum()
@@ -114,13 +130,13 @@ def test_a_line_lies_at_parts_of_a_pixel(width_px: int) -> None:
 
 def test_a_dashed_line_is_still_seen() -> None:
     before, image = video(), video()
-    draw_line(image, scene(), ON_BONE, COLOUR, 1)
+    draw_line(image, scene(), ON_BONE, 1)
     assert (change(before, image) > 3).sum() > 50
 
 
 def test_a_cross_has_its_middle_at_its_point() -> None:
     given, image, point = seen(scene()), black(), TARGET - (0.0, 0.0, 10.0)
-    draw_lines(image, given, cross_lines(point, given.picture_axes_in_bone, 5.0), COLOUR)
+    draw_lines(image, given, cross_lines(point, given.picture_axes_in_bone, 5.0))
     (u, v), reach = pixels_of(point)[0], round(4.0 * 700 / 400)
     lit = is_colour(image, COLOUR)
     assert lit[v, u - reach : u + reach + 1].all()
@@ -132,11 +148,11 @@ def test_a_cross_has_its_middle_at_its_point() -> None:
 def test_points_beside_and_behind_the_lens_are_left_out(depth_mm: float) -> None:
     near = np.array([[80.0, 5.0, depth_mm], [-90.0, 7.0, depth_mm]])
     image = black()
-    draw_line(image, scene(), POSE.inverse().apply(near), COLOUR)
+    draw_line(image, scene(), POSE.inverse().apply(near))
     assert not image.any()
 
 
 def test_one_point_is_no_line() -> None:
     image = black()
-    draw_line(image, seen(scene()), MESH.vertices_mm[:1], COLOUR)
+    draw_line(image, seen(scene()), MESH.vertices_mm[:1])
     assert not image.any()

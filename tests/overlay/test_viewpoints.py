@@ -50,7 +50,7 @@ def test_what_nobody_matched_is_a_guess() -> None:
 
 def test_marks_of_what_stands_in_front_have_a_soft_edge_at_their_place() -> None:
     column = 325.0
-    in_front = left_view().see(measured(Occluder(column)), WHOLE).in_front
+    in_front = left_view().see(measured(Occluder(column)), WHOLE).in_front / 255.0
     row = in_front[HEIGHT // 2]
     assert row[: int(column) - 5].max() < 0.01
     assert row[int(column) + 5 : int(column) + 20].min() > 0.99

@@ -1,13 +1,13 @@
 """Layers that can be drawn: one function each, and the table of their names.
 
-A layer draws into the picture and asks the label board for words; it returns nothing. Later layers
-lie over earlier ones.
+A layer tells a drawing what of its scene is to be drawn; it returns nothing. Of one kind, what
+later layers ask for lies over that of earlier ones.
 """
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from navapp.overlay.labels import Image, LabelBoard
+from navapp.overlay.drawing import Drawing
 from navapp.overlay.layers.bone import draw_bone, draw_defects, draw_removal
 from navapp.overlay.layers.drills import draw_drills
 from navapp.overlay.layers.parts import draw_parts
@@ -17,7 +17,7 @@ from navapp.overlay.layers.scale import draw_scale
 from navapp.overlay.layers.targets import draw_targets
 from navapp.overlay.scene import Scene
 
-Layer = Callable[[Image, Scene, LabelBoard], None]
+Layer = Callable[[Scene, Drawing], None]
 
 LAYERS: Mapping[str, Layer] = MappingProxyType(
     {

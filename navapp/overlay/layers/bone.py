@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
-from navapp.overlay.blend_kernels import blend_colour, compute_face_tints
-from navapp.overlay.colours import DEFECT, REMOVAL_RAMP
+from navapp.overlay.blend_kernels import compute_face_tints
+from navapp.overlay.colours import DEFECT, REMOVAL_RAMP, one_colour
+from navapp.overlay.drawing import Drawing, Tint
 from navapp.overlay.labels import Image, LabelBoard, put_text
 from navapp.overlay.plane_sections import depth_beyond
-from navapp.overlay.scene import SKIN_MM, Scene
-from navapp.overlay.shading import draw_surface, outline_box, tint
+from navapp.overlay.scene import Scene
 from navapp.values import ResectionPlane
 
 # Of the bone's colour over a part that faces the camera, and how much more over a steep one.
@@ -20,63 +20,45 @@ _LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
 # Bone to be removed is covered so far; the ramp of its colours ends at this depth.
 _REMOVAL_SHARE, _REMOVAL_FULL_MM = 0.5, 15.0
 _LEGEND_PX = (14, 120)  # width and height of the ramp
-_DOT = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
 
 
-def draw_bone(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_bone(scene: Scene, drawing: Drawing) -> None:
     """Outline, and creases and shape as a light veil, so that the bone beneath stays visible."""
-    view, mesh = scene.view, scene.drawn_mesh
-    if view.box.is_empty:
-        return
+    mesh = scene.drawn_mesh
     # Steep parts are tinted more than those that face the camera: the shape shows, the bone too.
     share = compute_face_tints(
         mesh.normals, mesh.faces, scene.axis_in_bone, _LEAST_SHARE, _STEEP_SHARE
     )
-    weight = scene.weight_over(outline_box(view, scene))
-    draw_surface(image, scene, view, share, scene.colour, weight)
+    drawing.tints.append(Tint(share, one_colour(scene.colour)))
+    drawing.outline = scene.colour
 
 
-def draw_removal(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_removal(scene: Scene, drawing: Drawing) -> None:
     """The bone beyond the stage's planes, coloured by how far it lies beyond, with a legend."""
     planes = tuple(scene.planes.values())
-    if not planes or scene.view.box.is_empty:
+    if not planes or scene.box.is_empty:
         return
-    share, colours = _removal_tints(scene.drawn_mesh, planes)
-    if not share.any():
-        return
-    view = scene.view
-    tint(image, view, share, colours, scene.weight_over(view.box))
-    _draw_removal_legend(image, labels)
+    tint = _removal_tint(scene.drawn_mesh, planes)
+    if tint is not None:
+        drawing.tints.append(tint)
+        drawing.panels.append(_draw_removal_legend)
 
 
-def draw_defects(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_defects(scene: Scene, drawing: Drawing) -> None:
     """Damaged cartilage as dots on the side of the stage's bone that is seen."""
-    box, part = scene.box, image[scene.box.slices]
-    share = np.zeros(scene.bone_mm.shape, dtype=np.float32)
     for defect in scene.plan.content.defects.values():
-        if defect.bone != scene.stage.bone:
-            continue
-        in_camera = scene.to_camera(scene.mesh.vertices_mm[defect.vertices])
-        with np.errstate(invalid="ignore"):
-            at = np.round(scene.camera.project(in_camera)) - (box.x, box.y)
-            is_inside = ((at >= 1) & (at < (box.width - 1, box.height - 1))).all(axis=1)
-        u, v = at[is_inside].astype(np.intp).T
-        # A comparison with an unknown depth is False.
-        is_far = in_camera[is_inside, 2] > scene.bone_mm[v, u] + SKIN_MM
-        u, v = u[~is_far], v[~is_far]
-        for down, right in _DOT:
-            share[v + down, u + right] = scene.weight[v, u]
-    blend_colour(part, share, DEFECT)
+        if defect.bone == scene.stage.bone and not scene.box.is_empty:
+            drawing.dots.append((scene.mesh.vertices_mm[defect.vertices], DEFECT))
 
 
 @lru_cache(maxsize=16)
-def _removal_tints(
-    mesh: TriangleMesh, planes: tuple[ResectionPlane, ...]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Share (F,) and colour (F, 3) of each triangle."""
+def _removal_tint(mesh: TriangleMesh, planes: tuple[ResectionPlane, ...]) -> Tint | None:
+    """Of each triangle; None when nothing lies beyond the planes."""
     beyond_mm = depth_beyond(mesh, planes)[mesh.faces]
     share = np.where((beyond_mm > 0.0).all(axis=1), _REMOVAL_SHARE, 0.0)
-    return share.astype(np.float32), ramp_colours(beyond_mm.mean(axis=1))
+    if not share.any():
+        return None
+    return Tint(share.astype(np.float32), ramp_colours(beyond_mm.mean(axis=1)))
 
 
 def ramp_colours(depth_mm: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -1,35 +1,44 @@
 """Planned holes: entry, direction and depth."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import DRILL
-from navapp.overlay.labels import Image, LabelBoard
+from navapp.overlay.drawing import Drawing
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import cross_lines, draw_lines, sample_line
+from navapp.overlay.strokes import cross_lines, sample_line
+from navapp.values import DrillAxis
 
 # The axis is drawn so far out of the bone, towards the hand that drills.
 _OUTSIDE_MM = 30.0
 _N_AROUND = 48
 
 
-def draw_drills(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_drills(scene: Scene, drawing: Drawing) -> None:
     """The stage's drill axes: a cross and the hole's rim at the entry, the axis, the end."""
-    thin: list[FloatArray] = []
     thick: list[FloatArray] = []
     for name, drill in scene.drills.items():
-        axes = _across(drill.direction)
-        end = drill.entry_mm + drill.depth_mm * drill.direction
-        start = drill.entry_mm - _OUTSIDE_MM * drill.direction
-        radius_mm = 0.5 * drill.diameter_mm
-        thin += [sample_line(np.stack([start, end])), _circle(end, axes, radius_mm)]
-        thick.append(_circle(drill.entry_mm, axes, radius_mm))
-        thick += cross_lines(drill.entry_mm, axes, 1.8 * radius_mm)
+        axis_and_end, entry = _lines(drill)
+        drawing.lines(axis_and_end, DRILL, 1.0)
+        thick += entry
         words = name.replace("_", " ")
         text = f"{words}: {drill.depth_mm:.0f} mm deep, {drill.diameter_mm:g} mm wide"
-        labels.add(text, scene.pixel_of(drill.entry_mm), DRILL)
-    draw_lines(image, scene, thin, DRILL, 1.0)
-    draw_lines(image, scene, thick, DRILL)
+        drawing.label(text, drill.entry_mm, DRILL)
+    drawing.lines(thick, DRILL)
+
+
+@lru_cache(maxsize=64)
+def _lines(drill: DrillAxis) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Points (N, 3) of the axis and of the hole's end, and of its entry."""
+    axes = _across(drill.direction)
+    end = drill.entry_mm + drill.depth_mm * drill.direction
+    start = drill.entry_mm - _OUTSIDE_MM * drill.direction
+    radius_mm = 0.5 * drill.diameter_mm
+    axis_and_end = [sample_line(np.stack([start, end])), _circle(end, axes, radius_mm)]
+    rim = _circle(drill.entry_mm, axes, radius_mm)
+    return axis_and_end, [rim, *cross_lines(drill.entry_mm, axes, 1.8 * radius_mm)]
 
 
 def _across(direction: FloatArray) -> FloatArray:

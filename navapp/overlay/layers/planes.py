@@ -1,24 +1,31 @@
 """Planned cuts: the line in which the blade leaves the bone, and the plane's frame."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import PLANE
-from navapp.overlay.labels import Image, LabelBoard
+from navapp.overlay.drawing import Drawing
 from navapp.overlay.plane_sections import cut_lines
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import draw_lines, sample_line
+from navapp.overlay.strokes import sample_line
+from navapp.values import ResectionPlane
 
 
-def draw_planes(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_planes(scene: Scene, drawing: Drawing) -> None:
     """The stage's planes."""
-    frames: list[FloatArray] = []
     cuts: list[FloatArray] = []
     for name, plane in scene.planes.items():
-        corners = plane.corners_mm()
-        frames.append(sample_line(np.vstack([corners, corners[:1]])))
+        drawing.lines([_frame(plane)], PLANE, 1.0)
         cuts += cut_lines(scene.drawn_mesh, plane)
         words = name.removeprefix(f"{scene.stage.bone}_").replace("_", " ")
-        labels.add(f"{words} cut", scene.pixel_of(corners[1]), PLANE)
-    draw_lines(image, scene, frames, PLANE, 1.0)
-    draw_lines(image, scene, cuts, PLANE)
+        drawing.label(f"{words} cut", plane.corners_mm()[1], PLANE)
+    drawing.lines(cuts, PLANE)
+
+
+@lru_cache(maxsize=64)
+def _frame(plane: ResectionPlane) -> FloatArray:
+    """(N, 3) points on the planned rectangle."""
+    corners = plane.corners_mm()
+    return sample_line(np.vstack([corners, corners[:1]]))

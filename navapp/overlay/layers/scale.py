@@ -1,9 +1,12 @@
 """A scale bar: how long a length at the bone's depth is in the picture."""
 
+from functools import partial
+
 import numpy as np
 
 from navapp.geometry.box import Box
 from navapp.overlay.colours import SCALE
+from navapp.overlay.drawing import Drawing
 from navapp.overlay.labels import Image, LabelBoard, put_text, text_size
 from navapp.overlay.scene import Scene
 
@@ -12,16 +15,19 @@ _LEAST_PX = 70.0
 _TICK_PX = 5
 
 
-def draw_scale(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_scale(scene: Scene, drawing: Drawing) -> None:
     """At the left, above the picture's last lines."""
-    import cv2
-
     depth_mm = float(scene.to_camera(scene.mesh.centroid_mm[None])[0, 2])
     if depth_mm <= 0.0:
         return
     px_per_mm = scene.camera.focal_px / depth_mm
     length_mm = next((mm for mm in _LENGTHS_MM if mm * px_per_mm >= _LEAST_PX), _LENGTHS_MM[-1])
-    length = length_mm * px_per_mm
+    drawing.panels.append(partial(_draw_bar, length_mm, length_mm * px_per_mm))
+
+
+def _draw_bar(length_mm: float, length: float, image: Image, labels: LabelBoard) -> None:
+    import cv2
+
     x, y = 16.0, image.shape[0] - 52.0
     bar = np.array([[x, y - _TICK_PX], [x, y], [x + length, y], [x + length, y - _TICK_PX]])
     told = np.round(bar * 16).astype(np.int32)

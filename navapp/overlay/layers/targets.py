@@ -4,14 +4,14 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import TARGET
-from navapp.overlay.labels import Image, LabelBoard
+from navapp.overlay.drawing import Drawing
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import cross_lines, draw_lines
+from navapp.overlay.strokes import cross_lines
 
 _HALF_MM = 3.0
 
 
-def draw_targets(image: Image, scene: Scene, labels: LabelBoard) -> None:
+def draw_targets(scene: Scene, drawing: Drawing) -> None:
     """The stage's targets of one point as crosses with their names."""
     axes = scene.picture_axes_in_bone
     crosses: list[FloatArray] = []
@@ -22,5 +22,5 @@ def draw_targets(image: Image, scene: Scene, labels: LabelBoard) -> None:
             continue
         point_mm = np.asarray(points, dtype=np.float64).reshape(3)
         crosses += cross_lines(point_mm, axes, _HALF_MM)
-        labels.add(name.split("/", 1)[1].replace("_", " "), scene.pixel_of(point_mm), TARGET)
-    draw_lines(image, scene, crosses, TARGET)
+        drawing.label(name.split("/", 1)[1].replace("_", " "), point_mm, TARGET)
+    drawing.lines(crosses, TARGET)

@@ -6,8 +6,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render
 from navapp.overlay.colours import CANDIDATE, DEFECT, GUIDE, REMOVAL_RAMP
-from navapp.overlay.labels import LabelBoard
-from navapp.overlay.layers.bone import draw_removal, ramp_colours
+from navapp.overlay.layers.bone import ramp_colours
 from navapp.values import Defect, ResectionPlane, SurgicalContent
 from tests.geometry.shapes import sphere
 from tests.overlay.scenes import (
@@ -18,10 +17,10 @@ from tests.overlay.scenes import (
     TARGET,
     WIDTH,
     Occluder,
-    black,
     draw,
     grown,
     is_colour,
+    panel_boxes,
     pixels_of,
     scene,
     seen,
@@ -86,9 +85,7 @@ class TestRemoval:
 
     def test_its_colours_are_those_of_the_legend(self) -> None:
         image = draw("removal", seen(scene(mesh=BALL, pose=BEFORE, content=NEAR)))
-        board = LabelBoard(0.45)
-        draw_removal(black(), seen(scene(mesh=BALL, pose=BEFORE, content=NEAR)), board)
-        (taken,) = board.taken
+        (taken,) = panel_boxes("removal", seen(scene(mesh=BALL, pose=BEFORE, content=NEAR)))
         assert taken.clip(WIDTH, HEIGHT) == taken
         ramp = image[taken.slices][40:-30, 20]
         luma = ramp @ np.array([0.114, 0.587, 0.299])

@@ -8,7 +8,6 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.overlay import LAYERS, Scene
 from navapp.overlay.colours import DEFECT, DRILL, PART, PLANE, SCALE, TARGET, risk_colour
-from navapp.overlay.labels import LabelBoard
 from navapp.values import (
     Box,
     Defect,
@@ -22,10 +21,10 @@ from navapp.values import (
 from tests.overlay.scenes import (
     POSE,
     Occluder,
-    black,
     change,
     draw,
     is_colour,
+    panel_boxes,
     scene,
     seen,
     video,
@@ -61,10 +60,8 @@ def full(**options) -> Scene:
 
 def bone_part(mask: np.ndarray) -> np.ndarray:
     """(h, w) without the removal's legend, which has its own place."""
-    board = LabelBoard(0.45)
-    LAYERS["removal"](black(), full(), board)
     part = mask.copy()
-    for box in board.taken:
+    for box in panel_boxes("removal", full()):
         part[box.slices] = 0
     return part
 

@@ -5,17 +5,14 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform
 from navapp.overlay.colours import SCALE
-from navapp.overlay.labels import LabelBoard
-from navapp.overlay.layers.scale import draw_scale
-from tests.overlay.scenes import CAMERA, HEIGHT, WIDTH, black, is_colour, scene
+from tests.overlay.scenes import CAMERA, HEIGHT, WIDTH, draw, is_colour, panel_boxes, scene
 
 
 @pytest.mark.parametrize(("z_mm", "length_mm"), [(180.0, 20.0), (400.0, 50.0), (900.0, 50.0)])
 def test_the_bar_is_as_long_as_that_length_at_the_bone(z_mm: float, length_mm: float) -> None:
     pose = RigidTransform.from_parts("left", "femur", np.eye(3), (0.0, 0.0, z_mm))
-    given, image = scene(pose=pose), black()
-    board = LabelBoard(0.45)
-    draw_scale(image, given, board)
+    given = scene(pose=pose)
+    image = draw("scale", given)
     row = image[HEIGHT - 52]
     lit = np.flatnonzero(is_colour(row[None], SCALE)[0])
     middle = given.to_camera(given.mesh.centroid_mm[None])
@@ -26,7 +23,7 @@ def test_the_bar_is_as_long_as_that_length_at_the_bone(z_mm: float, length_mm: f
     expected = np.linalg.norm(ends[1] - ends[0])
     # The line is two pixels wide.
     assert lit[-1] - lit[0] + 1 == pytest.approx(expected + 2.0, abs=2.0)
-    (taken,) = board.taken
+    (taken,) = panel_boxes("scale", given)
     assert taken.clip(WIDTH, HEIGHT) == taken
     outside = image.copy()
     outside[taken.slices] = 0
@@ -36,7 +33,6 @@ def test_the_bar_is_as_long_as_that_length_at_the_bone(z_mm: float, length_mm: f
 def test_a_length_is_chosen_that_can_be_read() -> None:
     for z_mm in (80.0, 150.0, 300.0, 450.0):
         pose = RigidTransform.from_parts("left", "femur", np.eye(3), (0.0, 0.0, z_mm))
-        image = black()
-        draw_scale(image, scene(pose=pose), LabelBoard(0.45))
+        image = draw("scale", scene(pose=pose))
         lit = np.flatnonzero(is_colour(image[HEIGHT - 52][None], SCALE)[0])
         assert 65 < lit[-1] - lit[0] < 180

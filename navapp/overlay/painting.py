@@ -1,0 +1,70 @@
+"""Paints what the layers of a scene ask for into a picture."""
+
+import numpy as np
+
+from navapp.geometry.bands import begin_on_helper, run_both
+from navapp.geometry.transform import FloatArray
+from navapp.overlay.blend_kernels import blend_colour, mark_dots
+from navapp.overlay.colours import Colour
+from navapp.overlay.drawing import Drawing
+from navapp.overlay.labels import Image, LabelBoard
+from navapp.overlay.layers import LAYERS
+from navapp.overlay.scene import SKIN_MM, Scene
+from navapp.overlay.shading import draw_body, draw_bone
+from navapp.overlay.strokes import trace
+
+
+def paint_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
+    """The scene's layers in the order of their table, and their words."""
+    drawing = Drawing()
+    for name, layer in LAYERS.items():
+        if name in scene.layers:
+            layer(scene, drawing)
+    paint(image, scene, drawing, labels)
+
+
+def paint(image: Image, scene: Scene, drawing: Drawing, labels: LabelBoard) -> None:
+    """All that was asked for, into a picture (H, W, 3)."""
+    # Two threads: what stands in front is looked up while the bone is rendered, and lines are
+    # followed while surfaces are tinted. Both need the box of the bone.
+    _ = scene.box
+    run_both(lambda: scene.view, lambda: scene.seen)
+    _ = scene.ground
+    with begin_on_helper(lambda: trace(scene, drawing.strokes, image.shape)) as traced:
+        draw_bone(image, scene, drawing.tints, drawing.outline)
+        for body in drawing.bodies:
+            draw_body(image, scene, scene.render(body.mesh), body)
+        for points_mm, colour in drawing.dots:
+            _draw_dots(image, scene, points_mm, colour)
+    traced.result()(image)
+    for panel in drawing.panels:
+        panel(image, labels)
+    ask_for_words(scene, drawing, labels)
+    labels.draw(image)
+
+
+def _draw_dots(image: Image, scene: Scene, points_mm: FloatArray, colour: Colour) -> None:
+    """Points (N, 3) of the bone's surface, those on the side that is seen."""
+    in_camera = scene.to_camera(points_mm)
+    pixels = scene.camera.project(in_camera) - (scene.box.x, scene.box.y)
+    share = np.zeros(scene.bone_mm.shape, dtype=np.float32)
+    depth_mm = np.ascontiguousarray(in_camera[:, 2])
+    rows = mark_dots(pixels, depth_mm, scene.bone_mm, scene.weight, SKIN_MM, share)
+    blend_colour(image[scene.box.slices][slice(*rows)], share[slice(*rows)], colour)
+
+
+def ask_for_words(scene: Scene, drawing: Drawing, labels: LabelBoard) -> None:
+    """Ask the board for labels beside the middle ones of the points that lie in the picture."""
+    if not drawing.words:
+        return
+    points_mm = np.concatenate([words.points_mm for words in drawing.words])
+    pixels = scene.camera.project(scene.to_camera(points_mm))
+    size = scene.camera.width, scene.camera.height
+    with np.errstate(invalid="ignore"):
+        is_inside = np.asarray(((pixels >= 0) & (pixels < size)).all(axis=1))
+    last = 0
+    for words in drawing.words:
+        first, last = last, last + len(words.points_mm)
+        seen = pixels[first:last][is_inside[first:last]]
+        if len(seen):
+            labels.add(words.text, seen[len(seen) // 2], words.colour)

@@ -1,0 +1,75 @@
+"""Compiled look-up of the measured depth at the pixels of a picture that is not rectified."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+class Measured(NamedTuple):
+    """A map in the rectified left view, over its pixels or over squares of them."""
+
+    disparity: NDArray[np.float32]  # (h, w) px of the map's own pixels, NaN where unknown
+    is_matched: NDArray[np.bool_]  # (h, w); others are guesses, or unknown
+    # x, y: column and row of the map's first pixel, counted in its own pixels.
+    x: int
+    y: int
+    halvings: int  # a pixel of the map covers 2 ** halvings of the view, each way
+
+
+@njit(cache=True, nogil=True)
+def look_up_depth(
+    columns: NDArray[np.int16],
+    rows: NDArray[np.int16],
+    depth_share: NDArray[np.float32],
+    focal_baseline: float,
+    around: Measured,
+    finer: Measured,
+    is_in_front: NDArray[np.bool_],
+    corner: tuple[int, int],
+    depth_mm: NDArray[np.float32],
+    is_guess: NDArray[np.uint8],
+    in_front: NDArray[np.uint8],
+) -> None:
+    """What was measured at pixels of the rectified view.
+
+    Args:
+        columns: (h, w) nearest one of the rectified view, for each pixel of the picture's box.
+        rows: (h, w) nearest one.
+        depth_share: (h, w) depth in the picture's camera over rectified depth.
+        focal_baseline: px mm of the rectified pair.
+        around: what lies around the bone.
+        finer: what holds instead where it is matched.
+        is_in_front: (H, W) marks of what hides the bone.
+        corner: column and row of the marks' first pixel.
+        depth_mm: (h, w) in place, NaN where unknown.
+        is_guess: (h, w) in place, 1 where nothing is matched.
+        in_front: (h, w) in place, 255 where it is marked.
+    """
+    for j in range(columns.shape[0]):
+        for i in range(columns.shape[1]):
+            depth_mm[j, i], is_guess[j, i], in_front[j, i] = np.nan, 1, 0
+            u, v = int(columns[j, i]), int(rows[j, i])
+            x, y = u - corner[0], v - corner[1]
+            # Beside the marks nothing is known.
+            if x < 0 or y < 0 or x >= is_in_front.shape[1] or y >= is_in_front.shape[0]:
+                continue
+            if is_in_front[y, x]:
+                in_front[j, i] = 255
+            disparity, is_matched = _look_up(u, v, finer)
+            if not is_matched:
+                disparity, is_matched = _look_up(u, v, around)
+            if is_matched:
+                is_guess[j, i] = 0
+            if disparity > 0.0:
+                depth_mm[j, i] = np.float32(focal_baseline / disparity * depth_share[j, i])
+
+
+@njit(cache=True, nogil=True)
+def _look_up(u: int, v: int, given: Measured) -> tuple[np.float32, bool]:
+    """Disparity in px of the view at one of its pixels, NaN where unknown, and whether matched."""
+    x, y = (u >> given.halvings) - given.x, (v >> given.halvings) - given.y
+    if x < 0 or y < 0 or x >= given.disparity.shape[1] or y >= given.disparity.shape[0]:
+        return np.float32(np.nan), False
+    return np.float32(1 << given.halvings) * given.disparity[y, x], given.is_matched[y, x]

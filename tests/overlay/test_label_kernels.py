@@ -1,0 +1,35 @@
+"""Compiled placing and blending of words, beside plain forms."""
+
+import numpy as np
+import pytest
+
+from navapp.overlay.label_kernels import blend_text, find_free_place
+
+pytestmark = pytest.mark.kernel
+
+
+def test_the_first_box_that_is_free_is_found() -> None:
+    places = np.array([[-1, 5], [5, 96], [40, 40], [60, 20], [61, 20], [20, 20]])
+    others = np.array([[30, 45, 20, 3], [50, 0, 11, 100]])
+    # Beside the picture, below it, over one, over the other by a column; then free.
+    assert find_free_place(places, (20, 10), (100, 100), others) == 4
+    assert find_free_place(places[:4], (20, 10), (100, 100), others) == -1
+    assert find_free_place(places, (20, 10), (100, 100), np.empty((0, 4), np.int64)) == 2
+
+
+@pytest.mark.parametrize("corner", [(4, 3), (-5, -2), (25, 16), (40, 40)])
+def test_letters_are_blended_over_their_rim_inside_the_picture(corner: tuple[int, int]) -> None:
+    rng = np.random.default_rng(1)
+    before = rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
+    letters = rng.choice([0.0, 0.4, 1.0], (6, 12)).astype(np.float32)
+    rim = np.maximum(letters, rng.choice([0.0, 0.7], (6, 12))).astype(np.float32)
+    image = before.copy()
+    blend_text(image, letters, rim, corner, (10, 200, 250))
+    expected = before.astype(float)
+    for y in range(6):
+        for x in range(12):
+            row, column = y + corner[1], x + corner[0]
+            if 0 <= row < 20 and 0 <= column < 30:
+                below = expected[row, column] * (1.0 - rim[y, x])
+                expected[row, column] = below + letters[y, x] * ((10, 200, 250) - below)
+    assert np.abs(image - expected).max() <= 0.5 + 1e-3
