@@ -4,13 +4,9 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Literal
 
-import numpy as np
-
 from drivers.interfaces import DisplayInfo
-from navapp.control.other_eye import OtherEye
 from navapp.control.states import MirrorCheck
 from navapp.geometry.display_model import DisplayModel
-from navapp.geometry.transform import FloatArray
 from navapp.values import Reason
 
 Eyes = Literal["both", "left", "right"]
@@ -40,16 +36,6 @@ class CalibratedDisplay:
             return Reason.DISPLAY_EXPIRED
         is_accepted = quality is not None and quality.is_accepted
         return None if is_accepted or self.allows_unaccepted else Reason.DISPLAY_NOT_ACCEPTED
-
-    def see_with_other_eye(self, points_mm: FloatArray) -> OtherEye | None:
-        """Guides at points (N, 3) of the left camera's frame; None when one eye is covered."""
-        if self.eyes != "both":
-            return None
-        error_mm = self.model.error_for_other_eye_mm(points_mm)
-        shift_mm = self.model.screen_shift_mm(points_mm)
-        # Where the eye does not see a guide its error is not known.
-        known_mm = np.where(np.isfinite(error_mm), error_mm, np.inf)
-        return OtherEye(float(known_mm.max(initial=0.0)), shift_mm)
 
     def find_check_reason(self, check: MirrorCheck | None, now_ns: int) -> Reason | None:
         """What the surgeon's check has against guides; None when it was passed lately."""

@@ -27,6 +27,7 @@ from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
 from navapp.control.frame_result import FrameResult
 from navapp.control.mirror_checking import MirrorChecking
+from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import Composer, Image
 from navapp.control.registration_job import RegistrationJob
@@ -96,7 +97,7 @@ class SessionController:
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
-            specification, self._rig_watch,
+            _make_mirror_judge(specification, self._composer), specification, self._rig_watch,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -252,6 +253,15 @@ class SessionController:
         pose = snapshot.left_from_bone
         cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
         return self._composer.compose_mirror(snapshot, foreground, cross_px)
+
+
+def _make_mirror_judge(
+    specification: SessionSpecification, composer: Composer
+) -> MirrorJudge | None:
+    display, view = specification.display, composer.mirror_view
+    if display is None or view is None:
+        return None
+    return MirrorJudge(display, view, specification.plan)
 
 
 def _make_session(

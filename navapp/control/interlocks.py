@@ -1,5 +1,6 @@
 """Whether guides may be shown: one answer for display, overlay, log and screen."""
 
+from navapp.control.mirror_error import MirrorError
 from navapp.control.states import OtherBone, SessionState, Snapshot
 from navapp.values import Reason, Status
 
@@ -22,8 +23,8 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
     if snapshot.is_camera_silent:
         reasons.append(Reason.CAMERA_SILENT)
     reasons += snapshot.device_reasons
-    if snapshot.other_eye is not None and snapshot.other_eye.is_off:
-        reasons.append(Reason.OTHER_EYE)
+    if snapshot.mirror_error is not None:
+        reasons += _of_mirror(snapshot.mirror_error, snapshot.stage.tolerance_mm)
     if snapshot.mirror_reason is not None:
         reasons.append(snapshot.mirror_reason)
     if not snapshot.is_bone_planned:
@@ -35,6 +36,13 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
     if snapshot.state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
         reasons += _of_pose(snapshot)
     return tuple(reasons)
+
+
+def _of_mirror(error: MirrorError, tolerance_mm: float) -> list[Reason]:
+    if error.is_all_off:
+        return [Reason.OTHER_EYE]
+    # A comparison with what is no number is False.
+    return [] if error.bound_mm <= tolerance_mm else [Reason.MIRROR_INEXACT]
 
 
 def is_current(other: OtherBone) -> bool:

@@ -1,8 +1,11 @@
 """The pictures for the screen and for the display, from what the session knows."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.control.mirror_error import MirrorError
 from navapp.control.states import SessionState, Snapshot
 from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.rig import StereoRig
@@ -26,6 +29,11 @@ class Composer:
         self._plan = plan
         self._left_view = LeftView(rig)
         self._mirror_view = None if eye_view is None else MirrorView(eye_view, rig)
+
+    @property
+    def mirror_view(self) -> MirrorView | None:
+        """Of the eye that looks into the mirror; None over video."""
+        return self._mirror_view
 
     @property
     def mode(self) -> OverlayMode:
@@ -73,6 +81,9 @@ class Composer:
         is_checkable = snapshot.reasons == (snapshot.mirror_reason,)
         scene = None
         if snapshot.is_navigable:
+            off = () if snapshot.mirror_error is None else snapshot.mirror_error.off_layers
+            seen = tuple(name for name in snapshot.layers if name not in off)
+            snapshot = replace(snapshot, layers=seen)
             scene = _scene(snapshot, view, self._plan, foreground)
         return compose_mirror(
             scene,
@@ -87,10 +98,7 @@ def banner(snapshot: Snapshot) -> str:
     """One line: what the picture is."""
     stage = f"{snapshot.stage.number} {snapshot.stage.name}"
     if snapshot.is_navigable and snapshot.verdict is not None:
-        # In the mirror the registration's bound is not the error of what is seen.
-        bound_mm = None if snapshot.has_mirror else snapshot.verdict.predicted_tre_mm
-        error = "" if bound_mm is None else f" - error <= {bound_mm:.2f} mm"
-        return f"{stage} - NAVIGATING{error} - not verified on the patient"
+        return f"{stage} - NAVIGATING{_describe_error(snapshot)} - not verified on the patient"
     if snapshot.cross_check is not None and snapshot.reasons == (snapshot.mirror_reason,):
         check = snapshot.cross_check
         return f"{stage} - CHECK OF THE MIRROR: cross {check.number + 1} of {check.count}"
@@ -99,11 +107,32 @@ def banner(snapshot: Snapshot) -> str:
     if snapshot.is_candidate:
         return f"{stage} - CANDIDATE, not accepted"
     why = snapshot.reasons[0].value if snapshot.reasons else ""
-    if snapshot.reasons[:1] == (Reason.OTHER_EYE,) and snapshot.other_eye is not None:
-        shift_mm = snapshot.other_eye.screen_shift_mm
-        way = "away" if shift_mm > 0.0 else "nearer"
-        why = f"{why}: cover it, or bring the picture {abs(shift_mm):.0f} mm {way}"
+    if snapshot.reasons[:1] == (Reason.OTHER_EYE,) and snapshot.mirror_error is not None:
+        why = f"{why}: cover it, or {_describe_shift(snapshot.mirror_error)}"
     return f"{stage} - NO GUIDES: {why}"
+
+
+def _describe_error(snapshot: Snapshot) -> str:
+    """Of guides that are shown: over the video that of the pose, in the mirror of what is seen."""
+    if not snapshot.has_mirror:
+        bound_mm = None if snapshot.verdict is None else snapshot.verdict.predicted_tre_mm
+        return "" if bound_mm is None else f" - error <= {bound_mm:.2f} mm"
+    error = snapshot.mirror_error
+    if error is None:
+        return ""
+    told = f" - error <= {error.bound_mm:.1f} mm"
+    if error.covered_eye:
+        return f"{told}, {error.covered_eye} eye covered"
+    if not error.off_layers:
+        return told
+    off = ", ".join(error.off_layers)
+    return f"{told} - off for the other eye, not shown: {off} ({_describe_shift(error)})"
+
+
+def _describe_shift(error: MirrorError) -> str:
+    """By how much the display must move to be right for both eyes."""
+    way = "away" if error.screen_shift_mm > 0.0 else "nearer"
+    return f"bring the picture {abs(error.screen_shift_mm):.0f} mm {way}"
 
 
 def _scene(

@@ -10,16 +10,14 @@ from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.interlocks import check_interlocks
 from navapp.control.mirror_checking import MirrorChecking
-from navapp.control.other_eye import OtherEye
+from navapp.control.mirror_error import MirrorError
+from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
 from navapp.control.stages import STAGES
 from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
-from navapp.values import BoneModel, Reason, TrackedFrame
-
-# Of the bone's vertices so many tell what the other eye sees.
-_N_OTHER_EYE = 200
+from navapp.values import Reason, TrackedFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +29,7 @@ class SnapshotMaker:
     display: DisplayLink  # in use
     monitored: MonitoredDevices  # projector and mirror
     mirror_checking: MirrorChecking  # of what is seen in the mirror
+    mirror_judge: MirrorJudge | None  # of guides in it; None: guides lie over video
     specification: SessionSpecification  # of the session
     rig_watch: RigWatch  # that watches the rig
 
@@ -73,7 +72,7 @@ class SnapshotMaker:
             is_bone_planned=bone is not None,
             device_reasons=self._device_reasons(reports),
             has_mirror=self.specification.display is not None,
-            other_eye=self._see_with_other_eye(bone, tracked),
+            mirror_error=self._judge_mirror(tracked, now_ns),
             mirror_reason=self.mirror_checking.find_reason(now_ns),
             cross_check=self.mirror_checking.state,
             is_camera_silent=self.camera.is_silent,
@@ -92,19 +91,11 @@ class SnapshotMaker:
             reasons += [] if of_display is None else [of_display]
         return tuple(reasons)
 
-    def _see_with_other_eye(
-        self, bone: BoneModel | None, tracked: TrackedFrame | None
-    ) -> OtherEye | None:
-        """Guides on what of the bone faces the cameras; None over video or without a pose."""
-        calibrated = self.specification.display
-        pose = None if tracked is None else tracked.left_from_bone
-        if calibrated is None or bone is None or pose is None:
+    def _judge_mirror(self, tracked: TrackedFrame | None, now_ns: int) -> MirrorError | None:
+        if self.mirror_judge is None:
             return None
-        vertices = bone.mesh.vertices_mm
-        step = max(1, len(vertices) // _N_OTHER_EYE)
-        is_faced = bone.mesh.visible_vertices(pose)[::step]
-        points_mm = pose.apply(vertices[::step][is_faced])
-        return calibrated.see_with_other_eye(points_mm) if len(points_mm) else None
+        session = self.session
+        return self.mirror_judge.judge(session.stage, session.layers, tracked, now_ns)
 
     @property
     def _is_simulated(self) -> bool:

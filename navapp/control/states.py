@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.control.length_check import LengthCheck
-from navapp.control.other_eye import OtherEye
+from navapp.control.mirror_error import MirrorError
 from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, StageSpec, Verdict
 
@@ -280,7 +280,7 @@ class Snapshot:
     # what projector and mirror have against guides; nothing at all is shown then.
     device_reasons: tuple[Reason, ...] = ()
     has_mirror: bool = False  # the display is seen in the mirror
-    other_eye: OtherEye | None = None  # what guides are for it; None when nobody looks with it
+    mirror_error: MirrorError | None = None  # of guides in the mirror; None without any
     mirror_reason: Reason | None = None  # what the check of the mirror has against guides
     cross_check: CrossCheck | None = None  # that is under way; no guide is shown meanwhile
     is_simulated: bool = False  # the pictures are not of this world

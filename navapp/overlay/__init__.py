@@ -2,6 +2,7 @@
 
 from navapp.overlay.composition import compose_mirror, compose_video, make_preview, put_mark
 from navapp.overlay.depth_marks import DepthMarks
+from navapp.overlay.guide_points import sample_guides
 from navapp.overlay.layers import LAYERS
 from navapp.overlay.scene import Scene
 from navapp.overlay.viewpoints import LeftView, MirrorView, Viewpoint
@@ -17,4 +18,5 @@ __all__ = [
     "compose_video",
     "make_preview",
     "put_mark",
+    "sample_guides",
 ]

@@ -53,6 +53,7 @@ class Reason(Enum):
     DISPLAY_EXPIRED = "the calibration of the mirror has expired"
     MOVES_TOO_FAST = "the bone moves too fast for the display"
     OTHER_EYE = "guides are more than 1 mm off for the other eye"
+    MIRROR_INEXACT = "guides in the mirror may be off by more than the stage allows"
     MIRROR_UNCHECKED = "nobody has checked what is seen in the mirror"
     MIRROR_CHECK_FAILED = "the check of the mirror has failed"
     MIRROR_CHECK_OLD = "the check of the mirror is too old"
@@ -103,6 +104,7 @@ _REMEDIES = {
     Reason.DISPLAY_EXPIRED: "calibrate the mirror again",
     Reason.MOVES_TOO_FAST: "hold the leg still until it is shown again",
     Reason.OTHER_EYE: "cover it and say so ([mirror] eyes), or move the display",
+    Reason.MIRROR_INEXACT: "bring the display's picture nearer to the bone, or calibrate again",
     Reason.MIRROR_UNCHECKED: "check it on three points of the bone",
     Reason.MIRROR_CHECK_FAILED: "look from the calibrated place and check again, or calibrate",
     Reason.MIRROR_CHECK_OLD: "check it again on three points of the bone",

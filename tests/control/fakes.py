@@ -77,7 +77,9 @@ def answer(
 ) -> TrackedFrame:
     """What a tracker says of a frame."""
     pose = pose or a_pose()
-    estimate = PoseEstimate(pose, 0.01 * np.eye(6), 500, 0.9, 0.2, 0.2, 3, True)
+    # 0.1 mm and 1 mrad.
+    covariance = np.diag([1e-2] * 3 + [1e-6] * 3)
+    estimate = PoseEstimate(pose, covariance, 500, 0.9, 0.2, 0.2, 3, True)
     bound = 0.8 if has_pose else None
     verdict = Verdict(status, bound, reasons, 0.7, 0.0, 0.9, 0.2, 0.2)
     return TrackedFrame(pose.source, estimate if has_pose else None, verdict, FrameTimings())

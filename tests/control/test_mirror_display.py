@@ -16,6 +16,7 @@ from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.device_handlers import ProjectorHandler
 from navapp.control.mirror_checking import LEAST_APART_MM
+from navapp.control.pictures import banner
 from navapp.control.states import (
     Blank,
     CheckMirror,
@@ -24,24 +25,30 @@ from navapp.control.states import (
     MirrorCheck,
     NudgeCross,
     Show,
+    ToggleLayer,
 )
 from navapp.errors import ConfigurationError
 from navapp.geometry.display_model import DisplayModel, DisplayQuality
 from navapp.geometry.display_model_files import write_display_model
 from navapp.geometry.display_model_optics import VirtualScreen
 from navapp.geometry.rectification import Rectifier
+from navapp.overlay.colours import DRILL, GUIDE
 from navapp.values import (
     DisparityMap,
+    DrillAxis,
     Foreground,
     Origin,
     OverlayMode,
+    Plan,
     Reason,
     Status,
+    SurgicalContent,
     Surroundings,
     TrackedFrame,
 )
 from sim_devices.display import SimulatedDisplay
-from tests.control.fakes import PERIOD_NS, Bench, a_pose, a_rig, answer, navigating
+from tests.control.fakes import PERIOD_NS, Bench, a_plan, a_pose, a_rig, answer, navigating
+from tests.overlay.scenes import is_colour
 
 WIDTH, HEIGHT, PITCH_MM = 400, 300, 0.5
 DEPTH_MM, EYE_MM = 300.0, np.array([20.0, -60.0, -150.0])
@@ -86,6 +93,8 @@ def a_bench(
     delay_ms: float = 0.0,
     eyes: Eyes = "left",
     mirror: FixedMirror | None = None,
+    plan: Plan | None = None,
+    layers: tuple[str, ...] | None = None,
 ) -> Bench:
     display = CalibratedDisplay(model or a_model(), check_minutes=1.0, eyes=eyes)
     bench = Bench(
@@ -93,6 +102,8 @@ def a_bench(
         make_display=make_display,
         display_delay_ms=delay_ms,
         mirror=mirror,
+        plan=plan,
+        layers=layers,
     )
     bench.script.tracked = measured_bone()
     return bench
@@ -366,20 +377,72 @@ def test_guides_are_where_the_bone_will_be_when_their_light_is_seen() -> None:
     assert middles[1] - middles[0] == pytest.approx(-0.7 / PITCH_MM, abs=0.4)
 
 
-def test_two_eyes_are_refused_where_guides_are_off_for_the_other() -> None:
+def status(bench: Bench) -> str:
+    return banner(bench.snapshot)
+
+
+def test_two_eyes_are_refused_where_all_guides_are_off_for_the_other() -> None:
     """The bone reaches from the screen's plane to 32 mm behind it, 450 mm from the eye."""
     bench = a_bench(eyes="both")
     navigating(bench)
     assert bench.snapshot.reasons[0] is Reason.OTHER_EYE
-    other = bench.snapshot.other_eye
-    assert other is not None
-    assert 2.0 < other.error_mm < 6.0
-    assert 5.0 < other.screen_shift_mm < 32.0
+    error = bench.snapshot.mirror_error
+    assert error is not None
+    assert error.other_eye_mm is not None
+    assert 2.0 < error.other_eye_mm < 6.0
+    assert 5.0 < error.screen_shift_mm < 32.0
+    assert f"bring the picture {error.screen_shift_mm:.0f} mm away" in status(bench)
     assert not guides(bench).any()
-    alone = a_bench(eyes="left")
-    navigating(alone)
-    check(alone)
-    assert alone.snapshot.is_navigable
+
+
+def test_a_covered_eye_is_named_with_the_error_of_the_one_that_looks() -> None:
+    bench = a_bench(eyes="left")
+    navigating(bench)
+    check(bench)
+    assert bench.snapshot.is_navigable
+    error = bench.snapshot.mirror_error
+    assert error is not None
+    assert error.other_eye_mm is None
+    assert f"error <= {error.bound_mm:.1f} mm, right eye covered" in status(bench)
+
+
+def test_layers_that_are_off_for_the_other_eye_are_not_lit_and_named() -> None:
+    """A hole along the screen's plane, and a bone whose rim is 32 mm behind it."""
+    drill = DrillAxis("femur", np.zeros(3), np.array([1.0, 0.0, 0.0]), 10.0, 4.0)
+    plan = replace(a_plan(), content=SurgicalContent(drills={"guide": drill}))
+    bench = a_bench(eyes="both", plan=plan, layers=("bone", "drills"))
+    navigating(bench)
+    error = bench.snapshot.mirror_error
+    assert error is not None
+    assert error.off_layers == ("bone",)
+    check(bench)
+    assert bench.snapshot.is_navigable
+    assert "off for the other eye, not shown: bone (bring the picture" in status(bench)
+    lit = bench.display.visible_image()[: round(0.93 * HEIGHT)]
+    assert is_colour(lit, DRILL).sum() > 5
+    assert not is_colour(lit, GUIDE).any()
+    bench.do(ToggleLayer("drills"))
+    bench.frames()
+    assert bench.snapshot.reasons[0] is Reason.OTHER_EYE
+
+
+def test_guides_that_may_be_off_by_more_than_the_stage_allows_are_not_lit() -> None:
+    """A pose that is certain to 1 mm, and a stage that allows 2."""
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    told = measured_bone()
+    assert told.estimate is not None
+    for sd_mm, is_lit in ((0.3, True), (1.5, False)):
+        covariance = np.diag([sd_mm**2] * 3 + [1e-8] * 3)
+        estimate = replace(told.estimate, covariance=covariance)
+        bench.script.tracked = replace(told, estimate=estimate)
+        bench.frames(12)
+        error = bench.snapshot.mirror_error
+        assert error is not None
+        assert error.bound_mm > 1.9 * sd_mm
+        assert (Reason.MIRROR_INEXACT in bench.snapshot.reasons) == (not is_lit)
+        assert guides(bench).any() == is_lit
 
 
 class KeystoneProjector:

@@ -1,0 +1,104 @@
+"""Judges what is seen in the mirror: how far guides may be off for the eye, and for the other."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.stats import chi2
+
+from navapp.control.calibrated_display import CalibratedDisplay, Eyes
+from navapp.control.mirror_error import OTHER_EYE_MM, MirrorError
+from navapp.geometry.transform import FloatArray
+from navapp.overlay import MirrorView, Scene, sample_guides
+from navapp.values import Plan, PoseEstimate, StageSpec, TrackedFrame
+
+# The eye is not measured: in 95 % of cases it is this near to its calibrated place.
+EYE_RADIUS_MM = 10.0
+_EYE_SD_MM = EYE_RADIUS_MM / float(np.sqrt(chi2.ppf(0.95, 3)))
+# Errors vary slowly with the pose: they are predicted anew after this time.
+_VALID_NS = 200_000_000
+_COVERED: Mapping[Eyes, str] = {"both": "", "left": "right", "right": "left"}
+
+
+class MirrorJudge:
+    """Predicts the errors of the guides that are drawn, and keeps the answer for a moment.
+
+    Args:
+        display: in the mirror.
+        view: of its calibrated eye.
+        plan: with the guides.
+    """
+
+    def __init__(self, display: CalibratedDisplay, view: MirrorView, plan: Plan) -> None:
+        self._display, self._view, self._plan = display, view, plan
+        self._judged: tuple[str, tuple[str, ...], int] | None = None
+        self._error: MirrorError | None = None
+
+    def judge(
+        self, stage: StageSpec, layers: tuple[str, ...], tracked: TrackedFrame | None, now_ns: int
+    ) -> MirrorError | None:
+        """Of a stage's layers; None without a pose, or when nothing lies at the bone."""
+        estimate = None if tracked is None else tracked.estimate
+        if estimate is None or stage.bone not in self._plan.bones:
+            self._judged = self._error = None
+            return None
+        last = self._judged
+        is_valid = last is not None and last[:2] == (stage.name, layers)
+        if last is None or not is_valid or not 0 <= now_ns - last[2] < _VALID_NS:
+            self._judged = stage.name, layers, now_ns
+            self._error = self._predict(stage, layers, estimate)
+        return self._error
+
+    def _predict(
+        self, stage: StageSpec, layers: tuple[str, ...], estimate: PoseEstimate
+    ) -> MirrorError | None:
+        pose = estimate.camera_from_bone
+        scene = Scene(self._plan, stage, pose, self._view, False, None, layers)
+        points = {name: sample_guides(scene, name) for name in layers}
+        in_left = {name: pose.apply(some) for name, some in points.items() if len(some)}
+        if not in_left:
+            return None
+        other_mm = self._for_other_eye(in_left)
+        off = tuple(name for name, error_mm in other_mm.items() if error_mm > OTHER_EYE_MM)
+        is_all_off = len(off) == len(in_left)
+        drawn = [name for name in in_left if name not in off or is_all_off]
+        chosen = np.concatenate([in_left[name] for name in drawn])
+        centre_mm = pose.apply(self._plan.bones[stage.bone].mesh.vertices_mm.mean(axis=0)[None])[0]
+        covariances = _point_covariances(chosen - centre_mm, estimate.covariance)
+        model = self._display.model
+        bounds_mm = _known(model.predict_error(chosen, _EYE_SD_MM, covariances))
+        return MirrorError(
+            float(bounds_mm.max()),
+            _COVERED[self._display.eyes],
+            max(other_mm.values()) if other_mm else None,
+            model.screen_shift_mm(np.concatenate(list(in_left.values()))),
+            off,
+            is_all_off,
+        )
+
+    def _for_other_eye(self, points_mm: Mapping[str, FloatArray]) -> dict[str, float]:
+        """The largest error of each layer; nothing when that eye is covered."""
+        if self._display.eyes != "both":
+            return {}
+        model = self._display.model
+        return {
+            name: float(_known(model.error_for_other_eye_mm(some)).max())
+            for name, some in points_mm.items()
+        }
+
+
+def _known(errors_mm: FloatArray) -> FloatArray:
+    """Where a guide is not seen its error is not known: without bound."""
+    return np.where(np.isfinite(errors_mm), errors_mm, np.inf)
+
+
+def _point_covariances(offsets_mm: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(N, 3, 3) of points at offsets (N, 3) from where a twist's covariance (6, 6) is told."""
+    jacobian = np.zeros((len(offsets_mm), 3, 6))
+    jacobian[:, :, :3] = np.eye(3)
+    x, y, z = offsets_mm.T
+    # A turn w moves an offset p by w x p = -[p]x w.
+    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+    spread: FloatArray = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+    return spread
