@@ -97,6 +97,9 @@ def _middle(view: View, width: int) -> tuple[list[Content], list[Content]]:
         _figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"),
         _figure("occluded", Number.WHOLE, _compute_occluded_percent(snapshot), "%"),
     ]
+    if snapshot.mirror_error is not None:
+        # Of what is seen: with the calibration of the mirror, and an eye beside its place.
+        needed.append(_figure("in mirror", Number.MM, snapshot.mirror_error.bound_mm, "mm"))
     return needed, _fit(snapshot)
 
 

@@ -10,7 +10,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.overlay.blend_kernels import compute_face_tints
 from navapp.overlay.colours import DEFECT, REMOVAL_RAMP, one_colour
 from navapp.overlay.drawing import Drawing, Tint
-from navapp.overlay.labels import Image, LabelBoard, put_text
+from navapp.overlay.labels import Image, LabelBoard, put_text, text_size
 from navapp.overlay.plane_sections import depth_beyond
 from navapp.overlay.scene import Scene
 from navapp.values import ResectionPlane
@@ -19,7 +19,8 @@ from navapp.values import ResectionPlane
 _LEAST_SHARE, _STEEP_SHARE = 0.10, 0.35
 # Bone to be removed is covered so far; the ramp of its colours ends at this depth.
 _REMOVAL_SHARE, _REMOVAL_FULL_MM = 0.5, 15.0
-_LEGEND_PX = (14, 120)  # width and height of the ramp
+_LEGEND_PX, _LEGEND_RIM_PX = (14, 120), 16  # width and height of the ramp; from the picture's rim
+_LEGEND_TITLE = "to remove"
 
 
 def draw_bone(scene: Scene, drawing: Drawing) -> None:
@@ -72,15 +73,18 @@ def ramp_colours(depth_mm: NDArray[np.float64]) -> NDArray[np.float32]:
 def _draw_removal_legend(image: Image, labels: LabelBoard) -> None:
     """The ramp with its ends in mm, at the right of the picture."""
     height, width = image.shape[:2]
+    size, words = labels.size, (f">{_REMOVAL_FULL_MM:.0f} mm", "0 mm")
+    text_w, text_h = map(max, *(text_size(text, size) for text in words))
+    title_w, title_h = text_size(_LEGEND_TITLE, size)
     w, h = _LEGEND_PX
-    x, y = width - w - 76, max(80, height // 2 - h // 2)
-    if y + h + 30 > height or x < 0:
+    around_w, around_h = max(w + 6 + text_w, title_w), h + 2 * title_h + text_h
+    left, top = width - around_w - _LEGEND_RIM_PX, max(80, (height - around_h) // 2)
+    if left < 0 or top + around_h > height:
         return
+    y = top + 2 * title_h
     depth_mm = np.linspace(_REMOVAL_FULL_MM, 0.0, h)
-    image[y : y + h, x : x + w] = np.round(ramp_colours(depth_mm))[:, None].astype(np.uint8)
-    size = labels.size
-    for share, text in ((0.0, f">{_REMOVAL_FULL_MM:.0f} mm"), (1.0, "0 mm")):
-        at = (x + w + 5, y + round(share * h) + 5)
-        put_text(image, text, at, size, (235, 235, 235))
-    put_text(image, "to remove", (x - 14, y - 14), size, (235, 235, 235))
-    labels.taken.append(Box(x - 16, y - 32, w + 92, h + 50))
+    image[y : y + h, left : left + w] = np.round(ramp_colours(depth_mm))[:, None].astype(np.uint8)
+    for text, row in zip(words, (y, y + h), strict=True):
+        put_text(image, text, (left + w + 6, row + text_h // 3), size, (235, 235, 235))
+    put_text(image, _LEGEND_TITLE, (left, top + title_h), size, (235, 235, 235))
+    labels.taken.append(Box(left, top, around_w, around_h).grow(4).clip(width, height))
