@@ -77,6 +77,7 @@ class LabelBoard:
         return None if number < 0 else Box(int(places[number, 0]), int(places[number, 1]), w, h)
 
 
+@lru_cache(maxsize=256)
 def text_size(text: str, size: float) -> tuple[int, int]:
     """Width and height of a line in px, with what hangs below it."""
     import cv2

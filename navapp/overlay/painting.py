@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from navapp.geometry.bands import begin_on_helper, run_both
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.blend_kernels import blend_colour, mark_dots
 from navapp.overlay.colours import Colour
@@ -11,7 +10,7 @@ from navapp.overlay.labels import Image, LabelBoard
 from navapp.overlay.layers import LAYERS
 from navapp.overlay.scene import SKIN_MM, Scene
 from navapp.overlay.shading import draw_body, draw_bone
-from navapp.overlay.strokes import trace
+from navapp.overlay.strokes import draw_strokes
 
 
 def paint_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
@@ -25,18 +24,12 @@ def paint_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
 
 def paint(image: Image, scene: Scene, drawing: Drawing, labels: LabelBoard) -> None:
     """All that was asked for, into a picture (H, W, 3)."""
-    # Two threads: what stands in front is looked up while the bone is rendered, and lines are
-    # followed while surfaces are tinted. Both need the box of the bone.
-    _ = scene.box
-    run_both(lambda: scene.view, lambda: scene.seen)
-    _ = scene.ground
-    with begin_on_helper(lambda: trace(scene, drawing.strokes, image.shape)) as traced:
-        draw_bone(image, scene, drawing.tints, drawing.outline)
-        for body in drawing.bodies:
-            draw_body(image, scene, scene.render(body.mesh), body)
-        for points_mm, colour in drawing.dots:
-            _draw_dots(image, scene, points_mm, colour)
-    traced.result()(image)
+    draw_bone(image, scene, drawing.tints, drawing.outline)
+    for body in drawing.bodies:
+        draw_body(image, scene, scene.render(body.mesh), body)
+    for points_mm, colour in drawing.dots:
+        _draw_dots(image, scene, points_mm, colour)
+    draw_strokes(image, scene, drawing.strokes)
     for panel in drawing.panels:
         panel(image, labels)
     ask_for_words(scene, drawing, labels)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 _STEP_PX = 1.5
 _FARTHEST_PX = 20_000.0
 _DASH_PX, _GAP_PX = 7.0, 5.0
+_HIDDEN, _BENEATH, _ON_TOP = 0, 1, 2
 
 
 class Ground(NamedTuple):
@@ -132,22 +133,31 @@ def _trace_line(
             continue
         length = np.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2)
         n = int(length / _STEP_PX) + 1
-        for step in range(n):
-            a, b = step / n, (step + 1) / n
-            middle = 0.5 * (a + b)
-            u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
-            z = depth_mm[k] + middle * (depth_mm[k + 1] - depth_mm[k])
-            weight = weigh(u, v, z, ground)
-            is_beneath = weight <= ground.beneath
-            along += length / n
-            if weight < 0.5 * ground.beneath or (is_beneath and along % period > _DASH_PX):
+        # Steps that are drawn alike are covered as one piece.
+        kind, first = _HIDDEN, 0
+        for step in range(n + 1):
+            this = _HIDDEN
+            if step < n:
+                middle = (step + 0.5) / n
+                u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
+                z = depth_mm[k] + middle * (depth_mm[k + 1] - depth_mm[k])
+                weight = weigh(u, v, z, ground)
+                along += length / n
+                if weight > ground.beneath:
+                    this = _ON_TOP
+                elif weight >= 0.5 * ground.beneath and along % period <= _DASH_PX:
+                    this = _BENEATH
+            if this == kind and step < n:
                 continue
-            ends = (
-                u0 + a * (u1 - u0), v0 + a * (v1 - v0), u0 + b * (u1 - u0), v0 + b * (v1 - v0)
-            )  # fmt: skip
-            n_line = _cover(ends, half_px, room.line, room.touched[0], n_line)
-            if rim_px > 0.0 and not is_beneath:
-                n_rim = _cover(ends, half_px + rim_px, room.rim, room.touched[1], n_rim)
+            if kind != _HIDDEN:
+                a, b = first / n, step / n
+                ends = (
+                    u0 + a * (u1 - u0), v0 + a * (v1 - v0), u0 + b * (u1 - u0), v0 + b * (v1 - v0)
+                )  # fmt: skip
+                n_line = _cover(ends, half_px, room.line, room.touched[0], n_line)
+                if rim_px > 0.0 and kind == _ON_TOP:
+                    n_rim = _cover(ends, half_px + rim_px, room.rim, room.touched[1], n_rim)
+            kind, first = this, step
     return n_line, n_rim
 
 
@@ -166,9 +176,16 @@ def _cover(
     squared = du * du + dv * dv
     per_px = 1.0 / squared if squared > 0.0 else 0.0
     first_row, last_row = int(np.ceil(min(v0, v1) - reach)), int(np.floor(max(v0, v1) + reach))
-    first, last = int(np.ceil(min(u0, u1) - reach)), int(np.floor(max(u0, u1) + reach))
     for row in range(max(0, first_row), min(last_row + 1, share.shape[0])):
-        for column in range(max(0, first), min(last + 1, share.shape[1])):
+        # The part of the line that is within reach of this row.
+        low, high = 0.0, 1.0
+        if abs(dv) > 1e-9:
+            a, b = (row - reach - v0) / dv, (row + reach - v0) / dv
+            low, high = max(0.0, min(a, b)), min(1.0, max(a, b))
+        left, right = u0 + low * du, u0 + high * du
+        first = max(0, int(np.ceil(min(left, right) - reach)))
+        last = min(share.shape[1] - 1, int(np.floor(max(left, right) + reach)))
+        for column in range(first, last + 1):
             along = ((column - u0) * du + (row - v0) * dv) * per_px
             along = min(max(along, 0.0), 1.0)
             off_u, off_v = column - u0 - along * du, row - v0 - along * dv

@@ -1,7 +1,7 @@
 """Lines and crosses in space, drawn with soft edges at parts of a pixel."""
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -38,16 +38,14 @@ def cross_lines(point_mm: FloatArray, axes: FloatArray, half_mm: float) -> list[
     return [np.stack([point_mm - half_mm * a, point_mm, point_mm + half_mm * a]) for a in axes]
 
 
-def trace(
-    scene: Scene, strokes: Sequence[Stroke], shape: tuple[int, ...]
-) -> Callable[[Image], None]:
-    """Find the pixels (H, W) of strokes; what is returned blends them into a picture.
+def draw_strokes(image: Image, scene: Scene, strokes: Sequence[Stroke]) -> None:
+    """Strokes in their order.
 
     They are dashed where they lie beneath something or where that is not known, left out where a
     hand or an instrument hides them.
     """
     if not strokes:
-        return lambda image: None
+        return
     in_camera = scene.to_camera(np.concatenate([stroke.points_mm for stroke in strokes]))
     pixels = scene.camera.project(in_camera)
     firsts = np.cumsum([0, *(len(stroke.points_mm) for stroke in strokes)])
@@ -55,7 +53,7 @@ def trace(
     has_rim = scene.viewpoint.is_video
     rims = [_RIM_PX if has_rim and width > 1.0 else 0.0 for width in widths]
     colours = [stroke.colour for stroke in strokes]
-    return _trace(pixels, in_camera[:, 2], firsts, widths, rims, colours, scene.ground, shape)
+    _draw(image, pixels, in_camera[:, 2], firsts, (widths, rims, colours), scene.ground)
 
 
 def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: float = 14.0) -> None:
@@ -67,32 +65,30 @@ def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: floa
         at_px + half_px * np.array([[0.25 * x, 0.25 * y], [x, y]])
         for x, y in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
     ]
-    firsts = np.arange(0, 9, 2)
-    _trace(
-        np.concatenate(arms), np.zeros(8), firsts, [1.5] * 4, [0.0] * 4, [colour] * 4, ground,
-        image.shape,
-    )(image)  # fmt: skip
+    pens = [1.5] * 4, [0.0] * 4, [colour] * 4
+    _draw(image, np.concatenate(arms), np.zeros(8), np.arange(0, 9, 2), pens, ground)
 
 
-def _trace(
+def _draw(
+    image: Image,
     pixels: FloatArray,
     depth_mm: FloatArray,
     firsts: NDArray[np.int64],
-    widths_px: list[float],
-    rims_px: list[float],
-    colours: list[Colour],
+    pens: tuple[list[float], list[float], list[Colour]],
     ground: Ground,
-    shape: tuple[int, ...],
-) -> Callable[[Image], None]:
-    room = _room(shape[0], shape[1], threading.get_ident())
+) -> None:
+    """Strokes through places (N, 2) of the picture at depths (N,), from the first to the next one.
+
+    The pens are widths and rims in px, and colours.
+    """
+    widths_px, rims_px, colours = pens
+    room = _room(image.shape[0], image.shape[1], threading.get_ident())
     n = trace_strokes(
         pixels, np.ascontiguousarray(depth_mm), firsts, 0.5 * np.array(widths_px),
         np.array(rims_px), ground, room,
     )  # fmt: skip
-    # Copies: the room is used again before they are blended.
-    place, share, number = (part[:n].copy() for part in (room.place, room.share, room.colour))
     table = np.array(colours, dtype=np.float32)
-    return lambda image: blend_places(image, place, share, number, table)
+    blend_places(image, room.place[:n], room.share[:n], room.colour[:n], table)
 
 
 @lru_cache(maxsize=8)

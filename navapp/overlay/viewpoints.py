@@ -6,10 +6,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import run_both
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.display_model_view import EyeView
-from navapp.geometry.halves import half_box
+from navapp.geometry.halves import double, half_box, inside_of_halves
 from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
@@ -25,6 +26,8 @@ _NARROW_PX = 5
 _EDGE_SIGMA_PX = 1.2
 # Of the measured points in the rectified picture every so many is moved to the eye, each way.
 _POINT_STEP = 2
+# Half as many points are enough work for each of two threads.
+_WORTH_TWO = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,18 +93,18 @@ class LeftView:
         return points_mm
 
     def see(self, foreground: Foreground, box: Box) -> SeenDepth:
-        """What was measured in the rectified picture, at the places of the pixels of a box."""
-        shape = box.height, box.width
+        """What was measured in the rectified picture, at every second pixel of a box each way."""
+        half = half_box(box)
+        shape = half.height, half.width
         depth_mm = np.empty(shape, dtype=np.float32)
         is_guess, in_front = np.empty((2, *shape), dtype=np.uint8)
-        geometry = self._geometry
         look_up_depth(
-            self._columns[box.slices], self._rows[box.slices], self._depth_share[box.slices],
-            geometry.focal_px * geometry.baseline_mm, *_maps_of(foreground),
+            self._columns[half.slices], self._rows[half.slices], self._depth_share[half.slices],
+            self._geometry.focal_px * self._geometry.baseline_mm, *_maps_of(foreground),
             foreground.is_in_front, (foreground.box.x, foreground.box.y), depth_mm, is_guess,
             in_front,
         )  # fmt: skip
-        return SeenDepth(box, depth_mm, open_gaps(is_guess), soften(in_front))
+        return _double_depth(box, depth_mm, is_guess, in_front)
 
 
 def _maps_of(foreground: Foreground) -> tuple[Measured, Measured]:
@@ -117,29 +120,33 @@ def _maps_of(foreground: Foreground) -> tuple[Measured, Measured]:
     )  # fmt: skip
 
 
-def open_gaps(is_guess: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """A mask (h, w) of guesses, 0 or 1, without its specks and narrow parts."""
+def _double_depth(
+    box: Box, depth_mm: FloatMap, is_guess: NDArray[np.uint8], in_front: NDArray[np.uint8]
+) -> SeenDepth:
+    """From what is known of every second pixel each way, over `half_box(box)`.
+
+    Guesses lose their specks and narrow parts, and marks of 0 and 255 get a smooth edge.
+    """
     import cv2
 
-    square = np.ones((_NARROW_PX, _NARROW_PX), np.uint8)
-    return np.asarray(cv2.morphologyEx(is_guess, cv2.MORPH_OPEN, square))
-
-
-def soften(marks: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Marks (h, w) of 0 and 255 with a smooth edge."""
-    import cv2
-
-    return np.asarray(cv2.GaussianBlur(marks, (0, 0), _EDGE_SIGMA_PX))
+    square = np.ones((_NARROW_PX // 2 + 1, _NARROW_PX // 2 + 1), np.uint8)
+    is_gap = np.asarray(cv2.morphologyEx(is_guess, cv2.MORPH_OPEN, square), dtype=np.uint8)
+    blurred = cv2.GaussianBlur(in_front, (0, 0), 0.5 * _EDGE_SIGMA_PX)
+    height, width = in_front.shape
+    soft = cv2.resize(blurred, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
+    smooth = np.asarray(soft[inside_of_halves(box)], dtype=np.uint8)
+    return SeenDepth(box, double(depth_mm, box), double(is_gap, box), smooth)
 
 
 def _rectified_places(
     camera: Camera, geometry: RectifiedGeometry
 ) -> tuple[NDArray[np.int16], NDArray[np.int16], FloatMap]:
-    """Of each pixel (H, W): nearest column and row in the rectified picture, and a share of depth.
+    """Of every second pixel (H, W): column and row in the rectified picture, and a share of depth.
 
-    Columns and rows are negative where there is none. The depth in the camera is the rectified
-    depth times that share.
+    Nearest ones, negative where there is none. The depth in the camera is the rectified depth times
+    that share.
     """
+    camera = camera.scale(0.5)
     rows, columns = np.mgrid[: camera.height, : camera.width]
     rectified = rectify_rays(camera, geometry, columns.ravel(), rows.ravel())
     places = np.nan_to_num(
@@ -185,14 +192,19 @@ class MirrorView:
 
     def to_camera(self, points_mm: FloatArray) -> FloatArray:
         """So that they are seen where they are: with glass and bulge."""
-        return self.eye_view.warp(points_mm)
+        middle = len(points_mm) // 2
+        if middle < _WORTH_TWO:
+            return self.eye_view.warp(points_mm)
+        halves = points_mm[:middle], points_mm[middle:]
+        warp = self.eye_view.warp
+        return np.concatenate(run_both(lambda: warp(halves[0]), lambda: warp(halves[1])))
 
     def see(self, foreground: Foreground, box: Box) -> SeenDepth:
         """Every second measured point each way, drawn as large as the gap to the next one."""
-        around = foreground.box
+        around, half = foreground.box, half_box(box)
         disparity_px, origin = foreground.depth
         sparse = np.s_[::_POINT_STEP, ::_POINT_STEP]
-        depth_mm = np.full((box.height, box.width), np.nan, dtype=np.float32)
+        depth_mm = np.full((half.height, half.width), np.nan, dtype=np.float32)
         mark = np.zeros(depth_mm.shape, dtype=np.uint8)
         splat_points(
             np.ascontiguousarray(disparity_px[sparse]),
@@ -201,21 +213,22 @@ class MirrorView:
             (around.x, around.y, _POINT_STEP),
             self._lens_of_pair(),
             self._eye_from_rectified(foreground),
-            self._lens_of_eye(box),
+            self._lens_of_eye(half),
             depth_mm,
             mark,
         )
         is_guess = (mark & KNOWN == 0).view(np.uint8)
         in_front = np.where(mark & IN_FRONT > 0, np.uint8(255), np.uint8(0))
-        return SeenDepth(box, depth_mm, open_gaps(is_guess), soften(in_front))
+        return _double_depth(box, depth_mm, is_guess, in_front)
 
     def _lens_of_pair(self) -> tuple[float, float, float, float]:
         one = self._geometry
         return one.focal_px, one.centre_x_px, one.centre_y_px, one.baseline_mm
 
-    def _lens_of_eye(self, box: Box) -> tuple[float, float, float, float]:
-        matrix = self.camera.matrix
-        return matrix[0, 0], matrix[1, 1], matrix[0, 2] - box.x, matrix[1, 2] - box.y
+    def _lens_of_eye(self, half: Box) -> tuple[float, float, float, float]:
+        """Of the picture at half its resolution, counted from a box in it."""
+        matrix = self.camera.scale(0.5).matrix
+        return matrix[0, 0], matrix[1, 1], matrix[0, 2] - half.x, matrix[1, 2] - half.y
 
     def _eye_from_rectified(self, foreground: Foreground) -> FloatArray:
         """(3, 4); what glass and bulge do in the middle of the bone they do everywhere near."""

@@ -15,8 +15,8 @@ def test_the_depth_is_that_of_the_left_camera() -> None:
     bone = render(MESH, POSE, CAMERA)
     error_mm = np.abs(seen.depth_mm - bone.depth_mm)[bone.mask]
     assert bone.mask.sum() > 10_000
-    # The nearest pixel: the bone is steep beside the edges.
-    assert np.percentile(error_mm, 99) < 1.0
+    # Every second pixel: the bone is steep beside its edges, and the table far behind them.
+    assert np.percentile(error_mm, 98) < 1.0
     assert np.median(error_mm) < 0.2
     assert not seen.is_guess[bone.mask].any()
 
