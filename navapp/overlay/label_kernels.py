@@ -7,33 +7,38 @@ from numpy.typing import NDArray
 
 @njit(cache=True, nogil=True)
 def find_free_place(
-    places: NDArray[np.int64],
+    at: tuple[float, float],
+    offsets_px: NDArray[np.float64],
+    shares: NDArray[np.float64],
     size_px: tuple[int, int],
     picture_px: tuple[int, int],
     others: NDArray[np.int64],
-) -> int:
-    """Number of the first box that lies in the picture and over no other one; -1 without any.
+) -> tuple[int, int, bool]:
+    """Column and row of the first box that lies in the picture and over no other; if there is one.
 
     Args:
-        places: (N, 2) column and row of the boxes' first pixels.
-        size_px: width and height of each.
+        at: column and row that the boxes lie around.
+        offsets_px: (N, 2) of each box from there.
+        shares: (N, 2) of its own size that it is moved by besides.
+        size_px: width and height of the boxes.
         picture_px: width and height.
         others: (M, 4) column, row, width and height.
     """
     w, h = size_px
-    for number in range(len(places)):
-        x, y = places[number, 0], places[number, 1]
+    for k in range(len(offsets_px)):
+        x = int(np.floor(at[0] + offsets_px[k, 0] + shares[k, 0] * w + 0.5))
+        y = int(np.floor(at[1] + offsets_px[k, 1] + shares[k, 1] * h + 0.5))
         if x < 0 or y < 0 or x + w > picture_px[0] or y + h > picture_px[1]:
             continue
         is_free = True
-        for k in range(len(others)):
-            ox, oy, ow, oh = others[k, 0], others[k, 1], others[k, 2], others[k, 3]
+        for m in range(len(others)):
+            ox, oy, ow, oh = others[m, 0], others[m, 1], others[m, 2], others[m, 3]
             if x < ox + ow and ox < x + w and y < oy + oh and oy < y + h:
                 is_free = False
                 break
         if is_free:
-            return number
-    return -1
+            return x, y, True
+    return 0, 0, False
 
 
 @njit(cache=True, nogil=True)

@@ -42,15 +42,20 @@ class LabelBoard:
 
         height, width = image.shape[:2]
         # Not over what the words name.
-        named = [Box(round(u), round(v), 0, 0).grow(_ROUND_PX) for _, (u, v), _ in self._asked]
+        size = 2 * _ROUND_PX
+        named = [
+            (round(u) - _ROUND_PX, round(v) - _ROUND_PX, size, size) for _, (u, v), _ in self._asked
+        ]
+        taken = [(one.x, one.y, one.width, one.height) for one in self.taken] + named
         placed = []
         for text, at, colour in self._asked:
             if not (0 <= at[0] < width and 0 <= at[1] < height):
                 continue
-            box = self._find_place(text, at, (width, height), named)
+            box = self._find_place(text, at, (width, height), taken)
             if box is None:
                 continue
             self.taken.append(box)
+            taken.append((box.x, box.y, box.width, box.height))
             placed.append(box)
             nearest = (
                 int(np.clip(at[0], box.x, box.x + box.width)),
@@ -65,16 +70,17 @@ class LabelBoard:
         return placed
 
     def _find_place(
-        self, text: str, at: tuple[float, float], picture_px: tuple[int, int], named: list[Box]
+        self,
+        text: str,
+        at: tuple[float, float],
+        picture_px: tuple[int, int],
+        taken: list[tuple[int, int, int, int]],
     ) -> Box | None:
         w, h = text_size(text, self.size)
-        size = np.array([w, h]) + 2 * _PADDING_PX
-        # Beside the point on the left or above, the box ends where on the right it begins.
-        places = np.round(np.array(at) + _OFFSETS_PX + _SHARES * size).astype(np.int64)
-        others = np.array([(one.x, one.y, one.width, one.height) for one in (*self.taken, *named)])
-        w, h = int(size[0]), int(size[1])
-        number = find_free_place(places, (w, h), picture_px, others)
-        return None if number < 0 else Box(int(places[number, 0]), int(places[number, 1]), w, h)
+        w, h = w + 2 * _PADDING_PX, h + 2 * _PADDING_PX
+        others = np.array(taken, dtype=np.int64).reshape(-1, 4)
+        x, y, is_free = find_free_place(at, _OFFSETS_PX, _SHARES, (w, h), picture_px, others)
+        return Box(x, y, w, h) if is_free else None
 
 
 @lru_cache(maxsize=256)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.blend_kernels import blend_colour, mark_dots
 from navapp.overlay.colours import Colour
@@ -16,10 +17,17 @@ from navapp.overlay.strokes import draw_strokes
 def paint_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
     """The scene's layers in the order of their table, and their words."""
     drawing = Drawing()
+    # Looked up by the helper, meanwhile: the layers know nothing of what stands in front.
+    with begin_on_helper(lambda: scene.seen):
+        ask_layers(scene, drawing)
+    paint(image, scene, drawing, labels)
+
+
+def ask_layers(scene: Scene, drawing: Drawing) -> None:
+    """What the scene's layers want to be drawn, in the order of their table."""
     for name, layer in LAYERS.items():
         if name in scene.layers:
             layer(scene, drawing)
-    paint(image, scene, drawing, labels)
 
 
 def paint(image: Image, scene: Scene, drawing: Drawing, labels: LabelBoard) -> None:

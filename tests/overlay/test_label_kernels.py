@@ -9,12 +9,15 @@ pytestmark = pytest.mark.kernel
 
 
 def test_the_first_box_that_is_free_is_found() -> None:
-    places = np.array([[-1, 5], [5, 96], [40, 40], [60, 20], [61, 20], [20, 20]])
-    others = np.array([[30, 45, 20, 3], [50, 0, 11, 100]])
+    offsets = np.array([[-41.0, 5], [5, 96], [40, 40], [60, 20], [61, 20], [20, 20]]) - (0, 10.4)
+    shares = np.array([[0.0, 0], [0, 0], [0.5, -1], [0, 0], [0, 0], [0, 0]])
+    others = np.array([[50, 35, 20, 3], [50, 0, 11, 100]])
+    given = (0.2, 10.0), offsets, shares, (20, 10), (100, 100)
     # Beside the picture, below it, over one, over the other by a column; then free.
-    assert find_free_place(places, (20, 10), (100, 100), others) == 4
-    assert find_free_place(places[:4], (20, 10), (100, 100), others) == -1
-    assert find_free_place(places, (20, 10), (100, 100), np.empty((0, 4), np.int64)) == 2
+    assert find_free_place(*given, others) == (61, 20, True)
+    assert find_free_place(given[0], offsets[:4], shares[:4], *given[3:], others)[2] is False
+    nowhere = np.empty((0, 4), np.int64)
+    assert find_free_place(*given, nowhere) == (50, 30, True)
 
 
 @pytest.mark.parametrize("corner", [(4, 3), (-5, -2), (25, 16), (40, 40)])

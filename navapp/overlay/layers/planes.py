@@ -20,8 +20,15 @@ def draw_planes(scene: Scene, drawing: Drawing) -> None:
         drawing.lines([_frame(plane)], PLANE, 1.0)
         cuts += cut_lines(scene.drawn_mesh, plane)
         words = name.removeprefix(f"{scene.stage.bone}_").replace("_", " ")
-        drawing.label(f"{words} cut", plane.corners_mm()[1], PLANE)
+        drawing.label(f"{words} cut", _label_mm(plane), PLANE)
     drawing.lines(cuts, PLANE)
+
+
+@lru_cache(maxsize=64)
+def _label_mm(plane: ResectionPlane) -> FloatArray:
+    """(3,) the corner that is named."""
+    corner_mm: FloatArray = plane.corners_mm()[1]
+    return corner_mm
 
 
 @lru_cache(maxsize=64)
