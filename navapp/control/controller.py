@@ -26,6 +26,7 @@ from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
 from navapp.control.frame_result import FrameResult
+from navapp.control.interlocks import grow_older
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import OtherBones
@@ -74,7 +75,7 @@ class SessionController:
         hooks = hooks or SessionHooks()
         rig, plan = specification.rig, specification.plan
         self._overlay_valid_ms = specification.overlay_valid_ms
-        self._display_delay_ns = round(specification.display_delay_ms * 1e6)
+        self._is_late = False
         self._devices = devices
         self._mirror_checking = MirrorChecking(specification.display, Rectifier(rig).geometry)
         self._composer = Composer(rig, plan, self._mirror_checking.view)
@@ -108,8 +109,12 @@ class SessionController:
 
     @property
     def snapshot(self) -> Snapshot:
-        """The newest one."""
+        """The newest one, as of when it was made."""
         return self._snapshot
+
+    def snapshot_now(self) -> Snapshot:
+        """The newest one, judged at this moment; callable from any thread."""
+        return grow_older(self._snapshot, self._session.now_ns)
 
     def submit(self, command: Command) -> None:
         """Queue a command; callable from any thread, never blocks."""
@@ -142,8 +147,8 @@ class SessionController:
             self._display.darken()
         elif not (self._snapshot.is_navigable or self._snapshot.is_candidate):
             is_same_cross = self._snapshot.cross_check == before.cross_check is not None
-            if not is_same_cross:
-                self._display.withdraw_guides()
+            if not is_same_cross and self._display.withdraw_guides():
+                self._tell_withdrawn()
         tell_changes(session, before, self._snapshot)
         return self._snapshot
 
@@ -168,6 +173,29 @@ class SessionController:
             return snapshot
         self._mirror_checking.check_session(snapshot)
         return self._maker.make()
+
+    def _tell_withdrawn(self) -> None:
+        """Guides went out between two frames; what commands do is told by the commands."""
+        reasons = self._snapshot.reasons
+        # What came too late was never seen.
+        if (
+            not self._is_late
+            and reasons
+            and reasons[0] in (Reason.POSE_TOO_OLD, Reason.CAMERA_SILENT)
+        ):
+            text = f"guides withdrawn: {reasons[0].value}"
+            self._session.add_event("display", text, EventLevel.WARNING)
+
+    def _tell_late(self, age_ms: float, has_guides: bool) -> None:
+        """A picture that was too old when it was ready is not shown: told once, until one is."""
+        is_late = has_guides and age_ms >= self._overlay_valid_ms
+        if is_late and not self._is_late:
+            text = f"the display stays dark: the picture was {age_ms:.0f} ms old when it was ready"
+            text += f", {self._overlay_valid_ms:.0f} ms are allowed"
+            self._session.add_event("display", text, EventLevel.WARNING)
+        elif self._is_late and has_guides and not is_late:
+            self._session.add_event("display", "pictures are ready in time again")
+        self._is_late = is_late if has_guides else self._is_late
 
     def _next_frame(self, timeout_s: float) -> StereoFrame | None:
         session = self._session
@@ -236,20 +264,18 @@ class SessionController:
         if is_shown and has_cross and not (self._display.is_blanked or self._display.trouble):
             self._mirror_checking.note_shown()
         preview = make_preview(video)
+        plain = make_preview(frame.left) if has_guides else None
         if self._session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
-        self._session.keep_preview(preview)
+        self._session.keep_preview(preview, plain)
         age_ns = self._session.now_ns - frame.captured_ns
+        self._tell_late(age_ns / 1e6, is_shown and has_guides)
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
-        """Guides where the bone will be when their light is seen; none if it moves too fast."""
+        """Guides where the bone will be when their light is seen."""
         if snapshot.is_navigable:
-            light_ns = self._session.now_ns + self._display_delay_ns
-            predicted = self._session.predict_pose(light_ns)
-            snapshot = replace(snapshot, left_from_bone=predicted)
-            if predicted is None:
-                snapshot = replace(snapshot, reasons=(Reason.MOVES_TOO_FAST,))
+            snapshot = replace(snapshot, left_from_bone=snapshot.pose_at_light)
         pose = snapshot.left_from_bone
         cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
         return self._composer.compose_mirror(snapshot, foreground, cross_px)

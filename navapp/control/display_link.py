@@ -76,10 +76,12 @@ class DisplayLink:
         if self.is_blanked:
             self._display.blank()
 
-    def withdraw_guides(self) -> None:
-        """Turn a picture dark whose guides a command or the passing time has made wrong."""
-        if self._has_guides:
+    def withdraw_guides(self) -> bool:
+        """Turn a picture dark whose guides have become wrong; whether there was one."""
+        had_guides = self._has_guides
+        if had_guides:
             self.darken()
+        return had_guides
 
     def close(self) -> None:
         """Dark, and not opened any more."""

@@ -1,11 +1,32 @@
 """Whether guides may be shown: one answer for display, overlay, log and screen."""
 
+from dataclasses import replace
+
 from navapp.control.mirror_error import MirrorError
 from navapp.control.states import OtherBone, SessionState, Snapshot
 from navapp.values import Reason, Status
 
-# A pose older than this shows where the bone was, not where it is.
+# A pose older than this shows where the bone was, not where it is, whatever is configured.
 MAX_POSE_AGE_MS = 500.0
+
+
+def judge(draft: Snapshot) -> Snapshot:
+    """A snapshot with the interlocks' answer; without guides its preview shows none either."""
+    judged = replace(draft, reasons=check_interlocks(draft))
+    if judged.is_navigable or judged.is_candidate or draft.plain_preview is None:
+        return judged
+    return replace(judged, preview=draft.plain_preview)
+
+
+def grow_older(snapshot: Snapshot, now_ns: int) -> Snapshot:
+    """The same snapshot judged at a later moment: what it knows of poses has become older."""
+    passed_ms = max(now_ns - snapshot.time_ns, 0) / 1e6
+    others = tuple(
+        other if other.age_ms is None else replace(other, age_ms=other.age_ms + passed_ms)
+        for other in snapshot.others
+    )
+    age_ms = None if snapshot.pose_age_ms is None else snapshot.pose_age_ms + passed_ms
+    return judge(replace(snapshot, pose_age_ms=age_ms, others=others))
 
 
 def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
@@ -58,6 +79,9 @@ def _of_pose(snapshot: Snapshot) -> list[Reason]:
     reasons: list[Reason] = []
     if verdict.status is not Status.OK:
         reasons += verdict.reasons or (Reason.BONE_LOST,)
-    if snapshot.pose_age_ms is None or snapshot.pose_age_ms > MAX_POSE_AGE_MS:
+    longest_ms = min(snapshot.valid_ms, MAX_POSE_AGE_MS)
+    if snapshot.pose_age_ms is None or snapshot.pose_age_ms > longest_ms:
         reasons.append(Reason.POSE_TOO_OLD)
+    if snapshot.has_mirror and snapshot.pose_at_light is None:
+        reasons.append(Reason.MOVES_TOO_FAST)
     return reasons

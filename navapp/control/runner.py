@@ -51,8 +51,8 @@ class SessionRunner:
         self._thread.start()
 
     def snapshot(self) -> Snapshot:
-        """The newest one."""
-        return self._controller.snapshot
+        """The newest one, judged at this moment: also while a step hangs."""
+        return self._controller.snapshot_now()
 
     def submit(self, command: Command) -> None:
         """Hand a command over."""

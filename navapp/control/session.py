@@ -59,6 +59,7 @@ class Session:
         self._switched_layers: frozenset[str] = frozenset()
         self._tracked_at_ns = 0
         self._preview: Image | None = None
+        self._plain_preview: Image | None = None
         self._meter = RateMeter()
         self._is_over = False
         self._rig_error: RigError | None = None
@@ -104,6 +105,11 @@ class Session:
     def preview(self) -> Image | None:
         """Of the newest picture, None before the first."""
         return self._preview
+
+    @property
+    def plain_preview(self) -> Image | None:
+        """The same without guides; None when it has none."""
+        return self._plain_preview
 
     @property
     def is_over(self) -> bool:
@@ -191,9 +197,9 @@ class Session:
         self._switched_layers ^= {name}
         self.add_event("layer", f"layer {name} {'on' if name in self.layers else 'off'}")
 
-    def keep_preview(self, preview: Image) -> None:
-        """The newest picture, made small."""
-        self._preview = preview
+    def keep_preview(self, preview: Image, plain: Image | None) -> None:
+        """The newest picture, made small; when guides are drawn in it, also without them."""
+        self._preview, self._plain_preview = preview, plain
 
     def end_frame(self, result: FrameResult, latency_ms: float | None) -> None:
         """Count a frame that was handled, and tell its result; latency as of `RateMeter`."""

@@ -1,6 +1,6 @@
 """The snapshot of a session, with the interlocks' answer in it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 
 from navapp.control.camera_link import CameraLink
@@ -8,7 +8,7 @@ from navapp.control.device_handlers import DeviceReport
 from navapp.control.device_lines import camera_line, display_line, rig_line
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
-from navapp.control.interlocks import check_interlocks
+from navapp.control.interlocks import judge
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_error import MirrorError
 from navapp.control.mirror_judging import MirrorJudge
@@ -17,6 +17,7 @@ from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
 from navapp.control.stages import STAGES
 from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
+from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, TrackedFrame
 
 
@@ -55,7 +56,10 @@ class SnapshotMaker:
             candidate_id=session.candidate_id if is_candidate else None,
             pose_age_ms=session.pose_age_ms(now_ns),
             others=session.other_bones(now_ns),
+            valid_ms=self.specification.overlay_valid_ms,
+            pose_at_light=self._predict_pose(now_ns),
             preview=session.preview,
+            plain_preview=session.plain_preview,
             shows_depth=session.shows_depth,
             layers=session.layers,
             rates=session.rates(self.camera.n_dropped),
@@ -80,7 +84,7 @@ class SnapshotMaker:
             length_check=self.rig_watch.length_check,
             is_over=session.is_over,
         )
-        return replace(draft, reasons=check_interlocks(draft))
+        return judge(draft)
 
     def _device_reasons(self, reports: tuple[DeviceReport, ...]) -> tuple[Reason, ...]:
         """Of projector, mirror and a display that is seen in it."""
@@ -90,6 +94,13 @@ class SnapshotMaker:
             of_display = calibrated.find_reason(self.display.display.info, date.today())
             reasons += [] if of_display is None else [of_display]
         return tuple(reasons)
+
+    def _predict_pose(self, now_ns: int) -> RigidTransform | None:
+        """At the moment in which light from the display is seen; None over video."""
+        if self.mirror_judge is None or self.session.state is not SessionState.NAVIGATING:
+            return None
+        delay_ns = round(self.specification.display_delay_ms * 1e6)
+        return self.session.predict_pose(now_ns + delay_ns)
 
     def _judge_mirror(self, tracked: TrackedFrame | None, now_ns: int) -> MirrorError | None:
         if self.mirror_judge is None:

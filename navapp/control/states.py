@@ -255,10 +255,15 @@ class Snapshot:
     # session; None when none waits.
     candidate_id: int | None = None
     pose_age_ms: float | None = None  # of that pose, now
+    valid_ms: float = 500.0  # a pose that is older is not where the bone is
+    # in the mirror: where the bone will be when light from the display is seen; None when it moves
+    # too fast to know.
+    pose_at_light: RigidTransform | None = None
     others: tuple[OtherBone, ...] = ()  # the other bones that are followed
     # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
-    # frame.
+    # frame. `plain_preview` is the same without guides, None when it has none.
     preview: NDArray[np.uint8] | None = None
+    plain_preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
     rates: Rates = field(default_factory=Rates)

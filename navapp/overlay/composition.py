@@ -123,5 +123,7 @@ def make_preview(image: Image) -> Image:
     factor = min(PREVIEW_WIDTH / width, PREVIEW_HEIGHT / height, 1.0)
     size = (max(1, round(width * factor)), max(1, round(height * factor)))
     small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    if small.ndim == 2:
+        small = np.repeat(small[:, :, None], 3, axis=2)
     small.setflags(write=False)
     return small
