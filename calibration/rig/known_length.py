@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.rig.corner_locator import find_pair
 from calibration.rig.initial_rig import matrix_of, pose_of
 from calibration.targets.boards import Board
-from calibration.targets.detection import SeenBoard, find_board
+from calibration.targets.detection import SeenBoard
 from calibration.targets.seen_pairs import SeenPair
-from navapp.geometry.rectification import Image, luma
+from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 
@@ -35,15 +35,8 @@ class LengthMeter:
 
     def __call__(self, left: Image, right: Image) -> MeasuredLength | None:
         """Measure; None where not both pictures show enough of the board."""
-        try:
-            in_left = find_board(luma(left), self.board)
-            in_right = None if in_left is None else find_board(luma(right), self.board)
-        except (cv2.error, np.linalg.LinAlgError):
-            # A detector that stumbles over some picture has not seen the board in it.
-            return None
-        if in_left is None or in_right is None:
-            return None
-        return measure_length(self.board, self.rig, SeenPair(0, in_left, in_right))
+        pair = find_pair(self.board, left, right)
+        return None if pair is None else measure_length(self.board, self.rig, pair)
 
 
 def measure_length(board: Board, rig: StereoRig, pair: SeenPair) -> MeasuredLength | None:

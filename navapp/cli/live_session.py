@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.board_watch import BoardWatch
     from navapp.control.calibrated_display import CalibratedDisplay
+    from navapp.control.check_points import LocateCorners
     from navapp.control.controller import SessionController
     from navapp.control.event_log import SessionHooks
     from navapp.control.frame_result import FrameListener
@@ -145,7 +146,17 @@ def make_controller(
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
         hooks=_make_hooks(session, on_frame, undo),
         board_watch=_make_board_watch(session, is_inline=is_inline),
+        locate_corners=_make_locator(session),
     )
+
+
+def _make_locator(session: LiveSession) -> "LocateCorners | None":
+    """What finds the board for the check of the mirror; None without a board or a mirror."""
+    if session.board is None or session.specification.display is None:
+        return None
+    from calibration.rig.corner_locator import CornerLocator
+
+    return CornerLocator(session.board, session.opened.rig)
 
 
 def _make_board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None":

@@ -167,7 +167,8 @@ class CommandHandler:
         if why:
             self._refuse("mirror", why)
             return
-        self._session.add_event("mirror", "check of the mirror: move each cross onto its point")
+        what = "corner of the board" if self._mirror.is_on_board else "place on the bone"
+        self._session.add_event("mirror", f"check of the mirror: move each cross onto its {what}")
 
     def _on_cross(self, command: NudgeCross | ConfirmCross) -> None:
         tracked = self._session.tracked
@@ -181,6 +182,10 @@ class CommandHandler:
             return
         if isinstance(command, NudgeCross):
             self._mirror.nudge(command.right_px, command.down_px)
+            return
+        why = self._mirror.find_moved()
+        if why:
+            self._refuse("mirror", f"{why}: hold it still, or begin the check again")
             return
         found = self._mirror.confirm(pose, self._session.now_ns)
         if found is not None:

@@ -19,6 +19,7 @@ from navapp.control.board_watch import BoardWatch
 from navapp.control.bone_motion import BoneMotion
 from navapp.control.bone_tracks import BoneTracks
 from navapp.control.camera_link import CameraLink
+from navapp.control.check_points import LocateCorners
 from navapp.control.command_handler import CommandHandler
 from navapp.control.device_handlers import MirrorHandler, ProjectorHandler
 from navapp.control.device_monitor import MonitoredDevices, tell_changes
@@ -60,6 +61,7 @@ class SessionController:
         executor: Executor,
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
+        locate_corners: LocateCorners | None = None,
         make_tracker: MakeTracker = make_tracker,
     ) -> None:
         """Bring the devices to their places; no frame is taken yet.
@@ -70,6 +72,7 @@ class SessionController:
             executor: runs first registrations.
             hooks: who is told what.
             board_watch: looks for a known length; None: nobody does.
+            locate_corners: of a board, for the check of the mirror; None: no board is known.
             make_tracker: makes the tracker of a bone.
         """
         hooks = hooks or SessionHooks()
@@ -77,7 +80,9 @@ class SessionController:
         self._overlay_valid_ms = specification.overlay_valid_ms
         self._is_late = False
         self._devices = devices
-        self._mirror_checking = MirrorChecking(specification.display, Rectifier(rig).geometry)
+        self._mirror_checking = MirrorChecking(
+            specification.display, Rectifier(rig).geometry, locate_corners
+        )
         self._composer = Composer(rig, plan, self._mirror_checking.view)
         self._depth_marks = DepthMarks(rig)
         self._executor = executor
@@ -217,6 +222,7 @@ class SessionController:
     def _handle_frame(self, frame: StereoFrame) -> None:
         session = self._session
         session.begin_frame(frame)
+        self._mirror_checking.keep_frame(frame)
         session.look_for_bone(frame)
         self._rig_watch.check_frame(frame)
         snapshot = self._make_snapshot()
@@ -244,7 +250,8 @@ class SessionController:
         mark = "SIMULATED" if snapshot.is_simulated else ""
         tracked = self._session.tracked
         foreground = None if tracked is None else tracked.foreground
-        point_mm = self._mirror_checking.point_mm
+        pose = snapshot.left_from_bone
+        point_mm = None if pose is None else self._mirror_checking.point_mm(pose)
         video = self._composer.compose_video(frame.left, snapshot, mark, foreground, point_mm)
         image = video
         if self._composer.mode is OverlayMode.MIRROR:

@@ -1,15 +1,25 @@
-"""The surgeon's check of the mirror: crosses on the bone, moved until they lie where they should.
+"""The surgeon's check of the mirror: crosses, moved until they lie on their points.
 
-Three points of the bone's surface that the cameras have measured in that moment, marked on the
-operator's screen too; none of them took part in the calibration. What the crosses had to be moved
-by is the error of the whole chain as the eye sees it.
+Three corners of a board that the cameras see in that moment, or, without a board, three places of
+the bone that they have just measured; both are marked on the operator's screen too, and none of
+them took part in the calibration. What the crosses had to be moved by is the error of the whole
+chain as the eye sees it.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivers.frames import StereoFrame
 from navapp.control.calibrated_display import CalibratedDisplay
+from navapp.control.check_points import (
+    LEAST_APART_MM,
+    CheckPoint,
+    LocateCorners,
+    choose_corners,
+    choose_on_bone,
+    draw_places_px,
+)
 from navapp.control.states import CrossCheck, MirrorCheck, SessionState, Snapshot
 from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.mesh import TriangleMesh
@@ -17,16 +27,13 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Reason, TrackedFrame
 
-N_POINTS, LEAST_APART_MM = 3, 40.0
-# Of the measured pixels every so many is a candidate; crosses stay so far from the picture's rim.
-_STRIDE_PX, _RIM_PX = 8, 20
-# From the plane through the nearest vertex of the model, and from that vertex.
-_ON_BONE_MM, _NEAR_VERTEX_MM = 2.0, 8.0
+# A board that has moved by more than this is not where its crosses are.
+_MOST_MOVED_MM = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Cross:
-    point_mm: FloatArray  # (3,) of the bone
+    point: CheckPoint
     nudge_px: tuple[int, int] = (0, 0)
 
 
@@ -36,12 +43,20 @@ class MirrorChecking:
     Args:
         display: that is checked; None: guides lie over video, and nothing is asked.
         geometry: of the rectified pair in which points are measured.
+        locate: finds the corners of a board; None: no board is known.
     """
 
-    def __init__(self, display: CalibratedDisplay | None, geometry: RectifiedGeometry) -> None:
+    def __init__(
+        self,
+        display: CalibratedDisplay | None,
+        geometry: RectifiedGeometry,
+        locate: LocateCorners | None = None,
+    ) -> None:
         self._display = display
         self._view = None if display is None else display.model.view()
         self._geometry = geometry
+        self._locate = locate
+        self._frame: StereoFrame | None = None
         self._crosses: list[_Cross] = []
         self._number = 0
         self._bone = ""
@@ -61,10 +76,14 @@ class MirrorChecking:
             return None
         return CrossCheck(self._number, len(self._crosses), self._crosses[self._number].nudge_px)
 
-    @property
-    def point_mm(self) -> FloatArray | None:
-        """(3,) of the bone, where the cross belongs; None without a check."""
-        return self._crosses[self._number].point_mm if self._crosses else None
+    def point_mm(self, left_from_bone: RigidTransform) -> FloatArray | None:
+        """(3,) in the left camera's frame, where the cross belongs; None without a check."""
+        return self._crosses[self._number].point.in_left(left_from_bone) if self._crosses else None
+
+    def keep_frame(self, frame: StereoFrame) -> None:
+        """The newest pictures, in which a board is looked for when the check asks for it."""
+        if self._locate is not None:
+            self._frame = frame
 
     def find_reason(self, now_ns: int) -> Reason | None:
         """What the check has against guides."""
@@ -103,18 +122,40 @@ class MirrorChecking:
         return self._shown == (self._number, self._crosses[self._number].nudge_px)
 
     def begin(self, tracked: TrackedFrame, mesh: TriangleMesh) -> str:
-        """Choose points that were measured on a bone; what is wrong, empty when it has begun."""
+        """Choose points on a board, or on a bone; what is wrong, empty when it has begun."""
         if self._view is None:
             return "no display in the mirror is configured"
-        points = self._candidates(self._view, tracked, mesh)
-        chosen = _furthest_apart(points)
-        pose = tracked.left_from_bone
-        if chosen is None or pose is None:
-            return f"no three points {LEAST_APART_MM:.0f} mm apart are measured on the bone"
-        self._crosses = [_Cross(point) for point in pose.inverse().apply(chosen)]
+        points = choose_corners(self._view, self._locate_corners())
+        if not points:
+            points = choose_on_bone(self._view, self._geometry, tracked, mesh)
+        if not points:
+            return f"no three points {LEAST_APART_MM:.0f} mm apart are seen, on a board or the bone"
+        self._crosses = [_Cross(point) for point in points]
         self._number, self._finished, self._shown = 0, None, None
         self._bone = tracked.bone
         return ""
+
+    @property
+    def is_on_board(self) -> bool:
+        """The check that is under way uses the corners of a board."""
+        return bool(self._crosses) and self._crosses[0].point.corner_id is not None
+
+    def find_moved(self) -> str:
+        """What is wrong with the board that the cross lies on; empty when it lies still."""
+        point = self._crosses[self._number].point
+        if point.corner_id is None:
+            return ""
+        located = self._locate_corners()
+        if located is None or point.corner_id not in located[0]:
+            return "both cameras must see the board"
+        now_mm = located[1][located[0] == point.corner_id][0]
+        moved_mm = float(np.linalg.norm(now_mm - point.point_mm))
+        return "" if moved_mm <= _MOST_MOVED_MM else f"the board has moved by {moved_mm:.1f} mm"
+
+    def _locate_corners(self) -> tuple[np.ndarray, FloatArray] | None:
+        if self._locate is None or self._frame is None:
+            return None
+        return self._locate(self._frame.left, self._frame.right)
 
     def give_up(self) -> None:
         """End the check without a result: the mirror is unchecked."""
@@ -131,7 +172,7 @@ class MirrorChecking:
         if not self._crosses or self._view is None:
             return None
         cross = self._crosses[self._number]
-        pixel = _pixels(self._view, left_from_bone.apply(cross.point_mm[None]))[0]
+        pixel = draw_places_px(self._view, cross.point.in_left(left_from_bone)[None])[0]
         moved: FloatArray = pixel + np.array(cross.nudge_px)
         return moved
 
@@ -141,49 +182,10 @@ class MirrorChecking:
         self._shown = None
         if self._number < len(self._crosses) or self._view is None:
             return None
-        points = np.array([cross.point_mm for cross in self._crosses])
-        depth_mm = self._view.warp(left_from_bone.apply(points))[:, 2]
+        points = np.array([cross.point.in_left(left_from_bone) for cross in self._crosses])
+        depth_mm = self._view.warp(points)[:, 2]
         off_px = np.linalg.norm([cross.nudge_px for cross in self._crosses], axis=1)
         residual_mm = off_px * depth_mm / self._view.camera.focal_px
         self._crosses = []
         self._finished = MirrorCheck(now_ns, float(residual_mm.max()))
         return self._finished
-
-    def _candidates(self, view: EyeView, tracked: TrackedFrame, mesh: TriangleMesh) -> FloatArray:
-        """(N, 3) points measured on the bone that the display can show, in the left camera."""
-        from scipy.spatial import cKDTree
-
-        pose, foreground = tracked.left_from_bone, tracked.foreground
-        if foreground is None or pose is None:
-            return np.empty((0, 3))
-        cloud = foreground.measured.reproject(self._geometry, _STRIDE_PX)
-        points = self._geometry.rectified_from_left.inverse().apply(cloud.points_mm)
-        # A hand, or what was matched wrongly, is not on the bone.
-        in_bone = pose.inverse().apply(points)
-        far_mm, nearest = cKDTree(mesh.vertices_mm).query(in_bone)
-        normals = mesh.normals[nearest]
-        off_mm = np.abs(np.sum((in_bone - mesh.vertices_mm[nearest]) * normals, axis=1))
-        points = points[(off_mm < _ON_BONE_MM) & (far_mm < _NEAR_VERTEX_MM)]
-        last = np.array([view.camera.width, view.camera.height]) - _RIM_PX
-        pixels = _pixels(view, points)
-        # Unknown places compare as outside.
-        inside: FloatArray = points[((pixels > _RIM_PX) & (pixels < last)).all(axis=1)]
-        return inside
-
-
-def _pixels(view: EyeView, points_mm: FloatArray) -> FloatArray:
-    """(N, 2) where points (N, 3) of the left camera's frame are drawn, as the eye reads them."""
-    pixels: FloatArray = view.camera.project(view.warp(points_mm))
-    return pixels
-
-
-def _furthest_apart(points: FloatArray) -> FloatArray | None:
-    """(3, 3) of points (N, 3): a triangle whose sides are long; None when one is too short."""
-    if len(points) < N_POINTS:
-        return None
-    first = points[np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1))]
-    second = points[np.argmax(np.linalg.norm(points - first, axis=1))]
-    to_both = np.minimum(*(np.linalg.norm(points - one, axis=1) for one in (first, second)))
-    chosen = np.stack([first, second, points[np.argmax(to_both)]])
-    sides_mm = np.linalg.norm(chosen - np.roll(chosen, 1, axis=0), axis=1)
-    return chosen if sides_mm.min() >= LEAST_APART_MM else None

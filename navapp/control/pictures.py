@@ -55,13 +55,14 @@ class Composer:
             snapshot: its `reasons` decide; nothing else does.
             mark: words for the corner.
             foreground: what was measured of the depth around the bone in that frame.
-            point_mm: (3,) of the bone, where the cross of a check of the mirror belongs.
+            point_mm: (3,) in the left camera's frame, where the cross of a check of the mirror
+                belongs.
         """
         scene = _scene(snapshot, self._left_view, self._plan, foreground)
-        pose, cross_px = snapshot.left_from_bone, None
+        cross_px = None
         is_ok = snapshot.verdict is not None and snapshot.verdict.status is Status.OK
-        if pose is not None and point_mm is not None and is_ok:
-            cross_px = self._left_view.camera.project(pose.apply(point_mm[None]))[0]
+        if point_mm is not None and is_ok:
+            cross_px = self._left_view.camera.project(point_mm[None])[0]
         return compose_video(left, scene, banner(snapshot), mark, cross_px)
 
     def compose_mirror(

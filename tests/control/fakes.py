@@ -21,6 +21,7 @@ from drivers.interfaces import (
 from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
 from navapp.control.calibrated_display import CalibratedDisplay
+from navapp.control.check_points import LocateCorners
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
@@ -207,6 +208,7 @@ class Bench:
         mirror: MirrorMount | None = None,
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
+        locate_corners: LocateCorners | None = None,
         make_display: Callable[[Clock, int, int], SimulatedDisplay] = SimulatedDisplay,
         calibrated_display: CalibratedDisplay | None = None,
         display_delay_ms: float = 0.0,
@@ -241,6 +243,7 @@ class Bench:
             ),
             executor=executor or InlineExecutor(),
             board_watch=board_watch,
+            locate_corners=locate_corners,
             make_tracker=self._make_tracker,
             hooks=replace(
                 given,

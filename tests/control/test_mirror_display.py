@@ -13,21 +13,22 @@ from drivers.interfaces import PowerState, ProjectorStatus
 from navapp.cli.live_session import _read_display
 from navapp.config import parse
 from navapp.control.calibrated_display import CalibratedDisplay, Eyes
+from navapp.control.check_points import LEAST_APART_MM, LocateCorners
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.device_handlers import ProjectorHandler
-from navapp.control.mirror_checking import LEAST_APART_MM
 from navapp.control.pictures import banner
 from navapp.control.states import (
     Blank,
     CheckMirror,
     ConfirmCross,
+    DistrustRig,
     EnterStage,
     MirrorCheck,
     NudgeCross,
     Show,
     ToggleLayer,
 )
-from navapp.errors import ConfigurationError
+from navapp.errors import ConfigurationError, DeviceLost
 from navapp.geometry.display_model import DisplayModel, DisplayQuality
 from navapp.geometry.display_model_files import write_display_model
 from navapp.geometry.display_model_optics import VirtualScreen
@@ -95,6 +96,7 @@ def a_bench(
     mirror: FixedMirror | None = None,
     plan: Plan | None = None,
     layers: tuple[str, ...] | None = None,
+    locate_corners: LocateCorners | None = None,
 ) -> Bench:
     display = CalibratedDisplay(model or a_model(), check_minutes=1.0, eyes=eyes)
     bench = Bench(
@@ -104,6 +106,7 @@ def a_bench(
         mirror=mirror,
         plan=plan,
         layers=layers,
+        locate_corners=locate_corners,
     )
     bench.script.tracked = measured_bone()
     return bench
@@ -161,6 +164,79 @@ def test_the_cross_is_shown_where_its_point_is_seen_and_moves_with_the_keys() ->
     # The eye's right is the display's left: the columns are seen from right to left.
     np.testing.assert_allclose(moved, [4.0, -10.0], atol=0.2)
     assert not bench.snapshot.is_navigable
+
+
+class Board:
+    """Corners at the depth of the bone's rim, beside it."""
+
+    ids = np.array([3, 5, 8, 11])
+
+    def __init__(self) -> None:
+        self.corners_mm: np.ndarray | None = np.array(
+            [[-40.0, -30.0, 310.0], [30.0, -30.0, 310.0], [-5.0, 30.0, 312.0], [0.0, 0.0, 310.0]]
+        )
+
+    def __call__(self, left: np.ndarray, right: np.ndarray):
+        return None if self.corners_mm is None else (self.ids, self.corners_mm.copy())
+
+
+def test_corners_of_a_board_that_is_seen_are_checked_rather_than_the_bone() -> None:
+    board = Board()
+    bench = a_bench(locate_corners=board)
+    navigating(bench)
+    bench.do(CheckMirror())
+    bench.frames()
+    assert "corner of the board" in bench.events[-1].text
+    shown = np.argwhere(guides(bench)).mean(axis=0)[::-1]
+    view = a_model().view()
+    places = view.to_display_px(view.camera.project(view.warp(board.corners_mm)))
+    assert np.linalg.norm(places - shown, axis=1).min() < 1.0
+    for _ in range(3):
+        bench.do(ConfirmCross())
+        bench.frames()
+    assert bench.snapshot.is_navigable
+
+
+def test_a_board_that_moves_or_is_hidden_confirms_nothing() -> None:
+    board = Board()
+    bench = a_bench(locate_corners=board)
+    navigating(bench)
+    bench.do(CheckMirror())
+    bench.frames()
+    at_rest = board.corners_mm
+    for corners, why in ((at_rest + 0.4, "moved by 0.7 mm"), (None, "must see the board")):
+        board.corners_mm = corners
+        bench.do(ConfirmCross())
+        assert why in bench.refused()
+        assert bench.snapshot.cross_check.number == 0
+    board.corners_mm = at_rest + 0.1
+    bench.do(ConfirmCross())
+    assert bench.snapshot.cross_check.number == 1
+
+
+@pytest.mark.parametrize("board", [lambda left, right: None, lambda left, right: (
+    np.array([1, 2, 3]), np.array([[0.0, 0.0, 300.0], [30.0, 0.0, 300.0], [0.0, 30.0, 300.0]])
+)], ids=["not seen", "too small"])  # fmt: skip
+def test_without_three_corners_the_bone_is_checked(board) -> None:
+    bench = a_bench(locate_corners=board)
+    navigating(bench)
+    bench.do(CheckMirror())
+    assert "place on the bone" in bench.events[-1].text
+
+
+@pytest.mark.parametrize("what", ["camera", "rig"])
+def test_in_a_fault_nothing_is_lit(what: str) -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    assert guides(bench).any()
+    if what == "camera":
+        bench.camera.error = DeviceLost("gone")
+    else:
+        bench.do(DistrustRig("it was bumped"))
+    bench.frames()
+    assert bench.state == "fault"
+    assert not bench.display.visible_image().any()
 
 
 def test_a_check_that_is_off_keeps_the_display_dark() -> None:

@@ -74,7 +74,7 @@ def test_a_detector_that_stumbles_has_seen_nothing(world, monkeypatch) -> None:
     def stumble(picture, board):
         raise cv2.error("assertion failed")
 
-    monkeypatch.setattr("calibration.rig.known_length.find_board", stumble)
+    monkeypatch.setattr("calibration.rig.corner_locator.find_board", stumble)
     grey = np.full((720, 1280), 90, np.uint8)
     assert LengthMeter(BOARD, world[0])(grey, grey) is None
 

@@ -1,0 +1,44 @@
+"""Where the marks of a board are, seen in one pair of pictures."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.rig.lengths import triangulate_mm
+from calibration.targets.boards import Board
+from calibration.targets.detection import find_board
+from calibration.targets.seen_pairs import SeenPair
+from navapp.geometry.rectification import Image, luma
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray
+
+
+def find_pair(board: Board, left: Image, right: Image) -> SeenPair | None:
+    """The marks in both pictures; None where not both of them show the board."""
+    try:
+        in_left = find_board(luma(left), board)
+        in_right = None if in_left is None else find_board(luma(right), board)
+    except (cv2.error, np.linalg.LinAlgError):
+        # A detector that stumbles over some picture has not seen the board in it.
+        return None
+    if in_left is None or in_right is None:
+        return None
+    return SeenPair(0, in_left, in_right)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CornerLocator:
+    """Finds a board in pairs of pictures and tells where its marks are."""
+
+    board: Board
+    rig: StereoRig
+
+    def __call__(self, left: Image, right: Image) -> tuple[NDArray[np.intp], FloatArray] | None:
+        """Ids (n,) and places (n, 3) mm in the left camera's frame; None without the board."""
+        pair = find_pair(self.board, left, right)
+        if pair is None:
+            return None
+        ids, left_px, right_px = pair.common()
+        return ids, triangulate_mm(self.rig, left_px, right_px)
