@@ -140,4 +140,7 @@ def _tell(found: "Latency", names: tuple[str, str], diagnostics: Diagnostics) ->
             "the two pictures of a moving bone are not of one moment; trigger the cameras together"
         )
     if delay.value_ms > 0.0:
-        diagnostics.say(f"for the configuration:\n\n[display]\ndelay_ms = {delay.value_ms:.1f}")
+        diagnostics.say(
+            f"for the configuration:\n\n[display]\ndelay_ms = {delay.value_ms:.1f}\n"
+            f"delay_bound_ms = {delay.bound_ms:.1f}"
+        )

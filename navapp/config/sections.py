@@ -44,6 +44,8 @@ class DisplaySection(Section):
     """A picture without a newer one turns black after this."""
     delay_ms: NotNegative = 0.0
     """What is shown is seen so much later (calibrate latency), and withdrawn so much earlier."""
+    delay_bound_ms: NotNegative = 0.0
+    """95 % bound of that delay's error (calibrate latency); 0: not known."""
     simulated: DisplaySimulationSection = DisplaySimulationSection()
     """The display that simulated cameras see."""
 

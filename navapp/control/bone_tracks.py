@@ -12,7 +12,7 @@ from navapp.tracking import TrackState
 from navapp.values import FrameTimings, StageSpec, Status, TrackedFrame, Verdict
 
 # Further than that within one delay of the display a patient does not move: chosen.
-_FARTHEST_PREDICTED_MM = 5.0
+FARTHEST_PREDICTED_MM = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +144,7 @@ class BoneTracks:
         """Where the accepted bone will be at a moment, by its motion.
 
         Where it was measured, when it was lost before or is in doubt; None when a corner of its box
-        moves further than `_FARTHEST_PREDICTED_MM` until then: nobody knows where it will be.
+        moves further than `FARTHEST_PREDICTED_MM` until then: nobody knows where it will be.
         """
         track = self._tracks.get(stage.bone)
         if track is None:
@@ -154,7 +154,7 @@ class BoneTracks:
         corners_mm = self._trackers.corners_mm(stage.bone)
         pose = track.predict(time_ns, corners_mm.mean(axis=0))
         moved = pose.apply(corners_mm) - track.left_from_bone.apply(corners_mm)
-        return pose if np.linalg.norm(moved, axis=1).max() <= _FARTHEST_PREDICTED_MM else None
+        return pose if np.linalg.norm(moved, axis=1).max() <= FARTHEST_PREDICTED_MM else None
 
     def glance(
         self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None

@@ -32,6 +32,7 @@ from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import Composer, Image
+from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
@@ -321,4 +322,5 @@ def _make_session(
         OtherBones(tracks, plan, specification.others),
         specification.stage,
         specification.layers,
+        RateMeter(specification.display_delay_ms, specification.display_delay_bound_ms),
     )

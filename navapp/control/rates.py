@@ -3,15 +3,24 @@
 import time
 from collections import deque
 
-from navapp.control.states import Rates
+import numpy as np
 
-_WINDOW = 40
+from navapp.control.states import CaptureToLight, Rates
+
+# Frames over which figures are told; a spread is told of so many at least.
+_WINDOW, _FEWEST = 40, 10
 
 
 class RateMeter:
-    """Counts handled frames in real time."""
+    """Counts handled frames in real time.
 
-    def __init__(self) -> None:
+    Args:
+        delay_ms: from handing a picture to the display until its light; 0: not known.
+        delay_bound_ms: 95 % bound of that delay's error.
+    """
+
+    def __init__(self, delay_ms: float = 0.0, delay_bound_ms: float = 0.0) -> None:
+        self._delay_ms, self._delay_bound_ms = delay_ms, delay_bound_ms
         self._moments_ns: deque[int] = deque(maxlen=_WINDOW)
         self._fps: deque[float] = deque(maxlen=_WINDOW)
         self._latency_ms: deque[float] = deque(maxlen=_WINDOW)
@@ -42,7 +51,17 @@ class RateMeter:
             latency_ms=self._latency_ms[-1] if self._latency_ms else None,
             fps_history=tuple(self._fps),
             latency_history_ms=tuple(self._latency_ms),
+            light=self._light(),
             n_frames=self._n_frames,
             n_dropped=n_dropped,
             skew_ms=self._skew_ms,
+        )
+
+    def _light(self) -> CaptureToLight | None:
+        if self._delay_ms <= 0.0 or len(self._latency_ms) < _FEWEST:
+            return None
+        latency_ms = np.array(self._latency_ms)
+        off_ms = np.quantile(np.abs(latency_ms - latency_ms.mean()), 0.95)
+        return CaptureToLight(
+            float(latency_ms.mean()) + self._delay_ms, float(np.hypot(off_ms, self._delay_bound_ms))
         )

@@ -35,6 +35,7 @@ class Session:
         others: the other bones that are followed.
         stage: to start in.
         layers: drawn in every stage; None: the stage's own.
+        meter: of its frames.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Session:
         others: OtherBones,
         stage: StageSpec,
         layers: tuple[str, ...] | None = None,
+        meter: RateMeter | None = None,
     ) -> None:
         self._clock = clock
         self._log = log
@@ -60,7 +62,7 @@ class Session:
         self._tracked_at_ns = 0
         self._preview: Image | None = None
         self._plain_preview: Image | None = None
-        self._meter = RateMeter()
+        self._meter = meter or RateMeter()
         self._is_over = False
         self._rig_error: RigError | None = None
         self._stage = stage

@@ -31,6 +31,7 @@ class SessionSpecification:
     # where the mirror stood when the display was calibrated, if the display's model does not say.
     mirror_deg: float = 45.0
     display_delay_ms: float = 0.0  # from showing a picture until its light
+    display_delay_bound_ms: float = 0.0  # 95 % bound of that delay's error, 0 when not known
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
     display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
@@ -92,10 +93,11 @@ def specify_session(
         configuration.tracking.follow_refused if follows_refused is None else follows_refused,
         configuration.camera.depth_mm,
         others,
-        display.withdrawn_ms if is_live else display.valid_ms,
-        configuration.mirror.calibrated_deg,
-        display.delay_ms if is_live else 0.0,
-        is_live and configuration.recording.folder is not None,
-        layers,
-        calibrated_display,
+        overlay_valid_ms=display.withdrawn_ms if is_live else display.valid_ms,
+        mirror_deg=configuration.mirror.calibrated_deg,
+        display_delay_ms=display.delay_ms if is_live else 0.0,
+        display_delay_bound_ms=display.delay_bound_ms if is_live else 0.0,
+        is_recording=is_live and configuration.recording.folder is not None,
+        layers=layers,
+        display=calibrated_display,
     )

@@ -188,6 +188,15 @@ class DeviceLine:
 
 
 @dataclass(frozen=True, slots=True)
+class CaptureToLight:
+    """From the capture of a frame until the light of its picture, the display's delay included."""
+
+    mean_ms: float  # over the last frames
+    # 95 % of frames are within so much of it, the error of the display's delay included.
+    spread_ms: float
+
+
+@dataclass(frozen=True, slots=True)
 class Rates:
     """How fast frames are handled; None before there is a figure."""
 
@@ -198,6 +207,7 @@ class Rates:
     # fps_history, latency_history_ms: the last values, oldest first, for sparklines.
     fps_history: tuple[float, ...] = ()
     latency_history_ms: tuple[float, ...] = ()
+    light: CaptureToLight | None = None  # None when the display's delay is not known
     n_frames: int = 0  # handled so far
     n_dropped: int = 0  # replaced by newer ones before they were handled
     skew_ms: float | None = None  # between the two cameras, newest frame

@@ -17,7 +17,7 @@ class LinePanel(TextView):
         self.border_title = "line"
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
-        """Three lines; a fourth where there is room."""
+        """Three lines; what else there is room for."""
         rates, symbols = view.snapshot.rates, view.symbols
         room = width - 10
         lines = [
@@ -39,6 +39,10 @@ class LinePanel(TextView):
                 (" ms", "$text-muted"),
             ),
         ]
+        light = rates.light
+        if light is not None and height > len(lines):
+            told = f"{light.mean_ms:5.0f} +-{light.spread_ms:.0f}"
+            lines.append(Content.assemble(("light", "$text-muted"), told, (" ms", "$text-muted")))
         if height > len(lines):
             lines.append(Content.assemble(("frames ", "$text-muted"), f"{rates.n_frames:d}"))
         return lines

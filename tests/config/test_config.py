@@ -68,6 +68,7 @@ CHANGED: dict[str, Any] = {
         "flip_vertically": True,
         "valid_ms": 100.0,
         "delay_ms": 55.5,
+        "delay_bound_ms": 2.5,
         "simulated": {"delay_ms": 12.0, "refresh_hz": 50.0},
     },
     "projector": {
