@@ -17,9 +17,12 @@ from navapp.overlay.strokes import draw_strokes
 def paint_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
     """The scene's layers in the order of their table, and their words."""
     drawing = Drawing()
-    # Looked up by the helper, meanwhile: the layers know nothing of what stands in front.
+    # Both threads need the box. What stands in front is looked up by the helper, while the layers,
+    # which know nothing of it, are asked and the bone is rendered.
+    _ = scene.box
     with begin_on_helper(lambda: scene.seen):
         ask_layers(scene, drawing)
+        _ = scene.view
     paint(image, scene, drawing, labels)
 
 

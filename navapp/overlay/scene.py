@@ -196,7 +196,9 @@ class Scene:
         return self._order[0]
 
     def weight_over(self, box: Box) -> FloatMap:
-        """The weights over another box; beyond `box` nothing is known."""
+        """The weights over another box, not to be changed; beyond `box` nothing is known."""
+        if box.intersect(self.box) == box:
+            return self.weight[box.relative_to(self.box).slices]
         weight = np.full((box.height, box.width), self.guess_weight, dtype=np.float32)
         here, there = box.shared_slices(self.box)
         weight[here] = self.weight[there]
@@ -213,7 +215,7 @@ class Scene:
 
     def weight_of(self, view: RenderedView, box: Box) -> FloatMap:
         """The weights over a box of another mesh: those of beneath where the bone is nearer."""
-        weight = self.weight_over(box)
+        weight = self.weight_over(box).copy()
         here, there = box.shared_slices(self.box)
         mesh_mm = np.full(weight.shape, np.nan, dtype=np.float32)
         mesh_mm[view.box.relative_to(box).slices] = view.depth_mm

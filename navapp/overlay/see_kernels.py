@@ -57,9 +57,9 @@ def look_up_depth(
                 continue
             if is_in_front[y, x]:
                 in_front[j, i] = 255
-            disparity, is_matched = _look_up(u, v, finer)
+            disparity, is_matched = look_up(u, v, finer)
             if not is_matched:
-                disparity, is_matched = _look_up(u, v, around)
+                disparity, is_matched = look_up(u, v, around)
             if is_matched:
                 is_guess[j, i] = 0
             if disparity > 0.0:
@@ -67,7 +67,7 @@ def look_up_depth(
 
 
 @njit(cache=True, nogil=True)
-def _look_up(u: int, v: int, given: Measured) -> tuple[np.float32, bool]:
+def look_up(u: int, v: int, given: Measured) -> tuple[np.float32, bool]:
     """Disparity in px of the view at one of its pixels, NaN where unknown, and whether matched."""
     x, y = (u >> given.halvings) - given.x, (v >> given.halvings) - given.y
     if x < 0 or y < 0 or x >= given.disparity.shape[1] or y >= given.disparity.shape[0]:

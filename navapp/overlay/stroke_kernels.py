@@ -154,9 +154,8 @@ def _trace_line(
                 ends = (
                     u0 + a * (u1 - u0), v0 + a * (v1 - v0), u0 + b * (u1 - u0), v0 + b * (v1 - v0)
                 )  # fmt: skip
-                n_line = _cover(ends, half_px, room.line, room.touched[0], n_line)
-                if rim_px > 0.0 and kind == _ON_TOP:
-                    n_rim = _cover(ends, half_px + rim_px, room.rim, room.touched[1], n_rim)
+                rim = rim_px if kind == _ON_TOP else 0.0
+                n_line, n_rim = _cover(ends, half_px, rim, room, n_line, n_rim)
             kind, first = this, step
     return n_line, n_rim
 
@@ -165,18 +164,20 @@ def _trace_line(
 def _cover(
     ends: tuple[float, float, float, float],
     half_px: float,
-    share: NDArray[np.float32],
-    touched: NDArray[np.int32],
-    n: int,
-) -> int:
-    """Pixels of a stroke with round ends; their edge is one pixel wide. How many were touched."""
+    rim_px: float,
+    room: Room,
+    n_line: int,
+    n_rim: int,
+) -> tuple[int, int]:
+    """Cover a piece with round ends, and its rim; their edges are one pixel wide."""
     u0, v0, u1, v1 = ends
-    reach = half_px + 0.5
     du, dv = u1 - u0, v1 - v0
     squared = du * du + dv * dv
     per_px = 1.0 / squared if squared > 0.0 else 0.0
+    reach = half_px + rim_px + 0.5
+    height, width = room.line.shape
     first_row, last_row = int(np.ceil(min(v0, v1) - reach)), int(np.floor(max(v0, v1) + reach))
-    for row in range(max(0, first_row), min(last_row + 1, share.shape[0])):
+    for row in range(max(0, first_row), min(last_row + 1, height)):
         # The part of the line that is within reach of this row.
         low, high = 0.0, 1.0
         if abs(dv) > 1e-9:
@@ -184,7 +185,7 @@ def _cover(
             low, high = max(0.0, min(a, b)), min(1.0, max(a, b))
         left, right = u0 + low * du, u0 + high * du
         first = max(0, int(np.ceil(min(left, right) - reach)))
-        last = min(share.shape[1] - 1, int(np.floor(max(left, right) + reach)))
+        last = min(width - 1, int(np.floor(max(left, right) + reach)))
         for column in range(first, last + 1):
             along = ((column - u0) * du + (row - v0) * dv) * per_px
             along = min(max(along, 0.0), 1.0)
@@ -192,14 +193,31 @@ def _cover(
             off_squared = off_u * off_u + off_v * off_v
             if off_squared >= reach * reach:
                 continue
-            covered = np.float32(min(reach - np.sqrt(off_squared), 1.0))
-            if covered > share[row, column]:
-                if share[row, column] == 0.0:
-                    if n == len(touched):
-                        continue
-                    touched[n] = row * share.shape[1] + column
-                    n += 1
-                share[row, column] = covered
+            inside = reach - np.sqrt(off_squared)
+            n_line = _raise(room.line, room.touched[0], n_line, row, column, inside - rim_px)
+            if rim_px > 0.0:
+                n_rim = _raise(room.rim, room.touched[1], n_rim, row, column, inside)
+    return n_line, n_rim
+
+
+@njit(cache=True, nogil=True)
+def _raise(
+    share: NDArray[np.float32],
+    touched: NDArray[np.int32],
+    n: int,
+    row: int,
+    column: int,
+    inside_px: float,
+) -> int:
+    """A pixel's share to what is covered of it, if that is more; how many pixels are touched."""
+    covered = np.float32(min(inside_px, 1.0))
+    if covered > share[row, column]:
+        if share[row, column] == 0.0:
+            if n == len(touched):
+                return n
+            touched[n] = row * share.shape[1] + column
+            n += 1
+        share[row, column] = covered
     return n
 
 

@@ -202,14 +202,11 @@ class MirrorView:
     def see(self, foreground: Foreground, box: Box) -> SeenDepth:
         """Every second measured point each way, drawn as large as the gap to the next one."""
         around, half = foreground.box, half_box(box)
-        disparity_px, origin = foreground.depth
-        sparse = np.s_[::_POINT_STEP, ::_POINT_STEP]
         depth_mm = np.full((half.height, half.width), np.nan, dtype=np.float32)
         mark = np.zeros(depth_mm.shape, dtype=np.uint8)
         splat_points(
-            np.ascontiguousarray(disparity_px[sparse]),
-            np.ascontiguousarray(origin[sparse] == Origin.MATCHED),
-            np.ascontiguousarray(foreground.is_in_front[sparse]),
+            *_maps_of(foreground),
+            foreground.is_in_front,
             (around.x, around.y, _POINT_STEP),
             self._lens_of_pair(),
             self._eye_from_rectified(foreground),
