@@ -48,6 +48,10 @@ def result(path: Path) -> dict[str, Any]:
     return content
 
 
+def events_of(session: Path) -> list[dict[str, Any]]:
+    return list(map(json.loads, (session / "events.jsonl").read_text("utf-8").splitlines()))
+
+
 @pytest.mark.slow
 def test_the_scripted_operator_refuses_a_wrong_pose_then_accepts_and_tracks(tmp_path: Path) -> None:
     out = tmp_path / "out.json"
@@ -88,11 +92,14 @@ do = "register"
 do = "stage"
 stage = "opening"
 at_frame = 9
+[[step]]
+do = "blank"
+at_frame = 12
 """
 
 
 @pytest.mark.slow
-def test_two_bones_are_followed_at_once_and_replay_to_the_same_poses(
+def test_the_operators_script_has_two_bones_followed_at_once_and_they_replay_to_the_same_poses(
     tmp_path: Path, moving: Path
 ) -> None:
     script, session = tmp_path / "script.toml", tmp_path / "session"
@@ -102,6 +109,11 @@ def test_two_bones_are_followed_at_once_and_replay_to_the_same_poses(
     options += ["--operator", str(script), "--record", str(session)]
     assert run([*options, "--json", str(first)]) == 0
     frames = result(first)["frames"]
+    blanks = [e for e in events_of(session) if e.get("command") == "blank"]
+    assert [entry["sequence"] for entry in blanks] == [12]
+    stages = [frame["stage"] for frame in frames]
+    assert list(dict.fromkeys(stages)) == ["opening", "spacer"]
+    assert stages[-1] == "opening"
     for bone, other in (("tibia", "femur"), ("femur", "tibia")):
         its_turns = [f for f in frames if f["bone"] == bone and f["bodies"]]
         assert len(its_turns) >= 2
@@ -162,25 +174,6 @@ def test_verbose_tells_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture
         run([*words, *(word for word in options if word != "--quiet")])
         lines = capsys.readouterr().err.splitlines()
         assert [line.split()[2] for line in lines if line.startswith("navapp: frame")] == told
-
-
-def test_the_operators_script_is_followed(tmp_path: Path, moving: Path) -> None:
-    script, out = tmp_path / "script.toml", tmp_path / "out.json"
-    script.write_text(
-        '[[step]]\ndo = "register"\n[[step]]\ndo = "stage"\nstage = "drilling"\nat_frame = 5\n'
-        '[[step]]\ndo = "blank"\nat_frame = 8\n',
-        encoding="utf-8",
-    )
-    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "10"]
-    session = tmp_path / "session"
-    options += ["--operator", str(script), "--record", str(session)]
-    assert run([*options, "--json", str(out)]) == 0
-    lines = (session / "events.jsonl").read_text(encoding="utf-8").splitlines()
-    blanks = [e for e in map(json.loads, lines) if e.get("command") == "blank"]
-    assert [entry["sequence"] for entry in blanks] == [8]
-    stages = [frame["stage"] for frame in result(out)["frames"]]
-    assert stages[0] == "opening"
-    assert stages[-1] == "drilling"
 
 
 def test_nothing_found_is_exit_code_4(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.xdist_group("knees"))
 
 
-@pytest.fixture(params=few_of([8, 20]), ids="{} knees".format, scope="package")
+@pytest.fixture(params=few_of([6, 20]), ids="{} knees".format, scope="package")
 def people(request: pytest.FixtureRequest) -> list[KneeAnatomy]:
-    """Both knees of four people, or of all."""
+    """Both knees of three people, or of all."""
     return knees()[: request.param]

@@ -22,6 +22,7 @@ from tests.calibration.marks import (
     drawn_rig,
     seen_pair,
 )
+from tests.many import few_of
 
 SIZE = (WIDTH, HEIGHT)
 
@@ -63,9 +64,10 @@ def test_the_rig_is_found_and_accepted(world, solved):
     assert solved.held_out_rms_px == pytest.approx(solved.solved.rms_px, rel=0.1)
 
 
-def test_the_predicted_error_holds_over_many_rigs():
+@pytest.mark.parametrize("n_rigs", few_of([2, 4]))
+def test_the_predicted_error_holds_over_many_rigs(n_rigs):
     errors, bounds = [], []
-    for seed in range(4):
+    for seed in range(n_rigs):
         rng = np.random.default_rng(1000 + seed)
         true = drawn_rig(rng)
         found = solve_rig(BOARD, drawn_pairs(true, rng, 10), SIZE)
