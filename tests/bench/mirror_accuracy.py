@@ -5,10 +5,14 @@ usage: python -m tests.bench.mirror_accuracy [--setups N] [--computed N]
 
 Set-ups are drawn at random: a 24 inch monitor of 1920 x 1080 seen at the bone's depth from 350 to
 550 mm, a plate of 1 to 4 mm at some 45 degrees. For `--setups` of them pictures are rendered by
-rays of their own, marks are found and the display is solved as `navapp calibrate mirror` does; then
-crosses are drawn on points of the site, shown, and read from the picture that the eye sees, against
-where the points themselves appear. For `--computed` more the marks are computed with noise instead.
-With `--keys`, operators align crosses with an eye that wanders by 3 mm (95 %).
+rays of their own, marks are found and the display is solved as `navapp calibrate mirror` does. In
+each lies another knee, which is registered and followed; the product draws crosses on points of the
+femur and the line of the distal cut, and both are read from the picture that the eye sees, against
+where the true femur's points and line appear: drawn with the true pose and display, and with the
+tracked pose and the solved display. For `--computed` more the marks are computed with noise.
+
+With `--keys`, operators align crosses with an eye that wanders by 3 mm (95 %): N of them in all, a
+third with each noise.
 
 The exit code is 1 when a limit is missed; each is told beside its figure.
 """
@@ -23,17 +27,19 @@ from calibration.mirror.display_solution import DisplayCalibration, solve_displa
 from calibration.mirror.first_state import Told
 from calibration.mirror.seen_views import SeenView
 from calibration.mirror.view_detection import find_view
-from navapp.geometry.display_model import DisplayModel
+from navapp.evaluation import compute_mean_tre_mm
 from sim_devices.mirror_optics import MirrorSetup
-from sim_devices.mirror_setups import (
-    HEIGHT_PX,
-    PITCH_MM,
-    WIDTH_PX,
-    draw_setup,
-    look_at_site,
-    make_eye_camera,
+from sim_devices.mirror_setups import PITCH_MM, draw_setup, look_at_site
+from tests.bench.mirror_guides import (
+    Crosses,
+    ReadCut,
+    choose_targets,
+    find_cut,
+    read_crosses,
+    read_cut,
 )
-from sim_devices.mirror_view import MirrorView
+from tests.bench.mirror_knees import BONE, follow_knee
+from tests.bench.mirror_reading import Sight
 from tests.calibration.mirror.simulated_operators import SimulatedOperator
 from tests.calibration.mirror.simulated_pictures import take_view
 from tests.calibration.mirror.simulated_views import drawn_views, eye_camera, scene
@@ -42,12 +48,31 @@ from tests.mirrors import true_display
 
 N_VIEWS = 8
 _FIRST_SEED, _FIRST_COMPUTED, _FIRST_OPERATOR = 3100, 31000, 310000
-_EYE_PX, _EYE_FOCAL_PX = 1500, 5000.0
-_CROSS_PX, _STROKE_PX = 25.0, 3.0
-# The ghost of the plate's second face is a fiftieth of the picture.
-_READ_ABOVE = 0.06
-_WINDOW_PX = 60
 _NOISES_PX = (0.5, 1.0, 2.0)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Guides:
+    """What is read of one way to draw them."""
+
+    crosses: Crosses
+    cut: ReadCut
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Row:
+    """What is found in one set-up."""
+
+    is_accepted: bool
+    # held_out_mm, held_out_arcmin: 95 % of them.
+    held_out_mm: float
+    held_out_arcmin: float
+    pose_mm: float  # mean distance of the tracked bone's points from the true ones
+    predicted_mm: np.ndarray  # (n,) of the model at the targets
+    model_error_mm: np.ndarray  # (n,) computed there, without pictures
+    by_truth: Guides
+    by_estimate: Guides
+    is_cut_seen_by_cameras: np.ndarray  # of the cut line's samples
 
 
 class Limits:
@@ -84,41 +109,120 @@ def main() -> int:
 
 
 def by_pictures(n_setups: int, limits: Limits) -> None:
-    """Calibrate from rendered pictures, then read what is shown."""
-    held, exact, calibrated, below, refused = [], [], [], [], 0
-    print("| set-up | views | held out 95 % mm | arcmin | predicted mm | crosses by the truth mm "
-          "| by the calibration, median mm | largest mm | s |")  # fmt: skip
-    print("|---|" + "---|" * 8)
+    """Calibrate from rendered pictures, follow a knee, then read what is shown."""
+    print("| set-up | held out mm | arcmin | predicted mm | pose mm | crosses | whole "
+          "| by the truth: bars 95 % mm | line 95 % mm "
+          "| by the estimate: centroids median mm | bars 95 % mm | line 95 % mm | line seen | read | s |")  # fmt: skip
+    print("|---|" + "---|" * 14)
+    rows = []
     for number in range(n_setups):
-        rng, began = np.random.default_rng(_FIRST_SEED + number), time.perf_counter()
-        setup = draw_setup(rng)
-        found, eye = calibrate_by_pictures(rng, setup)
-        true = dataclasses.replace(true_display(setup), eye_mm=eye)
-        points = draw_targets(rng, setup)
-        by_truth, by_model = (read_crosses(setup, true, m, points) for m in (true, found.model))
-        bounds = found.model.predict_error(points)
-        errors = seen_beside_mm(found.model, true, points, points)
-        quality = found.model.quality
-        refused += quality is None or not quality.is_accepted
-        held.append(found.held_out.quantile(0.95))
-        exact.append(by_truth)
-        calibrated.append(by_model)
-        below.append(errors <= bounds)
+        began = time.perf_counter()
+        rows.append(row := read_setup(_FIRST_SEED + number))
         took_s = time.perf_counter() - began
-        print(f"| {number} | {len(found.views)} | {held[-1][0]:.3f} | {held[-1][1]:.2f} "
-              f"| {np.median(bounds):.3f} | {by_truth.max():.3f} | {np.median(by_model):.3f} "
-              f"| {by_model.max():.3f} | {took_s:.0f} |", flush=True)  # fmt: skip
-    crosses = np.concatenate(calibrated)
+        truth, estimate = row.by_truth, row.by_estimate
+        print(f"| {number} | {row.held_out_mm:.3f} | {row.held_out_arcmin:.2f} "
+              f"| {np.median(row.predicted_mm):.3f} | {row.pose_mm:.3f} "
+              f"| {len(truth.crosses.is_whole)} | {truth.crosses.is_whole.sum()} "
+              f"| {at(truth.crosses.crossing_mm, 0.95):.3f} | {at(truth.cut.off_mm, 0.95):.3f} "
+              f"| {at(estimate.crosses.centroid_mm, 0.5):.3f} "
+              f"| {at(estimate.crosses.crossing_mm, 0.95):.3f} "
+              f"| {at(estimate.cut.off_mm, 0.95):.3f} | {len(estimate.cut.off_mm)} "
+              f"| {np.isfinite(estimate.cut.off_mm).sum()} | {took_s:.0f} |",
+              flush=True)  # fmt: skip
     print(f"\n| {n_setups} set-ups with pictures | found | limit | |")
     print("|---|---|---|---|")
-    limits.line("not accepted", refused, 0)
-    limits.line("held-out error, worst set-up, mm", max(one[0] for one in held), 0.3)
-    limits.line("held-out error, worst set-up, arcmin", max(one[1] for one in held), 2.0)
-    limits.line("crosses by true calibration, 95 %, mm", np.quantile(np.concatenate(exact), 0.95),
-                0.05)  # fmt: skip
-    limits.line("crosses by solved calibration, median, mm", np.median(crosses), 0.35)
-    limits.line("crosses by solved calibration, 95 %, mm", np.quantile(crosses, 0.95), 0.8)
-    print(f"| prediction holds (of the model, without reading) | {np.mean(below):.3f} | | |\n")
+    limits.line("not accepted", sum(not row.is_accepted for row in rows), 0)
+    limits.line("held-out error, worst set-up, mm", max(row.held_out_mm for row in rows), 0.3)
+    limits.line("held-out error, worst set-up, arcmin", max(r.held_out_arcmin for r in rows), 2.0)
+    judge_truth([row.by_truth for row in rows], limits)
+    judge_estimate([row.by_estimate for row in rows], limits)
+    below = np.concatenate([row.model_error_mm <= row.predicted_mm for row in rows])
+    print(f"| prediction holds (of the model, without reading) | {np.mean(below):.3f} | | |")
+    tell_lit(rows)
+
+
+def read_setup(seed: int) -> Row:
+    """One set-up: everything in it is drawn anew from the seed."""
+    rng, knee = np.random.default_rng(seed), follow_knee(seed)
+    setup = draw_setup(rng, knee.middle_mm)
+    found, eye_mm = calibrate_by_pictures(rng, setup)
+    true = dataclasses.replace(true_display(setup), eye_mm=eye_mm)
+    sight = Sight(setup, look_at_site(setup, eye_mm - setup.eye_mm))
+    targets_mm, cut = choose_targets(rng, knee, sight), find_cut(knee, sight)
+    guides = [
+        Guides(
+            read_crosses(knee, sight, model.view(), pose, targets_mm),
+            read_cut(knee, sight, model.view(), pose, cut),
+        )
+        for model, pose in ((true, knee.true), (found.model, knee.estimated))
+    ]
+    points_mm, quality = knee.true.apply(targets_mm), found.model.quality
+    pose_mm = compute_mean_tre_mm(
+        knee.estimated, knee.true, knee.plan.bones[BONE], np.empty((0, 3))
+    )
+    return Row(
+        quality is not None and quality.is_accepted,
+        *found.held_out.quantile(0.95),
+        pose_mm,
+        found.model.predict_error(points_mm),
+        seen_beside_mm(found.model, true, points_mm, points_mm),
+        *guides,
+        cut.is_seen_by_cameras,
+    )
+
+
+def at(errors: np.ndarray, share: float) -> float:
+    """That so many of the errors that were read stay below."""
+    return float(np.nanquantile(np.abs(errors), share))
+
+
+def judge_truth(guides: list[Guides], limits: Limits) -> None:
+    """Drawn with the true pose and calibration: what is left is the drawing's and the reading's."""
+    centroids = np.concatenate([one.crosses.centroid_mm for one in guides])
+    bars = np.concatenate([one.crosses.crossing_mm for one in guides])
+    is_whole = np.concatenate([one.crosses.is_whole for one in guides])
+    name = "true pose and calibration"
+    if is_whole.any():
+        limits.line(f"{name}: centroids of whole crosses, 95 %, mm", at(centroids[is_whole], 0.95),
+                    0.05)  # fmt: skip
+    limits.line(f"{name}: centroids of all crosses, 95 %, mm", at(centroids, 0.95), 0.05)
+    limits.line(f"{name}: where bars cross, 95 %, mm", at(bars, 0.95), 0.05)
+    lines = np.concatenate([one.cut.off_mm for one in guides])
+    limits.line(f"{name}: cut line, 95 %, mm", at(lines, 0.95), 0.05)
+
+
+def judge_estimate(guides: list[Guides], limits: Limits) -> None:
+    """Drawn with the pose as tracked and the display as solved."""
+    name = "as tracked and solved"
+    for kind in ("centroid", "crossing"):
+        errors = np.concatenate([getattr(one.crosses, f"{kind}_mm") for one in guides])
+        words = {"centroid": "centroids of all crosses", "crossing": "where bars cross"}[kind]
+        limits.line(f"{name}: {words}, median, mm", at(errors, 0.5), 0.35)
+        limits.line(f"{name}: {words}, 95 %, mm", at(errors, 0.95), 0.8)
+    lines = np.abs(np.concatenate([one.cut.off_mm for one in guides]))
+    is_read = np.isfinite(lines)
+    print(f"| {name}: cut line, 95 %, mm | {at(lines, 0.95):.3f} | | |")
+    limits.line(f"{name}: drawn cut line within 0.5 mm", np.mean(lines[is_read] <= 0.5), 0.95,
+                is_upper=False)  # fmt: skip
+
+
+def tell_lit(rows: list[Row]) -> None:
+    """How much of what the eye could see is drawn, and read."""
+    crosses = [row.by_estimate.crosses for row in rows]
+    n = sum(len(one.is_whole) for one in crosses)
+    n_dark = sum(np.isnan(one.centroid_mm).sum() for one in crosses)
+    n_barred = sum(np.isfinite(one.crossing_mm).sum() for one in crosses)
+    n_whole = sum(one.is_whole.sum() for one in crosses)
+    lit = np.concatenate([row.by_estimate.cut.is_lit for row in rows])
+    read = np.isfinite(np.concatenate([row.by_estimate.cut.off_mm for row in rows]))
+    by_cameras = np.concatenate([row.is_cut_seen_by_cameras for row in rows])
+    print(f"| crosses, of {n}: dark, with two bars to be read, whole "
+          f"| {n_dark}, {n_barred}, {n_whole} | | |")  # fmt: skip
+    print(
+        f"| cut line that the eye could see: lit, read | {lit.mean():.3f}, {read.mean():.3f} | | |"
+    )
+    print(f"| of what the cameras see too: lit, read | {lit[by_cameras].mean():.3f}, "
+          f"{read[by_cameras].mean():.3f} | | |\n")  # fmt: skip
 
 
 def calibrate_by_pictures(
@@ -136,58 +240,6 @@ def calibrate_by_pictures(
             centres += [centre] * found.is_eye
     told = Told(PITCH_MM * (1.0 + rng.normal(0.0, 0.001)), setup.plate.thickness_mm + 0.2)
     return solve_display(common, views, told), np.mean(centres, axis=0)
-
-
-def read_crosses(
-    setup: MirrorSetup, true: DisplayModel, drawn_by: DisplayModel, points_mm: np.ndarray
-) -> np.ndarray:
-    """(n,) mm between points and the crosses on them, in the picture that the eye sees."""
-    view = drawn_by.view()
-    shown = draw_crosses(view.camera.project(view.warp(points_mm)))
-    place = true.eye_mm - setup.eye_mm
-    camera = make_eye_camera(_EYE_PX, _EYE_PX, _EYE_FOCAL_PX)
-    eye = MirrorView(setup, camera, look_at_site(setup, place))
-    expected = eye.site_px(points_mm)
-    distances = np.linalg.norm(points_mm - true.eye_mm, axis=1)
-    seen = eye.render(view.to_display(shown))[:, :, 0]
-    read = np.array([read_cross(seen, where) for where in expected])
-    return np.linalg.norm(read - expected, axis=1) / _EYE_FOCAL_PX * distances
-
-
-def draw_targets(rng: np.random.Generator, setup: MirrorSetup) -> np.ndarray:
-    """(9, 3) points of the site, apart as the eye sees them, at any depth."""
-    x, y = np.meshgrid((-30.0, 0.0, 30.0), (-30.0, 0.0, 30.0))
-    aside = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-5.0, 5.0, (9, 2))
-    depth = rng.uniform(-25.0, 25.0, 9)
-    return setup.site_mm + np.column_stack([aside, depth]) @ look_at_site(setup).rotation
-
-
-def draw_crosses(pixels: np.ndarray) -> np.ndarray:
-    """A picture with a cross at each place (n, 2), each pixel as bright as it is covered."""
-    picture = np.zeros((HEIGHT_PX, WIDTH_PX), np.uint8)
-    for u, v in pixels:
-        long_u, thin_u = (cover(u, width, WIDTH_PX) for width in (_CROSS_PX, _STROKE_PX))
-        long_v, thin_v = (cover(v, width, HEIGHT_PX) for width in (_CROSS_PX, _STROKE_PX))
-        lit = np.maximum(np.outer(thin_v, long_u), np.outer(long_v, thin_u))
-        # The monitor's light rises with the value to the power 2.2.
-        picture = np.maximum(picture, np.rint(255.0 * lit ** (1.0 / 2.2)).astype(np.uint8))
-    return picture
-
-
-def cover(middle: float, width: float, n: int) -> np.ndarray:
-    """(n,) share of each pixel that an interval covers."""
-    low = np.arange(n) - 0.5
-    covered = np.minimum(low + 1.0, middle + 0.5 * width) - np.maximum(low, middle - 0.5 * width)
-    return np.clip(covered, 0.0, 1.0)
-
-
-def read_cross(picture: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """(2,) px centroid of what is bright around a place."""
-    low = np.maximum(np.rint(near).astype(int) - _WINDOW_PX, 0)
-    part = picture[low[1] : low[1] + 2 * _WINDOW_PX + 1, low[0] : low[0] + 2 * _WINDOW_PX + 1]
-    light = np.where(part > _READ_ABOVE * part.max(), part, 0.0)
-    v, u = np.mgrid[: part.shape[0], : part.shape[1]]
-    return low + np.array([(u * light).sum(), (v * light).sum()]) / light.sum()
 
 
 def by_marks(n_setups: int, limits: Limits) -> None:
