@@ -13,7 +13,6 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Foreground, Plan, Status
 from sim_devices.mirror_setups import make_eye_camera
-from sim_devices.renderer import DepthPicture
 from sim_devices.rigs import camera_from_left
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import Eye
@@ -34,18 +33,18 @@ _BEHIND_MM = 0.5
 class FollowedKnee:
     """One frame of a followed femur: what the tracker tells of it, and the truth beside it."""
 
-    scenario: Scenario
+    world: World  # the room, for judging
     rig: StereoRig
     plan: Plan
     estimated: RigidTransform  # left camera from femur, as tracked
     foreground: Foreground  # as measured by the tracker
     true: RigidTransform  # for judging, and to place what stands in the room
-    time_ns: int  # of the world
+    time_ns: int  # of the world, when the frame was captured
 
     @cached_property
     def middle_mm(self) -> FloatArray:
         """(3,) of the femur's surface that the left camera sees, in its frame."""
-        seen = self._depth_from("left")
+        seen = self.world.depth("left", self.time_ns)
         is_femur = seen.body == seen.bodies.index(BONE)
         v, u = np.nonzero(is_femur)
         rays = self.rig.left.rays(np.column_stack([u, v]).astype(float))
@@ -58,35 +57,27 @@ class FollowedKnee:
         """
         camera = make_eye_camera(self.rig.left.width, self.rig.left.height, _EYE_FOCAL_PX)
         rig = StereoRig(self.rig.left, camera, eye_from_left.rename("right", "left"))
-        return self._is_seen(points_mm, "right", rig)
+        # The room is laid out for the rig that takes the pictures; this one only looks.
+        world = World(self.world.scenario)
+        world.rig = rig
+        return self._is_seen(points_mm, "right", world)
 
     def is_seen_by_cameras(self, points_mm: FloatArray) -> BoolArray:
         """(n,) whether both cameras see points (n, 3) of the femur."""
         return np.logical_and(
-            self._is_seen(points_mm, "left", self.rig), self._is_seen(points_mm, "right", self.rig)
+            self._is_seen(points_mm, "left", self.world),
+            self._is_seen(points_mm, "right", self.world),
         )
 
-    def _is_seen(self, points_mm: FloatArray, which: Eye, rig: StereoRig) -> BoolArray:
-        camera = rig.left if which == "left" else rig.right
-        depth_mm = self._depth_from(which, rig).depth_mm
-        there = camera_from_left(rig, which).apply(self.true.apply(points_mm))
+    def _is_seen(self, points_mm: FloatArray, which: Eye, world: World) -> BoolArray:
+        camera = world.rig.left if which == "left" else world.rig.right
+        depth_mm = world.depth(which, self.time_ns).depth_mm
+        there = camera_from_left(world.rig, which).apply(self.true.apply(points_mm))
         at = np.rint(camera.project(there))
         size = (camera.width - 1, camera.height - 1)
         is_inside = ((at >= 0) & (at <= size)).all(axis=1)
         u, v = np.clip(at, 0, size).astype(np.intp).T
         return is_inside & (there[:, 2] <= depth_mm[v, u] + _BEHIND_MM)
-
-    @cached_property
-    def _room(self) -> World:
-        return World(self.scenario)
-
-    def _depth_from(self, which: Eye, rig: StereoRig | None = None) -> DepthPicture:
-        if rig is None or rig is self.rig:
-            return self._room.depth(which, self.time_ns)
-        # The room is laid out for the rig that takes the pictures; another one only looks.
-        world = World(self.scenario)
-        world.rig = rig
-        return world.depth(which, self.time_ns)
 
 
 def follow_knee(seed: int) -> FollowedKnee:
@@ -115,6 +106,6 @@ def follow_knee(seed: int) -> FollowedKnee:
     truth, time_ns = knee.truth(frame), knee.camera.world_time_ns(frame.captured_ns)
     knee.camera.close()
     return FollowedKnee(
-        knee.world.scenario, knee.rig, plan, tracked.left_from_bone, tracked.foreground, truth,
+        knee.world, knee.rig, plan, tracked.left_from_bone, tracked.foreground, truth,
         time_ns,
     )  # fmt: skip
