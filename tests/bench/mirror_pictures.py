@@ -165,16 +165,21 @@ def tell_lit(rows: list[Row]) -> None:
     n_dark = sum(np.isnan(one.centroid_mm).sum() for one in crosses)
     n_barred = sum(np.isfinite(one.crossing_mm).sum() for one in crosses)
     n_whole = sum(one.is_whole.sum() for one in crosses)
-    lit = np.concatenate([row.by_estimate.cut.is_lit for row in rows])
-    read = np.isfinite(np.concatenate([row.by_estimate.cut.off_mm for row in rows]))
-    by_cameras = np.concatenate([row.is_cut_seen_by_cameras for row in rows])
     print(f"| crosses, of {n}: dark, with two bars to be read, whole "
           f"| {n_dark}, {n_barred}, {n_whole} | | |")  # fmt: skip
-    print(
-        f"| cut line that the eye could see: lit, read | {lit.mean():.3f}, {read.mean():.3f} | | |"
-    )
-    print(f"| of what the cameras see too: lit, read | {lit[by_cameras].mean():.3f}, "
-          f"{read[by_cameras].mean():.3f} | | |\n")  # fmt: skip
+    by_cameras = np.concatenate([row.is_cut_seen_by_cameras for row in rows])
+    # A line that is further off than it is looked for would be missing from the second alone.
+    for name, cuts in (
+        ("by the truth", [row.by_truth.cut for row in rows]),
+        ("as tracked and solved", [row.by_estimate.cut for row in rows]),
+    ):
+        lit = np.concatenate([one.is_lit for one in cuts])
+        read = np.isfinite(np.concatenate([one.off_mm for one in cuts]))
+        print(f"| {name}: cut line that the eye could see, lit, read "
+              f"| {lit.mean():.3f}, {read.mean():.3f} | | |")  # fmt: skip
+        print(f"| of what the cameras see too: lit, read | {lit[by_cameras].mean():.3f}, "
+              f"{read[by_cameras].mean():.3f} | | |")  # fmt: skip
+    print()
 
 
 def calibrate_by_pictures(
