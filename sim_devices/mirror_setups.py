@@ -13,15 +13,20 @@ from sim_devices.rigs import WORKING_DISTANCE_MM
 WIDTH_PX, HEIGHT_PX = 1920, 1080
 _DIAGONAL_MM = 24.0 * 25.4
 PITCH_MM = _DIAGONAL_MM / math.hypot(WIDTH_PX, HEIGHT_PX)
+_BEFORE_CAMERA = np.array([0.0, 0.0, WORKING_DISTANCE_MM])
 
 
-def draw_setup(rng: np.random.Generator) -> MirrorSetup:
+def draw_setup(rng: np.random.Generator, about_mm: FloatArray = _BEFORE_CAMERA) -> MirrorSetup:
     """A 24 inch monitor seen near the bone's depth from an eye 350 to 550 mm away.
 
     The plate stands at some 45 degrees between eye and site; the monitor is where its reflection
     is wanted, the right way round or upside down, with or without flips of its own.
+
+    Args:
+        rng: of all that is drawn.
+        about_mm: (3,) in the left camera's frame; the site lies within 15 mm of it, each way.
     """
-    site = np.array([0.0, 0.0, WORKING_DISTANCE_MM]) + rng.uniform(-15.0, 15.0, 3)
+    site = about_mm + rng.uniform(-15.0, 15.0, 3)
     # The eye stands beside the cameras: they must not see the site through the plate.
     leaning = math.radians(rng.uniform(25.0, 45.0))
     turn = rotation_from_vector((leaning, 0.0, 0.0)) @ rotation_from_vector(
