@@ -109,6 +109,7 @@ def find_weights(
     guess: float,
     weight: NDArray[np.float32],
     nearest_mm: NDArray[np.float32],
+    is_hidden: NDArray[np.bool_],
 ) -> None:
     """How strongly a guide on the bone's surface is drawn in each pixel, and what is nearest.
 
@@ -123,6 +124,7 @@ def find_weights(
         guess: weight where that is not known.
         weight: (h, w) in place, 0 (hidden) to 1 (on top).
         nearest_mm: (h, w) in place, depth of bone or what was matched before it; NaN where unknown.
+        is_hidden: (h, w) in place, something stands in front of most of the pixel.
     """
     for y in range(bone_mm.shape[0]):
         for x in range(bone_mm.shape[1]):
@@ -140,6 +142,7 @@ def find_weights(
                 weight[y, x] = seen * np.float32(guess)
             else:
                 weight[y, x] = seen * np.float32(beneath) if is_beneath else seen
+            is_hidden[y, x] = seen < 0.5
             nearest_mm[y, x] = depth if is_known and not depth > bone else bone
 
 

@@ -12,6 +12,7 @@ from navapp.overlay.colours import Colour
 from navapp.overlay.labels import Image, LabelBoard
 
 _BETWEEN = np.full((1, 3), np.nan)
+_CROSS_PX = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +39,8 @@ class Stroke:
     points_mm: FloatArray
     colour: Colour
     width_px: float
+    # whether it lies on top or beneath is judged at its first point, not piece by piece.
+    is_judged_whole: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +74,16 @@ class Drawing:
         parts = [part for line in lines_mm for part in (line, _BETWEEN)]
         if parts:
             self.strokes.append(Stroke(np.concatenate(parts), colour, width_px))
+
+    def cross(self, point_mm: FloatArray, axes: FloatArray, half_mm: float, colour: Colour) -> None:
+        """Ask for a cross on a point (3,) along two axes (2, 3): whole, dashed or left out."""
+        arms = [
+            np.stack([point_mm, point_mm + sign * half_mm * axis])
+            for axis in axes
+            for sign in (1.0, -1.0)
+        ]
+        parts = [part for arm in arms for part in (arm, _BETWEEN)]
+        self.strokes.append(Stroke(np.concatenate(parts), colour, _CROSS_PX, True))
 
     def label(self, text: str, points_mm: FloatArray, colour: Colour) -> None:
         """Ask for words beside a point (3,), or beside one of several (N, 3)."""

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
@@ -178,17 +179,19 @@ class Scene:
         return self.viewpoint.see(self.foreground, self.box)
 
     @cached_property
-    def _order(self) -> tuple[FloatMap, FloatMap]:
-        """(h, w) over `box`: weight of guides on the bone, and depth of what is nearest."""
+    def _order(self) -> tuple[FloatMap, FloatMap, NDArray[np.bool_]]:
+        """(h, w) over `box`: weight of guides on the bone, depth of what is nearest, is hidden."""
         weight = np.full(self.bone_mm.shape, self.guess_weight, dtype=np.float32)
+        is_hidden = np.zeros(weight.shape, dtype=np.bool_)
         if self.seen is None:
-            return weight, self.bone_mm
+            return weight, self.bone_mm, is_hidden
         nearest_mm = np.empty_like(weight)
         find_weights(
             self.bone_mm, self.seen.depth_mm, self.seen.is_guess, self.seen.in_front, TISSUE_MM,
             self._aside_mm, BENEATH_WEIGHT, self.guess_weight, weight, nearest_mm,
+            is_hidden,
         )  # fmt: skip
-        return weight, nearest_mm
+        return weight, nearest_mm, is_hidden
 
     @property
     def weight(self) -> FloatMap:
@@ -207,11 +210,12 @@ class Scene:
     @cached_property
     def ground(self) -> Ground:
         """What lines and points of guides are compared with."""
-        weight, nearest_mm = self._order
+        weight, nearest_mm, is_hidden = self._order
         skin_mm, beneath, beyond = (
             np.float32(value) for value in (SKIN_MM, BENEATH_WEIGHT, self.guess_weight)
         )
-        return Ground(self.box.x, self.box.y, weight, nearest_mm, skin_mm, beneath, beyond)
+        maps = weight, nearest_mm, is_hidden
+        return Ground(self.box.x, self.box.y, *maps, skin_mm, beneath, beyond)
 
     def weight_of(self, view: RenderedView, box: Box) -> FloatMap:
         """The weights over a box of another mesh: those of beneath where the bone is nearer."""

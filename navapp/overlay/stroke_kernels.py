@@ -20,6 +20,7 @@ class Ground(NamedTuple):
     y: int
     weight: NDArray[np.float32]  # (h, w) 0 to 1, of guides on the bone
     nearest_mm: NDArray[np.float32]  # (h, w) of bone and what was matched, NaN where unknown
+    is_hidden: NDArray[np.bool_]  # (h, w) something stands in front
     skin_mm: np.float32  # further behind that a point is beneath
     beneath: np.float32  # weight of what lies beneath
     beyond: np.float32  # weight outside of the box
@@ -41,6 +42,7 @@ def trace_strokes(
     pixels: NDArray[np.float64],
     depth_mm: NDArray[np.float64],
     firsts: NDArray[np.int64],
+    is_whole: NDArray[np.bool_],
     half_px: NDArray[np.float64],
     rim_px: NDArray[np.float64],
     ground: Ground,
@@ -55,6 +57,8 @@ def trace_strokes(
         pixels: (N, 2) of the points of all strokes; NaN where they are not seen.
         depth_mm: (N,).
         firsts: (S + 1,) number of each stroke's first point, and N.
+        is_whole: (S,) whether a stroke is on top or beneath is judged at its first point for all of
+            it; what stands in front hides parts of it nevertheless.
         half_px: (S,) half of the strokes' widths.
         rim_px: (S,) width of a dark rim on either side, where the line is on top.
         ground: what is seen.
@@ -63,9 +67,17 @@ def trace_strokes(
     n = 0
     for stroke in range(len(firsts) - 1):
         first, last = firsts[stroke], firsts[stroke + 1]
+        weight = np.float32(np.nan)
+        if is_whole[stroke] and first < last:
+            u, v = pixels[first, 0], pixels[first, 1]
+            # A comparison with NaN is False.
+            if not (abs(u) < _FARTHEST_PX and abs(v) < _FARTHEST_PX):
+                continue
+            weight = weigh(u, v, depth_mm[first], ground)
         n_line, n_rim = _trace_line(
-            pixels[first:last], depth_mm[first:last], ground, half_px[stroke], rim_px[stroke], room
-        )
+            pixels[first:last], depth_mm[first:last], weight, ground, half_px[stroke],
+            rim_px[stroke], room,
+        )  # fmt: skip
         n = _move(room.rim, room.touched[1, :n_rim], -1, room, n)
         n = _move(room.line, room.touched[0, :n_line], stroke, room, n)
     return n
@@ -113,21 +125,37 @@ def weigh(u: float, v: float, z: float, ground: Ground) -> np.float32:
 
 
 @njit(cache=True, nogil=True)
+def _is_hidden(u: float, v: float, ground: Ground) -> bool:
+    """Whether something stands in front at a place of the picture; not known beyond the ground."""
+    column, row = int(np.floor(u + 0.5)) - ground.x, int(np.floor(v + 0.5)) - ground.y
+    height, width = ground.is_hidden.shape
+    if column < 0 or row < 0 or column >= width or row >= height:
+        return False
+    hidden: bool = ground.is_hidden[row, column]
+    return hidden
+
+
+@njit(cache=True, nogil=True)
 def _trace_line(
     pixels: NDArray[np.float64],
     depth_mm: NDArray[np.float64],
+    of_whole: np.float32,
     ground: Ground,
     half_px: float,
     rim_px: float,
     room: Room,
 ) -> tuple[int, int]:
-    """Cover a line and its rim in the room; how many pixels of both are touched."""
+    """Cover a line and its rim in the room; how many pixels of both are touched.
+
+    Weighed piece by piece, unless there is a weight of the whole; dashes begin with each line.
+    """
     period, along = _DASH_PX + _GAP_PX, 0.0
     n_line, n_rim = 0, 0
     for k in range(len(pixels) - 1):
         u0, v0, u1, v1 = pixels[k, 0], pixels[k, 1], pixels[k + 1, 0], pixels[k + 1, 1]
         # A comparison with NaN is False.
         if not (abs(u0) < _FARTHEST_PX and abs(v0) < _FARTHEST_PX):
+            along = 0.0
             continue
         if not (abs(u1) < _FARTHEST_PX and abs(v1) < _FARTHEST_PX):
             continue
@@ -141,7 +169,11 @@ def _trace_line(
                 middle = (step + 0.5) / n
                 u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
                 z = depth_mm[k] + middle * (depth_mm[k + 1] - depth_mm[k])
-                weight = weigh(u, v, z, ground)
+                weight = of_whole
+                if np.isnan(of_whole):
+                    weight = weigh(u, v, z, ground)
+                elif _is_hidden(u, v, ground):
+                    weight = np.float32(0.0)
                 along += length / n
                 if weight > ground.beneath:
                     this = _ON_TOP

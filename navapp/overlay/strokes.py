@@ -33,11 +33,6 @@ def sample_line(points_mm: FloatArray, step_mm: float = _STEP_MM) -> FloatArray:
     return np.column_stack([np.interp(places, known, points_mm[:, k]) for k in range(3)])
 
 
-def cross_lines(point_mm: FloatArray, axes: FloatArray, half_mm: float) -> list[FloatArray]:
-    """Two lines (3, 3) through a point, along two axes (2, 3)."""
-    return [np.stack([point_mm - half_mm * a, point_mm, point_mm + half_mm * a]) for a in axes]
-
-
 def draw_strokes(image: Image, scene: Scene, strokes: Sequence[Stroke]) -> None:
     """Strokes in their order.
 
@@ -53,38 +48,43 @@ def draw_strokes(image: Image, scene: Scene, strokes: Sequence[Stroke]) -> None:
     has_rim = scene.viewpoint.is_video
     rims = [_RIM_PX if has_rim and width > 1.0 else 0.0 for width in widths]
     colours = [stroke.colour for stroke in strokes]
-    _draw(image, pixels, in_camera[:, 2], firsts, (widths, rims, colours), scene.ground)
+    is_whole = np.array([stroke.is_judged_whole for stroke in strokes])
+    pens = widths, rims, colours
+    _draw(image, pixels, in_camera[:, 2], (firsts, is_whole), pens, scene.ground)
 
 
 def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: float = 14.0) -> None:
     """A thin cross at a place (2,) of the picture, its middle left open."""
     # Nothing is known of the depth, and all is drawn as on top.
     nowhere, one = np.empty((0, 0), dtype=np.float32), np.float32(1.0)
-    ground = Ground(0, 0, nowhere, nowhere, one, np.float32(0.5), one)
+    hidden = np.empty((0, 0), dtype=np.bool_)
+    ground = Ground(0, 0, nowhere, nowhere, hidden, one, np.float32(0.5), one)
     arms = [
         at_px + half_px * np.array([[0.25 * x, 0.25 * y], [x, y]])
         for x, y in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
     ]
     pens = [1.5] * 4, [0.0] * 4, [colour] * 4
-    _draw(image, np.concatenate(arms), np.zeros(8), np.arange(0, 9, 2), pens, ground)
+    parts = np.arange(0, 9, 2), np.zeros(4, dtype=np.bool_)
+    _draw(image, np.concatenate(arms), np.zeros(8), parts, pens, ground)
 
 
 def _draw(
     image: Image,
     pixels: FloatArray,
     depth_mm: FloatArray,
-    firsts: NDArray[np.int64],
+    parts: tuple[NDArray[np.int64], NDArray[np.bool_]],
     pens: tuple[list[float], list[float], list[Colour]],
     ground: Ground,
 ) -> None:
-    """Strokes through places (N, 2) of the picture at depths (N,), from the first to the next one.
+    """Strokes through places (N, 2) of the picture at depths (N,).
 
-    The pens are widths and rims in px, and colours.
+    The parts are the numbers (S + 1,) of the strokes' first points and whether (S,) each is judged
+    as a whole; the pens are widths and rims in px, and colours.
     """
     widths_px, rims_px, colours = pens
     room = _room(image.shape[0], image.shape[1], threading.get_ident())
     n = trace_strokes(
-        pixels, np.ascontiguousarray(depth_mm), firsts, 0.5 * np.array(widths_px),
+        pixels, np.ascontiguousarray(depth_mm), *parts, 0.5 * np.array(widths_px),
         np.array(rims_px), ground, room,
     )  # fmt: skip
     table = np.array(colours, dtype=np.float32)

@@ -15,8 +15,8 @@ BENEATH = np.float32(0.5)
 def ground(weight: float = 1.0, nearest_mm: float = np.nan, size: int = 200) -> Ground:
     shape = (size, size)
     return Ground(
-        0, 0, np.full(shape, weight, np.float32), np.full(shape, nearest_mm, np.float32), ONE,
-        BENEATH, BENEATH,
+        0, 0, np.full(shape, weight, np.float32), np.full(shape, nearest_mm, np.float32),
+        np.zeros(shape, bool), ONE, BENEATH, BENEATH,
     )  # fmt: skip
 
 
@@ -35,7 +35,7 @@ def trace(
     given_room, firsts = room(), np.array([0, len(pixels)])
     depths = np.full(len(pixels), depth_mm)
     pens = np.array([half_px]), np.array([rim_px])
-    n = trace_strokes(pixels, depths, firsts, *pens, given, given_room)
+    n = trace_strokes(pixels, depths, firsts, np.array([False]), *pens, given, given_room)
     assert not given_room.line.any()
     assert not given_room.rim.any()
     found = []
@@ -113,7 +113,14 @@ def test_strokes_are_traced_one_after_the_other_each_with_its_pen() -> None:
     both, firsts = np.concatenate([LINE, LINE[::-1] + 3.0]), np.array([0, 4, 8])
     given = room()
     n = trace_strokes(
-        both, np.full(8, 50.0), firsts, np.array([0.5, 1.5]), np.array([0.0, 1.0]), ground(), given
+        both,
+        np.full(8, 50.0),
+        firsts,
+        np.zeros(2, bool),
+        np.array([0.5, 1.5]),
+        np.array([0.0, 1.0]),
+        ground(),
+        given,
     )
     order = given.colour[:n]
     # The first stroke, the second one's rim, then the second one.
@@ -125,10 +132,48 @@ def test_strokes_are_traced_one_after_the_other_each_with_its_pen() -> None:
 
 
 @pytest.mark.kernel
+@pytest.mark.parametrize(("weight", "is_drawn"), [(1.0, True), (0.2, False)])
+def test_a_whole_stroke_is_as_its_first_point(weight: float, is_drawn: bool) -> None:
+    """The ground hides all but the left part, or only that."""
+    given = ground()
+    given.weight[:, :110] = weight
+    given.weight[:, 110:] = 0.2 if is_drawn else 1.0
+    line, given_room = np.array([[104.0, 60.0], [150.0, 60.0]]), room()
+    n = trace_strokes(
+        line, np.full(2, 50.0), np.array([0, 2]), np.array([True]), np.array([1.0]),
+        np.array([0.0]), given, given_room,
+    )  # fmt: skip
+    share = np.zeros(given_room.line.shape)
+    share.ravel()[given_room.place[:n]] = given_room.share[:n]
+    assert (share[60, 104:151].min() == 1.0) == is_drawn
+    assert share.any() == is_drawn
+
+
+@pytest.mark.kernel
+def test_what_stands_in_front_hides_parts_of_a_whole_stroke() -> None:
+    given, given_room = ground(), room()
+    given.is_hidden[:, 130:] = True
+    line = np.array([[104.0, 60.0], [150.0, 60.0]])
+    n = trace_strokes(
+        line, np.full(2, 50.0), np.array([0, 2]), np.array([True]), np.array([1.0]),
+        np.array([0.0]), given, given_room,
+    )  # fmt: skip
+    columns = given_room.place[:n] % given_room.line.shape[1]
+    assert 128 <= columns.max() <= 132
+
+
+@pytest.mark.kernel
 def test_what_does_not_fit_into_the_room_is_left_out_and_leaves_no_trace() -> None:
     given = room(n=40)
     n = trace_strokes(
-        LINE, np.full(4, 50.0), np.array([0, 4]), np.array([1.0]), np.array([1.0]), ground(), given
+        LINE,
+        np.full(4, 50.0),
+        np.array([0, 4]),
+        np.array([False]),
+        np.array([1.0]),
+        np.array([1.0]),
+        ground(),
+        given,
     )
     assert n == 40
     assert not given.line.any()

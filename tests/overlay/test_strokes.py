@@ -5,7 +5,7 @@ import pytest
 
 from navapp.overlay.drawing import Drawing
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import cross_lines, sample_line
+from navapp.overlay.strokes import sample_line
 from tests.overlay.scenes import (
     BEHIND,
     CAMERA,
@@ -134,14 +134,41 @@ def test_a_dashed_line_is_still_seen() -> None:
     assert (change(before, image) > 3).sum() > 50
 
 
+def draw_cross(given: Scene, point_mm: np.ndarray, half_mm: float = 5.0) -> np.ndarray:
+    drawing = Drawing()
+    drawing.cross(point_mm, given.picture_axes_in_bone, half_mm, COLOUR)
+    return painted(given, drawing)
+
+
 def test_a_cross_has_its_middle_at_its_point() -> None:
-    given, image, point = seen(scene()), black(), TARGET - (0.0, 0.0, 10.0)
-    draw_lines(image, given, cross_lines(point, given.picture_axes_in_bone, 5.0))
+    given, point = seen(scene()), TARGET - (0.0, 0.0, 10.0)
+    lit = is_colour(draw_cross(given, point), COLOUR)
     (u, v), reach = pixels_of(point)[0], round(4.0 * 700 / 400)
-    lit = is_colour(image, COLOUR)
     assert lit[v, u - reach : u + reach + 1].all()
     assert lit[v - reach : v + reach + 1, u].all()
     assert not lit[v + 4, u + 4]
+
+
+@pytest.mark.parametrize("nearer_mm", [0.0, 3.5])
+def test_a_cross_is_judged_at_its_point_and_its_light_lies_around_it(nearer_mm: float) -> None:
+    """Its arms reach into the bowl's flank: what lies beneath would be cut off them."""
+    occluder = Occluder(nearer_mm=nearer_mm) if nearer_mm else None
+    given, point = seen(scene(), occluder=occluder), np.array([-25.0, 5.0, 0.008 * 25.0**2])
+    image = draw_cross(given, point, 8.0)[..., 1].astype(float)
+    v, u = np.mgrid[: image.shape[0], : image.shape[1]]
+    light = np.array([(u * image).sum(), (v * image).sum()]) / image.sum()
+    expected = CAMERA.project(POSE.apply(point[None]))[0]
+    np.testing.assert_allclose(light, expected, atol=0.3)
+    lit_px = (image > 0).sum()
+    whole_px = (draw_cross(seen(scene()), point, 8.0)[..., 1] > 0).sum()
+    assert (lit_px < 0.9 * whole_px) == (nearer_mm > 0.0)
+
+
+def test_a_cross_whose_point_is_hidden_is_left_out() -> None:
+    given = seen(scene(), occluder=Occluder(325.0))
+    hidden = np.array([20.0, 5.0, 0.008 * 20.0**2])
+    assert pixels_of(hidden)[0][0] > 330
+    assert not draw_cross(given, hidden, 40.0).any()
 
 
 @pytest.mark.parametrize("depth_mm", [-20.0, 0.0, 1e-5, 1e-3, 0.1])

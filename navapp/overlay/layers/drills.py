@@ -8,7 +8,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import DRILL
 from navapp.overlay.drawing import Drawing
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import cross_lines, sample_line
+from navapp.overlay.strokes import sample_line
 from navapp.values import DrillAxis
 
 # The axis is drawn so far out of the bone, towards the hand that drills.
@@ -18,27 +18,25 @@ _N_AROUND = 48
 
 def draw_drills(scene: Scene, drawing: Drawing) -> None:
     """The stage's drill axes: a cross and the hole's rim at the entry, the axis, the end."""
-    thick: list[FloatArray] = []
     for name, drill in scene.drills.items():
-        axis_and_end, entry = _lines(drill)
+        axes, axis_and_end, rim = _lines(drill)
         drawing.lines(axis_and_end, DRILL, 1.0)
-        thick += entry
+        drawing.lines([rim], DRILL)
+        drawing.cross(drill.entry_mm, axes, 0.9 * drill.diameter_mm, DRILL)
         words = name.replace("_", " ")
         text = f"{words}: {drill.depth_mm:.0f} mm deep, {drill.diameter_mm:g} mm wide"
         drawing.label(text, drill.entry_mm, DRILL)
-    drawing.lines(thick, DRILL)
 
 
 @lru_cache(maxsize=64)
-def _lines(drill: DrillAxis) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Points (N, 3) of the axis and of the hole's end, and of its entry."""
+def _lines(drill: DrillAxis) -> tuple[FloatArray, list[FloatArray], FloatArray]:
+    """Axes (2, 3) across it; points (N, 3) of the axis and of the hole's end, and of its entry."""
     axes = _across(drill.direction)
     end = drill.entry_mm + drill.depth_mm * drill.direction
     start = drill.entry_mm - _OUTSIDE_MM * drill.direction
     radius_mm = 0.5 * drill.diameter_mm
     axis_and_end = [sample_line(np.stack([start, end])), _circle(end, axes, radius_mm)]
-    rim = _circle(drill.entry_mm, axes, radius_mm)
-    return axis_and_end, [rim, *cross_lines(drill.entry_mm, axes, 1.8 * radius_mm)]
+    return axes, axis_and_end, _circle(drill.entry_mm, axes, radius_mm)
 
 
 def _across(direction: FloatArray) -> FloatArray:
