@@ -22,6 +22,9 @@ from tests.bench.mirror_reading import Sight
 from tests.geometry.test_display_model_errors import seen_beside_mm
 from tests.mirrors import true_display
 
+# A busy machine takes long to render and to read pictures.
+pytestmark = [pytest.mark.release, pytest.mark.timeout(300)]
+
 SEED = 3100
 
 
