@@ -27,7 +27,7 @@ from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor
 from navapp.control.frame_result import FrameResult
-from navapp.control.interlocks import grow_older
+from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import OtherBones
@@ -78,7 +78,7 @@ class SessionController:
         """
         hooks = hooks or SessionHooks()
         rig, plan = specification.rig, specification.plan
-        self._overlay_valid_ms = specification.overlay_valid_ms
+        self._overlay_valid_ms = min(specification.overlay_valid_ms, MAX_POSE_AGE_MS)
         self._is_late = False
         self._devices = devices
         self._mirror_checking = MirrorChecking(
@@ -120,7 +120,9 @@ class SessionController:
 
     def snapshot_now(self) -> Snapshot:
         """The newest one, judged at this moment; callable from any thread."""
-        return grow_older(self._snapshot, self._session.now_ns)
+        # The operator may have blanked the display while a step hangs.
+        newest = replace(self._snapshot, is_blanked=self._display.is_blanked)
+        return grow_older(newest, self._session.now_ns)
 
     def submit(self, command: Command) -> None:
         """Queue a command; callable from any thread, never blocks."""
@@ -261,23 +263,28 @@ class SessionController:
         valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
         has_guides = snapshot.is_navigable or snapshot.is_candidate
         is_scaled = self._composer.mode is OverlayMode.VIDEO
-        has_cross = snapshot.reasons == (snapshot.mirror_reason,) and snapshot.cross_check
+        is_checked = snapshot.reasons == (snapshot.mirror_reason,)
+        has_cross = is_checked and snapshot.cross_check is not None
         # The screen shows the live picture in a fault as well, the display shows nothing; nor does
         # it when what would be seen on it is not what is shown.
         is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
+        is_lit = is_shown and bool(snapshot.is_navigable if snapshot.has_mirror else has_guides)
+        is_lit = is_lit or (is_shown and has_cross)
         if is_shown and self._display.show(
-            image, valid_until_ns, has_guides=has_guides or bool(has_cross), is_scaled=is_scaled
+            image, valid_until_ns, has_guides=is_lit, is_scaled=is_scaled
         ):
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
-        if is_shown and has_cross and not (self._display.is_blanked or self._display.trouble):
+        # A picture that has expired on its way is not shown by any display.
+        age_ns = self._session.now_ns - frame.captured_ns
+        is_seen = not (self._display.is_blanked or self._display.trouble)
+        if is_shown and has_cross and is_seen and age_ns / 1e6 < self._overlay_valid_ms:
             self._mirror_checking.note_shown()
         preview = make_preview(video)
         plain = make_preview(frame.left) if has_guides else None
         if self._session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
         self._session.keep_preview(preview, plain)
-        age_ns = self._session.now_ns - frame.captured_ns
-        self._tell_late(age_ns / 1e6, is_shown and has_guides)
+        self._tell_late(age_ns / 1e6, is_lit)
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:

@@ -13,7 +13,9 @@ MAX_POSE_AGE_MS = 500.0
 def judge(draft: Snapshot) -> Snapshot:
     """A snapshot with the interlocks' answer; without guides its preview shows none either."""
     judged = replace(draft, reasons=check_interlocks(draft))
-    if judged.is_navigable or judged.is_candidate or draft.plain_preview is None:
+    is_young = judged.pose_age_ms is not None and judged.pose_age_ms <= _longest_ms(judged)
+    is_reviewed = judged.is_candidate and is_young and not judged.is_blanked
+    if judged.is_navigable or is_reviewed or draft.plain_preview is None:
         return judged
     return replace(judged, preview=draft.plain_preview)
 
@@ -79,9 +81,13 @@ def _of_pose(snapshot: Snapshot) -> list[Reason]:
     reasons: list[Reason] = []
     if verdict.status is not Status.OK:
         reasons += verdict.reasons or (Reason.BONE_LOST,)
-    longest_ms = min(snapshot.valid_ms, MAX_POSE_AGE_MS)
-    if snapshot.pose_age_ms is None or snapshot.pose_age_ms > longest_ms:
+    if snapshot.pose_age_ms is None or snapshot.pose_age_ms > _longest_ms(snapshot):
         reasons.append(Reason.POSE_TOO_OLD)
     if snapshot.has_mirror and snapshot.pose_at_light is None:
         reasons.append(Reason.MOVES_TOO_FAST)
     return reasons
+
+
+def _longest_ms(snapshot: Snapshot) -> float:
+    """How old a pose may be."""
+    return min(snapshot.valid_ms, MAX_POSE_AGE_MS)

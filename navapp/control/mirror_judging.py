@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.mirror_error import OTHER_EYE_MM, MirrorError
@@ -13,9 +13,10 @@ from navapp.values import Plan, PoseEstimate, StageSpec, TrackedFrame
 
 # The eye is not measured: in 95 % of cases it is this near to its calibrated place.
 EYE_RADIUS_MM = 10.0
-_EYE_SD_MM = EYE_RADIUS_MM / float(np.sqrt(chi2.ppf(0.95, 3)))
-# Errors vary slowly with the pose: they are predicted anew after this time.
-_VALID_NS = 200_000_000
+_EYE_SD_MM = EYE_RADIUS_MM / float(np.sqrt(chdtri(3, 0.05)))
+# Errors vary slowly with the pose: they are predicted anew after this time, or when the pose has
+# become less certain.
+_VALID_NS, _MOST_GROWN = 200_000_000, 1.1
 _COVERED: Mapping[Eyes, str] = {"both": "", "left": "right", "right": "left"}
 
 
@@ -30,7 +31,7 @@ class MirrorJudge:
 
     def __init__(self, display: CalibratedDisplay, view: MirrorView, plan: Plan) -> None:
         self._display, self._view, self._plan = display, view, plan
-        self._judged: tuple[str, tuple[str, ...], int] | None = None
+        self._judged: tuple[str, tuple[str, ...], int, float] | None = None
         self._error: MirrorError | None = None
 
     def judge(
@@ -41,10 +42,14 @@ class MirrorJudge:
         if estimate is None or stage.bone not in self._plan.bones:
             self._judged = self._error = None
             return None
+        spread = float(np.trace(estimate.covariance))
         last = self._judged
         is_valid = last is not None and last[:2] == (stage.name, layers)
         if last is None or not is_valid or not 0 <= now_ns - last[2] < _VALID_NS:
-            self._judged = stage.name, layers, now_ns
+            is_valid = False
+        # The pose's covariance may grow from one frame to the next.
+        if last is None or not is_valid or not spread <= _MOST_GROWN * last[3]:
+            self._judged = stage.name, layers, now_ns, spread
             self._error = self._predict(stage, layers, estimate)
         return self._error
 
@@ -66,6 +71,9 @@ class MirrorJudge:
         covariances = _point_covariances(chosen - centre_mm, estimate.covariance)
         model = self._display.model
         bounds_mm = _known(model.predict_error(chosen, _EYE_SD_MM, covariances))
+        if model.quality is None or model.quality.covariance is None:
+            # Nobody knows what the calibration adds.
+            bounds_mm = np.full(len(chosen), np.inf)
         return MirrorError(
             float(bounds_mm.max()),
             _COVERED[self._display.eyes],

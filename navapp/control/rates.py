@@ -16,7 +16,7 @@ class RateMeter:
 
     Args:
         delay_ms: from handing a picture to the display until its light; 0: not known.
-        delay_bound_ms: 95 % bound of that delay's error.
+        delay_bound_ms: 95 % bound of that delay's error; 0: not known.
     """
 
     def __init__(self, delay_ms: float = 0.0, delay_bound_ms: float = 0.0) -> None:
@@ -58,7 +58,7 @@ class RateMeter:
         )
 
     def _light(self) -> CaptureToLight | None:
-        if self._delay_ms <= 0.0 or len(self._latency_ms) < _FEWEST:
+        if min(self._delay_ms, self._delay_bound_ms) <= 0.0 or len(self._latency_ms) < _FEWEST:
             return None
         latency_ms = np.array(self._latency_ms)
         off_ms = np.quantile(np.abs(latency_ms - latency_ms.mean()), 0.95)

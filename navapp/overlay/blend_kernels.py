@@ -124,7 +124,8 @@ def find_weights(
         guess: weight where that is not known.
         weight: (h, w) in place, 0 (hidden) to 1 (on top).
         nearest_mm: (h, w) in place, depth of bone or what was matched before it; NaN where unknown.
-        is_hidden: (h, w) in place, something stands in front of most of the pixel.
+        is_hidden: (h, w) in place, something stands in front of most of the pixel, or it is not
+            known and guides there are not drawn.
     """
     for y in range(bone_mm.shape[0]):
         for x in range(bone_mm.shape[1]):
@@ -142,8 +143,10 @@ def find_weights(
                 weight[y, x] = seen * np.float32(guess)
             else:
                 weight[y, x] = seen * np.float32(beneath) if is_beneath else seen
-            is_hidden[y, x] = seen < 0.5
-            nearest_mm[y, x] = depth if is_known and not depth > bone else bone
+            # Where guides on a guess are unlit, it hides them.
+            is_hidden[y, x] = seen < 0.5 or (not is_known and guess <= 0.0)
+            is_nearer = depth <= bone or (np.isnan(bone) and not np.isnan(depth))
+            nearest_mm[y, x] = depth if is_known and is_nearer else bone
 
 
 @njit(cache=True, nogil=True)

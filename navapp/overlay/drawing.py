@@ -39,7 +39,8 @@ class Stroke:
     points_mm: FloatArray
     colour: Colour
     width_px: float
-    # whether it lies on top or beneath is judged at its first point, not piece by piece.
+    # arms from one point to another: on top or beneath as their first point, as long as the one of
+    # which least is seen.
     is_judged_whole: bool = False
 
 

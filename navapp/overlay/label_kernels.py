@@ -44,8 +44,8 @@ def find_free_place(
 @njit(cache=True, nogil=True)
 def blend_text(
     image: NDArray[np.uint8],
-    letters: NDArray[np.float32],
-    rim: NDArray[np.float32],
+    letters: NDArray[np.uint8],
+    rim: NDArray[np.uint8],
     corner: tuple[int, int],
     colour: tuple[int, int, int],
 ) -> None:
@@ -53,7 +53,7 @@ def blend_text(
 
     Args:
         image: (H, W, 3) in place.
-        letters: (h, w) share of the colour, 0 to 1.
+        letters: (h, w) share of the colour, 0 to 255.
         rim: (h, w) share of black below the letters.
         corner: column and row of the first pixel; what lies beside the picture is left out.
         colour: of the image's channels.
@@ -61,9 +61,10 @@ def blend_text(
     height, width = letters.shape
     for y in range(max(0, -corner[1]), min(height, image.shape[0] - corner[1])):
         for x in range(max(0, -corner[0]), min(width, image.shape[1] - corner[0])):
-            dark, lit = rim[y, x], letters[y, x]
-            if dark <= 0.0:
+            if rim[y, x] == 0:
                 continue
+            dark = np.float32(rim[y, x]) / np.float32(255.0)
+            lit = np.float32(letters[y, x]) / np.float32(255.0)
             row, column = y + corner[1], x + corner[0]
             for k in range(3):
                 below = np.float32(image[row, column, k]) * (np.float32(1.0) - dark)

@@ -98,9 +98,9 @@ def put_text(image: Image, text: str, at: tuple[int, int], size: float, colour: 
     blend_text(image, letters, rim, (at[0] - _TEXT_RIM_PX, at[1] - above), colour)
 
 
-@lru_cache(maxsize=256)
-def _text_shares(text: str, size: float) -> tuple[NDArray[np.float32], NDArray[np.float32], int]:
-    """Shares (h, w) of a line's letters and of their rim, and the rows above its baseline."""
+@lru_cache(maxsize=64)
+def _text_shares(text: str, size: float) -> tuple[NDArray[np.uint8], NDArray[np.uint8], int]:
+    """Shares (h, w), 0 to 255, of a line's letters and of their rim; rows above its baseline."""
     import cv2
 
     font = cv2.FONT_HERSHEY_SIMPLEX
@@ -109,6 +109,5 @@ def _text_shares(text: str, size: float) -> tuple[NDArray[np.float32], NDArray[n
     shape = above + below + 2 * _TEXT_RIM_PX, width + 2 * _TEXT_RIM_PX + 2
     drawn = np.zeros(shape, dtype=np.uint8)
     cv2.putText(drawn, text, (_TEXT_RIM_PX, above), font, size, 255, 1, cv2.LINE_AA)
-    letters = drawn.astype(np.float32) / np.float32(255.0)
-    rim = np.asarray(cv2.dilate(letters, np.ones((3, 3), np.uint8)), dtype=np.float32)
-    return letters, rim, above
+    rim = np.asarray(cv2.dilate(drawn, np.ones((3, 3), np.uint8)), dtype=np.uint8)
+    return drawn, rim, above

@@ -92,11 +92,6 @@ class Scene:
         """(N, 3) points of the bone in the frame of the picture's camera."""
         return self.viewpoint.to_camera(self.left_from_bone.apply(points_mm))
 
-    def pixel_of(self, point_mm: FloatArray) -> FloatArray:
-        """(2,) place in the picture of a point of the bone; NaN where it is not seen."""
-        pixel: FloatArray = self.camera.project(self.to_camera(point_mm[None]))[0]
-        return pixel
-
     @property
     def picture_axes_in_bone(self) -> FloatArray:
         """(2, 3) unit directions of the picture's columns and rows, in the bone's coordinates."""

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 # A line is followed in steps of so many px; each is on top, beneath or hidden as a whole.
 _STEP_PX = 1.5
 _FARTHEST_PX = 20_000.0
+# Arms that are left shorter are not drawn at all.
+_SHORTEST_PX = 2.5
 _DASH_PX, _GAP_PX = 7.0, 5.0
 _HIDDEN, _BENEATH, _ON_TOP = 0, 1, 2
 
@@ -20,7 +22,7 @@ class Ground(NamedTuple):
     y: int
     weight: NDArray[np.float32]  # (h, w) 0 to 1, of guides on the bone
     nearest_mm: NDArray[np.float32]  # (h, w) of bone and what was matched, NaN where unknown
-    is_hidden: NDArray[np.bool_]  # (h, w) something stands in front
+    is_hidden: NDArray[np.bool_]  # (h, w) nothing may be drawn
     skin_mm: np.float32  # further behind that a point is beneath
     beneath: np.float32  # weight of what lies beneath
     beyond: np.float32  # weight outside of the box
@@ -51,14 +53,14 @@ def trace_strokes(
     """How much of each pixel strokes cover, one stroke after the other; how many places there are.
 
     Dashed where it lies beneath something or where that is not known, left out where it is hidden.
-    What does not fit into the room is left out.
+    When the room is full, what comes after is left out: it was too small.
 
     Args:
         pixels: (N, 2) of the points of all strokes; NaN where they are not seen.
         depth_mm: (N,).
         firsts: (S + 1,) number of each stroke's first point, and N.
-        is_whole: (S,) whether a stroke is on top or beneath is judged at its first point for all of
-            it; what stands in front hides parts of it nevertheless.
+        is_whole: (S,) a stroke of arms from one point to another, judged at its first point for all
+            of it; where an arm would be hidden, all of them end as near.
         half_px: (S,) half of the strokes' widths.
         rim_px: (S,) width of a dark rim on either side, where the line is on top.
         ground: what is seen.
@@ -67,15 +69,17 @@ def trace_strokes(
     n = 0
     for stroke in range(len(firsts) - 1):
         first, last = firsts[stroke], firsts[stroke + 1]
-        weight = np.float32(np.nan)
+        weight, reach = np.float32(np.nan), 1.0
         if is_whole[stroke] and first < last:
             u, v = pixels[first, 0], pixels[first, 1]
             # A comparison with NaN is False.
             if not (abs(u) < _FARTHEST_PX and abs(v) < _FARTHEST_PX):
                 continue
             weight = weigh(u, v, depth_mm[first], ground)
+            reach = _find_reach(pixels[first:last], ground)
+        whole = (weight, reach)
         n_line, n_rim = _trace_line(
-            pixels[first:last], depth_mm[first:last], weight, ground, half_px[stroke],
+            pixels[first:last], depth_mm[first:last], whole, ground, half_px[stroke],
             rim_px[stroke], room,
         )  # fmt: skip
         n = _move(room.rim, room.touched[1, :n_rim], -1, room, n)
@@ -125,21 +129,41 @@ def weigh(u: float, v: float, z: float, ground: Ground) -> np.float32:
 
 
 @njit(cache=True, nogil=True)
+def _find_reach(pixels: NDArray[np.float64], ground: Ground) -> float:
+    """Share of the lines, from their first points, that is hidden on none; 0 when that is short."""
+    reach, longest = 1.0, 0.0
+    for k in range(len(pixels) - 1):
+        u0, v0, u1, v1 = pixels[k, 0], pixels[k, 1], pixels[k + 1, 0], pixels[k + 1, 1]
+        length = np.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2)
+        # A comparison with NaN is False.
+        if not length < _FARTHEST_PX:
+            continue
+        longest = max(longest, length)
+        n = int(length) + 1
+        for step in range(n + 1):
+            share = step / n
+            if share >= reach:
+                break
+            if _is_hidden(u0 + share * (u1 - u0), v0 + share * (v1 - v0), ground):
+                reach = share
+    return reach if reach * longest >= _SHORTEST_PX else 0.0
+
+
+@njit(cache=True, nogil=True)
 def _is_hidden(u: float, v: float, ground: Ground) -> bool:
-    """Whether something stands in front at a place of the picture; not known beyond the ground."""
+    """Whether a place of the picture is hidden; beyond the ground where nothing is drawn there."""
     column, row = int(np.floor(u + 0.5)) - ground.x, int(np.floor(v + 0.5)) - ground.y
     height, width = ground.is_hidden.shape
     if column < 0 or row < 0 or column >= width or row >= height:
-        return False
-    hidden: bool = ground.is_hidden[row, column]
-    return hidden
+        return bool(ground.beyond <= 0.0)
+    return bool(ground.is_hidden[row, column])
 
 
 @njit(cache=True, nogil=True)
 def _trace_line(
     pixels: NDArray[np.float64],
     depth_mm: NDArray[np.float64],
-    of_whole: np.float32,
+    whole: tuple[np.float32, float],
     ground: Ground,
     half_px: float,
     rim_px: float,
@@ -147,18 +171,21 @@ def _trace_line(
 ) -> tuple[int, int]:
     """Cover a line and its rim in the room; how many pixels of both are touched.
 
-    Weighed piece by piece, unless there is a weight of the whole; dashes begin with each line.
+    Weighed piece by piece, unless there is a weight of the whole (not NaN), which comes with the
+    share of each line that is drawn; dashes begin with each line.
     """
+    of_whole, reach = whole
     period, along = _DASH_PX + _GAP_PX, 0.0
     n_line, n_rim = 0, 0
     for k in range(len(pixels) - 1):
         u0, v0, u1, v1 = pixels[k, 0], pixels[k, 1], pixels[k + 1, 0], pixels[k + 1, 1]
         # A comparison with NaN is False.
-        if not (abs(u0) < _FARTHEST_PX and abs(v0) < _FARTHEST_PX):
+        if not (abs(u0) < _FARTHEST_PX and abs(v0) < _FARTHEST_PX) or reach == 0.0:
             along = 0.0
             continue
         if not (abs(u1) < _FARTHEST_PX and abs(v1) < _FARTHEST_PX):
             continue
+        u1, v1 = u0 + reach * (u1 - u0), v0 + reach * (v1 - v0)
         length = np.sqrt((u1 - u0) ** 2 + (v1 - v0) ** 2)
         n = int(length / _STEP_PX) + 1
         # Steps that are drawn alike are covered as one piece.
@@ -169,11 +196,7 @@ def _trace_line(
                 middle = (step + 0.5) / n
                 u, v = u0 + middle * (u1 - u0), v0 + middle * (v1 - v0)
                 z = depth_mm[k] + middle * (depth_mm[k + 1] - depth_mm[k])
-                weight = of_whole
-                if np.isnan(of_whole):
-                    weight = weigh(u, v, z, ground)
-                elif _is_hidden(u, v, ground):
-                    weight = np.float32(0.0)
+                weight = weigh(u, v, z, ground) if np.isnan(of_whole) else of_whole
                 along += length / n
                 if weight > ground.beneath:
                     this = _ON_TOP

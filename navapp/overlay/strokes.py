@@ -19,8 +19,9 @@ Image = NDArray[np.uint8]
 _STEP_MM = 8.0
 # A rim in black keeps a line visible on bone and on blood.
 _RIM_PX = 1.0
-# Room for this share of a picture's pixels, each counted as often as it is drawn.
-_MOST_DRAWN = 0.5
+# Room for this share of a picture's pixels, each counted as often as it is drawn; more is made when
+# that is not enough.
+_MOSTLY_DRAWN = 0.25
 
 
 def sample_line(points_mm: FloatArray, step_mm: float = _STEP_MM) -> FloatArray:
@@ -83,19 +84,28 @@ def _draw(
     """
     widths_px, rims_px, colours = pens
     room = _room(image.shape[0], image.shape[1], threading.get_ident())
-    n = trace_strokes(
-        pixels, np.ascontiguousarray(depth_mm), *parts, 0.5 * np.array(widths_px),
-        np.array(rims_px), ground, room,
-    )  # fmt: skip
+    pens_px = 0.5 * np.array(widths_px), np.array(rims_px)
+    depth_mm = np.ascontiguousarray(depth_mm)
+    n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
+    while n == len(room.place):
+        room = _enlarge(room)
+        n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
     table = np.array(colours, dtype=np.float32)
     blend_places(image, room.place[:n], room.share[:n], room.colour[:n], table)
 
 
-@lru_cache(maxsize=8)
+def _enlarge(room: Room) -> Room:
+    """Room for twice as many places."""
+    n = 2 * len(room.place)
+    place, number = np.empty((2, n), dtype=np.int32)
+    return room._replace(place=place, share=np.empty(n, dtype=np.float32), colour=number)
+
+
+@lru_cache(maxsize=4)
 def _room(height: int, width: int, _thread: int) -> Room:
     """Room to draw lines in, of one thread."""
     line, rim = np.zeros((2, height, width), dtype=np.float32)
     touched = np.empty((2, height * width), dtype=np.int32)
-    n = int(_MOST_DRAWN * height * width)
+    n = int(_MOSTLY_DRAWN * height * width)
     place, colour = np.empty((2, n), dtype=np.int32)
     return Room(line, rim, touched, place, np.empty(n, dtype=np.float32), colour)

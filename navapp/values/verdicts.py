@@ -105,9 +105,9 @@ _REMEDIES = {
     Reason.MOVES_TOO_FAST: "hold the leg still until it is shown again",
     Reason.OTHER_EYE: "cover it and say so ([mirror] eyes), or move the display",
     Reason.MIRROR_INEXACT: "bring the display's picture nearer to the bone, or calibrate again",
-    Reason.MIRROR_UNCHECKED: "check it on three points of the bone",
+    Reason.MIRROR_UNCHECKED: "check it on three corners of a board, or points of the bone",
     Reason.MIRROR_CHECK_FAILED: "look from the calibrated place and check again, or calibrate",
-    Reason.MIRROR_CHECK_OLD: "check it again on three points of the bone",
+    Reason.MIRROR_CHECK_OLD: "check it again on three corners or points",
     Reason.POSE_TOO_OLD: "wait for the next frame",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
 }

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.control.interlocks import grow_older
-from navapp.control.states import Event, Snapshot
+from navapp.control.states import Blank, Event, Register, Snapshot
 from navapp.values import Reason
 from sim_devices.display import SimulatedDisplay
 from tests.control.fakes import CLEAR, Bench, navigating
@@ -94,6 +94,32 @@ def test_guides_that_grow_old_between_two_frames_are_withdrawn_and_told() -> Non
 def _as_told(bench: Bench, text: str) -> tuple:
     (event,) = [event for event in bench.events if event.kind == "display"]
     return event.time_ns, "display", text, event.level, event.sequence
+
+
+def test_a_blank_is_on_the_screen_before_the_step_ends() -> None:
+    bench = navigating(Bench())
+    bench.controller.submit(Blank())
+    now = bench.controller.snapshot_now()
+    assert now.reasons[0] is Reason.BLANKED
+    assert not shows_guides(now)
+    assert not lit(bench)
+
+
+def test_a_candidate_that_grows_old_is_not_drawn() -> None:
+    bench = Bench()
+    bench.do(Register())
+    bench.frames(2)
+    assert bench.snapshot.is_candidate
+    assert shows_guides(bench.controller.snapshot_now())
+    bench.clock.advance_ns(510 * MS)
+    assert not shows_guides(bench.controller.snapshot_now())
+
+
+def test_no_picture_stays_longer_than_a_pose_is_believed() -> None:
+    bench = navigating(Bench(overlay_valid_ms=60_000.0))
+    bench.clock.advance_ns(510 * MS)
+    assert not bench.controller.snapshot_now().is_navigable
+    assert not lit(bench)
 
 
 def test_an_older_look_changes_nothing_but_ages() -> None:

@@ -49,12 +49,15 @@ from navapp.values import (
 )
 from sim_devices.display import SimulatedDisplay
 from tests.control.fakes import PERIOD_NS, Bench, a_plan, a_pose, a_rig, answer, navigating
+from tests.control.test_late_pictures import SlowDisplay
 from tests.overlay.scenes import is_colour
 
 WIDTH, HEIGHT, PITCH_MM = 400, 300, 0.5
 DEPTH_MM, EYE_MM = 300.0, np.array([20.0, -60.0, -150.0])
 TODAY = date.today()
-GOOD = DisplayQuality(True, error_mm=0.2, expires_on=TODAY + timedelta(days=1))
+GOOD = DisplayQuality(
+    True, error_mm=0.2, expires_on=TODAY + timedelta(days=1), covariance=1e-9 * np.eye(14)
+)
 
 
 def a_model(**changes: object) -> DisplayModel:
@@ -500,6 +503,36 @@ def test_layers_that_are_off_for_the_other_eye_are_not_lit_and_named() -> None:
     bench.do(ToggleLayer("drills"))
     bench.frames()
     assert bench.snapshot.reasons[0] is Reason.OTHER_EYE
+
+
+def test_a_calibration_that_does_not_know_its_error_lights_no_guide() -> None:
+    bench = a_bench(a_model(quality=replace(GOOD, covariance=None)))
+    navigating(bench)
+    assert Reason.MIRROR_INEXACT in bench.snapshot.reasons
+
+
+def test_a_pose_that_becomes_uncertain_is_judged_in_its_own_frame() -> None:
+    bench = a_bench()
+    navigating(bench)
+    check(bench)
+    told = measured_bone()
+    assert told.estimate is not None
+    estimate = replace(told.estimate, covariance=np.diag([2.0] * 3 + [1e-8] * 3))
+    bench.script.tracked = replace(told, estimate=estimate)
+    bench.frames(1)
+    assert not guides(bench).any()
+
+
+def test_a_cross_whose_picture_came_too_late_cannot_be_confirmed() -> None:
+    """Its display drops what has expired, without a word."""
+    bench = a_bench(make_display=lambda clock, w, h: SlowDisplay(clock, WIDTH, HEIGHT))
+    navigating(bench)
+    bench.display.delay_ns = 600_000_000
+    bench.do(CheckMirror())
+    bench.frames()
+    assert not bench.display.visible_image().any()
+    bench.do(ConfirmCross())
+    assert "not shown" in bench.refused()
 
 
 def test_guides_that_may_be_off_by_more_than_the_stage_allows_are_not_lit() -> None:

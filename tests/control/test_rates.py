@@ -39,8 +39,8 @@ def test_capture_to_light_has_the_displays_delay_and_its_error_in_it() -> None:
     assert (spread.mean_ms, spread.spread_ms) == (90.0, 5.0)
 
 
-def test_without_a_known_delay_no_light_is_told() -> None:
-    meter = RateMeter()
-    for _ in range(40):
-        meter.add(50.0, 0)
-    assert meter.rates(0).light is None
+def test_without_a_known_delay_and_its_error_no_light_is_told() -> None:
+    for meter in (RateMeter(), RateMeter(40.0)):
+        for _ in range(40):
+            meter.add(50.0, 0)
+        assert meter.rates(0).light is None

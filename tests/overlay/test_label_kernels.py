@@ -24,8 +24,8 @@ def test_the_first_box_that_is_free_is_found() -> None:
 def test_letters_are_blended_over_their_rim_inside_the_picture(corner: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
     before = rng.integers(0, 256, (20, 30, 3), dtype=np.uint8)
-    letters = rng.choice([0.0, 0.4, 1.0], (6, 12)).astype(np.float32)
-    rim = np.maximum(letters, rng.choice([0.0, 0.7], (6, 12))).astype(np.float32)
+    letters = rng.choice([0, 102, 255], (6, 12)).astype(np.uint8)
+    rim = np.maximum(letters, rng.choice([0, 180], (6, 12)).astype(np.uint8))
     image = before.copy()
     blend_text(image, letters, rim, corner, (10, 200, 250))
     expected = before.astype(float)
@@ -33,6 +33,7 @@ def test_letters_are_blended_over_their_rim_inside_the_picture(corner: tuple[int
         for x in range(12):
             row, column = y + corner[1], x + corner[0]
             if 0 <= row < 20 and 0 <= column < 30:
-                below = expected[row, column] * (1.0 - rim[y, x])
-                expected[row, column] = below + letters[y, x] * ((10, 200, 250) - below)
+                below = expected[row, column] * (1.0 - rim[y, x] / 255.0)
+                colour = np.array([10.0, 200.0, 250.0])
+                expected[row, column] = below + letters[y, x] / 255.0 * (colour - below)
     assert np.abs(image - expected).max() <= 0.5 + 1e-3

@@ -163,6 +163,27 @@ def test_what_stands_in_front_hides_parts_of_a_whole_stroke() -> None:
 
 
 @pytest.mark.kernel
+@pytest.mark.parametrize(("hidden_from", "reach"), [(109, 8), (102, 0)])
+def test_all_arms_end_as_near_as_the_one_of_which_least_is_seen(hidden_from, reach) -> None:
+    given, given_room, middle = ground(), room(), np.array([100.0, 60.0])
+    given.is_hidden[:, hidden_from:] = True
+    ways = np.array([[1.0, 0], [-1, 0], [0, 1], [0, -1]])
+    arms = [np.vstack([middle, middle + 20.0 * way, [[np.nan] * 2]]) for way in ways]
+    points = np.concatenate(arms)
+    n = trace_strokes(
+        points, np.full(12, 50.0), np.array([0, 12]), np.array([True]), np.array([1.0]),
+        np.array([0.0]), given, given_room,
+    )  # fmt: skip
+    assert (n > 0) == (reach > 0)
+    if n:
+        rows, columns = np.divmod(given_room.place[:n], given_room.line.shape[1])
+        light = given_room.share[:n]
+        centre = np.array([(columns * light).sum(), (rows * light).sum()]) / light.sum()
+        np.testing.assert_allclose(centre, middle, atol=0.05)
+        assert abs(columns - 100).max() == pytest.approx(reach + 1, abs=1)
+
+
+@pytest.mark.kernel
 def test_what_does_not_fit_into_the_room_is_left_out_and_leaves_no_trace() -> None:
     given = room(n=40)
     n = trace_strokes(
