@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from navapp.control.calibrated_display import CalibratedDisplay
     from navapp.control.controller import SessionController
     from navapp.control.event_log import SessionHooks
+    from navapp.control.eye_preview import EyePreview
     from navapp.control.frame_result import FrameListener
     from navapp.control.specification import SessionSpecification
     from navapp.devices import OpenedDevices
@@ -55,7 +56,9 @@ def prepare_session(
     prior = None if given.prior is None else read_prior(given.prior)
     board = _read_board(configuration)
     display = _read_display(configuration, options)
-    opened = open_live(configuration, is_headless=options.headless, board=board)
+    opened = open_live(
+        configuration, is_headless=options.headless, board=board, has_mirror=options.mirror
+    )
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         check_not_expired(opened.rig, date.today())
@@ -145,7 +148,19 @@ def make_controller(
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
         hooks=_make_hooks(session, on_frame, undo),
         board_watch=_make_board_watch(session, is_inline=is_inline),
+        eye=_make_eye(session, is_inline=is_inline),
     )
+
+
+def _make_eye(session: LiveSession, *, is_inline: bool) -> "EyePreview | None":
+    """What shows the operator the simulated mirror; None without one."""
+    from navapp.control.executors import InlineExecutor, ThreadExecutor
+    from navapp.control.eye_preview import EyePreview
+
+    look = session.opened.look
+    if look is None:
+        return None
+    return EyePreview(look, InlineExecutor() if is_inline else ThreadExecutor("eye"))
 
 
 def _make_board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None":

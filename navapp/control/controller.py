@@ -24,7 +24,8 @@ from navapp.control.device_handlers import MirrorHandler, ProjectorHandler
 from navapp.control.device_monitor import MonitoredDevices, tell_changes
 from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
-from navapp.control.executors import Executor
+from navapp.control.executors import Executor, InlineExecutor
+from navapp.control.eye_preview import EyePreview
 from navapp.control.frame_result import FrameResult
 from navapp.control.interlocks import grow_older
 from navapp.control.mirror_checking import MirrorChecking
@@ -60,6 +61,7 @@ class SessionController:
         executor: Executor,
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
+        eye: EyePreview | None = None,
         make_tracker: MakeTracker = make_tracker,
     ) -> None:
         """Bring the devices to their places; no frame is taken yet.
@@ -70,6 +72,7 @@ class SessionController:
             executor: runs first registrations.
             hooks: who is told what.
             board_watch: looks for a known length; None: nobody does.
+            eye: looks into a simulated mirror; None: nobody does.
             make_tracker: makes the tracker of a bone.
         """
         hooks = hooks or SessionHooks()
@@ -80,6 +83,7 @@ class SessionController:
         self._mirror_checking = MirrorChecking(specification.display, Rectifier(rig).geometry)
         self._composer = Composer(rig, plan, self._mirror_checking.view)
         self._depth_marks = DepthMarks(rig)
+        self._eye = eye or EyePreview(None, InlineExecutor())
         self._executor = executor
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
         self._display = DisplayLink(devices.display)
@@ -94,7 +98,7 @@ class SessionController:
         )
         self._commands = CommandHandler(
             self._session, self._camera, self._display, self._rig_watch, self._monitored,
-            self._mirror_checking, plan,
+            self._mirror_checking, self._eye, plan,
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
@@ -161,6 +165,7 @@ class SessionController:
         self._session.close()
         self._executor.close()
         self._rig_watch.close()
+        self._eye.close()
         self._camera.close()
         self._devices.close()
         self._session.go_offline()
@@ -263,14 +268,25 @@ class SessionController:
             self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
         if is_shown and has_cross and not (self._display.is_blanked or self._display.trouble):
             self._mirror_checking.note_shown()
-        preview = make_preview(video)
-        plain = make_preview(frame.left) if has_guides else None
-        if self._session.shows_depth:
-            preview = self._depth_marks.draw(preview, foreground)
-        self._session.keep_preview(preview, plain)
+        self._keep_preview(frame, video, snapshot, foreground)
         age_ns = self._session.now_ns - frame.captured_ns
         self._tell_late(age_ns / 1e6, is_shown and has_guides)
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
+
+    def _keep_preview(
+        self, frame: StereoFrame, video: Image, snapshot: Snapshot, foreground: Foreground | None
+    ) -> None:
+        """The operator's picture; a candidate is judged over the video, whatever is switched on."""
+        session = self._session
+        seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
+        if seen is not None and not snapshot.is_candidate:
+            session.keep_preview(*seen, is_of_eye=True)
+            return
+        has_guides = snapshot.is_navigable or snapshot.is_candidate
+        preview = make_preview(video)
+        if session.shows_depth:
+            preview = self._depth_marks.draw(preview, foreground)
+        session.keep_preview(preview, make_preview(frame.left) if has_guides else None)
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
         """Guides where the bone will be when their light is seen."""

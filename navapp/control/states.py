@@ -74,6 +74,11 @@ class ToggleDepth:
 
 
 @dataclass(frozen=True, slots=True)
+class ToggleEye:
+    """Show the operator what an eye sees in the simulated mirror, or the video again."""
+
+
+@dataclass(frozen=True, slots=True)
 class ToggleLayer:
     """Draw a layer of the overlay that is not drawn, or no longer draw it."""
 
@@ -136,6 +141,7 @@ Command = (
     | Blank
     | Show
     | ToggleDepth
+    | ToggleEye
     | ToggleLayer
     | CheckMirror
     | NudgeCross
@@ -265,6 +271,8 @@ class Snapshot:
     preview: NDArray[np.uint8] | None = None
     plain_preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
+    # it is not the video, but what an eye sees in a simulated mirror.
+    shows_eye: bool = False
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()

@@ -23,6 +23,7 @@ from navapp.control.states import (
     Show,
     Snapshot,
     ToggleDepth,
+    ToggleEye,
 )
 from navapp.values import Status
 
@@ -234,6 +235,16 @@ ACTIONS: tuple[Action, ...] = (
         _always,
         lambda _: ToggleDepth(),
         slot="depth",
+        needs_width=True,
+    ),
+    Action(
+        "eye",
+        "y",
+        "eye",
+        "see what an eye sees in the simulated mirror (navapp run --mirror), or the video",
+        lambda snapshot: snapshot.is_simulated,
+        lambda _: ToggleEye(),
+        slot="eye",
         needs_width=True,
     ),
     Action(
