@@ -26,7 +26,7 @@ Look = Callable[[], tuple[Image, Image]]
 
 # Standard deviations of the numbers of `DisplayModel.move`, of a careful calibration.
 _DEVIATIONS = (
-    *(0.0005, 0.0005, 0.0003), *(0.1, 0.1, 0.3), 0.0002, 0.05, 0.05, *(0.003, 0.003), *(1.0,) * 3
+    *(0.0003, 0.0003, 0.0002), *(0.06, 0.06, 0.2), 0.0002, 0.03, 0.05, *(0.002, 0.002), *(0.5,) * 3
 )  # fmt: skip
 _VALID_DAYS = 30
 _NEAR_MM = 40.0
