@@ -19,7 +19,9 @@ PITCH_MM = _DIAGONAL_MM / math.hypot(WIDTH_PX, HEIGHT_PX)
 # room; where the eye is, and the plate's middle before it.
 _PRACTICE_PX, _PRACTICE_DIAGONAL_MM = (1280, 800), 10.1 * 25.4
 _BONE_ON_TABLE_MM = (-2.0, -24.0, 11.0)
-_LEAN_DEG, _EYE_MM, _PLATE_MM = 30.0, 450.0, 150.0
+# The site's light is dimmed, so that guides stand out.
+_DIM_LX = 250.0
+_LEAN_DEG, _EYE_MM, _PLATE_MM = 30.0, 520.0, 180.0
 
 
 def draw_setup(rng: np.random.Generator) -> MirrorSetup:
@@ -52,7 +54,7 @@ def draw_setup(rng: np.random.Generator) -> MirrorSetup:
 
 
 def make_practice_setup(rig: StereoRig) -> MirrorSetup:
-    """A 10 inch panel seen amid the opened knee, from an eye 450 mm away and beside the cameras.
+    """A 10 inch panel seen amid the opened knee, from an eye 520 mm away and beside the cameras.
 
     The plate, of 3 mm, stands at 45 degrees; the panel hangs over the thigh and faces it.
     """
@@ -66,7 +68,7 @@ def make_practice_setup(rig: StereoRig) -> MirrorSetup:
     plate = Plate(eye + _PLATE_MM * ahead, math.sqrt(0.5) * (ahead + down))
     seen = np.column_stack([right, down, ahead])
     panel = _place_panel(plate, site, seen, _PRACTICE_PX, _PRACTICE_DIAGONAL_MM)
-    return MirrorSetup(eye, right, site, plate, panel)
+    return MirrorSetup(eye, right, site, plate, panel, _DIM_LX)
 
 
 def _place_panel(

@@ -102,7 +102,8 @@ class SessionController:
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
-            _make_mirror_judge(specification, self._composer), specification, self._rig_watch,
+            _make_mirror_judge(specification, self._composer), self._eye, specification,
+            self._rig_watch,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 

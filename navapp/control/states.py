@@ -271,8 +271,8 @@ class Snapshot:
     preview: NDArray[np.uint8] | None = None
     plain_preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
-    # it is not the video, but what an eye sees in a simulated mirror.
-    shows_eye: bool = False
+    has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead
+    shows_eye: bool = False  # it is shown
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()

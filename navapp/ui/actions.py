@@ -244,8 +244,6 @@ ACTIONS: tuple[Action, ...] = (
         "see what an eye sees in the simulated mirror (navapp run --mirror), or the video",
         lambda snapshot: snapshot.is_simulated,
         lambda _: ToggleEye(),
-        slot="eye",
-        needs_width=True,
     ),
     Action(
         "layers",

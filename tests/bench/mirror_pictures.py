@@ -8,7 +8,7 @@ the display); the folder is docs/images when none is given.
 """
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -57,11 +57,17 @@ def main() -> int:
 
 
 @contextmanager
-def practice(seed: int = 0) -> Iterator[tuple[OpenedDevices, SessionController]]:
-    """A session with the built-in simulated mirror that waits to be stepped."""
+def practice(
+    simulated: Mapping[str, object] | None = None,
+) -> Iterator[tuple[OpenedDevices, SessionController]]:
+    """A session with the built-in simulated mirror that waits to be stepped.
+
+    Args:
+        simulated: of the simulated camera's table in the configuration.
+    """
     options = _parser().parse_args(["run", "--headless", "--mirror"])
     with ExitStack() as undo:
-        configuration = parse({"camera": {"simulated": {"seed": seed}}}, "mirror pictures")
+        configuration = parse({"camera": {"simulated": dict(simulated or {})}}, "practice")
         configuration = add_practice_mirror(configuration, undo)
         session = prepare_session(configuration, options, Diagnostics(is_quiet=True))
         undo.callback(session.opened.devices.close)
