@@ -15,8 +15,9 @@ from sim_devices.sensor import make_tone_table
 # Of the picture: its size, and how much wider than the panel's image it is.
 EYE_WIDTH, EYE_HEIGHT, _MARGIN = 480, 300, 1.02
 # Luminance that is white to the eye.
-_WHITE_CD_M2 = 110.0
-_N_SAMPLES = 2
+_WHITE_CD_M2 = 80.0
+# Pictures are made smaller to be shown: one ray a pixel is enough.
+_N_SAMPLES = 1
 
 
 class RendersForCameras(Protocol):

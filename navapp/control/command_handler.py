@@ -156,7 +156,7 @@ class CommandHandler:
 
     def _on_toggle_eye(self) -> None:
         if not self._eye.is_possible:
-            self._refuse("eye", "no simulated mirror is here: `navapp run --mirror` has one")
+            self._refuse("eye", "there is no simulated mirror; start `navapp run --mirror`")
             return
         self._eye.toggle()
         shown = "what the eye sees in the mirror" if self._eye.is_on else "the video"

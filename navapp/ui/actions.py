@@ -241,7 +241,7 @@ ACTIONS: tuple[Action, ...] = (
         "eye",
         "y",
         "eye",
-        "see what an eye sees in the simulated mirror (navapp run --mirror), or the video",
+        "with run --mirror: see what an eye sees in the simulated mirror",
         lambda snapshot: snapshot.is_simulated,
         lambda _: ToggleEye(),
     ),
