@@ -16,8 +16,8 @@ from sim_devices.sensor import make_tone_table
 EYE_WIDTH, EYE_HEIGHT, _MARGIN = 480, 300, 1.02
 # Luminance that is white to the eye.
 _WHITE_CD_M2 = 80.0
-# Pictures are made smaller to be shown: one ray a pixel is enough.
-_N_SAMPLES = 1
+# No thin line of the panel falls between two rays.
+_N_SAMPLES = 2
 
 
 class RendersForCameras(Protocol):

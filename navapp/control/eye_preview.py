@@ -8,7 +8,7 @@ from navapp.control.executors import Executor, Job
 from navapp.overlay import make_preview
 
 # From one look to the next, at least.
-_PERIOD_NS = 200_000_000
+_PERIOD_NS = 250_000_000
 
 # What the eye sees now, and the same without the display's light; (H, W, 3) uint8 BGR each.
 Look = Callable[[], tuple[Image, Image]]

@@ -16,7 +16,7 @@ from tests.control.fakes import PERIOD_NS, Bench, FakeCamera, answer, navigating
 from tests.control.test_layer_switching import NoFrames
 
 LIT, SITE, VIDEO = 200, 90, 0
-PERIODS_OF_A_LOOK = -(-200_000_000 // PERIOD_NS)
+PERIODS_OF_A_LOOK = -(-250_000_000 // PERIOD_NS)
 
 
 class Eye:
