@@ -70,9 +70,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         if options.mirror:
             configuration = add_practice_mirror(configuration, undo)
         session = prepare_session(configuration, options, diagnostics)
-        if options.headless:
-            return _run_headless(session, script, options, diagnostics)
-        return _run_screen(session, options, diagnostics)
+    if options.headless:
+        return _run_headless(session, script, options, diagnostics)
+    return _run_screen(session, options, diagnostics)
 
 
 def _with_options(configuration: "Configuration", options: argparse.Namespace) -> "Configuration":

@@ -278,9 +278,10 @@ class SessionController:
         self, frame: StereoFrame, video: Image, snapshot: Snapshot, foreground: Foreground | None
     ) -> None:
         """The operator's picture; a candidate is judged over the video, whatever is switched on."""
-        session = self._session
-        seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
-        if seen is not None and not snapshot.is_candidate:
+        session, seen = self._session, None
+        if not snapshot.is_candidate:
+            seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
+        if seen is not None:
             session.keep_preview(*seen, is_of_eye=True)
             return
         has_guides = snapshot.is_navigable or snapshot.is_candidate
