@@ -39,6 +39,7 @@ help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 run: setup      ## the application on the simulated rig
+	@echo "with a display in a half-silvered mirror: $(BIN)/navapp run --mirror (docs/mirror.md, Practise)"
 	@$(BIN)/navapp run
 
 test: setup  ## style, types, import rules and the tests: some minutes

@@ -85,6 +85,17 @@ class MirrorSetup:
         directions: FloatArray = sine[:, None] * outward + np.sqrt(1.0 - sine**2)[:, None] * n
         return directions
 
+    def shift_of_site_mm(self) -> FloatArray:
+        """(3,) by how much the plate moves the site's middle towards the eye, along its normal.
+
+        t (1 - cos a / sqrt(n^2 - sin^2 a)) for the angle a between normal and line of sight.
+        """
+        plate = self.plate
+        cosine = float(self.directions_to_site(self.site_mm[None], self.eye_mm)[0] @ plate.normal)
+        inside = np.sqrt(plate.refractive_index**2 - 1.0 + cosine**2)
+        shift: FloatArray = -plate.thickness_mm * (1.0 - cosine / inside) * plate.normal
+        return shift
+
     def directions_to_pixels(self, pixels: FloatArray, eye_mm: FloatArray) -> FloatArray:
         """(N, 3) unit directions in which an eye at (3,) sees pixels (N, 2) by the front face.
 

@@ -1,4 +1,4 @@
-"""Set-ups of a display in a mirror beside the simulated rig, drawn at random."""
+"""Set-ups of a display in a mirror beside the simulated rig: drawn at random, and a fixed one."""
 
 import math
 from dataclasses import replace
@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from navapp.geometry.camera import Camera
+from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from sim_devices.layout import left_from_table
 from sim_devices.mirror_optics import MirrorSetup, Panel, Plate
 from sim_devices.rigs import WORKING_DISTANCE_MM
 
@@ -14,6 +16,13 @@ WIDTH_PX, HEIGHT_PX = 1920, 1080
 _DIAGONAL_MM = 24.0 * 25.4
 PITCH_MM = _DIAGONAL_MM / math.hypot(WIDTH_PX, HEIGHT_PX)
 _BEFORE_CAMERA = np.array([0.0, 0.0, WORKING_DISTANCE_MM])
+# Of the fixed set-up: the panel; middle of the bone that is seen, on the table of the simulated
+# room; where the eye is, and the plate's middle before it.
+_PRACTICE_PX, _PRACTICE_DIAGONAL_MM = (1280, 800), 10.1 * 25.4
+_BONE_ON_TABLE_MM = (-2.0, -24.0, 11.0)
+# The site's light is dimmed, so that guides stand out.
+_DIM_LX = 250.0
+_LEAN_DEG, _EYE_MM, _PLATE_MM = 30.0, 520.0, 180.0
 
 
 def draw_setup(rng: np.random.Generator, about_mm: FloatArray = _BEFORE_CAMERA) -> MirrorSetup:
@@ -41,26 +50,52 @@ def draw_setup(rng: np.random.Generator, about_mm: FloatArray = _BEFORE_CAMERA) 
     plate = Plate(front, normal, rng.uniform(1.0, 4.0))
     seen = rotation_from_vector(rng.normal(0.0, 0.03, 3)) @ np.column_stack([right, down, ahead])
     middle = site + rng.uniform(-30.0, 30.0) * ahead + rng.uniform(-15.0, 15.0) * right
-    setup = MirrorSetup(eye, right, site, plate, _place_panel(plate, middle, seen, rng))
+    size_px, is_upright = (WIDTH_PX, HEIGHT_PX), rng.random() < 0.5
+    panel = _place_panel(plate, middle, seen, size_px, _DIAGONAL_MM, is_upright=is_upright)
+    flips = rng.random(2) < 0.5
+    panel = replace(panel, flips_columns=bool(flips[0]), flips_rows=bool(flips[1]))
+    setup = MirrorSetup(eye, right, site, plate, panel)
     return replace(setup, site_lx=rng.uniform(200.0, 800.0))
 
 
+def make_practice_setup(rig: StereoRig) -> MirrorSetup:
+    """A 10 inch panel seen amid the opened knee, from an eye 520 mm away and beside the cameras.
+
+    The plate, of 3 mm, stands at 45 degrees; the panel hangs over the thigh and faces it.
+    """
+    on_table = left_from_table(rig)
+    axes, site = on_table.rotation, on_table.apply(np.array([_BONE_ON_TABLE_MM]))[0]
+    lean = math.radians(_LEAN_DEG)
+    ahead = axes @ (-math.sin(lean), 0.0, math.cos(lean))
+    down = axes[:, 1]
+    right = np.cross(down, ahead)
+    eye = site - _EYE_MM * ahead
+    plate = Plate(eye + _PLATE_MM * ahead, math.sqrt(0.5) * (ahead + down))
+    seen = np.column_stack([right, down, ahead])
+    panel = _place_panel(plate, site, seen, _PRACTICE_PX, _PRACTICE_DIAGONAL_MM)
+    return MirrorSetup(eye, right, site, plate, panel, _DIM_LX)
+
+
 def _place_panel(
-    plate: Plate, middle: FloatArray, seen: FloatArray, rng: np.random.Generator
+    plate: Plate,
+    middle: FloatArray,
+    seen: FloatArray,
+    size_px: tuple[int, int],
+    diagonal_mm: float,
+    *,
+    is_upright: bool = True,
 ) -> Panel:
     """The monitor whose middle and axes (columns right, down, ahead) are to be seen there."""
     n = plate.normal
     turned = seen - 2.0 * np.outer(n, n @ seen)
     place = middle - 2.0 * float((middle - plate.front_mm) @ n) * n
     # From its front a monitor's picture is not mirrored; from there, right is left.
-    sign = 1.0 if rng.random() < 0.5 else -1.0
+    sign = 1.0 if is_upright else -1.0
     across, down = -sign * turned[:, 0], sign * turned[:, 1]
-    half = 0.5 * PITCH_MM * np.array([WIDTH_PX - 1, HEIGHT_PX - 1])
+    pitch_mm = diagonal_mm / math.hypot(*size_px)
+    half = 0.5 * pitch_mm * (np.array(size_px) - 1)
     origin = place - half[0] * across - half[1] * down
-    flips = rng.random(2) < 0.5
-    return Panel(
-        origin, across, down, PITCH_MM, WIDTH_PX, HEIGHT_PX, bool(flips[0]), bool(flips[1])
-    )
+    return Panel(origin, across, down, pitch_mm, *size_px)
 
 
 def make_eye_camera(

@@ -48,13 +48,13 @@ class MirrorView:
 
         Args:
             screen_image_bgr: (h, w) or (h, w, C) that the monitor is handed; None: it is off.
-            site_reflectance: (H, W) as seen from this camera through the plate; None: dark.
+            site_reflectance: (H, W) or (H, W, C) as seen from this camera through the plate; None:
+                dark.
             n_samples: rays along each side of a pixel that go to the monitor.
         """
         plate, panel = self.setup.plate, self.setup.panel
-        n_channels = 1
-        if screen_image_bgr is not None and screen_image_bgr.ndim == 3:
-            n_channels = screen_image_bgr.shape[2]
+        seen = (screen_image_bgr, site_reflectance)
+        n_channels = max(1 if one is None or one.ndim == 2 else one.shape[2] for one in seen)
         shape = (self.camera.height, self.camera.width, n_channels)
         picture = np.zeros(shape, np.float32)
         if screen_image_bgr is not None:
@@ -72,7 +72,7 @@ class MirrorView:
             )  # fmt: skip
         if site_reflectance is not None:
             light = plate.transmission * self.setup.site_lx / math.pi
-            picture += np.float32(light) * site_reflectance[:, :, None]
+            picture += np.float32(light) * site_reflectance.reshape(*picture.shape[:2], -1)
         return picture
 
     def see_sheet(
@@ -123,7 +123,8 @@ class MirrorView:
             raise ValueError(f"the monitor takes {panel.width_px}x{panel.height_px} px")
         values = np.linspace(0.0, 1.0, 256) ** panel.gamma
         lit = panel.white_cd_m2 * (panel.black_share + (1.0 - panel.black_share) * values)
-        shown = lit.astype(np.float32)[image.reshape(*image.shape[:2], n_channels)]
+        shown = lit.astype(np.float32)[image.reshape(*image.shape[:2], -1)]
+        shown = np.broadcast_to(shown, (*image.shape[:2], n_channels))
         columns = slice(None, None, -1 if panel.flips_columns else 1)
         rows = slice(None, None, -1 if panel.flips_rows else 1)
         return np.ascontiguousarray(shown[rows, columns])

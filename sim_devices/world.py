@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.errors import UsageError
+from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
@@ -82,6 +83,7 @@ class World:
         )
         self._lock = threading.Lock()
         self._renderers: dict[tuple[str, Eye, float, Turn], Renderer] = {}
+        self._others: dict[tuple[str, Camera], Renderer] = {}
         self._parts: dict[str, tuple[Part, ...]] = {}
         self._stage = ""
         self.set_stage(scenario.stage)
@@ -169,33 +171,60 @@ class World:
             turn_rad: of the right eye, about its own axes.
         """
         renderer, parts = self._renderer(eye, scale, turn_rad)
-        poses, camera_from_table = self._poses(eye, parts, time_ns, turn_rad)
-        return renderer.render(poses, camera_from_table)
+        seen_from = camera_from_left(self.rig, eye, turn_rad)
+        return renderer.render(*self._poses(seen_from, parts, time_ns))
 
     def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
         """True depth and body of every pixel of the picture that `render` gives."""
         renderer, parts = self._renderer(eye, scale)
-        poses, camera_from_table = self._poses(eye, parts, time_ns)
-        return renderer.depth(poses, camera_from_table)
+        return renderer.depth(*self._poses(camera_from_left(self.rig, eye), parts, time_ns))
+
+    def render_for(
+        self, camera: Camera, seen_from: RigidTransform, time_ns: int
+    ) -> NDArray[np.float32]:
+        """(H, W, 3) BGR linear radiance, as of `render`, for a camera that is not the rig's.
+
+        Args:
+            camera: that looks; one that looks often is the same object each time.
+            seen_from: camera_from_left, of where it stands; it never moves.
+            time_ns: world time.
+        """
+        renderer, parts = self._renderer_for(camera)
+        return renderer.render(*self._poses(seen_from, parts, time_ns))
 
     def _renderer(
         self, eye: Eye, scale: float, turn_rad: Turn = NO_TURN
     ) -> tuple[Renderer, tuple[Part, ...]]:
         """That of an eye as it stands: what lies still is drawn once and kept."""
         with self._lock:
-            stage = self._stage
-            parts = self._parts.get(stage)
-            if parts is None:
-                parts = tuple(self._mirror_if_left(part) for part in STAGES[stage](self._site))
-                self._parts[stage] = parts
-            key = (stage, eye, scale, turn_rad)
+            parts = self._parts_now()
+            key = (self._stage, eye, scale, turn_rad)
             if key not in self._renderers:
                 rig = self.rig if scale == 1.0 else self.rig.scale(scale)
                 camera = rig.left if eye == "left" else rig.right
-                self._renderers[key] = Renderer(
-                    camera, parts, self._surfaces_at(scale), frozenset({"drape"})
-                )
+                self._renderers[key] = self._make_renderer(camera, parts, scale)
             return self._renderers[key], parts
+
+    def _renderer_for(self, camera: Camera) -> tuple[Renderer, tuple[Part, ...]]:
+        """That of another camera, kept likewise."""
+        with self._lock:
+            parts = self._parts_now()
+            key = (self._stage, camera)
+            if key not in self._others:
+                self._others[key] = self._make_renderer(camera, parts)
+            return self._others[key], parts
+
+    def _make_renderer(
+        self, camera: Camera, parts: tuple[Part, ...], scale: float = 1.0
+    ) -> Renderer:
+        return Renderer(camera, parts, self._surfaces_at(scale), frozenset({"drape"}))
+
+    def _parts_now(self) -> tuple[Part, ...]:
+        """Of the stage in force; called with the lock held."""
+        if self._stage not in self._parts:
+            made = STAGES[self._stage](self._site)
+            self._parts[self._stage] = tuple(self._mirror_if_left(part) for part in made)
+        return self._parts[self._stage]
 
     def _surfaces_at(self, scale: float) -> Surfaces:
         """Smaller pictures need a blurred texture, or its finest octave would flicker."""
@@ -206,10 +235,9 @@ class World:
         return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
 
     def _poses(
-        self, eye: Eye, parts: tuple[Part, ...], time_ns: int, turn_rad: Turn = NO_TURN
+        self, seen_from: RigidTransform, parts: tuple[Part, ...], time_ns: int
     ) -> tuple[dict[str, RigidTransform], RigidTransform]:
         """camera_from_body of everything in the scene, and camera_from_table."""
-        seen_from = camera_from_left(self.rig, eye, turn_rad)
         poses = {
             body: seen_from @ self.left_from_body(body, time_ns)
             for body in dict.fromkeys(part.body for part in parts)

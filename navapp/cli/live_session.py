@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from navapp.control.check_points import LocateCorners
     from navapp.control.controller import SessionController
     from navapp.control.event_log import SessionHooks
+    from navapp.control.eye_preview import EyePreview
     from navapp.control.frame_result import FrameListener
     from navapp.control.specification import SessionSpecification
     from navapp.devices import OpenedDevices
@@ -56,7 +57,9 @@ def prepare_session(
     prior = None if given.prior is None else read_prior(given.prior)
     board = _read_board(configuration)
     display = _read_display(configuration, options)
-    opened = open_live(configuration, is_headless=options.headless, board=board)
+    opened = open_live(
+        configuration, is_headless=options.headless, board=board, has_mirror=options.mirror
+    )
     with ExitStack() as undo:
         undo.callback(opened.devices.close)
         check_not_expired(opened.rig, date.today())
@@ -147,6 +150,7 @@ def make_controller(
         hooks=_make_hooks(session, on_frame, undo),
         board_watch=_make_board_watch(session, is_inline=is_inline),
         locate_corners=_make_locator(session),
+        eye=_make_eye(session, is_inline=is_inline),
     )
 
 
@@ -157,6 +161,17 @@ def _make_locator(session: LiveSession) -> "LocateCorners | None":
     from calibration.rig.corner_locator import CornerLocator
 
     return CornerLocator(session.board, session.opened.rig)
+
+
+def _make_eye(session: LiveSession, *, is_inline: bool) -> "EyePreview | None":
+    """What shows the operator the simulated mirror; None without one."""
+    from navapp.control.executors import InlineExecutor, ThreadExecutor
+    from navapp.control.eye_preview import EyePreview
+
+    look = session.opened.look
+    if look is None:
+        return None
+    return EyePreview(look, InlineExecutor() if is_inline else ThreadExecutor("eye"))
 
 
 def _make_board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch | None":

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from navapp.cli.diagnostics import Diagnostics, check_writable
 from navapp.cli.live_session import LiveSession, make_controller, prepare_session
 from navapp.cli.methods import add_method
+from navapp.cli.practice_mirror import add_practice_mirror
 from navapp.errors import ConfigurationError, InputError, UsageError
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _EXAMPLE = """\
 examples:
   navapp run                                     the simulated rig, in the terminal
+  navapp run --mirror                            the same with a display in a half-silvered mirror
   navapp run --headless --frames 120 --json -    the same without a screen, with a scripted operator
   navapp run --plan P --rig rig.yml --prior prior.json --record sessions/01
 """
@@ -36,6 +38,11 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--plan", metavar="P", help="plan folder")
     parser.add_argument("--rig", metavar="R", help="rig file")
     parser.add_argument("--prior", metavar="FILE", help="rough start pose (JSON)")
+    parser.add_argument(
+        "--mirror",
+        action="store_true",
+        help="practise with a simulated display in a half-silvered mirror",
+    )
     parser.add_argument("--headless", action="store_true", help="no screen; a scripted operator")
     parser.add_argument("--frames", type=int, metavar="N", help="end after N frames")
     parser.add_argument("--stage", metavar="S", help="stage to start in, name or number")
@@ -59,7 +66,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     check_writable(options.json)
     configuration = _with_options(load(find_file(options.config)), options)
     script = _script(options.operator)
-    session = prepare_session(configuration, options, diagnostics)
+    with ExitStack() as undo:
+        if options.mirror:
+            configuration = add_practice_mirror(configuration, undo)
+        session = prepare_session(configuration, options, diagnostics)
     if options.headless:
         return _run_headless(session, script, options, diagnostics)
     return _run_screen(session, options, diagnostics)

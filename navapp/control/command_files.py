@@ -21,6 +21,7 @@ from navapp.control.states import (
     Reject,
     Show,
     ToggleDepth,
+    ToggleEye,
     ToggleLayer,
 )
 from navapp.errors import SequenceError
@@ -32,6 +33,7 @@ _PLAIN: dict[str, type] = {
     "blank": Blank,
     "show": Show,
     "depth": ToggleDepth,
+    "eye": ToggleEye,
     "check_mirror": CheckMirror,
     "confirm_cross": ConfirmCross,
     "reconnect": Reconnect,

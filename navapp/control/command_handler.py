@@ -4,6 +4,7 @@ from navapp.control.bone_tracks import Candidate
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
+from navapp.control.eye_preview import EyePreview
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
@@ -28,6 +29,7 @@ from navapp.control.states import (
     SessionState,
     Show,
     ToggleDepth,
+    ToggleEye,
     ToggleLayer,
 )
 from navapp.errors import UsageError
@@ -48,6 +50,7 @@ class CommandHandler:
         rig: RigWatch,
         monitored: MonitoredDevices,
         mirror: MirrorChecking,
+        eye: EyePreview,
         plan: Plan,
     ) -> None:
         self._session = session
@@ -56,6 +59,7 @@ class CommandHandler:
         self._rig = rig
         self._monitored = monitored
         self._mirror = mirror
+        self._eye = eye
         self._plan = plan
 
     def handle(self, command: Command) -> None:
@@ -77,6 +81,8 @@ class CommandHandler:
                 self._on_show()
             case ToggleDepth():
                 self._session.toggle_depth()
+            case ToggleEye():
+                self._on_toggle_eye()
             case ToggleLayer():
                 self._on_toggle_layer(command)
             case CheckMirror():
@@ -147,6 +153,14 @@ class CommandHandler:
         if self._display.is_blanked:
             self._display.show_again()
             self._session.add_event("show", "display shown again")
+
+    def _on_toggle_eye(self) -> None:
+        if not self._eye.is_possible:
+            self._refuse("eye", "there is no simulated mirror; start `navapp run --mirror`")
+            return
+        self._eye.toggle()
+        shown = "what the eye sees in the mirror" if self._eye.is_on else "the video"
+        self._session.add_event("eye", f"the screen shows {shown}")
 
     def _on_toggle_layer(self, command: ToggleLayer) -> None:
         if command.name not in LAYERS:

@@ -25,7 +25,8 @@ from navapp.control.device_handlers import MirrorHandler, ProjectorHandler
 from navapp.control.device_monitor import MonitoredDevices, tell_changes
 from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
-from navapp.control.executors import Executor
+from navapp.control.executors import Executor, InlineExecutor
+from navapp.control.eye_preview import EyePreview
 from navapp.control.frame_result import FrameResult
 from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
 from navapp.control.mirror_checking import MirrorChecking
@@ -63,6 +64,7 @@ class SessionController:
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
         locate_corners: LocateCorners | None = None,
+        eye: EyePreview | None = None,
         make_tracker: MakeTracker = make_tracker,
     ) -> None:
         """Bring the devices to their places; no frame is taken yet.
@@ -74,6 +76,7 @@ class SessionController:
             hooks: who is told what.
             board_watch: looks for a known length; None: nobody does.
             locate_corners: of a board, for the check of the mirror; None: no board is known.
+            eye: looks into a simulated mirror; None: nobody does.
             make_tracker: makes the tracker of a bone.
         """
         hooks = hooks or SessionHooks()
@@ -86,6 +89,7 @@ class SessionController:
         )
         self._composer = Composer(rig, plan, self._mirror_checking.view)
         self._depth_marks = DepthMarks(rig)
+        self._eye = eye or EyePreview(None, InlineExecutor())
         self._executor = executor
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
         self._display = DisplayLink(devices.display)
@@ -100,11 +104,12 @@ class SessionController:
         )
         self._commands = CommandHandler(
             self._session, self._camera, self._display, self._rig_watch, self._monitored,
-            self._mirror_checking, plan,
+            self._mirror_checking, self._eye, plan,
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
-            _make_mirror_judge(specification, self._composer), specification, self._rig_watch,
+            _make_mirror_judge(specification, self._composer), self._eye, specification,
+            self._rig_watch,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -169,6 +174,7 @@ class SessionController:
         self._session.close()
         self._executor.close()
         self._rig_watch.close()
+        self._eye.close()
         self._camera.close()
         self._devices.close()
         self._session.go_offline()
@@ -279,13 +285,25 @@ class SessionController:
         is_seen = not (self._display.is_blanked or self._display.trouble)
         if is_shown and has_cross and is_seen and age_ns / 1e6 < self._overlay_valid_ms:
             self._mirror_checking.note_shown()
-        preview = make_preview(video)
-        plain = make_preview(frame.left) if has_guides else None
-        if self._session.shows_depth:
-            preview = self._depth_marks.draw(preview, foreground)
-        self._session.keep_preview(preview, plain)
+        self._keep_preview(frame, video, snapshot, foreground)
         self._tell_late(age_ns / 1e6, is_lit)
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
+
+    def _keep_preview(
+        self, frame: StereoFrame, video: Image, snapshot: Snapshot, foreground: Foreground | None
+    ) -> None:
+        """The operator's picture; a candidate is judged over the video, whatever is switched on."""
+        session, seen = self._session, None
+        if not snapshot.is_candidate:
+            seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
+        if seen is not None:
+            session.keep_preview(*seen, is_of_eye=True)
+            return
+        has_guides = snapshot.is_navigable or snapshot.is_candidate
+        preview = make_preview(video)
+        if session.shows_depth:
+            preview = self._depth_marks.draw(preview, foreground)
+        session.keep_preview(preview, make_preview(frame.left) if has_guides else None)
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
         """Guides where the bone will be when their light is seen."""

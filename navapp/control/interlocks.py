@@ -47,7 +47,7 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
         reasons.append(Reason.CAMERA_SILENT)
     reasons += snapshot.device_reasons
     if snapshot.mirror_error is not None:
-        reasons += _of_mirror(snapshot.mirror_error, snapshot.stage.tolerance_mm)
+        reasons += _of_mirror(snapshot.mirror_error)
     if snapshot.mirror_reason is not None:
         reasons.append(snapshot.mirror_reason)
     if not snapshot.is_bone_planned:
@@ -61,11 +61,11 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
     return tuple(reasons)
 
 
-def _of_mirror(error: MirrorError, tolerance_mm: float) -> list[Reason]:
-    if error.is_all_off:
-        return [Reason.OTHER_EYE]
-    # A comparison with what is no number is False.
-    return [] if error.bound_mm <= tolerance_mm else [Reason.MIRROR_INEXACT]
+def _of_mirror(error: MirrorError) -> list[Reason]:
+    """When no layer is left: what would have to change first."""
+    if not error.is_dark:
+        return []
+    return [Reason.OTHER_EYE if error.off_layers else Reason.MIRROR_INEXACT]
 
 
 def is_current(other: OtherBone) -> bool:

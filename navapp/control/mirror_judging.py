@@ -63,25 +63,38 @@ class MirrorJudge:
         if not in_left:
             return None
         other_mm = self._for_other_eye(in_left)
+        bounds_mm = self._bounds_mm(in_left, stage, estimate)
         off = tuple(name for name, error_mm in other_mm.items() if error_mm > OTHER_EYE_MM)
-        is_all_off = len(off) == len(in_left)
-        drawn = [name for name in in_left if name not in off or is_all_off]
-        chosen = np.concatenate([in_left[name] for name in drawn])
-        centre_mm = pose.apply(self._plan.bones[stage.bone].mesh.vertices_mm.mean(axis=0)[None])[0]
-        covariances = _point_covariances(chosen - centre_mm, estimate.covariance)
-        model = self._display.model
-        bounds_mm = _known(model.predict_error(chosen, _EYE_SD_MM, covariances))
-        if model.quality is None or model.quality.covariance is None:
-            # Nobody knows what the calibration adds.
-            bounds_mm = np.full(len(chosen), np.inf)
+        # A comparison with what is no number is False.
+        inexact = tuple(name for name, mm in bounds_mm.items() if not mm <= stage.tolerance_mm)
+        lit = [name for name in in_left if name not in off and name not in inexact]
         return MirrorError(
-            float(bounds_mm.max()),
+            max(bounds_mm[name] for name in lit or in_left),
             _COVERED[self._display.eyes],
             max(other_mm.values()) if other_mm else None,
-            model.screen_shift_mm(np.concatenate(list(in_left.values()))),
+            self._display.model.screen_shift_mm(np.concatenate(list(in_left.values()))),
             off,
-            is_all_off,
+            inexact,
+            not lit,
         )
+
+    def _bounds_mm(
+        self, points_mm: Mapping[str, FloatArray], stage: StageSpec, estimate: PoseEstimate
+    ) -> dict[str, float]:
+        """For the viewing eye, of each layer's worst point."""
+        model = self._display.model
+        if model.quality is None or model.quality.covariance is None:
+            # Nobody knows what the calibration adds.
+            return dict.fromkeys(points_mm, np.inf)
+        mesh = self._plan.bones[stage.bone].mesh
+        pose = estimate.camera_from_bone
+        centre_mm = pose.apply(mesh.vertices_mm.mean(axis=0)[None])[0]
+        joined = np.concatenate(list(points_mm.values()))
+        covariances = _point_covariances(joined - centre_mm, estimate.covariance)
+        errors_mm = _known(model.predict_error(joined, _EYE_SD_MM, covariances))
+        lasts = np.cumsum([len(some) for some in points_mm.values()])
+        parts = np.split(errors_mm, lasts[:-1])
+        return {name: float(part.max()) for name, part in zip(points_mm, parts, strict=True)}
 
     def _for_other_eye(self, points_mm: Mapping[str, FloatArray]) -> dict[str, float]:
         """The largest error of each layer; nothing when that eye is covered."""

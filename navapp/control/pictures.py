@@ -82,8 +82,9 @@ class Composer:
         is_checkable = snapshot.reasons == (snapshot.mirror_reason,)
         scene = None
         if snapshot.is_navigable:
-            off = () if snapshot.mirror_error is None else snapshot.mirror_error.off_layers
-            seen = tuple(name for name in snapshot.layers if name not in off)
+            error = snapshot.mirror_error
+            unlit = () if error is None else error.unlit_layers
+            seen = tuple(name for name in snapshot.layers if name not in unlit)
             snapshot = replace(snapshot, layers=seen)
             scene = _scene(snapshot, view, self._plan, foreground)
         return compose_mirror(
@@ -123,11 +124,13 @@ def _describe_error(snapshot: Snapshot) -> str:
         return ""
     told = f" - error <= {error.bound_mm:.1f} mm"
     if error.covered_eye:
-        return f"{told}, {error.covered_eye} eye covered"
-    if not error.off_layers:
-        return told
-    off = ", ".join(error.off_layers)
-    return f"{told} - off for the other eye, not shown: {off} ({_describe_shift(error)})"
+        told += f", {error.covered_eye} eye covered"
+    if error.inexact_layers:
+        told += f" - not shown, perhaps too far off: {', '.join(error.inexact_layers)}"
+    if error.off_layers:
+        off = ", ".join(error.off_layers)
+        told += f" - not shown, off for the other eye: {off} ({_describe_shift(error)})"
+    return told
 
 
 def _describe_shift(error: MirrorError) -> str:

@@ -62,6 +62,7 @@ class Session:
         self._tracked_at_ns = 0
         self._preview: Image | None = None
         self._plain_preview: Image | None = None
+        self._shows_eye = False
         self._meter = meter or RateMeter()
         self._is_over = False
         self._rig_error: RigError | None = None
@@ -199,9 +200,18 @@ class Session:
         self._switched_layers ^= {name}
         self.add_event("layer", f"layer {name} {'on' if name in self.layers else 'off'}")
 
-    def keep_preview(self, preview: Image, plain: Image | None) -> None:
-        """The newest picture, made small; when guides are drawn in it, also without them."""
+    def keep_preview(self, preview: Image, plain: Image | None, *, is_of_eye: bool = False) -> None:
+        """The newest picture, made small; when guides are drawn in it, also without them.
+
+        It is of the left camera, or of an eye that looks into a simulated mirror.
+        """
         self._preview, self._plain_preview = preview, plain
+        self._shows_eye = is_of_eye
+
+    @property
+    def shows_eye(self) -> bool:
+        """The newest picture is what an eye sees in a simulated mirror."""
+        return self._shows_eye
 
     def end_frame(self, result: FrameResult, latency_ms: float | None) -> None:
         """Count a frame that was handled, and tell its result; latency as of `RateMeter`."""

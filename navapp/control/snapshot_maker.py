@@ -8,6 +8,7 @@ from navapp.control.device_handlers import DeviceReport
 from navapp.control.device_lines import camera_line, display_line, rig_line
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
+from navapp.control.eye_preview import EyePreview
 from navapp.control.interlocks import judge
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_error import MirrorError
@@ -31,6 +32,7 @@ class SnapshotMaker:
     monitored: MonitoredDevices  # projector and mirror
     mirror_checking: MirrorChecking  # of what is seen in the mirror
     mirror_judge: MirrorJudge | None  # of guides in it; None: guides lie over video
+    eye: EyePreview  # into a simulated mirror
     specification: SessionSpecification  # of the session
     rig_watch: RigWatch  # that watches the rig
 
@@ -60,7 +62,9 @@ class SnapshotMaker:
             pose_at_light=self._predict_pose(now_ns),
             preview=session.preview,
             plain_preview=session.plain_preview,
-            shows_depth=session.shows_depth,
+            shows_depth=session.shows_depth and not session.shows_eye,
+            has_eye=self.eye.is_possible,
+            shows_eye=session.shows_eye,
             layers=session.layers,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),

@@ -74,6 +74,11 @@ class ToggleDepth:
 
 
 @dataclass(frozen=True, slots=True)
+class ToggleEye:
+    """Show the operator what an eye sees in the simulated mirror, or the video again."""
+
+
+@dataclass(frozen=True, slots=True)
 class ToggleLayer:
     """Draw a layer of the overlay that is not drawn, or no longer draw it."""
 
@@ -136,6 +141,7 @@ Command = (
     | Blank
     | Show
     | ToggleDepth
+    | ToggleEye
     | ToggleLayer
     | CheckMirror
     | NudgeCross
@@ -275,6 +281,8 @@ class Snapshot:
     preview: NDArray[np.uint8] | None = None
     plain_preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
+    has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead
+    shows_eye: bool = False  # it is shown
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()

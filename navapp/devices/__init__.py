@@ -4,6 +4,7 @@ from navapp.devices.cameras import make_real_camera
 from navapp.devices.capture import OpenedCapture, open_capture
 from navapp.devices.latency import OpenedLatency, open_latency
 from navapp.devices.session_devices import OpenedDevices, open_live, open_recording
+from navapp.devices.simulated_mirror import make_practice_display
 from navapp.devices.simulated_room import Simulation
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "OpenedDevices",
     "OpenedLatency",
     "Simulation",
+    "make_practice_display",
     "make_real_camera",
     "open_capture",
     "open_latency",

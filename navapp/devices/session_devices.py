@@ -1,7 +1,7 @@
 """Opens the devices of a session, from a configuration or a recording."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calibration.targets.boards import Board
 from drivers.clock import Clock, ManualClock, SystemClock
@@ -11,6 +11,7 @@ from navapp.config import Configuration
 from navapp.devices.cameras import make_real_camera
 from navapp.devices.peripherals import make_device_set
 from navapp.devices.rig_match import make_reopener, open_matching, read_configured_rig
+from navapp.devices.simulated_mirror import Look, make_look
 from navapp.devices.simulated_room import (
     Pace,
     Simulation,
@@ -21,6 +22,8 @@ from navapp.devices.simulated_room import (
 )
 from navapp.errors import DeviceError
 from navapp.geometry import StereoRig
+from sim_devices.camera import SimulatedCamera
+from sim_devices.display import SimulatedDisplay
 from sim_devices.world import World
 
 
@@ -32,10 +35,15 @@ class OpenedDevices:
     rig: StereoRig
     reopen_camera: Callable[[], StereoCamera]
     simulation: Simulation | None = None
+    look: Look | None = None  # of an eye into a simulated mirror, for showing only
 
 
 def open_live(
-    configuration: Configuration, *, is_headless: bool, board: Board | None = None
+    configuration: Configuration,
+    *,
+    is_headless: bool,
+    board: Board | None = None,
+    has_mirror: bool = False,
 ) -> OpenedDevices:
     """Open the configured devices.
 
@@ -43,12 +51,14 @@ def open_live(
         configuration: in force.
         board: that is held into a simulated view, when the configuration says so.
         is_headless: nobody watches; a simulated camera then waits to be read.
+        has_mirror: the simulated display is seen in the built-in simulated mirror.
 
     Raises:
         DeviceError, RigError, ConfigurationError.
     """
     if configuration.camera.backend == "simulated":
-        return _open_simulated(configuration, board, is_headless=is_headless)
+        opened, world, camera = _open_simulated(configuration, board, is_headless=is_headless)
+        return _with_look(opened, world, camera) if has_mirror else opened
     return _open_real(configuration)
 
 
@@ -69,7 +79,7 @@ def open_recording(
 
 def _open_simulated(
     configuration: Configuration, board: Board | None, *, is_headless: bool
-) -> OpenedDevices:
+) -> tuple[OpenedDevices, World, SimulatedCamera]:
     settings = configuration.camera.simulated
     world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=is_headless)
     scene = with_board(world, board, settings)
@@ -79,7 +89,16 @@ def _open_simulated(
     else:
         rig = world.rig if settings.scale == 1.0 else world.rig.scale(settings.scale)
     simulation = simulation_of(world, camera)
-    return _open_devices(configuration, camera, pace.clock, rig, simulation)
+    opened = _open_devices(configuration, camera, pace.clock, rig, simulation)
+    return opened, world, camera
+
+
+def _with_look(opened: OpenedDevices, world: World, camera: SimulatedCamera) -> OpenedDevices:
+    """With an eye that sees the site, and the display when it is a simulated one."""
+    devices = opened.devices
+    if not isinstance(devices.display, SimulatedDisplay):
+        return opened
+    return replace(opened, look=make_look(world, camera, devices.display, devices.clock))
 
 
 def _open_real(configuration: Configuration) -> OpenedDevices:

@@ -23,6 +23,7 @@ from navapp.control.states import (
     Show,
     Snapshot,
     ToggleDepth,
+    ToggleEye,
 )
 from navapp.values import Status
 
@@ -235,6 +236,14 @@ ACTIONS: tuple[Action, ...] = (
         lambda _: ToggleDepth(),
         slot="depth",
         needs_width=True,
+    ),
+    Action(
+        "eye",
+        "y",
+        "eye",
+        "with run --mirror: see what an eye sees in the simulated mirror",
+        lambda snapshot: snapshot.is_simulated,
+        lambda _: ToggleEye(),
     ),
     Action(
         "layers",

@@ -14,6 +14,7 @@ from navapp.values import DEPTH_COLOURS, Origin
 
 _WAITING = "waiting for the first picture"
 NOTICE = "research, not for clinical use"
+_EYE_HINT = "y: video, or what the eye sees in the mirror"
 _DEPTH_WORDS = {
     Origin.MATCHED: "matched",
     Origin.FILLED_BORDER: "border",
@@ -92,7 +93,7 @@ class PictureView(HalfBlocks):
     def __init__(self) -> None:
         super().__init__("picture")
         self.border_subtitle = NOTICE
-        self._title = ""
+        self._title, self._has_eye = "", False
 
     def show(self, view: View) -> None:
         """Take over the newest picture and say how it stands."""
@@ -100,6 +101,10 @@ class PictureView(HalfBlocks):
         if self._title != view.picture_title + key:
             self._title = view.picture_title + key
             self.border_title = self._title
+        if self._has_eye != view.snapshot.has_eye:
+            self._has_eye = view.snapshot.has_eye
+            hint = f"{_EYE_HINT} {view.symbols.dot} " if self._has_eye else ""
+            self.border_subtitle = hint + NOTICE
         for level in Level:
             self.set_class(level is view.level, f"-{level.name.lower()}")
         self.show_picture(view.snapshot.preview, view.symbols.ramp)

@@ -139,18 +139,24 @@ class View:
     @property
     def picture_title(self) -> str:
         """What the picture is, and what is wrong with it."""
-        dot = self.symbols.dot
+        name = "SIMULATED EYE in the mirror" if self.snapshot.shows_eye else "left view"
+        wrong = self._picture_trouble
+        return f"{name} {self.symbols.dot} {wrong}" if wrong else name
+
+    @property
+    def _picture_trouble(self) -> str:
+        """What is wrong with the picture; empty when guides are shown in it."""
         if self.is_silent:
-            return f"left view {dot} FROZEN, no answer"
+            return "FROZEN, no answer"
         if self.is_picture_old:
-            return f"left view {dot} OLD PICTURE, no new one comes"
+            return "OLD PICTURE, no new one comes"
         if self.snapshot.rig_alarm:
-            return f"left view {dot} RIG MOVED, the display is dark"
+            return "RIG MOVED, the display is dark"
         if self.snapshot.is_blanked:
-            return f"left view {dot} BLANKED, the display is dark"
+            return "BLANKED, the display is dark"
         if self.snapshot.is_candidate:
-            return f"left view {dot} CANDIDATE, not accepted"
-        return "left view" if self.is_navigable else f"left view {dot} NO GUIDES"
+            return "CANDIDATE, not accepted"
+        return "" if self.is_navigable else "NO GUIDES"
 
     def clock(self, time_ns: int) -> str:
         """Minutes and seconds since the session's start, `mm:ss`."""

@@ -25,6 +25,7 @@ from navapp.control.check_points import LocateCorners
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
+from navapp.control.eye_preview import EyePreview, Look
 from navapp.control.frame_result import FrameResult
 from navapp.control.specification import SessionSpecification
 from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Reject, Snapshot
@@ -212,6 +213,7 @@ class Bench:
         make_display: Callable[[Clock, int, int], SimulatedDisplay] = SimulatedDisplay,
         calibrated_display: CalibratedDisplay | None = None,
         display_delay_ms: float = 0.0,
+        look: Look | None = None,
     ) -> None:
         self.script = Script()
         self.trackers: dict[str, FakeTracker] = {}
@@ -244,6 +246,7 @@ class Bench:
             executor=executor or InlineExecutor(),
             board_watch=board_watch,
             locate_corners=locate_corners,
+            eye=EyePreview(look, InlineExecutor()),
             make_tracker=self._make_tracker,
             hooks=replace(
                 given,

@@ -496,13 +496,36 @@ def test_layers_that_are_off_for_the_other_eye_are_not_lit_and_named() -> None:
     assert error.off_layers == ("bone",)
     check(bench)
     assert bench.snapshot.is_navigable
-    assert "off for the other eye, not shown: bone (bring the picture" in status(bench)
+    assert "not shown, off for the other eye: bone (bring the picture" in status(bench)
     lit = bench.display.visible_image()[: round(0.93 * HEIGHT)]
     assert is_colour(lit, DRILL).sum() > 5
     assert not is_colour(lit, GUIDE).any()
     bench.do(ToggleLayer("drills"))
     bench.frames()
     assert bench.snapshot.reasons[0] is Reason.OTHER_EYE
+
+
+def test_layers_that_may_be_too_far_off_are_not_lit_and_named() -> None:
+    """An axis that stands 30 mm out of the bone, and a pose that may be turned."""
+    drill = DrillAxis("femur", np.zeros(3), np.array([1.0, 0.0, 0.0]), 10.0, 4.0)
+    plan = replace(a_plan(), content=SurgicalContent(drills={"guide": drill}))
+    bench = a_bench(plan=plan, layers=("bone", "drills"))
+    navigating(bench)
+    check(bench)
+    told = measured_bone()
+    assert told.estimate is not None
+    # About the bone's middle: its rim, 40 mm away, moves further than the axis.
+    covariance = np.diag([1e-4] * 3 + [6e-4] * 3)
+    bench.script.tracked = replace(told, estimate=replace(told.estimate, covariance=covariance))
+    bench.frames()
+    error = bench.snapshot.mirror_error
+    assert error is not None
+    assert error.inexact_layers == ("bone",)
+    assert error.bound_mm <= bench.snapshot.stage.tolerance_mm
+    assert bench.snapshot.is_navigable
+    assert "not shown, perhaps too far off: bone" in status(bench)
+    assert not is_colour(bench.display.visible_image(), GUIDE)[: round(0.93 * HEIGHT)].any()
+    assert guides(bench).any()
 
 
 def test_a_calibration_that_does_not_know_its_error_lights_no_guide() -> None:

@@ -45,16 +45,19 @@ def reachable(root: object, not_through: set[int]) -> list[object]:
     return found
 
 
-@pytest.fixture
-def built():
+@pytest.fixture(params=[False, True], ids=["video", "mirror"])
+def built(request: pytest.FixtureRequest):
     from navapp.cli.diagnostics import Diagnostics
     from navapp.cli.live_session import make_controller, prepare_session
     from navapp.cli.main import _parser
+    from navapp.cli.practice_mirror import add_practice_mirror
     from navapp.config import parse
 
     configuration = parse({"camera": {"simulated": {"scale": 0.2}}}, "test")
-    options = _parser().parse_args(["run", "--headless"])
+    options = _parser().parse_args(["run", "--headless"] + ["--mirror"] * request.param)
     with ExitStack() as undo:
+        if request.param:
+            configuration = add_practice_mirror(configuration, undo)
         session = prepare_session(configuration, options, Diagnostics(is_quiet=True))
         undo.callback(session.opened.devices.close)
         controller = make_controller(session, is_inline=True, on_frame=[], undo=undo)
@@ -71,6 +74,8 @@ def test_a_controller_leads_to_no_oracle_and_to_the_world_only_through_its_camer
     camera = session.opened.devices.camera
     simulation = session.opened.simulation
     allowed = {id(camera), id(simulation.set_stage), id(session.opened.reopen_camera)}
+    # What the eye sees is pictures for the screen; nothing else asks for it.
+    allowed.add(id(session.opened.look))
     found = reachable(controller, allowed)
     assert len(found) > 100
     assert not [item for item in found if isinstance(item, TruthOracle | World)]

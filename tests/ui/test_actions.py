@@ -1,4 +1,5 @@
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
@@ -46,3 +47,10 @@ def test_a_candidate_that_is_lost_can_only_be_rejected() -> None:
     snapshot = snapshots.review(verdict=Verdict(Status.LOST))
     assert not is_possible(ACTION_OF_NAME["accept"], snapshot, is_silent=False)
     assert is_possible(ACTION_OF_NAME["reject"], snapshot, is_silent=False)
+
+
+def test_an_eye_is_asked_for_in_a_simulated_room_only() -> None:
+    """Without a mirror there the session says how to get one."""
+    assert is_possible(ACTION_OF_NAME["eye"], snapshots.navigating(), is_silent=False)
+    real = replace(snapshots.navigating(), is_simulated=False)
+    assert not is_possible(ACTION_OF_NAME["eye"], real, is_silent=False)

@@ -28,6 +28,7 @@ from navapp.control.states import (
     Show,
     Snapshot,
     ToggleDepth,
+    ToggleEye,
 )
 from navapp.ui.app import NavigationApp
 from navapp.ui.layers_page import LayersPage
@@ -96,6 +97,7 @@ def press(*keys: str) -> Script:
         (snapshots.navigating(), "left_square_bracket", EnterStage(1)),
         (snapshots.suspended(), "o", Reconnect()),
         (snapshots.navigating(), "z", ToggleDepth()),
+        (snapshots.navigating(), "y", ToggleEye()),
         (snapshots.review(), "q", Quit()),
         (mirror(), "m", CheckMirror()),
         (mirror(CHECKING), "left", NudgeCross(-1, 0)),

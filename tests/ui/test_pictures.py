@@ -1,5 +1,6 @@
 """Pictures of the screen; look at a difference before accepting it with --snapshot-update."""
 
+import asyncio
 import dataclasses
 from collections.abc import Callable
 from typing import Any
@@ -48,6 +49,21 @@ def test_the_key_to_the_colours_of_the_depth(snap_compare: Callable[..., bool]) 
         assert title.plain == "left view · matched border interior mismatch unknown"
 
     assert snap_compare(app, run_before=look)
+
+
+def test_the_picture_of_the_eye_says_so_and_the_frame_how_to_see_it() -> None:
+    shown = dataclasses.replace(snapshots.navigating(), has_eye=True, shows_eye=True)
+
+    async def run() -> None:
+        app = NavigationApp(snapshots.ScriptedSession(shown), polls_per_s=0)
+        async with app.run_test() as pilot:
+            await pilot.pause()
+            picture = pilot.app.screen.query_one(PictureView)
+            assert str(picture.border_title) == "SIMULATED EYE in the mirror"
+            assert str(picture.border_subtitle).startswith("y: video, or what the eye sees")
+            assert "not for clinical use" in str(picture.border_subtitle)
+
+    asyncio.run(run())
 
 
 def test_plain_terminal(snap_compare: Callable[..., bool]) -> None:
