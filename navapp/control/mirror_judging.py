@@ -31,7 +31,7 @@ class MirrorJudge:
 
     def __init__(self, display: CalibratedDisplay, view: MirrorView, plan: Plan) -> None:
         self._display, self._view, self._plan = display, view, plan
-        self._judged: tuple[str, tuple[str, ...], int, float] | None = None
+        self._judged: tuple[str, tuple[str, ...], int, FloatArray] | None = None
         self._error: MirrorError | None = None
 
     def judge(
@@ -42,14 +42,14 @@ class MirrorJudge:
         if estimate is None or stage.bone not in self._plan.bones:
             self._judged = self._error = None
             return None
-        spread = float(np.trace(estimate.covariance))
+        variances = np.diag(estimate.covariance)
         last = self._judged
         is_valid = last is not None and last[:2] == (stage.name, layers)
         if last is None or not is_valid or not 0 <= now_ns - last[2] < _VALID_NS:
             is_valid = False
         # The pose's covariance may grow from one frame to the next.
-        if last is None or not is_valid or not spread <= _MOST_GROWN * last[3]:
-            self._judged = stage.name, layers, now_ns, spread
+        if last is None or not is_valid or not (variances <= _MOST_GROWN * last[3]).all():
+            self._judged = stage.name, layers, now_ns, variances
             self._error = self._predict(stage, layers, estimate)
         return self._error
 
