@@ -8,7 +8,14 @@ from drivers.clock import Clock, SystemClock
 from drivers.escvp21_projector import BAUD_RATE as ESCVP21_BAUD_RATE
 from drivers.escvp21_projector import EscVp21Projector
 from drivers.fixed_mirror import FixedMirror
-from drivers.interfaces import DeviceSet, Display, MirrorMount, ProjectorControl, StereoCamera
+from drivers.interfaces import (
+    DeviceSet,
+    Display,
+    MirrorMount,
+    ProjectorControl,
+    ProjectorStatus,
+    StereoCamera,
+)
 from drivers.no_projector import NoProjector
 from drivers.pjlink_line import TcpConnection
 from drivers.pjlink_projector import PjlinkProjector
@@ -62,6 +69,37 @@ def make_window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay
         return None
     flips = (settings.flip_horizontally, settings.flip_vertically)
     return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
+
+
+def read_projector(settings: ProjectorSection) -> ProjectorStatus | None:
+    """What the configured projector says of itself; None without one.
+
+    Raises:
+        DeviceError: it does not answer.
+    """
+    if settings.backend == "none":
+        return None
+    projector = _projector(settings)
+    with ExitStack() as undo:
+        undo.callback(projector.close)
+        projector.open()
+        return projector.status()
+
+
+def read_display_name(settings: DisplaySection) -> str:
+    """By which the opened display will be known; a window without `output` is opened for it.
+
+    Raises:
+        DeviceError: it cannot be opened.
+    """
+    clock = SystemClock()
+    display: Display = make_window_display(settings, clock) or SimulatedDisplay(clock)
+    if settings.output or display.info.is_simulated:
+        return display.info.name
+    with ExitStack() as undo:
+        undo.callback(display.close)
+        display.open()
+        return display.info.name
 
 
 def _projector(settings: ProjectorSection) -> ProjectorControl:
