@@ -16,7 +16,7 @@ WANDER_SD_MM = 3.0 / 2.7955
 _WIDTH_PX, _HEIGHT_PX = 160, 107
 # Half of the width that it looks at, mm, and how far a cross may be away for that, px of the panel.
 _ZOOMS = ((7.0, 18.0), (30.0, 80.0), (110.0, 320.0), (300.0, np.inf))
-_SITE_LX, _WHITE_CD_M2 = 250.0, 110.0
+_SITE_LX, _WHITE_CD_M2 = 400.0, 110.0
 _LIT = 40
 
 
@@ -37,7 +37,8 @@ class MirrorEye:
         """(2,) px of the monitor's picture where it puts a cross on a point (3,)."""
         eye_mm, off_px = self._draw(look)
         directions = self.setup.directions_to_site(point_mm[None], eye_mm)
-        return self.setup.pixels_in_directions(directions, eye_mm)[0] + off_px
+        aimed: FloatArray = self.setup.pixels_in_directions(directions, eye_mm)[0] + off_px
+        return aimed
 
     def see(
         self,

@@ -123,7 +123,8 @@ class MirrorSetup:
     @property
     def reads_upside_down(self) -> bool:
         """An upright observer sees the rows of the panel's picture rise upwards."""
-        middle = 0.5 * np.array([self.panel.width_px, self.panel.height_px])
-        first, second = self.directions_to_pixels(middle + [[0.0, 0.0], [0.0, 40.0]], self.eye_mm)
+        u, v = 0.5 * self.panel.width_px, 0.5 * self.panel.height_px
+        along = np.array([[u, v], [u, v + 40.0]])
+        first, second = self.directions_to_pixels(along, self.eye_mm)
         below = np.cross(self.site_mm - self.eye_mm, self.right)
         return bool((second - first) @ below < 0.0)

@@ -39,9 +39,10 @@ screen names, with the arrow keys, and confirms it with ENTER; 12 alignments at 
 60 mm are needed. They are kept beside the display's file, for --alignments. Without a screen a
 simulated eye aligns them.
 
-The folder of --views holds, for every view, eye_site_0000.png and eye_screen_0000.png of the camera at the
-eye's place (the board at the site with the display dark; the pattern on the display), and
-left_0000.png and right_0000.png of the stereo cameras (docs/calibration.md, The mirror).
+The folder of --views holds, for every view, eye_site_0000.png and eye_screen_0000.png of the
+camera at the eye's place (the board at the site with the display dark; the pattern on the
+display), and left_0000.png and right_0000.png of the stereo cameras (docs/calibration.md, The
+mirror).
 """
 
 
@@ -72,7 +73,9 @@ def add_parser(subparsers: Any) -> None:
     )  # fmt: skip
     parser.add_argument("--pattern", metavar="FILE.png", help="write what the display must show")
     parser.add_argument("--board", metavar="BOARD.json", help="what is at the site")
-    parser.add_argument("--rig", metavar="R", help="stereo rig that took left and right ([camera] rig)")
+    parser.add_argument(
+        "--rig", metavar="R", help="stereo rig that took left and right ([camera] rig)"
+    )
     parser.add_argument("--size", metavar="WxH", help="of the display ([display] size_px)")
     parser.add_argument("--diagonal-inch", type=float, metavar="D", help="of the display")
     parser.add_argument("--glass-mm", type=float, metavar="T", help="of the plate (3)")

@@ -15,14 +15,15 @@ class Ending(Protocol):
 
 SnapshotT = TypeVar("SnapshotT", bound=Ending)
 CommandT = TypeVar("CommandT")
+CommandT_contra = TypeVar("CommandT_contra", contravariant=True)
 
 
-class Stepped(Protocol[SnapshotT, CommandT]):
+class Stepped(Protocol[SnapshotT, CommandT_contra]):
     """What is stepped: a capture, or the alignment of crosses."""
 
     snapshot: SnapshotT
 
-    def submit(self, command: CommandT) -> None:
+    def submit(self, command: CommandT_contra) -> None:
         """Hand a command over; called from any thread."""
         ...
 

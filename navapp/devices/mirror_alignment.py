@@ -116,8 +116,9 @@ def open_mirror_alignment(
     if is_simulated:
         return _open_simulated(configuration, board, is_headless=is_headless)
     clock = SystemClock()
-    rig, window = read_configured_rig(configuration), make_window_display(
-        configuration.display, clock
+    rig, window = (
+        read_configured_rig(configuration),
+        make_window_display(configuration.display, clock),
     )
     assert window is not None  # noqa: S101 (for the type checker: the backend says so)
     camera = make_real_camera(configuration, clock, rig.rig_id)

@@ -19,7 +19,7 @@ _LEAST_SD_MM = 0.05
 # At rest: so many looks in a row whose corners stay within so much of each other.
 _N_STILL, _STILL_MM = 2, 0.4
 _N_REMEMBERED = 5
-_MOST_PAUSE_NS = 1_000_000_000
+_MOST_PAUSE_NS = 3_000_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,12 +121,13 @@ class BoardLooks:
         the marks err while the board rests is the same in all of them.
         """
         newest = self.newest
-        if newest is None or newest.point_of(corner) is None:
+        last = None if newest is None else newest.point_of(corner)
+        if newest is None or last is None:
             return None
-        points = [
+        before = [
             point
-            for place in self._resting
+            for place in list(self._resting)[:-1]
             if place.time_ns >= since_ns and (point := place.point_of(corner)) is not None
         ]
         sd_mm = float(newest.sds_mm[newest.ids == corner][0])
-        return np.mean(points or [newest.point_of(corner)], axis=0), sd_mm
+        return np.mean([*before, last], axis=0), sd_mm

@@ -12,9 +12,7 @@ _MARGIN = 0.15
 _MARK_BGR, _FIRST_BGR, _CORNER_BGR = (90, 235, 90), (60, 60, 255), (40, 220, 255)
 
 
-def preview_board(
-    picture: Image, seen: SeenBoard | None, corner: int | None
-) -> NDArray[np.uint8]:
+def preview_board(picture: Image, seen: SeenBoard | None, corner: int | None) -> NDArray[np.uint8]:
     """(128, 192, 3) BGR of the board in a picture, or of the whole picture without one.
 
     Args:
@@ -51,7 +49,11 @@ def _window(width: int, height: int, seen: SeenBoard | None) -> tuple[float, flo
         low, high = low - _MARGIN * (high - low), high + _MARGIN * (high - low)
     scale = float(min(np.array([_WIDTH_PX, _HEIGHT_PX]) / np.maximum(high - low, 1.0)))
     middle = 0.5 * (low + high)
-    return float(middle[0] - 0.5 * _WIDTH_PX / scale), float(middle[1] - 0.5 * _HEIGHT_PX / scale), scale
+    return (
+        float(middle[0] - 0.5 * _WIDTH_PX / scale),
+        float(middle[1] - 0.5 * _HEIGHT_PX / scale),
+        scale,
+    )
 
 
 def preview_seen(

@@ -21,8 +21,6 @@ def draw_cross(width_px: int, height_px: int, pixel: tuple[int, int]) -> NDArray
     return picture
 
 
-def _light(
-    picture: NDArray[np.uint8], columns: tuple[int, int], rows: tuple[int, int]
-) -> None:
+def _light(picture: NDArray[np.uint8], columns: tuple[int, int], rows: tuple[int, int]) -> None:
     top, left = max(rows[0], 0), max(columns[0], 0)
     picture[top : max(rows[1] + 1, 0), left : max(columns[1] + 1, 0)] = _BGR

@@ -1,6 +1,7 @@
 """Where a cross is lit first: about where the corner will be seen, as far as that is known."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignment_start import AlignedDisplay, make_first_model
@@ -35,12 +36,11 @@ def guess_pixel(
     return int(inside[0]), int(inside[1])
 
 
-def is_on_display(display: AlignedDisplay, pixels: FloatArray) -> np.ndarray:
+def is_on_display(display: AlignedDisplay, pixels: FloatArray) -> NDArray[np.bool_]:
     """(N,) bool of pixels (N, 2): a whole cross can be lit there."""
     last = np.array([display.width_px, display.height_px]) - 1 - RIM_PX
     # What is not a number compares as outside.
-    inside: np.ndarray = ((pixels >= RIM_PX) & (pixels <= last)).all(axis=1)
-    return inside
+    return np.asarray(((pixels >= RIM_PX) & (pixels <= last)).all(axis=1))
 
 
 def make_rough_model(display: AlignedDisplay, made: Alignments) -> DisplayModel | None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.mirror.alignment_start import AlignedDisplay
 from calibration.mirror.alignments import (
@@ -176,15 +177,15 @@ class Guide:
         heights, now = self._heights(known, place)
         more = max(LEAST_RANGE_MM + _SPARE_MM - range_mm, SAME_HEIGHT_MM)
         ends = [float(heights.max()) + more, float(heights.min()) - more]
-        ends = sorted((one for one in ends if not self._is_skipped(one)), key=lambda e: abs(e - now))
+        ends = sorted(
+            (one for one in ends if not self._is_skipped(one)), key=lambda e: abs(e - now)
+        )
         return self._goal_at(known, place, ends[0], now) if ends else None
 
     def _is_skipped(self, height: float) -> bool:
         return any(abs(height - one) < SAME_HEIGHT_MM for one in self._skipped_heights)
 
-    def _goal_at(
-        self, known: Known, place: BoardPlace, height: float, now: float
-    ) -> Goal | None:
+    def _goal_at(self, known: Known, place: BoardPlace, height: float, now: float) -> Goal | None:
         middle = self.middle_of(place) + (height - now) * known.axes[2]
         goal = Goal(
             middle, known.axes, is_of_height=True, height_mm=height, away_from=known.away_from
@@ -222,7 +223,7 @@ class Guide:
         points = points[self._can_be_had(known, points)]
         return float(compute_gains(found, points).max()) if len(points) else 0.0
 
-    def _can_be_had(self, known: Known, points_mm: FloatArray) -> np.ndarray:
+    def _can_be_had(self, known: Known, points_mm: FloatArray) -> NDArray[np.bool_]:
         """(N,) bool: on the display and in both pictures."""
         rig = self._rig
         has = np.ones(len(points_mm), dtype=bool)
@@ -253,7 +254,9 @@ class Guide:
             dtype=np.intp,
         )
         offered = offered[self._can_be_had(known, place.points_mm[offered])]
-        new = np.array([k for k in offered if int(place.ids[k]) not in self._done_here(known, place)])
+        new = np.array(
+            [k for k in offered if int(place.ids[k]) not in self._done_here(known, place)]
+        )
         offered = new.astype(np.intp) if len(new) else offered
         if len(offered) == 0:
             return None
