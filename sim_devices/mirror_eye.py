@@ -16,6 +16,7 @@ WANDER_SD_MM = 3.0 / 2.7955
 _WIDTH_PX, _HEIGHT_PX = 160, 107
 # Half of the width that it looks at, mm, and how far a cross may be away for that, px of the panel.
 _ZOOMS = ((7.0, 18.0), (30.0, 80.0), (110.0, 320.0), (300.0, np.inf))
+_FROM_AFAR_MM = 130.0
 _SITE_LX, _WHITE_CD_M2 = 400.0, 110.0
 _LIT = 40
 
@@ -64,10 +65,9 @@ class MirrorEye:
         if lit_px is not None:
             site[:, :, 1:2] += view.render(np.ascontiguousarray(shown_bgr[:, :, 1]))
         picture = expose(site, _WHITE_CD_M2, noise=0.0)
-        if half_mm > _ZOOMS[0][0]:
+        if lit_px is not None and half_mm > _ZOOMS[0][0]:
             _draw_ring(picture, view.site_px(point_mm[None])[0], (0, 220, 255))
-            if lit_px is not None:
-                _draw_ring(picture, view.screen_px(lit_px[None])[0], (80, 255, 80))
+            _draw_ring(picture, view.screen_px(lit_px[None])[0], (80, 255, 80))
         return picture
 
     def _draw(self, look: int) -> tuple[FloatArray, FloatArray]:
@@ -80,7 +80,7 @@ class MirrorEye:
         self, lit_px: FloatArray | None, point_mm: FloatArray, eye_mm: FloatArray
     ) -> float:
         if lit_px is None:
-            return _ZOOMS[1][0]
+            return _FROM_AFAR_MM
         directions = self.setup.directions_to_site(point_mm[None], eye_mm)
         aim_px = self.setup.pixels_in_directions(directions, eye_mm)[0]
         far_px = float(np.linalg.norm(lit_px - aim_px))

@@ -56,11 +56,12 @@ class PracticeEye:
         self.mirror_deg = 45.0
         self.reads_upside_down = eye.setup.reads_upside_down
 
-    def look(self, corner: int, number: int) -> NDArray[np.uint8]:
-        """(h, w, 3) BGR around a corner of the board, at the look of that number."""
+    def look(self, corner: int | None, number: int) -> NDArray[np.uint8]:
+        """(h, w, 3) BGR around a corner of the board, or its middle, at the look of that number."""
         pose = self._hand.left_from_body(self._world_ns())
         shown = self._display.visible_image()
-        return self._eye.see(shown, self._sheet, pose, pose.apply(self._points_mm[corner]), number)
+        point = self._points_mm.mean(axis=0) if corner is None else self._points_mm[corner]
+        return self._eye.see(shown, self._sheet, pose, pose.apply(point), number)
 
     def aim_px(self, corner: int, number: int) -> FloatArray:
         """(2,) px of the display's picture where the eye puts a cross on a corner."""

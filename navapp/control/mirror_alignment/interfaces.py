@@ -12,8 +12,9 @@ from calibration.mirror.alignment_start import AlignedDisplay
 from calibration.mirror.alignments import AlignedCalibration
 
 Solve = Callable[[AlignedDisplay, Alignments], AlignedCalibration]
-# (h, w, 3) BGR that a simulated eye sees around a corner (its id) at its look of that number.
-EyeLook = Callable[[int, int], NDArray[np.uint8]]
+# (h, w, 3) BGR that a simulated eye sees around a corner (its id; None: around the board's middle)
+# at its look of that number.
+EyeLook = Callable[[int | None, int], NDArray[np.uint8]]
 
 
 class MovingHand(Protocol):

@@ -92,12 +92,12 @@ def name_corner(board: Board, corner: int) -> str:
 
 def _pictures(
     parts: Parts, corner: int | None
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8] | None] | None:
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]] | None:
     frame = None if parts.frame is None else (parts.frame.left, parts.frame.right)
     both = preview_seen(parts.view, frame, corner)
     if both is None or parts.eye is None:
         return both
-    return both[0], None if corner is None else parts.eye(corner, len(parts.kept))
+    return both[0], parts.eye(corner, len(parts.kept))
 
 
 def _count_depths(parts: Parts) -> tuple[int, float]:
@@ -130,6 +130,12 @@ def _instruct(parts: Parts) -> str:
         found = parts.solution.found
         if parts.aimed.is_confirmed:
             return f"hold still: {name} is measured"
+        if len(parts.kept) == 0:
+            eye = parts.solution.display.viewing_eye
+            return (
+                f"move the cross onto {name} as the {eye} eye alone sees it, with your head at "
+                "rest, then ENTER"
+            )
         if found is None:
             return f"move the cross onto {name}, then ENTER"
         quality = found.model.quality

@@ -104,7 +104,7 @@ class AlignmentSnapshot:
     is_following: bool  # that hand goes where the board is wanted
     # (h, w, 3) BGR, small: the left camera's with the corner marked; beside it the right
     # camera's, or what a simulated eye sees. None before the first frame.
-    pictures: tuple[NDArray[np.uint8], NDArray[np.uint8] | None] | None
+    pictures: tuple[NDArray[np.uint8], NDArray[np.uint8]] | None
     has_eye: bool  # the second picture is what a simulated eye sees
     n_seen: tuple[int, int, int]  # marks in the left and right picture, of how many
     corner: int | None  # id of the one to be aligned; None while there is none
