@@ -22,7 +22,7 @@ _MM_PER_INCH = 25.4
 _USUAL_GLASS_MM = 3.0
 # Without a screen: so many frames without a new alignment are too many.
 _MOST_FRAMES_A_CROSS = 60
-_FRAMES_A_TRY = 6
+_FRAMES_A_TRY = 10
 
 
 def alignments_path(options: argparse.Namespace) -> Path:

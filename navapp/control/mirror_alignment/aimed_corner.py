@@ -6,6 +6,8 @@ from navapp.control.mirror_alignment.board_place import BoardLooks, BoardPlace
 MOST_MOVED_MM = 0.4
 # A board that moved by more lies elsewhere.
 _ELSEWHERE_MM = 5.0
+# A corner that is hidden, or missed in a picture, is waited for so long.
+_PATIENCE_NS = 1_500_000_000
 
 
 class AimedCorner:
@@ -49,30 +51,33 @@ class AimedCorner:
         """How far the corner is from where it was when the cross was moved last."""
         return None if place is None or self._anchor is None else place.moved_mm(self._anchor)
 
-    def judge(self, looks: BoardLooks) -> str | None:
+    def judge(self, looks: BoardLooks, now_ns: int) -> str | None:
         """What speaks against keeping what was confirmed: empty for nothing.
 
-        None while no picture was taken since.
+        Args:
+            looks: for the board.
+            now_ns: when the newest picture was taken.
+
+        Returns:
+            None while nothing was confirmed, or that is not decided yet.
         """
-        place = looks.newest
-        if self._confirmed_ns is None:
+        if self._confirmed_ns is None or now_ns < self._confirmed_ns:
             return None
+        place, against = looks.newest, ""
         if place is None:
-            return self._refuse("the board is not seen by both cameras")
-        if place.time_ns < self._confirmed_ns:
+            against = "the board is not seen by both cameras"
+        elif place.point_of(self.corner) is None:
+            against = "the corner is not seen by both cameras"
+        elif (moved_mm := self.moved_mm(place)) is not None and moved_mm > MOST_MOVED_MM:
+            self._anchor, self._confirmed_ns = place, None
+            return f"the board has moved by {moved_mm:.1f} mm, look again"
+        elif not looks.is_still:
+            against = "the board does not rest"
+        if against and now_ns - self._confirmed_ns < _PATIENCE_NS:
             return None
-        if place.point_of(self.corner) is None:
-            return self._refuse("the corner is not seen by both cameras")
-        moved_mm = self.moved_mm(place)
-        if moved_mm is not None and moved_mm > MOST_MOVED_MM:
-            self._anchor = place
-            return self._refuse(f"the board has moved by {moved_mm:.1f} mm, look again")
-        return "" if looks.is_still else self._refuse("the board does not rest")
+        self._confirmed_ns = None
+        return against
 
     def since_ns(self) -> int:
         """From when on looks show the corner where the cross was put."""
         return 0 if self._anchor is None else self._anchor.time_ns
-
-    def _refuse(self, why: str) -> str:
-        self._confirmed_ns = None
-        return why

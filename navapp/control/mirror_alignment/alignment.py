@@ -241,15 +241,15 @@ class MirrorAlignment:
         if self._aimed is None:
             return
         self._aimed.follow(place)
-        self._keep_if_due(self._aimed)
+        self._keep_if_due(self._aimed, view.frame.captured_ns)
         if place is not None and self._aimed is not None and self._aimed.is_elsewhere(place):
             self._add_event("the board was moved: another corner is chosen")
             self._guide.forget_corners()
             self._give_up_aim()
 
-    def _keep_if_due(self, aimed: AimedCorner) -> None:
+    def _keep_if_due(self, aimed: AimedCorner, now_ns: int) -> None:
         """What was confirmed, with its place in that moment."""
-        against = aimed.judge(self._looks)
+        against = aimed.judge(self._looks, now_ns)
         if against is None:
             return
         place, pixel = self._looks.newest, self._cross.pixel
@@ -285,7 +285,7 @@ class MirrorAlignment:
 
     def _choose(self) -> None:
         """Where the board is wanted next, or the corner that a cross is lit for."""
-        place = self._looks.newest
+        place = self._looks.steady
         if self._is_over or self._aimed is not None or self._solution.is_under_way:
             return
         if place is None or not self._looks.is_still:

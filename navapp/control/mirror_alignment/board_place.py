@@ -1,7 +1,7 @@
 """Where the corners of the board are, from both cameras, and whether it rests there."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,6 +91,22 @@ class BoardLooks:
     def newest(self) -> BoardPlace | None:
         """None when it is not seen now."""
         return self._resting[-1] if self._resting else None
+
+    @property
+    def steady(self) -> BoardPlace | None:
+        """The newest place, with those corners alone that were seen in every look at rest."""
+        newest = self.newest
+        if newest is None:
+            return None
+        kept = np.ones(len(newest.ids), dtype=bool)
+        for place in self._resting:
+            kept &= np.isin(newest.ids, place.ids)
+        return replace(
+            newest,
+            ids=newest.ids[kept],
+            points_mm=newest.points_mm[kept],
+            sds_mm=newest.sds_mm[kept],
+        )
 
     @property
     def is_still(self) -> bool:

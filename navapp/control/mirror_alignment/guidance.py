@@ -28,7 +28,7 @@ from navapp.geometry.transform import FloatArray
 # and alignments at each. The first three that can be had are taken.
 _HEIGHTS_MM, _AT_EACH = (0.0, 40.0, -40.0, 80.0, -80.0), 4
 _N_HEIGHTS = -(-FEWEST_ALIGNMENTS // _AT_EACH)
-SAME_HEIGHT_MM, _NEAR_MM = 12.0, 8.0
+SAME_HEIGHT_MM, _NEAR_MM = 14.0, 12.0
 # Beyond what is asked for, so that it is surely reached.
 _SPARE_MM = 6.0
 _ASIDE_MM, _NEAR_ASIDE_MM = 60.0, 20.0

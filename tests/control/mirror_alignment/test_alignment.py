@@ -117,12 +117,23 @@ def test_a_board_that_is_hidden_is_refused(room):
     asked = until_aimed(session)
     room.hidden_corners = {asked.corner}
     session.submit(Confirm())
-    assert steps(session).n_kept == 0
+    assert "hold still" in steps(session).instruction
+    assert steps(session, 9).n_kept == 0
     assert "the corner is not seen by both cameras" in told(session)
     room.is_hidden = True
     session.submit(Confirm())
-    assert steps(session).n_kept == 0
+    assert steps(session, 9).n_kept == 0
     assert "the board is not seen by both cameras" in told(session)
+
+
+def test_a_corner_that_one_picture_missed_is_waited_for(room):
+    session = alignment_in(room)
+    asked = until_aimed(session)
+    room.hidden_corners = {asked.corner}
+    session.submit(Confirm())
+    steps(session, 2)
+    room.hidden_corners = set()
+    assert steps(session).n_kept == 1
 
 
 def test_a_board_that_is_carried_away_gets_another_corner(room):
