@@ -201,14 +201,15 @@ class Guide:
         if np.count_nonzero(near) < _FEWEST_AT_PLACE:
             return None
         heights, now = self._heights(known, place)
-        here = self._best_gain(known, found, place, np.zeros(3))
+        here = self._best_gain(known, found, place.points_mm)
         best: tuple[float, Goal] | None = None
         aside = (-_ASIDE_MM, 0.0, _ASIDE_MM)
         for right, down, height in product(aside, aside, (heights.min(), now, heights.max())):
             way = np.array([right, down, height - now]) @ known.axes
             if np.linalg.norm(way) < SAME_HEIGHT_MM or self._is_skipped(float(height)):
                 continue
-            gain = self._best_gain(known, found, place, way)
+            moved = place.left_from_board.apply(self._board.points_mm) + way
+            gain = self._best_gain(known, found, moved)
             if gain > _WORTH_MOVING * here and (best is None or gain > best[0]):
                 third = self._third_of(known, middle + way)
                 goal = Goal(middle + way, known.axes, False, float(height), "eye", third)
@@ -216,11 +217,10 @@ class Guide:
         return None if best is None else best[1]
 
     def _best_gain(
-        self, known: Known, found: AlignedCalibration, place: BoardPlace, way_mm: FloatArray
+        self, known: Known, found: AlignedCalibration, corners_mm: FloatArray
     ) -> float:
-        """Of a corner of the board, moved by (3,) mm; 0 where none can be seen."""
-        points = place.left_from_board.apply(self._board.points_mm) + way_mm
-        points = points[self._can_be_had(known, points)]
+        """Of a corner among (N, 3); 0 where none can be had."""
+        points = corners_mm[self._can_be_had(known, corners_mm)]
         return float(compute_gains(found, points).max()) if len(points) else 0.0
 
     def _can_be_had(self, known: Known, points_mm: FloatArray) -> NDArray[np.bool_]:

@@ -13,7 +13,7 @@ from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines, break_line
 from navapp.ui.view import Level
 
-_GAUGE_WIDTH = 26
+_GAUGE_WIDTH = 22
 _WORDS = {
     AlignmentPhase.SEEKING: "WAITING",
     AlignmentPhase.MOVING: "MOVE BOARD",
@@ -49,8 +49,10 @@ class AlignmentTitle(Lines[AlignmentView]):
         """One line."""
         snapshot = view.snapshot
         word, level = view.state
+        n_strays = 0 if snapshot.verdict is None else len(snapshot.verdict.strays)
         right = Content.assemble(
-            (f"{snapshot.n_kept} of {snapshot.fewest} crosses", "bold $foreground"), "  ",
+            (f"{snapshot.n_kept} of {snapshot.fewest} crosses", "bold $foreground"),
+            (f", {n_strays} left out" if n_strays else "", Level.ATTENTION.value), "  ",
             (f"{level.mark(view.symbols)} {word}", level.value), " ",
         )  # fmt: skip
         left = Content.assemble(
@@ -97,7 +99,7 @@ class CrossLine(Lines[AlignmentView]):
         ]  # fmt: skip
         if moved is not None and moved < 100.0:
             level = Level.OK if moved <= MOST_MOVED_MM else Level.BAD
-            parts.append((f", moved {moved:.1f} mm since the cross", level.value))
+            parts.append((f", moved {moved:.1f} mm", level.value))
         return [Content.assemble(*parts).truncate(width)]
 
 
@@ -114,8 +116,6 @@ class ErrorLine(Lines[AlignmentView]):
         parts: list[str | Content | tuple[str, str]] = [
             (" error   ", "$text-muted"), (bar, level.value), f"{told}{snapshot.limit_mm:.2f}",
         ]  # fmt: skip
-        if verdict is not None and verdict.strays:
-            parts.append((f"; {len(verdict.strays)} left out", Level.ATTENTION.value))
         return [Content.assemble(*parts).truncate(width)]
 
 
