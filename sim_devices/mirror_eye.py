@@ -57,8 +57,10 @@ class MirrorEye:
         eye_mm, _ = self._draw(look)
         lit_px = _middle_of_light(shown_bgr)
         half_mm = self._zoom_mm(lit_px, point_mm, eye_mm)
-        around = replace(self.setup, eye_mm=eye_mm, site_mm=point_mm)
         distance_mm = float(np.linalg.norm(point_mm - eye_mm))
+        # The middle of the picture is where the point is seen through the plate.
+        ahead = self.setup.directions_to_site(point_mm[None], eye_mm)[0]
+        around = replace(self.setup, eye_mm=eye_mm, site_mm=eye_mm + distance_mm * ahead)
         camera = make_eye_camera(_WIDTH_PX, _HEIGHT_PX, 0.5 * _WIDTH_PX * distance_mm / half_mm)
         view = MirrorView(around, camera, look_at_site(around))
         site = np.repeat(view.render(None, view.see_sheet(sheet, left_from_sheet)), 3, axis=2)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
-from navapp.errors import ResultError, UsageError
+from navapp.errors import DeviceError, ResultError, UsageError
 
 if TYPE_CHECKING:
     from calibration.mirror.alignment_fit import Alignments
@@ -23,6 +23,8 @@ _USUAL_GLASS_MM = 3.0
 # Without a screen: so many frames without a new alignment are too many.
 _MOST_FRAMES_A_CROSS = 60
 _FRAMES_A_TRY = 10
+# As in a session without a screen.
+_LOST_NS = 10_000_000_000
 
 
 def alignments_path(options: argparse.Namespace) -> Path:
@@ -191,15 +193,21 @@ def _headless(
     from calibration.mirror.alignments import MOST_ALIGNMENTS
     from navapp.control.mirror_alignment.states import Leave, Save
 
-    told, waited, n_kept = 0, 0, 0
+    told, waited, n_kept, next_try = 0, 0, 0, 0
     snapshot = session.snapshot
+    well_ns = snapshot.time_ns
     while not snapshot.is_over:
         if snapshot.is_accepted or snapshot.n_kept >= MOST_ALIGNMENTS:
             session.submit(Save() if snapshot.is_accepted else Leave())
-        elif snapshot.corner is not None and waited % _FRAMES_A_TRY == 0:
-            _align(session, opened, snapshot.corner)
+        elif snapshot.corner is not None and waited >= next_try:
+            is_confirmed = _align(session, opened, snapshot.corner)
+            next_try = waited + _FRAMES_A_TRY if is_confirmed else waited
         snapshot = session.step()
-        waited = 0 if snapshot.n_kept != n_kept else waited + 1
+        well_ns = well_ns if snapshot.trouble else snapshot.time_ns
+        if snapshot.time_ns - well_ns > _LOST_NS:
+            raise DeviceError(f"{snapshot.trouble}, but nothing came; {n_kept} alignments are made")
+        is_waiting = snapshot.n_kept == n_kept and not snapshot.trouble
+        waited, next_try = (waited + 1, next_try) if is_waiting else (0, 0)
         n_kept = snapshot.n_kept
         if waited > _MOST_FRAMES_A_CROSS:
             raise ResultError(
@@ -211,16 +219,20 @@ def _headless(
         told = len(snapshot.events)
 
 
-def _align(session: "MirrorAlignment", opened: "OpenedAlignment", corner: int) -> None:
-    """What a person does: see where the cross is and where it goes, move it, confirm."""
+def _align(session: "MirrorAlignment", opened: "OpenedAlignment", corner: int) -> bool:
+    """What a person does: see where the cross is and where it goes, move it, confirm.
+
+    Returns:
+        Whether it was confirmed.
+    """
     from navapp.control.mirror_alignment.states import Confirm, NudgeCross, TurnArrows
 
     snapshot, practice = session.snapshot, opened.practice
     if practice is None or snapshot.cross_px is None:
-        return
+        return False
     if snapshot.flips[1] != practice.reads_upside_down:
         session.submit(TurnArrows(rows=True))
-        return
+        return False
     across, down = (practice.aim_px(corner, snapshot.n_kept) - snapshot.cross_px).round()
     session.submit(
         NudgeCross(
@@ -228,3 +240,4 @@ def _align(session: "MirrorAlignment", opened: "OpenedAlignment", corner: int) -
         )
     )
     session.submit(Confirm())
+    return True
