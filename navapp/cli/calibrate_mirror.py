@@ -115,6 +115,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         model, content = _solve_made(*read_alignments(options.alignments), options, record)
     else:
         made = align_by_keys(options, configuration, diagnostics)
+        if isinstance(made, int):
+            return made
         model, content = _solve_made(*made, options, record)
     if content.get("advice"):
         diagnostics.warn(content["advice"])

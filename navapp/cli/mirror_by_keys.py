@@ -36,8 +36,11 @@ def alignments_path(options: argparse.Namespace) -> Path:
 
 def align_by_keys(
     options: argparse.Namespace, configuration: "Configuration", diagnostics: Diagnostics
-) -> "tuple[AlignedDisplay, Alignments]":
+) -> "tuple[AlignedDisplay, Alignments] | int":
     """Let the operator, or a script without a screen, align crosses; kept in a file.
+
+    Returns:
+        The code of what ended the screen, if that was not the operator.
 
     Raises:
         UsageError: options that do not go together.
@@ -58,13 +61,13 @@ def align_by_keys(
     with ExitStack() as undo:
         opened = open_mirror_alignment(configuration, board, is_headless=options.headless)
         undo.callback(opened.close)
-        session = _make_session(opened, board, options, configuration)
+        session = make_session(opened, board, options, configuration)
         undo.callback(_keep, session, path, keeps_few=options.save_alignments is not None)
         undo.callback(session.close)
         if options.headless:
             _headless(session, opened, diagnostics)
-        else:
-            _on_screen(session)
+        elif (code := _on_screen(session)) != 0:
+            return code
     display, given = session.made
     check_alignments(given)
     diagnostics.say(f"{len(given.pixels)} alignments are kept in {path}")
@@ -97,12 +100,13 @@ def _check_options(options: argparse.Namespace, configuration: "Configuration") 
         )
 
 
-def _make_session(
+def make_session(
     opened: "OpenedAlignment",
     board: "Board",
     options: argparse.Namespace,
     configuration: "Configuration",
 ) -> "MirrorAlignment":
+    """The session on opened devices; of a simulated eye it is handed the picture alone."""
     from navapp.control.executors import InlineExecutor, ThreadExecutor
     from navapp.control.mirror_alignment.alignment import MirrorAlignment
     from navapp.control.mirror_alignment.interfaces import AlignmentSettings
@@ -168,8 +172,8 @@ def _keep(session: "MirrorAlignment", path: Path, *, keeps_few: bool) -> None:
         write_alignments(path, display, given)
 
 
-def _on_screen(session: "MirrorAlignment") -> None:
-    """The operator does it."""
+def _on_screen(session: "MirrorAlignment") -> int:
+    """The operator does it; 0, or the code of what ended the screen."""
     from navapp.cli.run import log_folder
     from navapp.control.guided_runner import GuidedRunner
     from navapp.ui.mirror_alignment.app import run_alignment_app
@@ -182,8 +186,7 @@ def _on_screen(session: "MirrorAlignment") -> None:
         runner.stop()
     if runner.error is not None:
         raise runner.error
-    if code != 0:
-        raise SystemExit(code)
+    return code
 
 
 def _headless(

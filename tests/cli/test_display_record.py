@@ -1,5 +1,6 @@
 """What a display's file says of the display and its projector."""
 
+import numpy as np
 import pytest
 
 from drivers.clock import ManualClock
@@ -76,9 +77,7 @@ def test_a_projector_that_does_not_answer_is_told_and_closed(monkeypatch):
     assert projector.n_closed == 1
 
 
-def test_the_model_gets_the_record(monkeypatch, rng=None):
-    import numpy as np
-
+def test_the_model_gets_the_record(monkeypatch):
     with_projector(monkeypatch, flips_horizontally=True, flips_vertically=False, keystone=(0, 0))
     rng = np.random.default_rng(3)
     operator = SimulatedOperator(draw_setup(rng), rng, 0.5)

@@ -1,4 +1,4 @@
-"""`navapp calibrate mirror --by-keys`: without a screen on the simulated room, and what is refused."""
+"""`navapp calibrate mirror --by-keys`: the simulated room without a screen; what is refused."""
 
 import json
 from pathlib import Path
@@ -6,9 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from navapp.cli.main import run
-from navapp.devices.mirror_alignment import make_practice_eye
+from calibration.targets.boards import read_board
+from navapp.cli.main import _parser, run
+from navapp.cli.mirror_by_keys import make_session
+from navapp.config import parse
+from navapp.devices.mirror_alignment import make_practice_eye, open_mirror_alignment
 from navapp.geometry.display_model_files import read_display_model
+from tests.control.test_truth_stays_out import reachable
 from tests.e2e.test_bad_input import refused
 from tests.geometry.test_display_model_errors import seen_beside_mm
 from tests.many import few_of
@@ -67,9 +71,7 @@ def test_a_simulated_eye_calibrates_its_display(board: str, tmp_path: Path, seed
     assert len(json.loads(made.read_text())["alignments"]) >= 12
 
 
-def test_a_camera_that_is_lost_keeps_what_was_asked_for(
-    board: str, tmp_path: Path, capsys
-) -> None:
+def test_a_camera_that_is_lost_keeps_what_was_asked_for(board: str, tmp_path: Path, capsys) -> None:
     fault = 'faults = [{kind = "unplug", start_s = 2.0, duration_s = inf}]\n'
     config = small_room(tmp_path / "navapp.toml", 0, fault)
     few, out = tmp_path / "few.json", tmp_path / "display.yml"
@@ -83,6 +85,21 @@ def test_a_camera_that_is_lost_keeps_what_was_asked_for(
     few.unlink()
     assert calibrate(out, *options, config=config) == 5
     assert not list(tmp_path.glob("*.alignments.json"))
+
+
+def test_the_session_never_gets_hold_of_the_mirror_or_of_what_an_eye_aims_at(
+    board: str, tmp_path: Path
+) -> None:
+    parsed = ["calibrate", "mirror", "--by-keys", "--headless", "--board", board, "--out", "d.yml"]
+    options, configuration = _parser().parse_args(parsed), parse({}, "x")
+    opened = open_mirror_alignment(configuration, read_board(board), is_headless=True)
+    session = make_session(opened, read_board(board), options, configuration)
+    try:
+        found = {type(one).__name__ for one in reachable(session, set())}
+    finally:
+        session.close()
+    assert "StereoRig" in found
+    assert not found & {"MirrorSetup", "MirrorEye", "PracticeEye"}
 
 
 def test_a_screen_needs_a_terminal(board: str, tmp_path: Path, capsys) -> None:

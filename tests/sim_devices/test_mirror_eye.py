@@ -40,7 +40,7 @@ def test_the_display_is_read_as_its_model_says(seed: int) -> None:
 def test_it_aims_as_well_as_it_can_and_wanders() -> None:
     setup = draw_setup(np.random.default_rng(3))
     true = true_display(setup)
-    eye, point = MirrorEye(setup, 5, 0.7), setup.site_mm + (20.0, -15.0, -60.0)
+    eye, point = MirrorEye(setup, 5, 0.7), setup.site_mm + np.array([20.0, -15.0, -60.0])
     aims = np.array([eye.aim_px(point, look) for look in range(300)])
     drawn = true.project(point[None])[0]
     assert np.abs(aims.mean(axis=0) - drawn).max() < 0.5
@@ -57,7 +57,9 @@ def test_it_aims_as_well_as_it_can_and_wanders() -> None:
 def test_light_that_is_aimed_lies_on_the_point_in_the_eyes_picture() -> None:
     setup = draw_setup(np.random.default_rng(3))
     eye, point = MirrorEye(setup, 5, 0.0), setup.site_mm
-    away = RigidTransform.from_parts("left", "sheet", np.eye(3), setup.site_mm + (5e3, 0, 0))
+    away = RigidTransform.from_parts(
+        "left", "sheet", np.eye(3), setup.site_mm + np.array([5e3, 0, 0])
+    )
     seen = eye.see(lit_at(eye.aim_px(point, 2)), SHEET, away, point, 2).astype(float)
     light = np.clip(seen[:, :, 1] - seen[:, :, 0] - 60.0, 0.0, None)
     v, u = np.mgrid[: seen.shape[0], : seen.shape[1]]
@@ -70,10 +72,10 @@ def test_from_afar_both_are_ringed() -> None:
     eye = MirrorEye(setup, 5, 0.0)
     board = RigidTransform.from_parts("left", "sheet", np.eye(3), setup.site_mm)
     aim = eye.aim_px(setup.site_mm, 0)
-    far = eye.see(lit_at(aim + (60.0, 0.0)), SHEET, board, setup.site_mm, 0)
+    far = eye.see(lit_at(aim + np.array([60.0, 0.0])), SHEET, board, setup.site_mm, 0)
     assert (far == (0, 220, 255)).all(axis=2).sum() > 50
     assert (far == (80, 255, 80)).all(axis=2).sum() > 50
-    near = eye.see(lit_at(aim + (3.0, 0.0)), SHEET, board, setup.site_mm, 0)
+    near = eye.see(lit_at(aim + np.array([3.0, 0.0])), SHEET, board, setup.site_mm, 0)
     assert not (near == (0, 220, 255)).all(axis=2).any()
     dark = eye.see(np.zeros_like(lit_at(aim)), SHEET, board, setup.site_mm, 0)
     assert dark.max() > 40

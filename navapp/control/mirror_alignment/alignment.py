@@ -222,7 +222,9 @@ class MirrorAlignment:
         loses = 0 < len(self._kept) < FEWEST_ALIGNMENTS and not self._settings.keeps_few
         if loses and not self._is_asked_to_leave:
             self._is_asked_to_leave = True
-            self._add_event(f"the alignments will be lost ({len(self._kept)} so far): leave again to end")
+            self._add_event(
+                f"the alignments will be lost ({len(self._kept)} so far): leave again to end"
+            )
             return
         self._is_over = True
 

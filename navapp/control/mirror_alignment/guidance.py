@@ -216,9 +216,7 @@ class Guide:
                 best = gain, goal
         return None if best is None else best[1]
 
-    def _best_gain(
-        self, known: Known, found: AlignedCalibration, corners_mm: FloatArray
-    ) -> float:
+    def _best_gain(self, known: Known, found: AlignedCalibration, corners_mm: FloatArray) -> float:
         """Of a corner among (N, 3); 0 where none can be had."""
         points = corners_mm[self._can_be_had(known, corners_mm)]
         return float(compute_gains(found, points).max()) if len(points) else 0.0

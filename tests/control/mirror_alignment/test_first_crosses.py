@@ -37,7 +37,7 @@ def test_a_rough_model_needs_two_planes():
     room = MirrorRoom()
     display = room.display_told
     assert make_rough_model(display, seen(room, grid(room, 0.0))) is None
-    flat = np.vstack([grid(room, 0.0), grid(room, 0.0) + (9.0, 7.0, 0.0)])
+    flat = np.vstack([grid(room, 0.0), grid(room, 0.0) + np.array([9.0, 7.0, 0.0])])
     assert make_rough_model(display, seen(room, flat)) is None
     made = seen(room, grid(room, 0.0, 40.0))
     model = make_rough_model(display, made)
