@@ -47,8 +47,9 @@ def read_record(configuration: "Configuration") -> DisplayRecord:
 
     Raises:
         ConfigurationError: the display is configured to be flipped.
-        DeviceError: a device does not answer, or the projector bends the picture.
+        DeviceError: a device does not answer; the projector is off, or bends the picture.
     """
+    from drivers.interfaces import PowerState
     from navapp.devices import read_display_name, read_projector
 
     display = configuration.display
@@ -59,6 +60,12 @@ def read_record(configuration: "Configuration") -> DisplayRecord:
             remedy="set both to false and take the pictures again: the model knows its flips",
         )
     status = read_projector(configuration.projector)
+    if status is not None and status.power is not PowerState.ON:
+        raise DeviceError(
+            f"the projector is not on ({status.power.value}): its flips and keystone are not told",
+            subject="projector",
+            remedy="switch it on, set as it is while the display is calibrated",
+        )
     keystone = None if status is None else status.keystone
     if keystone not in (None, _NO_KEYSTONE):
         raise DeviceError(

@@ -12,7 +12,7 @@ from drivers.clock import Clock, SystemClock
 from drivers.interfaces import Display, StereoCamera
 from navapp.config import Configuration
 from navapp.devices.cameras import make_real_camera
-from navapp.devices.peripherals import make_window_display
+from navapp.devices.peripherals import make_window_display, set_mirror
 from navapp.devices.rig_match import make_reopener, open_matching, read_configured_rig
 from navapp.devices.simulated_board import make_hand, print_board
 from navapp.devices.simulated_room import Pace, make_simulated_camera
@@ -123,6 +123,7 @@ def open_mirror_alignment(
     )
     assert window is not None  # noqa: S101 (for the type checker: the backend says so)
     camera = make_real_camera(configuration, clock, rig.rig_id)
+    set_mirror(configuration.mirror)
     return _open_all(camera, window, clock, rig)
 
 

@@ -29,6 +29,8 @@ from navapp.errors import ConfigurationError
 from navapp.geometry import StereoRig
 from sim_devices.display import SimulatedDisplay
 
+_MOTION_S = 60.0
+
 
 def make_device_set(
     configuration: Configuration,
@@ -84,6 +86,23 @@ def read_projector(settings: ProjectorSection) -> ProjectorStatus | None:
         undo.callback(projector.close)
         projector.open()
         return projector.status()
+
+
+def set_mirror(settings: MirrorSection) -> None:
+    """Bring the configured mount to its calibrated angle; a fixed one stands there.
+
+    Raises:
+        DeviceError: it does not answer, or not move.
+    """
+    mirror = _mirror(settings)
+    with ExitStack() as undo:
+        undo.callback(mirror.close)
+        mirror.open()
+        if not mirror.info.is_movable:
+            return
+        if mirror.position_deg() is None:
+            mirror.home(_MOTION_S)
+        mirror.move_to(settings.calibrated_deg, _MOTION_S)
 
 
 def read_display_name(settings: DisplaySection) -> str:

@@ -69,6 +69,12 @@ def test_a_projector_that_bends_the_picture_is_refused(monkeypatch):
         read_record(parse(PJLINK, "x"))
 
 
+def test_a_projector_that_is_off_is_refused(monkeypatch):
+    with_projector(monkeypatch).told = ProjectorStatus(PowerState.STANDBY)
+    with pytest.raises(DeviceError, match=r"not on \(standby\).*switch it on"):
+        read_record(parse(PJLINK, "x"))
+
+
 def test_a_projector_that_does_not_answer_is_told_and_closed(monkeypatch):
     projector = with_projector(monkeypatch)
     projector.told = DeviceError("no answer")

@@ -6,7 +6,13 @@ from enum import Enum, auto
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mirror.alignments import ACCEPT_MM, FEWEST_ALIGNMENTS
+from calibration.mirror.alignments import (
+    ACCEPT_MM,
+    FEWEST_ALIGNMENTS,
+    FEWEST_DEPTHS,
+    LEAST_RANGE_MM,
+    has_depth,
+)
 
 
 class AlignmentPhase(Enum):
@@ -121,7 +127,10 @@ class AlignmentSnapshot:
     used: NDArray[np.int64]  # (3, 3) alignments in each ninth of the display, as the eye reads it
     verdict: Verdict | None  # None before there are enough
     events: tuple[str, ...]  # newest last
+    # fewest, fewest_depths, least_range_mm, limit_mm: what is asked of them.
     fewest: int = FEWEST_ALIGNMENTS
+    fewest_depths: int = FEWEST_DEPTHS
+    least_range_mm: float = LEAST_RANGE_MM
     limit_mm: float = ACCEPT_MM
     trouble: str = ""  # of a device; empty when there is none
 
@@ -129,6 +138,11 @@ class AlignmentSnapshot:
     def is_over(self) -> bool:
         """It was left, or saved."""
         return self.phase is AlignmentPhase.OVER
+
+    @property
+    def has_depth(self) -> bool:
+        """The alignments lie at enough depths."""
+        return has_depth(self.n_depths, self.range_mm)
 
     @property
     def is_accepted(self) -> bool:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from textual.content import Content
 
-from calibration.mirror.alignments import FEWEST_DEPTHS, LEAST_RANGE_MM, has_depth
 from navapp.control.mirror_alignment.aimed_corner import MOST_MOVED_MM
 from navapp.control.mirror_alignment.states import AlignmentPhase, AlignmentSnapshot
 from navapp.ui.gauges import Number, cut, draw_bar
@@ -125,12 +124,14 @@ class UsedMap(Lines[AlignmentView]):
     def build(self, view: AlignmentView, width: int, height: int) -> list[Content]:
         """The depths, then three rows."""
         snapshot = view.snapshot
-        is_met = has_depth(snapshot.n_depths, snapshot.range_mm)
+        is_met = snapshot.has_depth
         level = Level.OK if is_met else Level.ATTENTION
+        n, range_mm = snapshot.n_depths, snapshot.range_mm
         depths = (
-            f"{snapshot.n_depths} of {FEWEST_DEPTHS}, "
-            f"{snapshot.range_mm:.0f} of {LEAST_RANGE_MM:.0f} mm"
+            f"{n} of {snapshot.fewest_depths}, {range_mm:.0f} of {snapshot.least_range_mm:.0f} mm"
         )
+        if is_met:
+            depths = f"{n} over {range_mm:.0f} mm"
         lines = [Content.assemble((" depths   ", "$text-muted"), (depths, level.value))]
         for name, row in zip((" display ", "", ""), snapshot.used.tolist(), strict=True):
             cells = " ".join(f"{count:2d}" if count else f" {view.symbols.dot}" for count in row)

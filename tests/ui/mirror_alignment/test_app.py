@@ -156,7 +156,7 @@ def test_saving_is_possible_once_it_is_accepted():
     assert session.commands == [Save()]
     assert "ENOUGH" in text
     assert "0.52 mm at the anatomy" in text
-    assert "4 of 3, 88 of 60 mm" in text
+    assert "4 over 88 mm" in text
 
 
 def test_while_the_board_is_moved_no_cross_is_moved():
