@@ -1,14 +1,14 @@
 """`navapp calibrate mirror`: the display in the mirror, from views or from aligned crosses."""
 
 import argparse
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.alignment_files import read_alignments
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.display_record import DisplayRecord, read_record
-from navapp.cli.mirror_by_keys import align_by_keys
+from navapp.cli.mirror_by_keys import align_by_keys, check_options
+from navapp.cli.mirror_options import USUAL_GLASS_MM, find_pitch_mm
 from navapp.cli.mirror_views import read_lens, read_views
 from navapp.errors import ResultError, UsageError
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.geometry.display_model import DisplayModel
 
-_MM_PER_INCH = 25.4
-_USUAL_GLASS_MM = 3.0
 _SOURCES = ("views", "alignments", "by_keys", "pattern")
 # Those of `DisplayModel`, which takes long to import.
 _EYES = ("left", "right", "camera")
@@ -74,7 +72,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--pattern", metavar="FILE.png", help="write what the display must show")
     parser.add_argument("--board", metavar="BOARD.json", help="what is at the site")
     parser.add_argument(
-        "--rig", metavar="R", help="stereo rig that took left and right ([camera] rig)"
+        "--rig", metavar="R", help="stereo rig that takes left and right (by keys: [camera] rig)"
     )
     parser.add_argument("--size", metavar="WxH", help="of the display ([display] size_px)")
     parser.add_argument("--diagonal-inch", type=float, metavar="D", help="of the display")
@@ -108,6 +106,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     configuration = load(find_file(options.config))
     if source == "pattern":
         return _write_pattern(options, configuration)
+    if source == "by_keys":
+        check_options(options, configuration)
     record = read_record(configuration)
     if source == "views":
         model, content = _solve_views(options, configuration, record, diagnostics)
@@ -195,9 +195,9 @@ def _solve_views(
     )
     lens = None if options.lens is None else read_lens(options.lens, scene.eye_size)
     limits = DisplayLimits()
-    glass_mm = _USUAL_GLASS_MM if options.glass_mm is None else options.glass_mm
+    glass_mm = USUAL_GLASS_MM if options.glass_mm is None else options.glass_mm
     found = solve_display(
-        scene, seen, Told(_pitch_mm(options, size), glass_mm, options.glass_deg),
+        scene, seen, Told(find_pitch_mm(options, size), glass_mm, options.glass_deg),
         lens=lens, with_bulge=options.curved, limits=limits,
         on_progress=lambda share: diagnostics.progress("solving", share),
     )  # fmt: skip
@@ -251,14 +251,6 @@ def _display_size(options: argparse.Namespace, configuration: "Configuration") -
             f"--size {options.size} is no size", remedy="give it in px, such as 1920x1080"
         )
     return int(width), int(height)
-
-
-def _pitch_mm(options: argparse.Namespace, size: tuple[int, int]) -> float | None:
-    if options.diagonal_inch is None:
-        return None
-    if not 0.0 < options.diagonal_inch < 1000.0:
-        raise UsageError("--diagonal-inch must be a length", remedy="give it in inches, such as 24")
-    return float(options.diagonal_inch * _MM_PER_INCH / math.hypot(*size))
 
 
 def _eye_views(text: str) -> set[int]:

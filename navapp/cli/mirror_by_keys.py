@@ -1,13 +1,14 @@
 """The alignments of `navapp calibrate mirror --by-keys`: the operator makes them with keys."""
 
 import argparse
-import math
 from contextlib import ExitStack
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
-from navapp.errors import DeviceError, ResultError, UsageError
+from navapp.cli.mirror_options import USUAL_GLASS_MM, find_pitch_mm
+from navapp.errors import DeviceError, ResultError, RigError, UsageError
 
 if TYPE_CHECKING:
     from calibration.mirror.alignment_fit import Alignments
@@ -17,9 +18,8 @@ if TYPE_CHECKING:
     from navapp.control.mirror_alignment.alignment import MirrorAlignment
     from navapp.devices import OpenedAlignment
     from navapp.geometry.display_model import ViewingEye
+    from navapp.geometry.rig import StereoRig
 
-_MM_PER_INCH = 25.4
-_USUAL_GLASS_MM = 3.0
 # Without a screen: so many frames without a new alignment are too many.
 _MOST_FRAMES_A_CROSS = 60
 _FRAMES_A_TRY = 10
@@ -43,7 +43,7 @@ def align_by_keys(
         The code of what ended the screen, if that was not the operator.
 
     Raises:
-        UsageError: options that do not go together.
+        UsageError: a board without a size.
         ResultError: fewer alignments than a solve needs.
         NavappError: a device, the rig or the board.
     """
@@ -51,8 +51,12 @@ def align_by_keys(
     from calibration.targets.boards import read_board
     from navapp.devices import open_mirror_alignment
 
-    _check_options(options, configuration)
     board = read_board(options.board)
+    if board.spacing_mm == 1.0:
+        raise UsageError(
+            f"board {options.board} is its own unit of length",
+            remedy="measure it, and give its lengths in mm",
+        )
     if options.rig is not None:
         camera = configuration.camera.model_copy(update={"rig": options.rig})
         configuration = configuration.model_copy(update={"camera": camera})
@@ -61,6 +65,7 @@ def align_by_keys(
     with ExitStack() as undo:
         opened = open_mirror_alignment(configuration, board, is_headless=options.headless)
         undo.callback(opened.close)
+        _check_rig(opened.rig)
         session = make_session(opened, board, options, configuration)
         undo.callback(_keep, session, path, keeps_few=options.save_alignments is not None)
         undo.callback(session.close)
@@ -74,7 +79,12 @@ def align_by_keys(
     return display, given
 
 
-def _check_options(options: argparse.Namespace, configuration: "Configuration") -> None:
+def check_options(options: argparse.Namespace, configuration: "Configuration") -> None:
+    """Refuse options that do not go together, before any device is opened.
+
+    Raises:
+        UsageError: the sentence says which.
+    """
     if options.board is None:
         raise UsageError(
             "--by-keys needs the board that lies at the site", remedy="give --board BOARD.json"
@@ -97,6 +107,23 @@ def _check_options(options: argparse.Namespace, configuration: "Configuration") 
         raise UsageError(
             "the size of the display in inches is not known",
             remedy="give --diagonal-inch D, from corner to corner of the picture",
+        )
+
+
+def _check_rig(rig: "StereoRig") -> None:
+    """A display can be no better than the rig that it is calibrated with.
+
+    Raises:
+        RigError: not accepted by its calibration, or expired.
+    """
+    from navapp.cli.headless import check_not_expired
+
+    check_not_expired(rig, date.today())
+    if rig.quality is not None and not rig.quality.is_accepted:
+        raise RigError(
+            f"rig {rig.name} was not accepted by its calibration",
+            subject=rig.name,
+            remedy="calibrate the cameras again before the display",
         )
 
 
@@ -138,11 +165,11 @@ def _describe_display(
     from calibration.mirror.alignment_start import AlignedDisplay
 
     info, practice = opened.display.info, opened.practice
-    if options.diagonal_inch is not None:
-        pitch_mm = options.diagonal_inch * _MM_PER_INCH / math.hypot(info.width, info.height)
-    else:
+    pitch_mm = find_pitch_mm(options, (info.width, info.height))
+    if pitch_mm is None:
+        # `check_options` wants it of every display but a simulated one.
         pitch_mm = 0.0 if practice is None else practice.pitch_mm
-    glass_mm = _USUAL_GLASS_MM if practice is None else practice.glass_mm
+    glass_mm = USUAL_GLASS_MM if practice is None else practice.glass_mm
     return AlignedDisplay(
         info.width,
         info.height,

@@ -1,6 +1,7 @@
 """`navapp calibrate mirror --by-keys`: the simulated room without a screen; what is refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,9 @@ from navapp.cli.mirror_by_keys import make_session
 from navapp.config import parse
 from navapp.devices.mirror_alignment import make_practice_eye, open_mirror_alignment
 from navapp.geometry.display_model_files import read_display_model
+from navapp.geometry.rig import RigQuality
+from navapp.geometry.rig_files import write_rig
+from sim_devices.rigs import make_default_rig
 from tests.control.test_truth_stays_out import reachable
 from tests.e2e.test_bad_input import refused
 from tests.geometry.test_display_model_errors import seen_beside_mm
@@ -108,6 +112,17 @@ def test_a_screen_needs_a_terminal(board: str, tmp_path: Path, capsys) -> None:
     assert not (tmp_path / "d.yml").exists()
 
 
+def test_a_rig_that_was_not_accepted_calibrates_no_display(
+    board: str, tmp_path: Path, capsys
+) -> None:
+    rig = tmp_path / "rig.yml"
+    quality = RigQuality(is_accepted=False, reasons=("too few views",))
+    write_rig(rig, replace(make_default_rig(), quality=quality))
+    options = ["--board", board, "--by-keys", "--headless", "--rig", str(rig)]
+    assert calibrate(tmp_path / "d.yml", *options) == 3
+    assert "was not accepted by its calibration" in capsys.readouterr().err
+
+
 BAD = {
     "no board": (["--by-keys"], "", "needs the board"),
     "two sources": (["--by-keys", "--alignments", "a.json"], "", "needs one source"),
@@ -123,6 +138,9 @@ BAD = {
     ),
     "no inches": (
         ["--by-keys", "--board", "board.json"], '[camera]\nbackend = "uvc"\n', "--diagonal-inch",
+    ),
+    "no length": (
+        ["--by-keys", "--board", "board.json", "--diagonal-inch", "-3"], "", "must be a length",
     ),
     "half simulated": (
         ["--by-keys", "--board", "board.json", "--diagonal-inch", "24"],

@@ -83,7 +83,7 @@ class Known:
     kept: KeptCrosses
     model: DisplayModel | None  # solved or rough; None before
     found: AlignedCalibration | None  # None before there is a solution
-    eye: tuple[bool, bool]  # columns and rows are read the other way than the display has them
+    flips: tuple[bool, bool]  # columns and rows are shown the other way than the eye reads them
 
     @property
     def axes(self) -> FloatArray:
@@ -94,10 +94,10 @@ class Known:
         points = self.kept.alignments.points_mm
         ahead = points.mean(axis=0) - model.eye_mm
         ahead /= np.linalg.norm(ahead)
-        right = model.screen.across * (-1.0 if self.eye[0] else 1.0)
+        right = model.screen.across * (-1.0 if self.flips[0] else 1.0)
         right = right - (right @ ahead) * ahead
         right /= np.linalg.norm(right)
-        down = model.screen.down * (-1.0 if self.eye[1] else 1.0)
+        down = model.screen.down * (-1.0 if self.flips[1] else 1.0)
         down = down - (down @ ahead) * ahead - (down @ right) * right
         return np.vstack([right, down / np.linalg.norm(down), ahead])
 
@@ -241,7 +241,7 @@ class Guide:
         if known.model is None:
             return ""
         share = known.model.project(middle_mm[None])[0][0] / self._display.width_px
-        share = 1.0 - share if known.eye[0] else share
+        share = 1.0 - share if known.flips[0] else share
         name = ("left", "middle", "right")[int(np.clip(3.0 * share, 0.0, 2.0))]
         return f"use the {name} third of the display"
 
