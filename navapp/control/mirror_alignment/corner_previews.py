@@ -37,7 +37,10 @@ def preview_board(picture: Image, seen: SeenBoard | None, corner: int | None) ->
         if id_ == corner:
             cv2.circle(small, (x, y), 11, _CORNER_BGR, 3)
         else:
-            cv2.circle(small, (x, y), 2, _FIRST_BGR if id_ == 0 else _MARK_BGR, -1)
+            is_first = id_ == 0
+            cv2.circle(
+                small, (x, y), 5 if is_first else 2, _FIRST_BGR if is_first else _MARK_BGR, -1
+            )
     return small
 
 
