@@ -5,6 +5,7 @@ Dark without the application's help: when a picture expires, when the applicatio
 
 import contextlib
 import time
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -43,7 +44,7 @@ class WindowDisplay:
 
     @property
     def info(self) -> DisplayInfo:
-        """Identity, size and the flips it was given."""
+        """Identity, size and the flips; since it was opened first, its output's real name."""
         return self._info
 
     @property
@@ -63,6 +64,7 @@ class WindowDisplay:
             self.close()
         if self._process is None:
             self._process = WindowProcess(self._settings)
+            self._info = replace(self._info, name=self._process.output or self._info.name)
 
     def show(self, image: Image, valid_until_ns: int) -> None:
         """Show a picture until that moment; one that is expired already changes nothing."""

@@ -41,6 +41,7 @@ class WindowProcess:
 
     Attributes:
         memory: what both share.
+        output: name of the monitor or projector that it covers.
 
     Raises:
         DeviceNotFound, WrongDevice, DeviceError: as the window says.
@@ -59,7 +60,7 @@ class WindowProcess:
             finally:
                 os.close(woken)
             undo.callback(_end, self._process)
-            _await_opening(self._process)
+            self.output = _await_opening(self._process)
             self.memory = WindowMemory(descriptor, settings.width, settings.height)
             os.close(descriptor)
             undo.pop_all()
@@ -119,8 +120,8 @@ def _start(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess
     )
 
 
-def _await_opening(process: "subprocess.Popen[bytes]") -> None:
-    """Return when the window stands."""
+def _await_opening(process: "subprocess.Popen[bytes]") -> str:
+    """The name of the output that it covers, when the window stands."""
     answers = cast("IO[bytes]", process.stdout)
     ready, _, _ = select.select([answers], [], [], _START_S)
     if not ready:
@@ -137,6 +138,7 @@ def _await_opening(process: "subprocess.Popen[bytes]") -> None:
         raise _ERRORS[answer["error"]](
             answer["problem"], subject="display", remedy=answer["remedy"]
         )
+    return answer["output"]
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:

@@ -51,6 +51,14 @@ class Panel:
         along: FloatArray = np.column_stack([u, v]) * self.pitch_mm
         return self.origin_mm + along @ np.vstack([self.across, self.down])
 
+    def pixels_of(self, points_mm: FloatArray) -> FloatArray:
+        """(N, 2) pixels of the picture that it is handed, lit at points (N, 3) of the panel."""
+        along = (points_mm - self.origin_mm) @ np.column_stack([self.across, self.down])
+        u, v = (along / self.pitch_mm).T
+        u = self.width_px - 1.0 - u if self.flips_columns else u
+        v = self.height_px - 1.0 - v if self.flips_rows else v
+        return np.column_stack([u, v])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MirrorSetup:
@@ -112,3 +120,22 @@ class MirrorSetup:
         directions: FloatArray = met - eye_mm
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         return directions
+
+    def pixels_in_directions(self, directions: FloatArray, eye_mm: FloatArray) -> FloatArray:
+        """(N, 2) pixels that an eye at (3,) sees by the front face in unit directions (N, 3)."""
+        plate, panel = self.plate, self.panel
+        n, facing = plate.normal, np.cross(panel.across, panel.down)
+        until = float((plate.front_mm - eye_mm) @ n) / (directions @ n)
+        met = eye_mm + until[:, None] * directions
+        back = directions - 2.0 * (directions @ n)[:, None] * n
+        further = ((panel.origin_mm - met) @ facing) / (back @ facing)
+        return panel.pixels_of(met + further[:, None] * back)
+
+    @property
+    def reads_upside_down(self) -> bool:
+        """An upright observer sees the rows of the panel's picture rise upwards."""
+        u, v = 0.5 * self.panel.width_px, 0.5 * self.panel.height_px
+        along = np.array([[u, v], [u, v + 40.0]])
+        first, second = self.directions_to_pixels(along, self.eye_mm)
+        below = np.cross(self.site_mm - self.eye_mm, self.right)
+        return bool((second - first) @ below < 0.0)

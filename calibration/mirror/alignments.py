@@ -113,8 +113,8 @@ def check_alignments(given: Alignments) -> None:
         )
 
 
-def choose_next(found: AlignedCalibration, offered_mm: FloatArray) -> int:
-    """Which of the points (K, 3) on offer, aligned next, lowers the predicted error most."""
+def compute_gains(found: AlignedCalibration, offered_mm: FloatArray) -> FloatArray:
+    """(K,) mm^2 by which each point (K, 3), aligned next, lowers the predicted error's square."""
     model = found.model
     covariance = None if model.quality is None else model.quality.covariance
     if covariance is None:
@@ -127,7 +127,12 @@ def choose_next(found: AlignedCalibration, offered_mm: FloatArray) -> int:
     by_point = covariance @ slopes.transpose(0, 2, 1)
     root = np.linalg.cholesky(np.linalg.inv(noise + slopes @ by_point))
     gains = [float(((told @ (by_point[k] @ root[k])) ** 2).sum()) for k in range(len(offered_mm))]
-    return int(np.argmax(gains))
+    return np.array(gains)
+
+
+def choose_next(found: AlignedCalibration, offered_mm: FloatArray) -> int:
+    """Which of the points (K, 3) on offer, aligned next, lowers the predicted error most."""
+    return int(np.argmax(compute_gains(found, offered_mm)))
 
 
 def choose_spread(aligned_mm: FloatArray, offered_mm: FloatArray) -> int:
@@ -177,27 +182,31 @@ def _judge(
             "alignments_dropped": float((~is_used).sum()),
             "alignment_sd_px": sd_px,
             "eye_wander_sd_mm": wander_sd_mm,
-            "depth_range_mm": float(np.ptp(_depths(model, given.points_mm[is_used]))),
+            "depth_range_mm": count_depths(given.points_mm[is_used], model.eye_mm)[1],
         },
     )
     return replace(model, quality=quality)
 
 
-def _depths(model: DisplayModel, points_mm: FloatArray) -> FloatArray:
-    """(N,) along the direction from the eye to their middle."""
-    ahead = points_mm.mean(axis=0) - model.eye_mm
-    depths: FloatArray = (points_mm - model.eye_mm) @ (ahead / np.linalg.norm(ahead))
-    return depths
-
-
-def _of_depths(model: DisplayModel, points_mm: FloatArray) -> Sequence[str]:
-    depths = np.sort(_depths(model, points_mm))
+def count_depths(points_mm: FloatArray, eye_mm: FloatArray) -> tuple[int, float]:
+    """How many depths points (N, 3) lie at along the line of sight, and over how many mm."""
+    ahead = points_mm.mean(axis=0) - eye_mm
+    depths = np.sort((points_mm - eye_mm) @ (ahead / np.linalg.norm(ahead)))
     n_depths, last = 0, -np.inf
     for depth in depths:
         if depth - last >= _SAME_DEPTH_MM:
             n_depths, last = n_depths + 1, float(depth)
-    range_mm = float(np.ptp(depths))
-    if n_depths >= FEWEST_DEPTHS and range_mm >= LEAST_RANGE_MM:
+    return n_depths, float(np.ptp(depths))
+
+
+def has_depth(n_depths: int, range_mm: float) -> bool:
+    """Whether these are enough depths, over enough mm."""
+    return n_depths >= FEWEST_DEPTHS and range_mm >= LEAST_RANGE_MM
+
+
+def _of_depths(model: DisplayModel, points_mm: FloatArray) -> Sequence[str]:
+    n_depths, range_mm = count_depths(points_mm, model.eye_mm)
+    if has_depth(n_depths, range_mm):
         return ()
     return (
         f"the points lie at {n_depths} depths over {range_mm:.0f} mm, {FEWEST_DEPTHS} depths over "

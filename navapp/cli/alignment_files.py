@@ -1,7 +1,8 @@
-"""Reads a file of crosses that an eye aligned with points of the site."""
+"""Reads and writes files of crosses that an eye aligned with points of the site."""
 
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,29 @@ def read_alignments(path: str) -> "tuple[AlignedDisplay, Alignments]":
     if not (np.isfinite(pixels).all() and np.isfinite(points).all() and (sds > 0.0).all()):
         raise _refusal(path, "holds numbers that are not finite, or an sd_mm that is not positive")
     return display, Alignments(pixels, points, sds)
+
+
+def write_alignments(path: Path, display: "AlignedDisplay", made: "Alignments") -> None:
+    """Write a file that `read_alignments` reads.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    from navapp.geometry.whole_files import write_whole
+
+    rows = [
+        {"pixel": pixel.tolist(), "point_mm": point.tolist(), "sd_mm": float(sd_mm)}
+        for pixel, point, sd_mm in zip(made.pixels, made.points_mm, made.points_sd_mm, strict=True)
+    ]
+    content = {"display": asdict(display), "alignments": rows}
+    try:
+        write_whole(path, (json.dumps(content, indent=1) + "\n").encode())
+    except OSError as error:
+        raise InputError(
+            f"alignment file {path} cannot be written ({error.strerror})",
+            subject=str(path),
+            remedy="name a file in a folder that you may write to",
+        ) from error
 
 
 def _parse_display(keys: dict[str, Any]) -> "AlignedDisplay":

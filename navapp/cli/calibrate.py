@@ -24,6 +24,7 @@ examples:
   navapp calibrate stereo pictures/ --board board.json --out rig.yml --report rig.html
   navapp calibrate check rig.yml today/ --board board.json
   navapp calibrate mirror --out display.yml --views views/ --board board.json --rig rig.yml
+  navapp calibrate mirror --out display.yml --board board.json --by-keys
   navapp calibrate latency
   navapp calibrate pivot poses.csv
 """

@@ -182,10 +182,10 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
 def _on_screen(capture: "Capture") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
     from navapp.cli.run import log_folder
-    from navapp.control.capture.runner import CaptureRunner
+    from navapp.control.guided_runner import GuidedRunner
     from navapp.ui.capture.app import run_capture_app
 
-    runner = CaptureRunner(capture)
+    runner = GuidedRunner(capture, "capture")
     runner.start()
     try:
         code = run_capture_app(runner, log_folder() / "navapp.log")

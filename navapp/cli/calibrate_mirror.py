@@ -1,21 +1,24 @@
 """`navapp calibrate mirror`: the display in the mirror, from views or from aligned crosses."""
 
 import argparse
-import math
 from dataclasses import replace
-from datetime import date, timedelta
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.alignment_files import read_alignments
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.cli.display_record import DisplayRecord, read_record
+from navapp.cli.mirror_by_keys import align_by_keys, check_options
+from navapp.cli.mirror_options import USUAL_GLASS_MM, find_pitch_mm
 from navapp.cli.mirror_views import read_lens, read_views
-from navapp.errors import ConfigurationError, ResultError, UsageError
+from navapp.errors import ResultError, UsageError
 
 if TYPE_CHECKING:
-    from navapp.config import Configuration, DisplaySection
+    from calibration.mirror.alignment_fit import Alignments
+    from calibration.mirror.alignment_start import AlignedDisplay
+    from navapp.config import Configuration
     from navapp.geometry.display_model import DisplayModel
 
-_MM_PER_INCH = 25.4
+_SOURCES = ("views", "alignments", "by_keys", "pattern")
 # Those of `DisplayModel`, which takes long to import.
 _EYES = ("left", "right", "camera")
 _EXAMPLE = """\
@@ -23,11 +26,21 @@ examples:
   navapp calibrate mirror --pattern pattern.png --size 1920x1080 --board board.json
   navapp calibrate mirror --out display.yml --views views/ --board board.json --rig rig.yml \\
       --size 1920x1080 --diagonal-inch 24 --report display.html
-  navapp calibrate mirror --out display.yml --alignments alignments.json
+  navapp calibrate mirror --out display.yml --board board.json --by-keys     the simulated room
+  navapp --config mine.toml calibrate mirror --out display.yml --board board.json --by-keys \\
+      --rig rig.yml --diagonal-inch 24 --viewing-eye right
+  navapp calibrate mirror --out display.yml --board board.json --by-keys --headless
+  navapp calibrate mirror --out display.yml --alignments display.alignments.json
 
-The folder holds, for every view, eye_site_0000.png and eye_screen_0000.png of the camera at the
-eye's place (the board at the site with the display dark; the pattern on the display), and
-left_0000.png and right_0000.png of the stereo cameras (docs/calibration.md, The mirror).
+By keys, the eye that looks moves one cross after the other onto the corner of the board that the
+screen names, with the arrow keys, and confirms it with ENTER; 12 alignments at three depths over
+60 mm are needed. They are kept beside the display's file, for --alignments. Without a screen a
+simulated eye aligns them.
+
+The folder of --views holds, for every view, eye_site_0000.png and eye_screen_0000.png of the
+camera at the eye's place (the board at the site with the display dark; the pattern on the
+display), and left_0000.png and right_0000.png of the stereo cameras (docs/calibration.md, The
+mirror).
 """
 
 
@@ -42,12 +55,28 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--out", metavar="DISPLAY.yml", help="display file to write")
     parser.add_argument("--views", metavar="DIR", help="views of a camera at the eye's place")
     parser.add_argument("--alignments", metavar="FILE.json", help="crosses that an eye aligned")
+    parser.add_argument(
+        "--by-keys", action="store_true", help="align crosses now, with the arrow keys"
+    )
+    parser.add_argument(
+        "--headless", action="store_true", help="no screen; a simulated eye aligns the crosses"
+    )
+    parser.add_argument(
+        "--save-alignments", metavar="FILE.json",
+        help="keep those made by keys here, also when they are too few (DISPLAY.alignments.json)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--upside-down", action="store_true",
+        help="by keys: the eye reads what the display shows on its head",
+    )  # fmt: skip
     parser.add_argument("--pattern", metavar="FILE.png", help="write what the display must show")
     parser.add_argument("--board", metavar="BOARD.json", help="what is at the site")
-    parser.add_argument("--rig", metavar="R", help="stereo rig that took left and right")
+    parser.add_argument(
+        "--rig", metavar="R", help="stereo rig that takes left and right (by keys: [camera] rig)"
+    )
     parser.add_argument("--size", metavar="WxH", help="of the display ([display] size_px)")
     parser.add_argument("--diagonal-inch", type=float, metavar="D", help="of the display")
-    parser.add_argument("--glass-mm", type=float, default=3.0, metavar="T", help="of the plate (3)")
+    parser.add_argument("--glass-mm", type=float, metavar="T", help="of the plate (3)")
     parser.add_argument(
         "--glass-deg", type=float, default=45.0, metavar="A",
         help="between the plate's normal and the line of sight, the display above (45)",
@@ -58,7 +87,9 @@ def add_parser(subparsers: Any) -> None:
         "--eye-views", default="", metavar="N,...",
         help="views whose camera stood where the eye will be (those within 5 mm of the first)",
     )  # fmt: skip
-    parser.add_argument("--viewing-eye", choices=_EYES, default="camera")
+    parser.add_argument(
+        "--viewing-eye", choices=_EYES, help="of the views (camera), or that aligns (right)"
+    )
     parser.add_argument("--report", metavar="R.html", help="what a person needs to trust it")
     parser.add_argument("--force", action="store_true", help="write what is not accepted")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
@@ -71,28 +102,52 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
     for path in (options.out, options.report, options.json, options.pattern):
         check_writable(path)
-    given = [name for name in ("views", "alignments", "pattern") if getattr(options, name)]
-    if len(given) != 1 or (options.out is None and given != ["pattern"]):
-        raise UsageError(
-            "calibrate mirror needs one source, and a file to write",
-            remedy="give --out DISPLAY.yml with --views DIR or --alignments FILE.json, or "
-            "--pattern FILE.png alone",
-        )
+    source = _choose_source(options)
     configuration = load(find_file(options.config))
-    _check_flips(configuration)
-    if given == ["pattern"]:
+    if source == "pattern":
         return _write_pattern(options, configuration)
-    solve = _solve_views if given == ["views"] else _solve_alignments
-    model, content = solve(options, configuration, diagnostics)
-    model = _with_record(model, configuration)
+    if source == "by_keys":
+        check_options(options, configuration)
+    record = read_record(configuration)
+    if source == "views":
+        model, content = _solve_views(options, configuration, record, diagnostics)
+    elif source == "alignments":
+        model, content = _solve_made(*read_alignments(options.alignments), options, record)
+    else:
+        made = align_by_keys(options, configuration, diagnostics)
+        if isinstance(made, int):
+            return made
+        model, content = _solve_made(*made, options, record)
+    if content.get("advice"):
+        diagnostics.warn(content["advice"])
+    model = record.add_to(model)
     is_accepted = model.quality is not None and model.quality.is_accepted
     if is_accepted or options.force:
         write_display_model(options.out, model)
     write_json(options.json, "calibrate mirror", {**_content(model), **content})
     if options.json != "-":
         _tell(model, diagnostics)
-    if is_accepted:
-        return 0
+    return 0 if is_accepted else _refuse(model, options)
+
+
+def _choose_source(options: argparse.Namespace) -> str:
+    """Where the display is solved from, or that its pattern is written."""
+    given = [name for name in _SOURCES if getattr(options, name)]
+    if len(given) != 1 or (options.out is None and given != ["pattern"]):
+        raise UsageError(
+            "calibrate mirror needs one source, and a file to write",
+            remedy="give --out DISPLAY.yml with --views DIR, --by-keys or --alignments FILE.json, "
+            "or --pattern FILE.png alone",
+        )
+    for name in ("headless", "save_alignments", "upside_down"):
+        if getattr(options, name) and given != ["by_keys"]:
+            raise UsageError(
+                f"--{name.replace('_', '-')} belongs to --by-keys", remedy="leave it away"
+            )
+    return given[0]
+
+
+def _refuse(model: "DisplayModel", options: argparse.Namespace) -> int:
     written = "written as not accepted" if options.force else "not written"
     reasons = () if model.quality is None else model.quality.reasons
     raise ResultError(
@@ -116,7 +171,10 @@ def _write_pattern(options: argparse.Namespace, configuration: "Configuration") 
 
 
 def _solve_views(
-    options: argparse.Namespace, configuration: "Configuration", diagnostics: Diagnostics
+    options: argparse.Namespace,
+    configuration: "Configuration",
+    record: DisplayRecord,
+    diagnostics: Diagnostics,
 ) -> "tuple[DisplayModel, dict[str, Any]]":
     """From the pictures of a folder."""
     from calibration.mirror.display_acceptance import DisplayLimits
@@ -137,17 +195,18 @@ def _solve_views(
     )
     lens = None if options.lens is None else read_lens(options.lens, scene.eye_size)
     limits = DisplayLimits()
+    glass_mm = USUAL_GLASS_MM if options.glass_mm is None else options.glass_mm
     found = solve_display(
-        scene, seen, Told(_pitch_mm(options, size), options.glass_mm, options.glass_deg),
+        scene, seen, Told(find_pitch_mm(options, size), glass_mm, options.glass_deg),
         lens=lens, with_bulge=options.curved, limits=limits,
         on_progress=lambda share: diagnostics.progress("solving", share),
     )  # fmt: skip
     found = replace(found, dropped=sorted([*dropped, *found.dropped], key=lambda one: one.index))
-    model = replace(found.model, viewing_eye=options.viewing_eye)
+    model = replace(found.model, viewing_eye=options.viewing_eye or "camera")
     if options.report:
         from calibration.report.display_report import write_view_report
 
-        named = replace(found, model=_with_record(model, configuration))
+        named = replace(found, model=record.add_to(model))
         write_view_report(options.report, named, limits)
     content = {
         "views_used": len(found.views),
@@ -156,68 +215,26 @@ def _solve_views(
     return model, content
 
 
-def _solve_alignments(
-    options: argparse.Namespace, configuration: "Configuration", diagnostics: Diagnostics
+def _solve_made(
+    display: "AlignedDisplay",
+    made: "Alignments",
+    options: argparse.Namespace,
+    record: DisplayRecord,
 ) -> "tuple[DisplayModel, dict[str, Any]]":
-    """From the crosses of a file."""
+    """From crosses that an eye aligned."""
     from calibration.mirror.alignments import advise, solve_alignments
 
-    display, given = read_alignments(options.alignments)
-    found = solve_alignments(display, given)
+    found = solve_alignments(display, made)
     if options.report:
         from calibration.report.display_report import write_alignment_report
 
-        named = replace(found, model=_with_record(found.model, configuration))
-        write_alignment_report(options.report, named)
-    advice = advise(found, len(given.pixels))
-    if advice:
-        diagnostics.warn(advice)
-    content = {
+        write_alignment_report(options.report, replace(found, model=record.add_to(found.model)))
+    return found.model, {
         "alignments_used": int(found.is_used.sum()),
         "alignments_dropped": [int(k) for k, used in enumerate(found.is_used) if not used],
         "alignment_sd_px": found.alignment_sd_px,
-        "advice": advice,
+        "advice": advise(found, len(made.pixels)),
     }
-    return found.model, content
-
-
-def _with_record(model: "DisplayModel", configuration: "Configuration") -> "DisplayModel":
-    """The model with all that its file should say of it."""
-    assert model.quality is not None  # noqa: S101 (for the type checker: it always has one)
-    today, display = date.today(), configuration.display
-    return replace(
-        model,
-        display_name=_display_name(display),
-        backend_flips=(display.flip_horizontally, display.flip_vertically),
-        mirror_deg=configuration.mirror.calibrated_deg,
-        quality=replace(
-            model.quality,
-            made_on=today,
-            expires_on=today + timedelta(days=configuration.calibration.valid_days),
-        ),
-    )
-
-
-def _display_name(display: "DisplaySection") -> str:
-    """By which the opened display will be known."""
-    if display.backend == "simulated":
-        return "sim:display"
-    return display.output or display.backend
-
-
-def _check_flips(configuration: "Configuration") -> None:
-    """Refuse flips that no session on a display with a model can have.
-
-    Raises:
-        ConfigurationError: the display is configured to be flipped.
-    """
-    display = configuration.display
-    if display.flip_horizontally or display.flip_vertically:
-        raise ConfigurationError(
-            "a display that is calibrated in the mirror is not flipped",
-            subject="display.flip_horizontally, display.flip_vertically",
-            remedy="set both to false and take the pictures again: the model knows its flips",
-        )
 
 
 def _display_size(options: argparse.Namespace, configuration: "Configuration") -> tuple[int, int]:
@@ -234,14 +251,6 @@ def _display_size(options: argparse.Namespace, configuration: "Configuration") -
             f"--size {options.size} is no size", remedy="give it in px, such as 1920x1080"
         )
     return int(width), int(height)
-
-
-def _pitch_mm(options: argparse.Namespace, size: tuple[int, int]) -> float | None:
-    if options.diagonal_inch is None:
-        return None
-    if not 0.0 < options.diagonal_inch < 1000.0:
-        raise UsageError("--diagonal-inch must be a length", remedy="give it in inches, such as 24")
-    return float(options.diagonal_inch * _MM_PER_INCH / math.hypot(*size))
 
 
 def _eye_views(text: str) -> set[int]:

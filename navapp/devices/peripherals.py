@@ -8,7 +8,14 @@ from drivers.clock import Clock, SystemClock
 from drivers.escvp21_projector import BAUD_RATE as ESCVP21_BAUD_RATE
 from drivers.escvp21_projector import EscVp21Projector
 from drivers.fixed_mirror import FixedMirror
-from drivers.interfaces import DeviceSet, Display, MirrorMount, ProjectorControl, StereoCamera
+from drivers.interfaces import (
+    DeviceSet,
+    Display,
+    MirrorMount,
+    ProjectorControl,
+    ProjectorStatus,
+    StereoCamera,
+)
 from drivers.no_projector import NoProjector
 from drivers.pjlink_line import TcpConnection
 from drivers.pjlink_projector import PjlinkProjector
@@ -21,6 +28,8 @@ from navapp.config import Configuration, DisplaySection, MirrorSection, Projecto
 from navapp.errors import ConfigurationError
 from navapp.geometry import StereoRig
 from sim_devices.display import SimulatedDisplay
+
+_MOTION_S = 60.0
 
 
 def make_device_set(
@@ -62,6 +71,54 @@ def make_window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay
         return None
     flips = (settings.flip_horizontally, settings.flip_vertically)
     return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
+
+
+def read_projector(settings: ProjectorSection) -> ProjectorStatus | None:
+    """What the configured projector says of itself; None without one.
+
+    Raises:
+        DeviceError: it does not answer.
+    """
+    if settings.backend == "none":
+        return None
+    projector = _projector(settings)
+    with ExitStack() as undo:
+        undo.callback(projector.close)
+        projector.open()
+        return projector.status()
+
+
+def set_mirror(settings: MirrorSection) -> None:
+    """Bring the configured mount to its calibrated angle; a fixed one stands there.
+
+    Raises:
+        DeviceError: it does not answer, or not move.
+    """
+    mirror = _mirror(settings)
+    with ExitStack() as undo:
+        undo.callback(mirror.close)
+        mirror.open()
+        if not mirror.info.is_movable:
+            return
+        if mirror.position_deg() is None:
+            mirror.home(_MOTION_S)
+        mirror.move_to(settings.calibrated_deg, _MOTION_S)
+
+
+def read_display_name(settings: DisplaySection) -> str:
+    """By which the opened display will be known; a window without `output` is opened for it.
+
+    Raises:
+        DeviceError: it cannot be opened.
+    """
+    clock = SystemClock()
+    display: Display = make_window_display(settings, clock) or SimulatedDisplay(clock)
+    if settings.output or display.info.is_simulated:
+        return display.info.name
+    with ExitStack() as undo:
+        undo.callback(display.close)
+        display.open()
+        return display.info.name
 
 
 def _projector(settings: ProjectorSection) -> ProjectorControl:

@@ -13,10 +13,10 @@ from sim_devices.sheet import PrintedSheet
 _SHEET_PX_PER_MM, _MOST_SHEET_PX, _SHEET_MARGIN_MM = 12.0, 6000.0, 8.0
 
 
-def print_board(board: Board) -> PrintedSheet:
+def print_board(board: Board, px_per_mm: float = _SHEET_PX_PER_MM) -> PrintedSheet:
     """The board on a sheet of paper."""
     drawing = make_drawing(board)
-    px_per_mm = min(_SHEET_PX_PER_MM, _MOST_SHEET_PX / max(board.size_mm))
+    px_per_mm = min(px_per_mm, _MOST_SHEET_PX / max(board.size_mm))
     left_mm, top_mm = drawing.low_mm - _SHEET_MARGIN_MM
     white = rasterise(drawing, px_per_mm, _SHEET_MARGIN_MM)
     return PrintedSheet(white, px_per_mm, float(left_mm), float(top_mm))

@@ -45,3 +45,11 @@ class Lines(Widget, Generic[ShownT]):
 
 class TextView(Lines[View]):
     """Lines of a session's view; never moves."""
+
+
+def break_line(text: str, width: int) -> tuple[str, str]:
+    """The words that fit into a line, and the others."""
+    if len(text) <= width:
+        return text, ""
+    place = text.rfind(" ", 0, max(width, 1) + 1)
+    return (text[:width], text[width:]) if place < 1 else (text[:place], text[place + 1 :])

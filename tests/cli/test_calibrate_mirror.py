@@ -11,17 +11,12 @@ import pytest
 
 from calibration.mirror.seen_views import Scene
 from calibration.targets.boards import keys_of
-from drivers.clock import ManualClock
-from navapp.cli.calibrate_mirror import _display_name
 from navapp.cli.main import run
 from navapp.cli.mirror_views import read_lens
-from navapp.config import DisplaySection
-from navapp.devices.peripherals import make_window_display
 from navapp.errors import InputError
 from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.display_model_files import read_display_model, write_display_model
 from navapp.geometry.rig_files import write_rig
-from sim_devices.display import SimulatedDisplay
 from sim_devices.mirror_setups import draw_setup
 from sim_devices.rigs import make_default_rig
 from tests.calibration.mirror.simulated_operators import SimulatedOperator
@@ -238,13 +233,6 @@ def test_a_view_without_all_its_pictures_is_refused(
     refused([*command, "--size", "1920x1080"], capsys, 3, "view 7", "no right picture")
     command[command.index("--views") + 1] = str(tmp_path / "none")
     refused([*command, "--size", "1920x1080"], capsys, 3, "does not exist")
-
-
-@pytest.mark.parametrize("content", [{}, {"backend": "window", "output": "DP-1"}], ids=str)
-def test_the_display_is_named_as_the_opened_one_is(content: dict) -> None:
-    section = DisplaySection(**content, size_px=(640, 480))
-    display = make_window_display(section, ManualClock()) or SimulatedDisplay(ManualClock())
-    assert _display_name(section) == display.info.name
 
 
 @pytest.mark.parametrize("flip", ["flip_horizontally", "flip_vertically"])

@@ -103,3 +103,8 @@ class CaptureSnapshot:
     events: tuple[str, ...]  # newest last
     outcome: Outcome | None = None  # what became of the last solve; None before
     trouble: str = ""  # what is wrong with it; empty when nothing is
+
+    @property
+    def is_over(self) -> bool:
+        """It was left."""
+        return self.phase is CapturePhase.OVER

@@ -8,7 +8,7 @@ from navapp.control.capture.states import CapturePhase, CaptureSnapshot
 from navapp.ui.capture.keys import HAND_HINT, KEYS, is_possible
 from navapp.ui.gauges import Number, cut, draw_bar, draw_fraction_bar
 from navapp.ui.symbols import Symbols
-from navapp.ui.text_view import Lines
+from navapp.ui.text_view import Lines, break_line
 from navapp.ui.view import Level
 
 _GAUGE_WIDTH, _WORK_WIDTH = 26, 30
@@ -68,26 +68,18 @@ class InstructionLines(Lines[CaptureView]):
             level = Level.OK if outcome.is_accepted else Level.BAD
             what = "accepted: rig.yml and report.html are written" if outcome.is_accepted else "no:"
             text = " ".join([what, *outcome.sentences])
-            first, rest = _break_line(text, width - 10)
+            first, rest = break_line(text, width - 10)
         else:
             level = Level.OK if view.snapshot.is_enough else Level.ATTENTION
-            first, rest = _break_line(view.snapshot.instruction, width - 10)
+            first, rest = break_line(view.snapshot.instruction, width - 10)
         head = "outcome " if outcome is not None else "wanted  "
         if view.snapshot.trouble:
             head, level = "camera  ", Level.BAD
-            first, rest = _break_line(view.snapshot.trouble, width - 10)
+            first, rest = break_line(view.snapshot.trouble, width - 10)
         return [
             Content.assemble((f" {head}", "$text-muted"), (first, level.value)),
             Content.assemble("         ", (cut(rest, max(width - 10, 0), symbols), level.value)),
         ]
-
-
-def _break_line(text: str, width: int) -> tuple[str, str]:
-    """The words that fit into a line, and the others."""
-    if len(text) <= width:
-        return text, ""
-    place = text.rfind(" ", 0, max(width, 1) + 1)
-    return (text[:width], text[width:]) if place < 1 else (text[:place], text[place + 1 :])
 
 
 class CheckLine(Lines[CaptureView]):

@@ -1,16 +1,16 @@
-"""The capture's thread: it ends with the capture, and keeps what ended it."""
+"""The thread of a guided calibration: it ends with it, and keeps what ended it."""
 
 import time
 
 import pytest
 
-from navapp.control.capture.runner import CaptureRunner
 from navapp.control.capture.states import CapturePhase, Leave
+from navapp.control.guided_runner import GuidedRunner
 from navapp.errors import DeviceLost
 from tests.control.capture.rooms import Room, capture_in
 
 
-def over(runner: CaptureRunner, limit_s: float = 20.0) -> bool:
+def over(runner: GuidedRunner, limit_s: float = 20.0) -> bool:
     end = time.monotonic() + limit_s
     while not runner.is_over and time.monotonic() < end:
         time.sleep(0.01)
@@ -23,7 +23,7 @@ def room() -> Room:
 
 
 def test_it_ends_when_it_is_left(room):
-    runner = CaptureRunner(capture_in(room))
+    runner = GuidedRunner(capture_in(room), "capture")
     runner.start()
     runner.submit(Leave())
     assert over(runner)
@@ -38,7 +38,7 @@ def test_a_lost_camera_ends_it_and_is_told(room, monkeypatch):
         raise DeviceLost("the camera is gone")
 
     monkeypatch.setattr(room, "read", lost)
-    runner = CaptureRunner(capture_in(room))
+    runner = GuidedRunner(capture_in(room), "capture")
     runner.start()
     assert over(runner)
     runner.stop()

@@ -1,0 +1,1 @@
+"""The screen of the alignment of crosses in the mirror."""

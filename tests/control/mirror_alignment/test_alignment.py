@@ -1,0 +1,291 @@
+"""The alignment of crosses, step by step, with a board in a simulated hand."""
+
+import numpy as np
+import pytest
+
+from navapp.control.mirror_alignment.states import (
+    AlignmentPhase,
+    Another,
+    Confirm,
+    Follow,
+    Leave,
+    MoveHand,
+    NudgeCross,
+    Save,
+    TurnArrows,
+    Undo,
+)
+from navapp.errors import DeviceLost
+from tests.calibration.marks import BOARD
+from tests.control.mirror_alignment.rooms import (
+    MirrorRoom,
+    align,
+    alignment_in,
+    steps,
+    until_aimed,
+)
+
+
+@pytest.fixture
+def room() -> MirrorRoom:
+    return MirrorRoom()
+
+
+def told(session) -> str:
+    return " | ".join(session.snapshot.events)
+
+
+def lit(room: MirrorRoom) -> np.ndarray:
+    """(2,) middle of what is lit; fails when the display is dark."""
+    rows, columns = np.nonzero(room.display.visible_image()[:, :, 1])
+    return 0.5 * np.array([columns.min() + columns.max(), rows.min() + rows.max()])
+
+
+def test_the_first_cross_lies_in_the_middle_of_the_display(room):
+    session = alignment_in(room)
+    asked = until_aimed(session)
+    assert asked.phase is AlignmentPhase.ALIGNING
+    np.testing.assert_allclose(lit(room), (959.5, 539.5), atol=1.0)
+    row, column = asked.row_column
+    assert asked.corner == (row - 1) * (BOARD.columns - 1) + column - 1
+    assert f"row {row}, column {column}" in asked.instruction
+    assert "right eye alone" in asked.instruction
+
+
+def test_the_cross_goes_as_the_eye_sees_it(room):
+    session = alignment_in(room)
+    first = until_aimed(session)
+    flips = np.array(first.flips)
+    assert flips.sum() == 1
+    session.submit(NudgeCross(10, 4))
+    steps(session)
+    moved = np.where(flips, -1, 1) * (10, 4)
+    np.testing.assert_allclose(lit(room), np.array(first.cross_px) + moved)
+    session.submit(TurnArrows(columns=True))
+    session.submit(NudgeCross(10, 0))
+    steps(session)
+    np.testing.assert_allclose(lit(room), np.array(first.cross_px) + moved * (0, 1))
+
+
+def test_arrows_that_were_exchanged_tell_how_the_display_is_read(room):
+    session = alignment_in(room)
+    until_aimed(session)
+    before = session.made[0].reads_upside_down
+    session.submit(TurnArrows(rows=True))
+    steps(session)
+    assert session.made[0].reads_upside_down is not before
+    assert session.snapshot.flips[1] is not before
+
+
+def test_what_is_confirmed_is_kept_with_its_place(room):
+    session = alignment_in(room)
+    asked = until_aimed(session)
+    assert asked.corner is not None
+    align(room, session)
+    _, made = session.made
+    aim = room.eye.aim_px(room.point_mm(asked.corner), 0)
+    assert np.abs(made.pixels[0] - aim).max() <= 0.5
+    assert np.linalg.norm(made.points_mm[0] - room.point_mm(asked.corner)) < 0.4
+    assert 0.03 < made.points_sd_mm[0] < 0.3
+    assert session.snapshot.used.sum() == 1
+
+
+def test_a_board_that_moved_while_aligning_is_refused_once(room):
+    session = alignment_in(room)
+    until_aimed(session)
+    room.nudge((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    session.submit(Confirm())
+    assert steps(session).n_kept == 0
+    assert "the board has moved by 1.0 mm, look again" in told(session)
+    # The operator looks again, and finds it right.
+    steps(session, 2)
+    session.submit(Confirm())
+    assert steps(session, 2).n_kept == 1
+
+
+def test_a_cross_that_was_moved_after_the_board_is_kept(room):
+    session = alignment_in(room)
+    until_aimed(session)
+    room.nudge((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+    steps(session, 2)
+    align(room, session)
+    assert session.snapshot.n_kept == 1
+
+
+def test_a_board_that_is_hidden_is_refused(room):
+    session = alignment_in(room)
+    asked = until_aimed(session)
+    room.hidden_corners = {asked.corner}
+    session.submit(Confirm())
+    assert "hold still" in steps(session).instruction
+    assert steps(session, 9).n_kept == 0
+    assert "the corner is not seen by both cameras" in told(session)
+    room.is_hidden = True
+    session.submit(Confirm())
+    assert steps(session, 9).n_kept == 0
+    assert "the board is not seen by both cameras" in told(session)
+
+
+def test_a_corner_that_one_picture_missed_is_waited_for(room):
+    session = alignment_in(room)
+    asked = until_aimed(session)
+    room.hidden_corners = {asked.corner}
+    session.submit(Confirm())
+    steps(session, 2)
+    room.hidden_corners = set()
+    assert steps(session).n_kept == 1
+
+
+def test_a_board_that_is_carried_away_gets_another_corner(room):
+    session = alignment_in(room)
+    until_aimed(session)
+    session.submit(MoveHand((30.0, 0.0, 0.0)))
+    steps(session)
+    steps(session, 2)
+    assert "another corner is chosen" in told(session)
+    assert until_aimed(session).corner is not None
+
+
+def test_a_corner_that_cannot_be_had_is_left_out(room):
+    session = alignment_in(room)
+    first = until_aimed(session).corner
+    session.submit(Another())
+    steps(session)
+    assert until_aimed(session).corner != first
+
+
+def test_the_last_one_can_be_undone(room):
+    session = alignment_in(room)
+    align(room, session, 2)
+    session.submit(Undo())
+    steps(session)
+    assert session.snapshot.n_kept == 1
+    session.submit(Undo())
+    session.submit(Undo())
+    assert steps(session).n_kept == 0
+
+
+def test_four_at_a_height_then_the_board_is_wanted_lower(room):
+    session = alignment_in(room, has_hand=False)
+    align(room, session, 4)
+    asked = steps(session, 3)
+    assert asked.phase is AlignmentPhase.MOVING
+    assert asked.cross_px is None
+    assert not room.display.visible_image().any()
+    assert asked.instruction.startswith("lower the board by 40 mm, away from the cameras")
+    room.nudge((0.0, 0.0, 25.0), (0.0, 0.0, 0.0))
+    assert steps(session, 3).instruction.startswith("lower the board by 15 mm")
+    room.nudge((0.0, 0.0, 15.0), (0.0, 0.0, 0.0))
+    assert until_aimed(session).n_depths == 1
+
+
+def test_a_height_that_cannot_be_had_is_left_out(room):
+    session = alignment_in(room, has_hand=False)
+    align(room, session, 4)
+    steps(session, 3)
+    session.submit(Another())
+    assert steps(session, 2).instruction.startswith("raise the board by 40 mm, towards the cameras")
+
+
+def test_a_hand_that_follows_is_soon_done(room):
+    session = alignment_in(room)
+    done = align(room, session, 12)
+    steps(session)
+    assert session.snapshot.is_accepted
+    assert done.n_depths >= 3
+    assert done.range_mm >= 60.0
+    session.submit(Save())
+    assert steps(session).is_over
+    display, made = session.made
+    assert len(made.pixels) == 12
+    assert display.reads_upside_down is room.setup.reads_upside_down
+
+
+def test_a_hand_that_is_let_go_stays(room):
+    session = alignment_in(room)
+    session.submit(Follow(is_on=False))
+    align(room, session, 4)
+    before = room.pose
+    steps(session, 3)
+    assert room.pose is before
+
+
+def test_crosses_are_soon_lit_near_their_corners(room):
+    session = alignment_in(room)
+    far_px = []
+    for _ in range(11):
+        asked = until_aimed(session)
+        aim = room.eye.aim_px(room.point_mm(asked.corner), asked.n_kept)
+        far_px.append(np.linalg.norm(aim - asked.cross_px))
+        align(room, session)
+    assert max(far_px[6:]) < 90.0
+    assert np.median(far_px[8:]) < 30.0
+
+
+def test_what_is_not_accepted_is_not_saved_and_goes_on(room):
+    session = alignment_in(room, solve=room.solve_as("too few depths"))
+    align(room, session, 12)
+    session.submit(Save())
+    assert not steps(session, 2).is_over
+    assert "it is not accepted yet" in told(session)
+    align(room, session)
+    assert session.snapshot.n_kept == 13
+
+
+def test_a_stray_is_told(room):
+    session = alignment_in(room, solve=room.solve_as(strays=(3,)))
+    align(room, session, 12)
+    steps(session)
+    assert "alignment 4 does not agree, it is left out: row" in told(session)
+    assert session.snapshot.verdict.strays == (3,)
+
+
+def test_leaving_asks_once_more_while_alignments_would_be_lost(room):
+    session = alignment_in(room)
+    align(room, session)
+    session.submit(Leave())
+    assert not steps(session).is_over
+    assert "the alignments will be lost (1 so far): leave again to end" in told(session)
+    session.submit(Leave())
+    assert steps(session).is_over
+
+
+@pytest.mark.parametrize("n", [0, 1])
+def test_leaving_ends_at_once_when_nothing_is_lost(room, n):
+    session = alignment_in(room, keeps_few=True)
+    align(room, session, n)
+    session.submit(Leave())
+    assert steps(session).is_over
+
+
+def test_a_lost_camera_is_said_and_the_display_is_dark(room, monkeypatch):
+    session = alignment_in(room, reopen=lambda: room)
+    align(room, session)
+    read = room.read
+
+    def lost(timeout_s):
+        raise DeviceLost("the camera was unplugged")
+
+    monkeypatch.setattr(room, "read", lost)
+    assert "the camera was unplugged" in steps(session).trouble
+    assert not room.display.visible_image().any()
+    monkeypatch.setattr(room, "read", read)
+    room.clock.advance_ns(5_000_000_000)
+    assert steps(session, 2).trouble == ""
+    align(room, session)
+    assert session.snapshot.n_kept == 2
+
+
+def test_the_cross_goes_out_by_itself(room):
+    until_aimed(alignment_in(room))
+    lit(room)
+    room.clock.advance_ns(600_000_000)
+    assert not room.display.visible_image().any()
+
+
+def test_the_display_is_dark_when_it_is_closed(room):
+    session = alignment_in(room)
+    until_aimed(session)
+    session.close()
+    assert room.is_closed
+    assert not room.display.visible_image().any()
