@@ -38,7 +38,13 @@ class CornerLocator:
     def __call__(self, left: Image, right: Image) -> tuple[NDArray[np.intp], FloatArray] | None:
         """Ids (n,) and places (n, 3) mm in the left camera's frame; None without the board."""
         pair = find_pair(self.board, left, right)
-        if pair is None:
-            return None
-        ids, left_px, right_px = pair.common()
-        return ids, triangulate_mm(self.rig, left_px, right_px)
+        return None if pair is None else locate_marks(self.rig, pair)
+
+
+def locate_marks(rig: StereoRig, pair: SeenPair) -> tuple[NDArray[np.intp], FloatArray]:
+    """Ids (n,) and places (n, 3) mm of the marks that both cameras see, in the left one's frame."""
+    ids, left_px, right_px = pair.common()
+    points = triangulate_mm(rig, left_px, right_px)
+    # Rays that were taken for the same mark wrongly may meet behind the cameras, or nowhere.
+    is_ahead = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)
+    return ids[is_ahead], points[is_ahead]

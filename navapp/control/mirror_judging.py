@@ -59,11 +59,12 @@ class MirrorJudge:
         pose = estimate.camera_from_bone
         scene = Scene(self._plan, stage, pose, self._view, False, None, layers)
         points = {name: sample_guides(scene, name) for name in layers}
-        in_left = {name: pose.apply(some) for name, some in points.items() if len(some)}
-        if not in_left:
+        points = {name: some for name, some in points.items() if len(some)}
+        if not points:
             return None
+        in_left = {name: pose.apply(some) for name, some in points.items()}
         other_mm = self._for_other_eye(in_left)
-        bounds_mm = self._bounds_mm(in_left, stage, estimate)
+        bounds_mm = self._bounds_mm(points, stage, estimate)
         off = tuple(name for name, error_mm in other_mm.items() if error_mm > OTHER_EYE_MM)
         # A comparison with what is no number is False.
         inexact = tuple(name for name, mm in bounds_mm.items() if not mm <= stage.tolerance_mm)
@@ -81,17 +82,16 @@ class MirrorJudge:
     def _bounds_mm(
         self, points_mm: Mapping[str, FloatArray], stage: StageSpec, estimate: PoseEstimate
     ) -> dict[str, float]:
-        """For the viewing eye, of each layer's worst point."""
+        """For the viewing eye, of each layer's worst point (N, 3) of the bone."""
         model = self._display.model
         if model.quality is None or model.quality.covariance is None:
             # Nobody knows what the calibration adds.
             return dict.fromkeys(points_mm, np.inf)
-        mesh = self._plan.bones[stage.bone].mesh
-        pose = estimate.camera_from_bone
-        centre_mm = pose.apply(mesh.vertices_mm.mean(axis=0)[None])[0]
+        centre_mm = self._plan.bones[stage.bone].mesh.vertices_mm.mean(axis=0)
         joined = np.concatenate(list(points_mm.values()))
-        covariances = _point_covariances(joined - centre_mm, estimate.covariance)
-        errors_mm = _known(model.predict_error(joined, _EYE_SD_MM, covariances))
+        covariances = estimate.predict_covariances(centre_mm, joined)
+        in_left = estimate.camera_from_bone.apply(joined)
+        errors_mm = _known(model.predict_error(in_left, _EYE_SD_MM, covariances))
         lasts = np.cumsum([len(some) for some in points_mm.values()])
         parts = np.split(errors_mm, lasts[:-1])
         return {name: float(part.max()) for name, part in zip(points_mm, parts, strict=True)}
@@ -110,16 +110,3 @@ class MirrorJudge:
 def _known(errors_mm: FloatArray) -> FloatArray:
     """Where a guide is not seen its error is not known: without bound."""
     return np.where(np.isfinite(errors_mm), errors_mm, np.inf)
-
-
-def _point_covariances(offsets_mm: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(N, 3, 3) of points at offsets (N, 3) from where a twist's covariance (6, 6) is told."""
-    jacobian = np.zeros((len(offsets_mm), 3, 6))
-    jacobian[:, :, :3] = np.eye(3)
-    x, y, z = offsets_mm.T
-    # A turn w moves an offset p by w x p = -[p]x w.
-    jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
-    jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
-    jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
-    spread: FloatArray = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
-    return spread

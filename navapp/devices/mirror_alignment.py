@@ -19,10 +19,10 @@ from navapp.devices.simulated_room import Pace, make_simulated_camera
 from navapp.errors import ConfigurationError
 from navapp.geometry import StereoRig
 from navapp.geometry.transform import FloatArray
+from sim_devices.aligning_eye import AligningEye
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.hand import Hand
-from sim_devices.mirror_eye import MirrorEye
 from sim_devices.mirror_setups import draw_setup
 from sim_devices.rigs import make_default_rig
 from sim_devices.sheet import SheetScene
@@ -46,7 +46,7 @@ class PracticeEye:
 
     def __init__(
         self, board: Board, hand: Hand, camera: SimulatedCamera, display: SimulatedDisplay,
-        clock: Clock, eye: MirrorEye,
+        clock: Clock, eye: AligningEye,
     ) -> None:  # fmt: skip
         self._points_mm, self._hand, self._camera = board.points_mm, hand, camera
         self._display, self._clock, self._eye = display, clock, eye
@@ -154,10 +154,10 @@ def _open_simulated(
     return _open_all(camera, display, pace.clock, rig, hand, practice)
 
 
-def make_practice_eye(seed: int) -> MirrorEye:
+def make_practice_eye(seed: int) -> AligningEye:
     """The eye of the simulated room of that seed, and the mirror that it looks into."""
     setup = draw_setup(np.random.default_rng([seed, 31]))
-    return MirrorEye(setup, seed, _ALIGNMENT_SD_PX)
+    return AligningEye(setup, seed, _ALIGNMENT_SD_PX)
 
 
 def _open_all(

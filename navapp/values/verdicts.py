@@ -165,14 +165,7 @@ class PoseEstimate:
 
         if len(targets_mm) == 0:
             raise ValueError("no targets to predict an error for")
-        offsets = (targets_mm - centre_mm) @ self.camera_from_bone.rotation.T
-        jacobian = np.zeros((len(offsets), 3, 6))
-        jacobian[:, :, :3] = np.eye(3)
-        x, y, z = offsets.T
-        # -[p - c]x, row by row.
-        jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
-        jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
-        jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+        jacobian = self._move_by_twist(centre_mm, targets_mm)
         mean_square = np.einsum("nki,nkj->ij", jacobian, jacobian) / len(jacobian)
         errors = self.covariance @ mean_square
         first, second = float(np.trace(errors)), float(np.trace(errors @ errors))
@@ -180,6 +173,29 @@ class PoseEstimate:
             return 0.0
         freedom = first**2 / second
         return float(np.sqrt(first / freedom * chdtri(freedom, 0.05)))
+
+    def predict_covariances(self, centre_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
+        """(N, 3, 3) mm^2 in the camera's frame, of points (N, 3) of the bone.
+
+        Args:
+            centre_mm: (3,) mean of the model's vertices, in bone coordinates.
+            points_mm: in bone coordinates.
+        """
+        jacobian = self._move_by_twist(centre_mm, points_mm)
+        covariances: FloatArray = jacobian @ self.covariance @ jacobian.transpose(0, 2, 1)
+        return covariances
+
+    def _move_by_twist(self, centre_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
+        """(N, 3, 6) J = [I | -[p - c]x]: how points of the bone move with the pose's twist."""
+        offsets = (points_mm - centre_mm) @ self.camera_from_bone.rotation.T
+        jacobian = np.zeros((len(offsets), 3, 6))
+        jacobian[:, :, :3] = np.eye(3)
+        x, y, z = offsets.T
+        # -[p - c]x, row by row.
+        jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
+        jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
+        jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
+        return jacobian
 
 
 class Status(Enum):

@@ -24,13 +24,13 @@ import numpy as np
 
 from calibration.mirror.display_solution import solve_display
 from calibration.mirror.first_state import Told
+from navapp.devices.simulated_mirror import true_display
 from sim_devices.mirror_setups import PITCH_MM, draw_setup
 from tests.bench.mirror_limits import Limits
 from tests.bench.mirror_pictures import N_VIEWS, by_pictures
 from tests.calibration.mirror.simulated_operators import SimulatedOperator
 from tests.calibration.mirror.simulated_views import drawn_views, scene
 from tests.geometry.test_display_model_errors import seen_beside_mm
-from tests.mirrors import true_display
 
 _FIRST_COMPUTED, _FIRST_OPERATOR = 31000, 310000
 _NOISES_PX = (0.5, 1.0, 2.0)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.control.stages import STAGES
+from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -25,7 +26,6 @@ from tests.bench.mirror_reading import (
     read_crossing,
     read_line,
 )
-from tests.mirrors import true_display
 
 PLANE = "femur_distal"
 # Targets are so far apart as the eye sees them, and face it so well: nearer to the bone's outline

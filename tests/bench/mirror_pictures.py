@@ -13,6 +13,7 @@ from calibration.mirror.display_solution import DisplayCalibration, solve_displa
 from calibration.mirror.first_state import Told
 from calibration.mirror.seen_views import SeenView
 from calibration.mirror.view_detection import find_view
+from navapp.devices.simulated_mirror import true_display
 from navapp.evaluation import compute_mean_tre_mm
 from sim_devices.mirror_optics import MirrorSetup
 from sim_devices.mirror_setups import PITCH_MM, draw_setup, look_at_site
@@ -30,7 +31,6 @@ from tests.bench.mirror_reading import Sight
 from tests.calibration.mirror.simulated_pictures import take_view
 from tests.calibration.mirror.simulated_views import eye_camera, scene
 from tests.geometry.test_display_model_errors import seen_beside_mm
-from tests.mirrors import true_display
 
 N_VIEWS = 8
 _FIRST_SEED = 3100

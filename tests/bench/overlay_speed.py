@@ -19,6 +19,7 @@ from navapp.cli.simulated_patient import make_built_in_plan
 from navapp.config import load
 from navapp.control.stages import STAGES
 from navapp.devices import OpenedDevices, open_live
+from navapp.devices.simulated_mirror import true_display
 from navapp.overlay import (
     LAYERS,
     LeftView,
@@ -31,7 +32,6 @@ from navapp.overlay import (
 from navapp.tracking import Goal, TrackState, make_tracker
 from sim_devices.mirror_setups import draw_setup
 from tests.bench.occlusion_speed import use_threads
-from tests.mirrors import true_display
 
 _LIMITS_MS = {"video": 4.0, "mirror": 8.0}
 _SETUP_SEED = 3100

@@ -13,6 +13,7 @@ from calibration.mirror.seen_views import Scene
 from calibration.targets.boards import keys_of
 from navapp.cli.main import run
 from navapp.cli.mirror_views import read_lens
+from navapp.devices.simulated_mirror import true_display
 from navapp.errors import InputError
 from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.display_model_files import read_display_model, write_display_model
@@ -24,7 +25,6 @@ from tests.calibration.mirror.simulated_pictures import take_view
 from tests.calibration.mirror.simulated_views import BOARD, PATTERN, eye_camera
 from tests.e2e.test_bad_input import refused
 from tests.geometry.test_display_model_errors import seen_beside_mm
-from tests.mirrors import true_display
 
 pytestmark = pytest.mark.xdist_group("mirror views")
 N_VIEWS, SEED = 6, 5

@@ -12,6 +12,7 @@ from navapp.cli.main import _parser, run
 from navapp.cli.mirror_by_keys import make_session
 from navapp.config import parse
 from navapp.devices.mirror_alignment import make_practice_eye, open_mirror_alignment
+from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model_files import read_display_model
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.rig_files import write_rig
@@ -20,7 +21,6 @@ from tests.control.test_truth_stays_out import reachable
 from tests.e2e.test_bad_input import refused
 from tests.geometry.test_display_model_errors import seen_beside_mm
 from tests.many import few_of
-from tests.mirrors import true_display
 
 BOARD = {
     "type": "charuco", "squares_x": 8, "squares_y": 6, "square_mm": 20.0,
@@ -103,7 +103,7 @@ def test_the_session_never_gets_hold_of_the_mirror_or_of_what_an_eye_aims_at(
     finally:
         session.close()
     assert "StereoRig" in found
-    assert not found & {"MirrorSetup", "MirrorEye", "PracticeEye"}
+    assert not found & {"MirrorSetup", "AligningEye", "PracticeEye"}
 
 
 def test_a_screen_needs_a_terminal(board: str, tmp_path: Path, capsys) -> None:

@@ -6,6 +6,7 @@ A short form of `tests.bench.mirror_accuracy`: one set-up, its display not calib
 import numpy as np
 import pytest
 
+from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.transform import RigidTransform
 from sim_devices.mirror_setups import draw_setup, look_at_site
@@ -20,7 +21,6 @@ from tests.bench.mirror_guides import (
 from tests.bench.mirror_knees import FollowedKnee, follow_knee
 from tests.bench.mirror_reading import Sight
 from tests.geometry.test_display_model_errors import seen_beside_mm
-from tests.mirrors import true_display
 
 # A busy machine takes long to render and to read pictures.
 pytestmark = [pytest.mark.release, pytest.mark.timeout(300)]

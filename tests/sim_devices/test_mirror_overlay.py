@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
+from navapp.devices.simulated_mirror import true_display
 from sim_devices.mirror_setups import draw_setup, look_at_site, make_eye_camera
 from sim_devices.mirror_view import MirrorView
 from tests.many import few_of
-from tests.mirrors import true_display
 
 LETTER_MM = 12.0
 

@@ -36,11 +36,11 @@ from navapp.control.mirror_alignment.states import (
     Follow,
     Leave,
     MoveHand,
-    NudgeCross,
     Save,
     TurnArrows,
     Undo,
 )
+from navapp.control.states import NudgeCross
 from navapp.errors import DeviceError
 from navapp.geometry.rig import StereoRig
 

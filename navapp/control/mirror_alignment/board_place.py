@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.rig.lengths import triangulate_mm
+from calibration.rig.corner_locator import locate_marks
 from calibration.targets.boards import Board
 from navapp.control.capture.board_view import BoardView
 from navapp.geometry.rig import StereoRig
@@ -50,10 +50,7 @@ def locate_board(view: BoardView, board: Board, rig: StereoRig) -> BoardPlace | 
     pair = view.to_pair(0)
     if pair is None:
         return None
-    ids, left_px, right_px = pair.common()
-    points = triangulate_mm(rig, left_px, right_px)
-    in_front = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)
-    ids, points = ids[in_front], points[in_front]
+    ids, points = locate_marks(rig, pair)
     if len(ids) < _FEWEST_CORNERS:
         return None
     sigma_px = np.hypot(

@@ -11,7 +11,7 @@ from navapp.control.mirror_alignment.first_crosses import make_rough_model
 from navapp.control.mirror_alignment.guidance import Known
 from navapp.control.mirror_alignment.interfaces import Solve
 from navapp.control.mirror_alignment.kept_crosses import KeptCrosses
-from navapp.control.mirror_alignment.states import Verdict
+from navapp.control.mirror_alignment.states import DisplayVerdict
 from navapp.errors import NavappError
 from navapp.geometry.display_model import DisplayModel
 
@@ -93,12 +93,12 @@ class DisplaySolution:
             self._job = None
 
     @property
-    def verdict(self) -> Verdict | None:
+    def verdict(self) -> DisplayVerdict | None:
         """Of the newest solution."""
         if self.found is None or self.found.model.quality is None:
             return None
         quality, is_used = self.found.model.quality, self.found.is_used
-        return Verdict(
+        return DisplayVerdict(
             float("nan") if quality.error_mm is None else quality.error_mm,
             quality.is_accepted,
             quality.reasons,

@@ -13,6 +13,7 @@ from calibration.mirror.alignments import (
     LEAST_RANGE_MM,
     has_depth,
 )
+from navapp.control.states import NudgeCross
 
 
 class AlignmentPhase(Enum):
@@ -23,14 +24,6 @@ class AlignmentPhase(Enum):
     ALIGNING = auto()  # a cross is lit for a corner
     SOLVING = auto()
     OVER = auto()
-
-
-@dataclass(frozen=True, slots=True)
-class NudgeCross:
-    """Move the cross, in px of the display, right and down as the eye sees it."""
-
-    right_px: int
-    down_px: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +79,7 @@ AlignmentCommand = (
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class DisplayVerdict:
     """What the newest solve says."""
 
     error_mm: float  # predicted 95 % error at the anatomy
@@ -125,7 +118,7 @@ class AlignmentSnapshot:
     n_depths: int  # that they lie at
     range_mm: float  # from the nearest to the farthest
     used: NDArray[np.int64]  # (3, 3) alignments in each ninth of the display, as the eye reads it
-    verdict: Verdict | None  # None before there are enough
+    verdict: DisplayVerdict | None  # None before there are enough
     events: tuple[str, ...]  # newest last
     # fewest, fewest_depths, least_range_mm, limit_mm: what is asked of them.
     fewest: int = FEWEST_ALIGNMENTS

@@ -11,11 +11,11 @@ from navapp.control.mirror_alignment.states import (
     Follow,
     Leave,
     MoveHand,
-    NudgeCross,
     Save,
     TurnArrows,
     Undo,
 )
+from navapp.control.states import NudgeCross
 
 _FINE_PX, _COARSE_PX, _HAND_MM = 1, 10, 20.0
 

@@ -12,10 +12,10 @@ from calibration.mirror.alignments import (
     choose_spread,
     solve_alignments,
 )
+from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model import DisplayModel
 from sim_devices.mirror_optics import MirrorSetup
 from sim_devices.mirror_setups import HEIGHT_PX, PITCH_MM, WIDTH_PX
-from tests.mirrors import true_display
 
 # 95 % of the places of the eye lie within 3 mm of their mean.
 WANDER_SD_MM = 3.0 / 2.7955

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from calibration.mirror.display_check import check_display
+from navapp.devices.simulated_mirror import true_display
 from navapp.errors import ResultError
 from sim_devices.mirror_setups import draw_setup
 from tests.calibration.mirror.simulated_views import drawn_views, scene
-from tests.mirrors import true_display
 
 RNG = np.random.default_rng(41)
 SETUP = draw_setup(RNG)

@@ -9,6 +9,7 @@ from calibration.mirror.display_acceptance import DisplayLimits, Found, judge
 from calibration.mirror.display_solution import DisplayCalibration, solve_display
 from calibration.mirror.first_state import Told
 from calibration.mirror.seen_views import SeenView
+from navapp.devices.simulated_mirror import true_display
 from navapp.errors import ResultError
 from navapp.geometry.display_model import DisplayModel
 from sim_devices.mirror_optics import MirrorSetup
@@ -16,7 +17,6 @@ from sim_devices.mirror_setups import PITCH_MM, draw_setup
 from tests.calibration.mirror.simulated_views import drawn_views, scene
 from tests.geometry.test_display_model_errors import seen_beside_mm
 from tests.many import few_of
-from tests.mirrors import true_display
 
 TOLD = Told(PITCH_MM * 1.001, 2.5)
 

@@ -11,15 +11,16 @@ from navapp.control.capture.board_view import BoardView
 from navapp.control.executors import InlineExecutor
 from navapp.control.mirror_alignment.alignment import MirrorAlignment
 from navapp.control.mirror_alignment.interfaces import AlignmentSettings
-from navapp.control.mirror_alignment.states import AlignmentSnapshot, Confirm, NudgeCross
+from navapp.control.mirror_alignment.states import AlignmentSnapshot, Confirm
+from navapp.control.states import NudgeCross
+from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model import DisplayQuality
 from navapp.geometry.transform import RigidTransform
+from sim_devices.aligning_eye import AligningEye
 from sim_devices.display import SimulatedDisplay
-from sim_devices.mirror_eye import MirrorEye
 from sim_devices.mirror_setups import HEIGHT_PX, PITCH_MM, WIDTH_PX, draw_setup
 from sim_devices.rigs import make_default_rig
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, seen_pair
-from tests.mirrors import true_display
 
 PERIOD_NS = 200_000_000
 MIDDLE_MM = BOARD.points_mm.mean(axis=0)
@@ -32,7 +33,7 @@ class MirrorRoom:
         self.rng = np.random.default_rng(seed)
         self.rig, self.noise_px, self.clock = make_default_rig(), noise_px, ManualClock()
         self.setup = draw_setup(self.rng)
-        self.eye, self.true = MirrorEye(self.setup, seed, 0.5), true_display(self.setup)
+        self.eye, self.true = AligningEye(self.setup, seed, 0.5), true_display(self.setup)
         self.display = SimulatedDisplay(self.clock, WIDTH_PX, HEIGHT_PX)
         self.display.open()
         place = np.array([0.0, 0.0, 450.0]) - MIDDLE_MM

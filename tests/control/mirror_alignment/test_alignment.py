@@ -10,11 +10,11 @@ from navapp.control.mirror_alignment.states import (
     Follow,
     Leave,
     MoveHand,
-    NudgeCross,
     Save,
     TurnArrows,
     Undo,
 )
+from navapp.control.states import NudgeCross
 from navapp.errors import DeviceLost
 from tests.calibration.marks import BOARD
 from tests.control.mirror_alignment.rooms import (

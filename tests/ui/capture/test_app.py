@@ -1,6 +1,5 @@
 """The capture's screen on fixed snapshots: words, keys, both sizes."""
 
-import asyncio
 import dataclasses
 
 import numpy as np
@@ -23,6 +22,7 @@ from navapp.control.states import Progress
 from navapp.ui.capture.app import CaptureApp
 from navapp.ui.capture.panels import CaptureView, CoverageMap, InstructionLines
 from navapp.ui.symbols import ASCII, UNICODE
+from tests.ui.guided import play_on
 
 
 def picture(level: int) -> np.ndarray:
@@ -58,46 +58,8 @@ SEEKING = CaptureSnapshot(
 change = dataclasses.replace
 
 
-class Session:
-    """Answers with one snapshot, remembers what it was told."""
-
-    def __init__(self, snapshot: CaptureSnapshot) -> None:
-        self.current, self.commands, self.is_over = snapshot, [], False
-
-    def snapshot(self) -> CaptureSnapshot:
-        return self.current
-
-    def submit(self, command) -> None:
-        self.commands.append(command)
-
-
-class BellCounter(CaptureApp):
-    n_bells = 0
-
-    def bell(self) -> None:
-        self.n_bells += 1
-
-
 def play(snapshot, *keys, size=(80, 24), symbols=UNICODE, then=None):
-    session = Session(snapshot)
-    app = BellCounter(session, symbols=symbols, polls_per_s=0)
-    told = {}
-
-    async def run() -> None:
-        async with app.run_test(size=size) as pilot:
-            await pilot.press(*keys)
-            app.poll()
-            if then is not None:
-                then(app, session)
-            await pilot.pause()
-            width, height = size
-            lines = [strip.text for strip in app.screen._compositor.render_strips()]
-            told["lines"] = lines
-            assert len(lines) == height
-            assert all(len(line) == width for line in lines)
-
-    asyncio.run(run())
-    return session, app, "\n".join(told["lines"])
+    return play_on(CaptureApp, snapshot, *keys, size=size, symbols=symbols, then=then)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])

@@ -1,6 +1,5 @@
 """The alignment's screen on fixed snapshots: words, keys, both sizes."""
 
-import asyncio
 import dataclasses
 
 import numpy as np
@@ -11,17 +10,18 @@ from navapp.control.mirror_alignment.states import (
     AlignmentSnapshot,
     Another,
     Confirm,
+    DisplayVerdict,
     Follow,
     Leave,
     MoveHand,
-    NudgeCross,
     Save,
     TurnArrows,
     Undo,
-    Verdict,
 )
+from navapp.control.states import NudgeCross
 from navapp.ui.mirror_alignment.app import AlignmentApp
 from navapp.ui.symbols import ASCII, UNICODE
+from tests.ui.guided import play_on
 
 
 def picture(level: int) -> np.ndarray:
@@ -56,54 +56,16 @@ ALIGNING = AlignmentSnapshot(
     events=tuple(f"alignment {k} is kept: row 1, column {k}" for k in range(1, 8)),
 )
 change = dataclasses.replace
-REFUSED = Verdict(0.72, False, ("the error is 0.72 mm, 0.60 mm are allowed",), 12, (3,), 1.2)
+REFUSED = DisplayVerdict(0.72, False, ("the error is 0.72 mm, 0.60 mm are allowed",), 12, (3,), 1.2)
 ENOUGH = change(
     ALIGNING, n_kept=13, n_depths=4, range_mm=88.0,
-    verdict=Verdict(0.52, True, (), 13, (), 0.8),
+    verdict=DisplayVerdict(0.52, True, (), 13, (), 0.8),
     instruction="this is enough: s saves; or move the cross onto row 3, column 4, then ENTER",
 )  # fmt: skip
 
 
-class Session:
-    """Answers with one snapshot, remembers what it was told."""
-
-    def __init__(self, snapshot: AlignmentSnapshot) -> None:
-        self.current, self.commands, self.is_over = snapshot, [], False
-
-    def snapshot(self) -> AlignmentSnapshot:
-        return self.current
-
-    def submit(self, command) -> None:
-        self.commands.append(command)
-
-
-class BellCounter(AlignmentApp):
-    n_bells = 0
-
-    def bell(self) -> None:
-        self.n_bells += 1
-
-
 def play(snapshot, *keys, size=(80, 24), symbols=UNICODE, then=None):
-    session = Session(snapshot)
-    app = BellCounter(session, symbols=symbols, polls_per_s=0)
-    told = {}
-
-    async def run() -> None:
-        async with app.run_test(size=size) as pilot:
-            await pilot.press(*keys)
-            app.poll()
-            if then is not None:
-                then(app, session)
-            await pilot.pause()
-            width, height = size
-            lines = [strip.text for strip in app.screen._compositor.render_strips()]
-            told["lines"] = lines
-            assert len(lines) == height
-            assert all(len(line) == width for line in lines)
-
-    asyncio.run(run())
-    return session, app, "\n".join(told["lines"])
+    return play_on(AlignmentApp, snapshot, *keys, size=size, symbols=symbols, then=then)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (160, 48)])

@@ -21,7 +21,7 @@ _SITE_LX, _WHITE_CD_M2 = 400.0, 110.0
 _LIT = 40
 
 
-class MirrorEye:
+class AligningEye:
     """Looks into the mirror from about one place, from another one at every look.
 
     Args:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.transform import RigidTransform
-from sim_devices.mirror_eye import WANDER_SD_MM, MirrorEye
+from sim_devices.aligning_eye import WANDER_SD_MM, AligningEye
 from sim_devices.mirror_setups import HEIGHT_PX, WIDTH_PX, draw_setup
 from sim_devices.sheet import PrintedSheet
 from tests.many import few_of
-from tests.mirrors import true_display
 
 SHEET = PrintedSheet(np.full((40, 40), 255, np.uint8), 1.0, -20.0, -20.0)
 GREEN = slice(1, 2)
@@ -40,7 +40,7 @@ def test_the_display_is_read_as_its_model_says(seed: int) -> None:
 def test_it_aims_as_well_as_it_can_and_wanders() -> None:
     setup = draw_setup(np.random.default_rng(3))
     true = true_display(setup)
-    eye, point = MirrorEye(setup, 5, 0.7), setup.site_mm + np.array([20.0, -15.0, -60.0])
+    eye, point = AligningEye(setup, 5, 0.7), setup.site_mm + np.array([20.0, -15.0, -60.0])
     aims = np.array([eye.aim_px(point, look) for look in range(300)])
     drawn = true.project(point[None])[0]
     assert np.abs(aims.mean(axis=0) - drawn).max() < 0.5
@@ -56,7 +56,7 @@ def test_it_aims_as_well_as_it_can_and_wanders() -> None:
 
 def test_light_that_is_aimed_lies_on_the_point_in_the_eyes_picture() -> None:
     setup = draw_setup(np.random.default_rng(3))
-    eye, point = MirrorEye(setup, 5, 0.0), setup.site_mm
+    eye, point = AligningEye(setup, 5, 0.0), setup.site_mm
     away = RigidTransform.from_parts(
         "left", "sheet", np.eye(3), setup.site_mm + np.array([5e3, 0, 0])
     )
@@ -69,7 +69,7 @@ def test_light_that_is_aimed_lies_on_the_point_in_the_eyes_picture() -> None:
 
 def test_from_afar_both_are_ringed() -> None:
     setup = draw_setup(np.random.default_rng(3))
-    eye = MirrorEye(setup, 5, 0.0)
+    eye = AligningEye(setup, 5, 0.0)
     board = RigidTransform.from_parts("left", "sheet", np.eye(3), setup.site_mm)
     aim = eye.aim_px(setup.site_mm, 0)
     far = eye.see(lit_at(aim + np.array([60.0, 0.0])), SHEET, board, setup.site_mm, 0)
