@@ -8,7 +8,6 @@
 """
 
 import threading
-import time
 from collections import deque
 from dataclasses import replace
 
@@ -27,25 +26,26 @@ from navapp.control.display_link import DisplayLink
 from navapp.control.event_log import EventLog, SessionHooks
 from navapp.control.executors import Executor, InlineExecutor
 from navapp.control.eye_preview import EyePreview
+from navapp.control.frame_presenter import FramePresenter
 from navapp.control.frame_result import FrameResult
 from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import OtherBones
-from navapp.control.pictures import Composer, Image
+from navapp.control.pictures import Composer
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.snapshot_maker import SnapshotMaker
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Blank, Command, EventLevel, SessionState, Snapshot
+from navapp.control.states import Blank, Command, Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import Rectifier
-from navapp.overlay import DepthMarks, make_preview
+from navapp.overlay import DepthMarks
 from navapp.tracking import make_tracker
-from navapp.values import Foreground, FrameTimings, OverlayMode, OverlayPicture, Reason
+from navapp.values import FrameTimings
 
 
 class SessionController:
@@ -81,14 +81,11 @@ class SessionController:
         """
         hooks = hooks or SessionHooks()
         rig, plan = specification.rig, specification.plan
-        self._overlay_valid_ms = min(specification.overlay_valid_ms, MAX_POSE_AGE_MS)
-        self._is_late = False
         self._devices = devices
         self._mirror_checking = MirrorChecking(
             specification.display, Rectifier(rig).geometry, locate_corners
         )
-        self._composer = Composer(rig, plan, self._mirror_checking.view)
-        self._depth_marks = DepthMarks(rig)
+        composer = Composer(rig, plan, self._mirror_checking.view)
         self._eye = eye or EyePreview(None, InlineExecutor())
         self._executor = executor
         self._camera = CameraLink(devices.camera, devices.clock, hooks.reopen_camera)
@@ -98,6 +95,10 @@ class SessionController:
         self._lock = threading.Lock()
         self._session = _make_session(devices.clock, specification, hooks, executor, make_tracker)
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
+        self._presenter = FramePresenter(
+            self._session, self._display, composer, self._mirror_checking, self._eye,
+            DepthMarks(rig), min(specification.overlay_valid_ms, MAX_POSE_AGE_MS),
+        )  # fmt: skip
         self._monitored = MonitoredDevices(
             ProjectorHandler(devices.projector, specification.display_model),
             MirrorHandler(devices.mirror, specification.calibrated_mirror_deg),
@@ -108,7 +109,7 @@ class SessionController:
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
-            _make_mirror_judge(specification, self._composer), self._eye, specification,
+            _make_mirror_judge(specification, composer), self._eye, specification,
             self._rig_watch,
         )  # fmt: skip
         self._snapshot = self._maker.make()
@@ -158,10 +159,8 @@ class SessionController:
         before, self._snapshot = self._snapshot, self._make_snapshot()
         if self._snapshot.device_reasons:
             self._display.darken()
-        elif not (self._snapshot.is_navigable or self._snapshot.is_candidate):
-            is_same_cross = self._snapshot.cross_check == before.cross_check is not None
-            if not is_same_cross and self._display.withdraw_guides():
-                self._tell_withdrawn()
+        else:
+            self._presenter.withdraw(before, self._snapshot)
         tell_changes(session, before, self._snapshot)
         return self._snapshot
 
@@ -188,29 +187,6 @@ class SessionController:
         self._mirror_checking.check_session(snapshot)
         return self._maker.make()
 
-    def _tell_withdrawn(self) -> None:
-        """Guides went out between two frames; what commands do is told by the commands."""
-        reasons = self._snapshot.reasons
-        # What came too late was never seen.
-        if (
-            not self._is_late
-            and reasons
-            and reasons[0] in (Reason.POSE_TOO_OLD, Reason.CAMERA_SILENT)
-        ):
-            text = f"guides withdrawn: {reasons[0].value}"
-            self._session.add_event("display", text, EventLevel.WARNING)
-
-    def _tell_late(self, age_ms: float, has_guides: bool) -> None:
-        """A picture that was too old when it was ready is not shown: told once, until one is."""
-        is_late = has_guides and age_ms >= self._overlay_valid_ms
-        if is_late and not self._is_late:
-            text = f"the display stays dark: the picture was {age_ms:.0f} ms old when it was ready"
-            text += f", {self._overlay_valid_ms:.0f} ms are allowed"
-            self._session.add_event("display", text, EventLevel.WARNING)
-        elif self._is_late and has_guides and not is_late:
-            self._session.add_event("display", "pictures are ready in time again")
-        self._is_late = is_late if has_guides else self._is_late
-
     def _next_frame(self, timeout_s: float) -> StereoFrame | None:
         session = self._session
         if self._camera.is_down:
@@ -235,7 +211,7 @@ class SessionController:
         session.look_for_bone(frame)
         self._rig_watch.check_frame(frame)
         snapshot = self._make_snapshot()
-        picture, overlay_ms = self._show(frame, snapshot)
+        picture, overlay_ms = self._presenter.show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
         timings = FrameTimings() if session.tracked is None else session.tracked.timings
@@ -252,66 +228,6 @@ class SessionController:
         # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped
         session.end_frame(result, None if is_stepped else picture.pose_age_ns / 1e6)
-
-    def _show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
-        """Compose, show until it expires, keep a preview; also how long composing took."""
-        started_ns = time.perf_counter_ns()
-        mark = "SIMULATED" if snapshot.is_simulated else ""
-        tracked = self._session.tracked
-        foreground = None if tracked is None else tracked.foreground
-        pose = snapshot.left_from_bone
-        point_mm = None if pose is None else self._mirror_checking.point_mm(pose)
-        video = self._composer.compose_video(frame.left, snapshot, mark, foreground, point_mm)
-        image = video
-        if self._composer.mode is OverlayMode.MIRROR:
-            image = self._compose_mirror(snapshot, foreground)
-        overlay_ms = (time.perf_counter_ns() - started_ns) / 1e6
-        valid_until_ns = frame.captured_ns + round(self._overlay_valid_ms * 1e6)
-        has_guides = snapshot.is_navigable or snapshot.is_candidate
-        is_scaled = self._composer.mode is OverlayMode.VIDEO
-        is_checked = snapshot.reasons == (snapshot.mirror_reason,)
-        has_cross = is_checked and snapshot.cross_check is not None
-        # The screen shows the live picture in a fault as well, the display shows nothing; nor does
-        # it when what would be seen on it is not what is shown.
-        is_shown = snapshot.state is not SessionState.FAULT and not snapshot.device_reasons
-        is_lit = is_shown and bool(snapshot.is_navigable if snapshot.has_mirror else has_guides)
-        is_lit = is_lit or (is_shown and has_cross)
-        if is_shown and self._display.show(
-            image, valid_until_ns, has_guides=is_lit, is_scaled=is_scaled
-        ):
-            self._session.add_event("device", self._display.trouble, EventLevel.ALARM)
-        # A picture that has expired on its way is not shown by any display.
-        age_ns = self._session.now_ns - frame.captured_ns
-        is_seen = not (self._display.is_blanked or self._display.trouble)
-        if is_shown and has_cross and is_seen and age_ns / 1e6 < self._overlay_valid_ms:
-            self._mirror_checking.note_shown()
-        self._keep_preview(frame, video, snapshot, foreground)
-        self._tell_late(age_ns / 1e6, is_lit)
-        return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
-
-    def _keep_preview(
-        self, frame: StereoFrame, video: Image, snapshot: Snapshot, foreground: Foreground | None
-    ) -> None:
-        """The operator's picture; a candidate is judged over the video, whatever is switched on."""
-        session, seen = self._session, None
-        if not snapshot.is_candidate:
-            seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
-        if seen is not None:
-            session.keep_preview(*seen, is_of_eye=True)
-            return
-        has_guides = snapshot.is_navigable or snapshot.is_candidate
-        preview = make_preview(video)
-        if session.shows_depth:
-            preview = self._depth_marks.draw(preview, foreground)
-        session.keep_preview(preview, make_preview(frame.left) if has_guides else None)
-
-    def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
-        """Guides where the bone will be when their light is seen."""
-        if snapshot.is_navigable:
-            snapshot = replace(snapshot, left_from_bone=snapshot.pose_at_light)
-        pose = snapshot.left_from_bone
-        cross_px = None if pose is None else self._mirror_checking.cross_px(pose)
-        return self._composer.compose_mirror(snapshot, foreground, cross_px)
 
 
 def _make_mirror_judge(
