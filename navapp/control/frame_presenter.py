@@ -7,7 +7,7 @@ from drivers.frames import StereoFrame
 from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
 from navapp.control.mirror_checking import MirrorChecking
-from navapp.control.pictures import Composer, Image
+from navapp.control.pictures import Composer, Image, OperatorPicture
 from navapp.control.session import Session
 from navapp.control.states import EventLevel, SessionState, Snapshot
 from navapp.overlay import DepthMarks, make_preview
@@ -94,13 +94,14 @@ class FramePresenter:
         if not snapshot.is_candidate:
             seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
         if seen is not None:
-            session.keep_preview(*seen, is_of_eye=True)
+            session.keep_picture(OperatorPicture(*seen, is_of_eye=True))
             return
         has_guides = snapshot.is_navigable or snapshot.is_candidate
         preview = make_preview(video)
         if session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
-        session.keep_preview(preview, make_preview(frame.left) if has_guides else None)
+        plain = make_preview(frame.left) if has_guides else None
+        session.keep_picture(OperatorPicture(preview, plain))
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
         """Guides where the bone will be when their light is seen."""

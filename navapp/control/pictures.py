@@ -1,6 +1,6 @@
 """The pictures for the screen and for the display, from what the session knows."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,15 @@ from navapp.overlay import LeftView, MirrorView, Scene, Viewpoint, compose_mirro
 from navapp.values import Foreground, OverlayMode, Plan, Reason, Status
 
 Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OperatorPicture:
+    """The small picture for the operator's screen: of the left camera, or of a simulated eye."""
+
+    drawn: Image  # (h, w, 3) uint8 BGR, with what was drawn over it
+    plain: Image | None = None  # the same without guides; None when it has none
+    is_of_eye: bool = False  # what an eye sees in a simulated mirror
 
 
 class Composer:

@@ -6,7 +6,7 @@ from navapp.control.bone_tracks import BoneTracks, Candidate
 from navapp.control.event_log import EventLog
 from navapp.control.frame_result import FrameResult
 from navapp.control.other_bones import OtherBones
-from navapp.control.pictures import Image
+from navapp.control.pictures import OperatorPicture
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.states import (
@@ -60,9 +60,7 @@ class Session:
         self._only_layers = layers
         self._switched_layers: frozenset[str] = frozenset()
         self._tracked_at_ns = 0
-        self._preview: Image | None = None
-        self._plain_preview: Image | None = None
-        self._shows_eye = False
+        self._picture: OperatorPicture | None = None
         self._meter = meter or RateMeter()
         self._is_over = False
         self._rig_error: RigError | None = None
@@ -105,14 +103,9 @@ class Session:
         return self._log.sequence
 
     @property
-    def preview(self) -> Image | None:
-        """Of the newest picture, None before the first."""
-        return self._preview
-
-    @property
-    def plain_preview(self) -> Image | None:
-        """The same without guides; None when it has none."""
-        return self._plain_preview
+    def picture(self) -> OperatorPicture | None:
+        """Of the newest frame, None before the first."""
+        return self._picture
 
     @property
     def is_over(self) -> bool:
@@ -200,18 +193,9 @@ class Session:
         self._switched_layers ^= {name}
         self.add_event("layer", f"layer {name} {'on' if name in self.layers else 'off'}")
 
-    def keep_preview(self, preview: Image, plain: Image | None, *, is_of_eye: bool = False) -> None:
-        """The newest picture, made small; when guides are drawn in it, also without them.
-
-        It is of the left camera, or of an eye that looks into a simulated mirror.
-        """
-        self._preview, self._plain_preview = preview, plain
-        self._shows_eye = is_of_eye
-
-    @property
-    def shows_eye(self) -> bool:
-        """The newest picture is what an eye sees in a simulated mirror."""
-        return self._shows_eye
+    def keep_picture(self, picture: OperatorPicture) -> None:
+        """What the newest frame shows the operator."""
+        self._picture = picture
 
     def end_frame(self, result: FrameResult, latency_ms: float | None) -> None:
         """Count a frame that was handled, and tell its result; latency as of `RateMeter`."""

@@ -40,7 +40,8 @@ class SnapshotMaker:
         """As of now."""
         session = self.session
         now_ns = session.now_ns
-        tracked = session.tracked
+        tracked, picture = session.tracked, session.picture
+        shows_eye = picture is not None and picture.is_of_eye
         # A candidate that was not followed into a frame yet is not on the screen.
         is_candidate = session.state is SessionState.REVIEW and tracked is not None
         reports = self.monitored.reports
@@ -60,11 +61,11 @@ class SnapshotMaker:
             others=session.other_bones(now_ns),
             valid_ms=self.specification.overlay_valid_ms,
             pose_at_light=self._predict_pose(now_ns),
-            preview=session.preview,
-            plain_preview=session.plain_preview,
-            shows_depth=session.shows_depth and not session.shows_eye,
+            preview=None if picture is None else picture.drawn,
+            plain_preview=None if picture is None else picture.plain,
+            shows_depth=session.shows_depth and not shows_eye,
             has_eye=self.eye.is_possible,
-            shows_eye=session.shows_eye,
+            shows_eye=shows_eye,
             layers=session.layers,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
