@@ -78,13 +78,10 @@ class Drawing:
 
     def cross(self, point_mm: FloatArray, axes: FloatArray, half_mm: float, colour: Colour) -> None:
         """Ask for a cross on a point (3,) along two axes (2, 3): whole, dashed or left out."""
-        arms = [
-            np.stack([point_mm, point_mm + sign * half_mm * axis])
-            for axis in axes
-            for sign in (1.0, -1.0)
-        ]
-        parts = [part for arm in arms for part in (arm, _BETWEEN)]
-        self.strokes.append(Stroke(np.concatenate(parts), colour, _CROSS_PX, True))
+        arms = np.full((4, 3, 3), np.nan)  # of each: from, to, a gap
+        arms[:, 0] = point_mm
+        arms[:, 1] = point_mm + half_mm * np.concatenate([axes, -axes])
+        self.strokes.append(Stroke(arms.reshape(-1, 3), colour, _CROSS_PX, True))
 
     def label(self, text: str, points_mm: FloatArray, colour: Colour) -> None:
         """Ask for words beside a point (3,), or beside one of several (N, 3)."""

@@ -182,9 +182,9 @@ class Scene:
             return weight, self.bone_mm, is_hidden
         nearest_mm = np.empty_like(weight)
         find_weights(
-            self.bone_mm, self.seen.depth_mm, self.seen.is_guess, self.seen.in_front, TISSUE_MM,
-            self._aside_mm, BENEATH_WEIGHT, self.guess_weight, weight, nearest_mm,
-            is_hidden,
+            self.bone_mm, self.seen.depth_mm, self.seen.is_guess,
+            (self.box.x % 2, self.box.y % 2), self.seen.in_front, TISSUE_MM, self._aside_mm,
+            BENEATH_WEIGHT, self.guess_weight, weight, nearest_mm, is_hidden,
         )  # fmt: skip
         return weight, nearest_mm, is_hidden
 

@@ -6,12 +6,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+# Of `values.Origin`, as a number for compiled code.
+_MATCHED = 1
+
 
 class Measured(NamedTuple):
     """A map in the rectified left view, over its pixels or over squares of them."""
 
     disparity: NDArray[np.float32]  # (h, w) px of the map's own pixels, NaN where unknown
-    is_matched: NDArray[np.bool_]  # (h, w); others are guesses, or unknown
+    origin: NDArray[np.uint8]  # (h, w) of `Origin`: what is not matched is a guess, or unknown
     # x, y: column and row of the map's first pixel, counted in its own pixels.
     x: int
     y: int
@@ -23,6 +26,7 @@ def look_up_depth(
     columns: NDArray[np.int16],
     rows: NDArray[np.int16],
     depth_share: NDArray[np.float32],
+    first: tuple[int, int],
     focal_baseline: float,
     around: Measured,
     finer: Measured,
@@ -35,9 +39,10 @@ def look_up_depth(
     """What was measured at pixels of the rectified view.
 
     Args:
-        columns: (h, w) nearest one of the rectified view, for each pixel of the picture's box.
-        rows: (h, w) nearest one.
-        depth_share: (h, w) depth in the picture's camera over rectified depth.
+        columns: (H', W') nearest one of the rectified view, for each pixel of the picture.
+        rows: (H', W') nearest one.
+        depth_share: (H', W') depth in the picture's camera over rectified depth.
+        first: column and row of the first pixel that is asked for.
         focal_baseline: px mm of the rectified pair.
         around: what lies around the bone.
         finer: what holds instead where it is matched.
@@ -47,10 +52,12 @@ def look_up_depth(
         is_guess: (h, w) in place, 1 where nothing is matched.
         in_front: (h, w) in place, 255 where it is marked.
     """
-    for j in range(columns.shape[0]):
-        for i in range(columns.shape[1]):
+    scale = np.float32(focal_baseline)
+    for j in range(depth_mm.shape[0]):
+        for i in range(depth_mm.shape[1]):
             depth_mm[j, i], is_guess[j, i], in_front[j, i] = np.nan, 1, 0
-            u, v = int(columns[j, i]), int(rows[j, i])
+            at = j + first[1], i + first[0]
+            u, v = int(columns[at]), int(rows[at])
             x, y = u - corner[0], v - corner[1]
             # Beside the marks nothing is known.
             if x < 0 or y < 0 or x >= is_in_front.shape[1] or y >= is_in_front.shape[0]:
@@ -63,7 +70,7 @@ def look_up_depth(
             if is_matched:
                 is_guess[j, i] = 0
             if disparity > 0.0:
-                depth_mm[j, i] = np.float32(focal_baseline / disparity * depth_share[j, i])
+                depth_mm[j, i] = scale / disparity * depth_share[at]
 
 
 @njit(cache=True, nogil=True)
@@ -72,4 +79,5 @@ def look_up(u: int, v: int, given: Measured) -> tuple[np.float32, bool]:
     x, y = (u >> given.halvings) - given.x, (v >> given.halvings) - given.y
     if x < 0 or y < 0 or x >= given.disparity.shape[1] or y >= given.disparity.shape[0]:
         return np.float32(np.nan), False
-    return np.float32(1 << given.halvings) * given.disparity[y, x], given.is_matched[y, x]
+    is_matched = given.origin[y, x] == _MATCHED
+    return np.float32(1 << given.halvings) * given.disparity[y, x], is_matched

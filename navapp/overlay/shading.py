@@ -14,7 +14,7 @@ from navapp.overlay.viewpoints import FloatMap
 Image = NDArray[np.uint8]
 
 # The outline lies on both sides of a mask's edge, which is made smooth over so much.
-_OUTLINE_SIGMA_PX, _OUTLINE_MARGIN_PX = 0.9, 4
+_OUTLINE_SIGMA_PX, _OUTLINE_WINDOW_PX, _OUTLINE_MARGIN_PX = 0.9, 5, 4
 # Where an outline is beneath something, stripes of this width are left out.
 _STRIPE_PX = 6
 
@@ -63,8 +63,10 @@ def draw_outline(
 
     box = outline_box(view, scene)
     mask = np.zeros((box.height, box.width), dtype=np.uint8)
-    mask[view.box.relative_to(box).slices][view.mask] = 255
-    soft = np.asarray(cv2.GaussianBlur(mask, (0, 0), _OUTLINE_SIGMA_PX), dtype=np.uint8)
+    inner = mask[view.box.relative_to(box).slices]
+    np.multiply(view.mask.view(np.uint8), np.uint8(255), out=inner)
+    window = _OUTLINE_WINDOW_PX, _OUTLINE_WINDOW_PX
+    soft = np.asarray(cv2.GaussianBlur(mask, window, _OUTLINE_SIGMA_PX), dtype=np.uint8)
     blend_outline(
         image[box.slices], soft, weight, (box.x, box.y), _STRIPE_PX, BENEATH_WEIGHT, colour
     )

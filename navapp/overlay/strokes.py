@@ -17,11 +17,35 @@ Image = NDArray[np.uint8]
 
 # Straight lines bend by lens and perspective: they are drawn in pieces as short as this.
 _STEP_MM = 8.0
+# Points of a curve are left out where it stays so straight: each costs a round end.
+_STRAIGHT_MM = 0.05
 # A rim in black keeps a line visible on bone and on blood.
 _RIM_PX = 1.0
 # Room for this share of a picture's pixels, each counted as often as it is drawn; more is made when
 # that is not enough.
 _MOSTLY_DRAWN = 0.25
+
+
+def thin_line(points_mm: FloatArray, straight_mm: float = _STRAIGHT_MM) -> FloatArray:
+    """(M, 3) of the points of a polyline (N, 3), with straight lines between them as near to all.
+
+    Source: Douglas and Peucker 1973.
+    """
+    is_kept = np.zeros(len(points_mm), dtype=np.bool_)
+    is_kept[[0, -1]] = True
+    parts = [(0, len(points_mm) - 1)]
+    while parts:
+        first, last = parts.pop()
+        start, along = points_mm[first], points_mm[last] - points_mm[first]
+        off = points_mm[first + 1 : last] - start
+        share = off @ along / max(float(along @ along), 1e-12)
+        off_mm = np.linalg.norm(off - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1)
+        if len(off_mm) and off_mm.max() > straight_mm:
+            middle = first + 1 + int(off_mm.argmax())
+            is_kept[middle] = True
+            parts += [(first, middle), (middle, last)]
+    thinned: FloatArray = points_mm[is_kept]
+    return thinned
 
 
 def sample_line(points_mm: FloatArray, step_mm: float = _STEP_MM) -> FloatArray:

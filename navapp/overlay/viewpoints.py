@@ -10,13 +10,13 @@ from navapp.geometry.bands import run_both
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.display_model_view import EyeView
-from navapp.geometry.halves import double, half_box, inside_of_halves
+from navapp.geometry.halves import half_box, inside_of_halves
 from navapp.geometry.rectification import RectifiedGeometry, Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.see_kernels import Measured, look_up_depth
 from navapp.overlay.splat_kernels import IN_FRONT, KNOWN, splat_points
-from navapp.values import Foreground, Origin
+from navapp.values import Foreground
 
 FloatMap = NDArray[np.float32]
 
@@ -32,11 +32,14 @@ _WORTH_TWO = 1000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenDepth:
-    """What the stereo camera has measured of the scene, in a box of a picture."""
+    """What the stereo camera has measured of the scene, in a box of a picture.
+
+    Depth and guesses are known of every second pixel each way, over `half_box(box)`.
+    """
 
     box: Box
-    depth_mm: FloatMap  # (h, w) along the picture's axis, NaN where unknown
-    is_guess: NDArray[np.uint8]  # (h, w) 1: unknown, or filled: nothing was matched there
+    depth_mm: FloatMap  # (h', w') along the picture's axis, NaN where unknown
+    is_guess: NDArray[np.uint8]  # (h', w') 1: unknown, or filled: nothing was matched there
     # (h, w) 0 to 255: how much of a pixel stands in front of the bone; smooth at its edge.
     in_front: NDArray[np.uint8]
 
@@ -99,12 +102,12 @@ class LeftView:
         depth_mm = np.empty(shape, dtype=np.float32)
         is_guess, in_front = np.empty((2, *shape), dtype=np.uint8)
         look_up_depth(
-            self._columns[half.slices], self._rows[half.slices], self._depth_share[half.slices],
+            self._columns, self._rows, self._depth_share, (half.x, half.y),
             self._geometry.focal_px * self._geometry.baseline_mm, *_maps_of(foreground),
             foreground.is_in_front, (foreground.box.x, foreground.box.y), depth_mm, is_guess,
             in_front,
         )  # fmt: skip
-        return _double_depth(box, depth_mm, is_guess, in_front)
+        return _smooth(box, depth_mm, is_guess, in_front)
 
 
 def _maps_of(foreground: Foreground) -> tuple[Measured, Measured]:
@@ -112,21 +115,15 @@ def _maps_of(foreground: Foreground) -> tuple[Measured, Measured]:
     around, finer = foreground.surroundings, foreground.measured
     box = half_box(around.box) if around.is_half else around.box
     return (
-        Measured(
-            around.disparity_px, around.origin == Origin.MATCHED, box.x, box.y,
-            int(around.is_half),
-        ),
-        Measured(finer.disparity_px, finer.origin == Origin.MATCHED, finer.x, finer.y, 0),
-    )  # fmt: skip
+        Measured(around.disparity_px, around.origin, box.x, box.y, int(around.is_half)),
+        Measured(finer.disparity_px, finer.origin, finer.x, finer.y, 0),
+    )
 
 
-def _double_depth(
+def _smooth(
     box: Box, depth_mm: FloatMap, is_guess: NDArray[np.uint8], in_front: NDArray[np.uint8]
 ) -> SeenDepth:
-    """From what is known of every second pixel each way, over `half_box(box)`.
-
-    Guesses lose their specks and narrow parts, and marks of 0 and 255 get a smooth edge.
-    """
+    """Guesses without specks and narrow parts; marks of 0 and 255 doubled, with a smooth edge."""
     import cv2
 
     square = np.ones((_NARROW_PX // 2 + 1, _NARROW_PX // 2 + 1), np.uint8)
@@ -134,8 +131,8 @@ def _double_depth(
     blurred = cv2.GaussianBlur(in_front, (0, 0), 0.5 * _EDGE_SIGMA_PX)
     height, width = in_front.shape
     soft = cv2.resize(blurred, (2 * width, 2 * height), interpolation=cv2.INTER_LINEAR)
-    smooth = np.asarray(soft[inside_of_halves(box)], dtype=np.uint8)
-    return SeenDepth(box, double(depth_mm, box), double(is_gap, box), smooth)
+    smooth = np.ascontiguousarray(soft[inside_of_halves(box)], dtype=np.uint8)
+    return SeenDepth(box, depth_mm, is_gap, smooth)
 
 
 def _rectified_places(
@@ -216,7 +213,7 @@ class MirrorView:
         )
         is_guess = (mark & KNOWN == 0).view(np.uint8)
         in_front = np.where(mark & IN_FRONT > 0, np.uint8(255), np.uint8(0))
-        return _double_depth(box, depth_mm, is_guess, in_front)
+        return _smooth(box, depth_mm, is_guess, in_front)
 
     def _lens_of_pair(self) -> tuple[float, float, float, float]:
         one = self._geometry

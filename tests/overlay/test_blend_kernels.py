@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.box import Box
+from navapp.geometry.halves import double, half_box
 from navapp.overlay.blend_kernels import (
     blend_colour,
     blend_outline,
@@ -16,6 +18,8 @@ from navapp.overlay.blend_kernels import (
 pytestmark = pytest.mark.kernel
 
 SHAPE = (20, 30)
+# Its first pixel is the second one of a half pixel, in columns.
+BOX = Box(5, 8, 30, 20)
 
 
 def picture(seed: int) -> np.ndarray:
@@ -55,14 +59,17 @@ def test_one_colour_is_blended_by_its_share() -> None:
 def test_weights_tell_what_hides_and_what_lies_on_the_bone(guess: float) -> None:
     rng = np.random.default_rng(5)
     bone = rng.choice([np.nan, 400.0, 405.0], SHAPE).astype(np.float32)
-    depth = rng.choice([np.nan, 390.0, 399.0, 402.0, 500.0], SHAPE).astype(np.float32)
-    is_guess = (np.isnan(depth) & (rng.random(SHAPE) < 0.7)) | (rng.random(SHAPE) < 0.3)
+    half = half_box(BOX)
+    size = half.height, half.width
+    half_depth = rng.choice([np.nan, 390.0, 399.0, 402.0, 500.0], size).astype(np.float32)
+    half_guess = (np.isnan(half_depth) & (rng.random(size) < 0.7)) | (rng.random(size) < 0.3)
+    depth, is_guess = double(half_depth, BOX), double(half_guess.view(np.uint8), BOX) > 0
     in_front = rng.choice([0, 102, 255], SHAPE).astype(np.uint8)
     weight, nearest = np.empty((2, *SHAPE), dtype=np.float32)
     hidden = np.empty(SHAPE, dtype=np.bool_)
     find_weights(
-        bone, depth, is_guess.view(np.uint8), in_front, 2.5, 395.0, 0.55, guess, weight, nearest,
-        hidden,
+        bone, half_depth, half_guess.view(np.uint8), (BOX.x % 2, BOX.y % 2), in_front, 2.5, 395.0,
+        0.55, guess, weight, nearest, hidden,
     )  # fmt: skip
     np.testing.assert_array_equal(nearest, np.fmin(bone, np.where(is_guess, np.nan, depth)))
     with np.errstate(invalid="ignore"):

@@ -5,6 +5,7 @@ import pytest
 
 from navapp.overlay.see_kernels import Measured
 from navapp.overlay.splat_kernels import IN_FRONT, KNOWN, splat_points
+from navapp.values import Origin
 
 PAIR = (200.0, 31.5, 23.5, 60.0)
 EYE = (150.0, 152.0, 40.0, 30.0)
@@ -18,9 +19,10 @@ def draw(disparity: np.ndarray, pose: np.ndarray, *, is_matched=None, is_in_fron
     yes = np.ones(disparity.shape, bool)
     is_matched = yes if is_matched is None else is_matched
     whole = np.ones((2, 2))
-    half = Measured((0.5 * disparity).astype(np.float32), is_matched, 2, 3, 1)
+    origin = np.where(is_matched, Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8)
+    half = Measured((0.5 * disparity).astype(np.float32), origin, 2, 3, 1)
     doubled = np.kron(disparity, whole).astype(np.float32)
-    finer = Measured(doubled, np.kron(is_matched, whole) > 0, 4, 6, 0)
+    finer = Measured(doubled, np.repeat(np.repeat(origin, 2, 0), 2, 1), 4, 6, 0)
     in_front = np.kron(~yes if is_in_front is None else is_in_front, whole) > 0
     splat_points(half, finer, in_front, (4, 6, 2), PAIR, pose, EYE, depth_mm, mark)
     return depth_mm, mark

@@ -5,7 +5,7 @@ import pytest
 
 from navapp.overlay.drawing import Drawing
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import sample_line
+from navapp.overlay.strokes import sample_line, thin_line
 from tests.overlay.scenes import (
     BEHIND,
     CAMERA,
@@ -27,6 +27,21 @@ COLOUR = (10, 200, 250)
 # On the bowl, through its middle.
 X = np.linspace(-40.0, 40.0, 81)
 ON_BONE = np.column_stack([X, np.zeros(81), 0.008 * X * X])
+
+
+@pytest.mark.parametrize("straight_mm", [0.02, 0.3])
+def test_of_a_curve_only_the_points_are_kept_that_it_needs(straight_mm: float) -> None:
+    angles = np.linspace(0.0, 1.5 * np.pi, 400)
+    curve = np.column_stack([20.0 * np.cos(angles), 20.0 * np.sin(angles), 3.0 * angles])
+    thinned = thin_line(curve, straight_mm)
+    np.testing.assert_array_equal(thinned[[0, -1]], curve[[0, -1]])
+    dense = sample_line(thinned, 0.02)
+    off_mm = np.linalg.norm(curve[:, None] - dense, axis=2).min(axis=1)
+    assert 0.2 * straight_mm < off_mm.max() < straight_mm + 0.005
+    assert len(thinned) < 80
+    # A corner stays, of a line that is straight beside it the ends alone.
+    corner = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0], [2, 0.5, 0]])
+    np.testing.assert_array_equal(thin_line(corner), corner[[0, 2, 4, 5]])
 
 
 def draw_lines(

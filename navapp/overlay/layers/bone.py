@@ -70,6 +70,13 @@ def ramp_colours(depth_mm: NDArray[np.float64]) -> NDArray[np.float32]:
     return np.column_stack([np.interp(at, places, ramp[:, k]) for k in range(3)]).astype(np.float32)
 
 
+@lru_cache(maxsize=4)
+def _legend_ramp(height: int) -> NDArray[np.uint8]:
+    """(height, 1, 3) colours from the ramp's end down to 0."""
+    depth_mm = np.linspace(_REMOVAL_FULL_MM, 0.0, height)
+    return np.round(ramp_colours(depth_mm))[:, None].astype(np.uint8)
+
+
 def _draw_removal_legend(image: Image, labels: LabelBoard) -> None:
     """The ramp with its ends in mm, at the right of the picture."""
     height, width = image.shape[:2]
@@ -82,8 +89,7 @@ def _draw_removal_legend(image: Image, labels: LabelBoard) -> None:
     if left < 0 or top + around_h > height:
         return
     y = top + 2 * title_h
-    depth_mm = np.linspace(_REMOVAL_FULL_MM, 0.0, h)
-    image[y : y + h, left : left + w] = np.round(ramp_colours(depth_mm))[:, None].astype(np.uint8)
+    image[y : y + h, left : left + w] = _legend_ramp(h)
     for text, row in zip(words, (y, y + h), strict=True):
         put_text(image, text, (left + w + 6, row + text_h // 3), size, (235, 235, 235))
     put_text(image, _LEGEND_TITLE, (left, top + title_h), size, (235, 235, 235))

@@ -13,7 +13,7 @@ from navapp.values import DrillAxis
 
 # The axis is drawn so far out of the bone, towards the hand that drills.
 _OUTSIDE_MM = 30.0
-_N_AROUND = 48
+_N_AROUND = 24
 
 
 def draw_drills(scene: Scene, drawing: Drawing) -> None:

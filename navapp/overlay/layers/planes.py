@@ -4,12 +4,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import PLANE
 from navapp.overlay.drawing import Drawing
 from navapp.overlay.plane_sections import cut_lines
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import sample_line
+from navapp.overlay.strokes import sample_line, thin_line
 from navapp.values import ResectionPlane
 
 
@@ -18,10 +19,16 @@ def draw_planes(scene: Scene, drawing: Drawing) -> None:
     cuts: list[FloatArray] = []
     for name, plane in scene.planes.items():
         drawing.lines([_frame(plane)], PLANE, 1.0)
-        cuts += cut_lines(scene.drawn_mesh, plane)
+        cuts += _cut_lines(scene.drawn_mesh, plane)
         words = name.removeprefix(f"{scene.stage.bone}_").replace("_", " ")
         drawing.label(f"{words} cut", _label_mm(plane), PLANE)
     drawing.lines(cuts, PLANE)
+
+
+@lru_cache(maxsize=64)
+def _cut_lines(mesh: TriangleMesh, plane: ResectionPlane) -> list[FloatArray]:
+    """Points (N, 3) of each line."""
+    return [sample_line(thin_line(line)) for line in cut_lines(mesh, plane)]
 
 
 @lru_cache(maxsize=64)

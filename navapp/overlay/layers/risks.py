@@ -9,11 +9,12 @@ from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import SAFETY, one_colour, risk_colour
 from navapp.overlay.drawing import Body, Drawing, Tint
 from navapp.overlay.scene import Scene
-from navapp.overlay.strokes import sample_line
+from navapp.overlay.strokes import sample_line, thin_line
 from navapp.values import Plan
 
 _NEAR_SHARE, _SURFACE_SHARE = 0.45, 0.3
-_CURVE_STEP_MM = 2.0
+# A label is put beside one of the points so far apart.
+_NAMED_STEP_MM = 4.0
 
 
 def draw_risks(scene: Scene, drawing: Drawing) -> None:
@@ -23,13 +24,19 @@ def draw_risks(scene: Scene, drawing: Drawing) -> None:
         drawing.tints.append(_near_tint(scene.drawn_mesh, scene.plan, near))
     for name, risk in scene.risks.items():
         colour = risk_colour(name)
-        structure_mm = sample_structure(scene.plan, name, _CURVE_STEP_MM)
         if risk.mesh is None:
-            drawing.lines([structure_mm], colour)
+            drawing.lines([_curve_mm(scene.plan, name)], colour)
         else:
             share = np.full(len(risk.mesh.faces), _SURFACE_SHARE, dtype=np.float32)
             drawing.bodies.append(Body(risk.mesh, share, colour))
+        structure_mm = sample_structure(scene.plan, name, _NAMED_STEP_MM)
         drawing.label(name.replace("_", " "), structure_mm, colour)
+
+
+@lru_cache(maxsize=64)
+def _curve_mm(plan: Plan, name: str) -> FloatArray:
+    """(N, 3) points of the line to be drawn."""
+    return sample_line(thin_line(plan.curves[name]))
 
 
 @lru_cache(maxsize=64)
