@@ -7,8 +7,9 @@ from drivers.frames import Image
 from navapp.control.executors import Executor, Job
 from navapp.overlay import make_preview
 
-# From one look to the next, at least.
+# From one look to the next, at least; a look that was begun longer ago is not shown.
 _PERIOD_NS = 250_000_000
+_VALID_NS = 4 * _PERIOD_NS
 
 # What the eye sees now, and the same without the display's light; (H, W, 3) uint8 BGR each.
 Look = Callable[[], tuple[Image, Image]]
@@ -20,7 +21,8 @@ class _Seen:
 
     picture: Image
     plain: Image  # without the display's light
-    has_guides: bool  # the display showed guides, or was about to, when the eye began to look
+    begun_ns: int  # before that the display was not looked at
+    has_guides: bool  # the display showed guides at some time during the look
 
 
 class EyePreview:
@@ -36,8 +38,10 @@ class EyePreview:
 
     def __init__(self, look: Look | None, executor: Executor) -> None:
         self._look, self._executor = look, executor
-        self._job: Job[_Seen] | None = None
-        self._due_ns = 0
+        self._job: Job[tuple[Image, Image]] | None = None
+        self._begun_ns = self._due_ns = 0
+        # While the job runs: guides were shown, and its pictures are still wanted.
+        self._had_guides = self._is_wanted = False
         self._seen: _Seen | None = None
         self.is_on = False
 
@@ -49,27 +53,34 @@ class EyePreview:
     def toggle(self) -> None:
         """Show it, or no longer."""
         self.is_on = not self.is_on
-        self._seen, self._due_ns = None, 0
+        self._forget()
 
-    def update(self, now_ns: int, *, has_guides: bool) -> tuple[Image, Image | None] | None:
+    def update(
+        self, now_ns: int, *, has_guides: bool, is_hidden: bool = False
+    ) -> tuple[Image, Image | None] | None:
         """The newest small pictures (h, w, 3), with guides and without; None without any.
 
-        A bug in the look is not hidden: it is raised.
+        None as well when the newest look was begun too long ago. A bug in the look is not hidden:
+        it is raised.
 
         Args:
             now_ns: on the session's clock.
             has_guides: the display shows guides now; without them, none that it showed are seen.
+            is_hidden: the screen shows something else now; what was seen before is forgotten.
         """
         look = self._look
-        if look is None or not self.is_on:
+        if look is None or not self.is_on or is_hidden:
+            self._forget()
             return None
         if self._job is None and now_ns >= self._due_ns:
-            self._due_ns = now_ns + _PERIOD_NS
-            self._job = Job(lambda report: _look_through(look, has_guides))
+            self._begun_ns, self._due_ns = now_ns, now_ns + _PERIOD_NS
+            self._had_guides, self._is_wanted = False, True
+            self._job = Job(lambda report: _look_through(look))
             self._executor.start(self._job)
+        self._had_guides |= has_guides
         self._take_over()
         seen = self._seen
-        if seen is None:
+        if seen is None or now_ns - seen.begun_ns > _VALID_NS:
             return None
         if has_guides:
             return seen.picture, seen.plain
@@ -79,6 +90,10 @@ class EyePreview:
         """Wait for a look that still runs."""
         self._executor.close()
 
+    def _forget(self) -> None:
+        """What was seen, and what a look that still runs will see."""
+        self._seen, self._due_ns, self._is_wanted = None, 0, False
+
     def _take_over(self) -> None:
         job = self._job
         if job is None or not job.is_finished:
@@ -86,9 +101,10 @@ class EyePreview:
         self._job = None
         if job.error is not None:
             raise job.error
-        self._seen = job.result
+        if self._is_wanted and job.result is not None:
+            self._seen = _Seen(*job.result, self._begun_ns, self._had_guides)
 
 
-def _look_through(look: Look, has_guides: bool) -> _Seen:
+def _look_through(look: Look) -> tuple[Image, Image]:
     picture, plain = look()
-    return _Seen(make_preview(picture), make_preview(plain), has_guides)
+    return make_preview(picture), make_preview(plain)

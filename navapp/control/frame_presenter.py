@@ -90,9 +90,10 @@ class FramePresenter:
         self, frame: StereoFrame, video: Image, snapshot: Snapshot, foreground: Foreground | None
     ) -> None:
         """The operator's picture; a candidate is judged over the video, whatever is switched on."""
-        session, seen = self._session, None
-        if not snapshot.is_candidate:
-            seen = self._eye.update(session.now_ns, has_guides=snapshot.is_navigable)
+        session = self._session
+        seen = self._eye.update(
+            session.now_ns, has_guides=snapshot.is_navigable, is_hidden=snapshot.is_candidate
+        )
         if seen is not None:
             session.keep_picture(OperatorPicture(*seen, is_of_eye=True))
             return

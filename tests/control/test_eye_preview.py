@@ -1,12 +1,15 @@
 """The operator's screen shows what an eye sees in a simulated mirror, when asked to."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.event_log import SessionHooks
-from navapp.control.executors import RecordedExecutor
+from navapp.control.executors import Job, RecordedExecutor
+from navapp.control.eye_preview import EyePreview
 from navapp.control.operators import RecordedOperator, read_events
 from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
@@ -17,6 +20,40 @@ from tests.control.test_layer_switching import NoFrames
 
 LIT, SITE, VIDEO = 200, 90, 0
 PERIODS_OF_A_LOOK = -(-250_000_000 // PERIOD_NS)
+
+
+class Later:
+    """Runs jobs when it is told to."""
+
+    def __init__(self) -> None:
+        self.jobs: list[Job[Any]] = []
+
+    def start(self, job: Job[Any]) -> None:
+        self.jobs.append(job)
+
+    def take_due(self, job: Job[Any], sequence: int) -> bool:
+        return job.is_finished
+
+    def close(self) -> None:
+        pass
+
+
+class Slow:
+    """A preview that is on, whose looks end when a test says so."""
+
+    def __init__(self) -> None:
+        self.later, self.now_ns = Later(), 0
+        self.preview = EyePreview(Eye(), self.later)
+        self.preview.toggle()
+
+    def update(self, after_ms: int = 0, *, has_guides: bool = True, **what: bool) -> int | None:
+        """Grey of what is shown; None: the video."""
+        self.now_ns += after_ms * 1_000_000
+        seen = self.preview.update(self.now_ns, has_guides=has_guides, **what)
+        return None if seen is None else int(seen[0][2, 2, 0])
+
+    def end_look(self) -> None:
+        self.later.jobs[-1].run()
 
 
 class Eye:
@@ -91,6 +128,57 @@ def test_guides_that_grow_old_are_not_seen_either() -> None:
     aged = bench.controller.snapshot_now()
     assert not aged.is_navigable
     assert aged.preview[2, 2, 0] == SITE
+
+
+def test_a_look_that_hangs_shows_no_old_guides() -> None:
+    slow = Slow()
+    assert slow.update() is None
+    slow.end_look()
+    assert slow.update(100) == LIT
+    # The next look begins, and does not end.
+    assert slow.update(300) == LIT
+    assert slow.update(500) == LIT
+    assert slow.update(200) is None
+    assert slow.update(60_000) is None
+    # What it saw a minute ago is no news either; a look that is begun now is.
+    slow.end_look()
+    assert slow.update() is None
+    assert slow.update(10) is None
+    assert len(slow.later.jobs) == 3
+    slow.end_look()
+    assert slow.update(10) == LIT
+
+
+def test_a_look_from_before_it_was_switched_off_is_not_shown_when_it_is_on_again() -> None:
+    slow = Slow()
+    slow.update()
+    slow.preview.toggle()
+    slow.preview.toggle()
+    slow.end_look()
+    assert slow.update(100) is None
+    assert slow.update(10) is None
+    slow.end_look()
+    assert slow.update(10) == LIT
+
+
+def test_what_was_seen_before_a_review_is_not_shown_after_it() -> None:
+    slow = Slow()
+    slow.update()
+    slow.end_look()
+    assert slow.update(10) == LIT
+    assert slow.update(10, is_hidden=True) is None
+    assert slow.update(10) is None
+    slow.end_look()
+    assert slow.update(10) == LIT
+
+
+@pytest.mark.parametrize("when", ["before", "meanwhile"])
+def test_guides_that_were_lit_during_a_look_are_not_seen_without_guides(when: str) -> None:
+    slow = Slow()
+    slow.update(has_guides=when == "before")
+    slow.update(10, has_guides=when == "meanwhile")
+    slow.end_look()
+    assert slow.update(10, has_guides=False) == SITE
 
 
 def test_a_candidate_is_looked_at_over_the_video() -> None:
