@@ -14,13 +14,14 @@ from navapp.control.operators import RecordedEvents, read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
 from navapp.control.specification import SessionSpecification
 from navapp.errors import SequenceError
+from navapp.geometry.display_model_files import write_display_model
 from navapp.geometry.rig_files import write_rig
 from navapp.geometry.whole_files import write_whole
 from navapp.preop import write_plan
 from navapp.tracking import Method
 
 _FILE = "session.json"
-_RIG, _PLAN, _PRIOR = "rig.yml", "plan", "prior.json"
+_RIG, _PLAN, _PRIOR, _DISPLAY = "rig.yml", "plan", "prior.json", "display.yml"
 _METHODS: tuple[Method, ...] = get_args(Method)
 
 
@@ -52,6 +53,12 @@ def start_recording(
     write_plan(folder / _PLAN, plan)
     prior = json.dumps(prior_to_json(specification.prior), indent=1)
     write_whole(folder / _PRIOR, prior.encode())
+    if specification.display is not None:
+        # The record keeps the display that was in force, whatever becomes of its file.
+        path = folder.resolve() / _DISPLAY
+        write_display_model(path, specification.display.model)
+        kept = configuration.display.model_copy(update={"model": str(path)})
+        configuration = configuration.model_copy(update={"display": kept})
     write_whole(folder / "configuration.toml", format_toml(configuration, False).encode())
     content = {
         "navapp": __version__,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from navapp.cli.live_session import _read_display
-from navapp.cli.main import _parser
+from navapp.cli.main import _parser, run
 from navapp.cli.practice_mirror import add_practice_mirror
-from navapp.config import parse
+from navapp.config import load, parse
 from navapp.devices import make_practice_display
 from navapp.errors import UsageError
 from navapp.geometry.display_model_files import read_display_model
@@ -68,3 +68,13 @@ def test_the_picture_s_middle_is_at_the_bone() -> None:
     assert 450.0 < model.distance_mm() < 550.0
     assert model.flips_columns
     assert not model.flips_rows
+
+
+def test_a_recorded_session_holds_the_display_that_its_configuration_names(tmp_path: Path) -> None:
+    folder = tmp_path / "kept"
+    code = run(
+        ["--quiet", "run", "--mirror", "--headless", "--frames", "2", "--record", str(folder)]
+    )
+    configured = load(folder / "configuration.toml").display.model
+    assert configured == str(folder / "display.yml")
+    assert read_display_model(configured).display_name == "sim:display"
