@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
@@ -26,6 +28,7 @@ from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import (
+    DisparityMap,
     Foreground,
     PoseEstimate,
     Reason,
@@ -90,31 +93,29 @@ class PoseJudge:
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         fit, view, agreement = self._settle(frame, fit, check)
-        evidence = self._evidence_of_pair(check.health, depth_mm)
-        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
-        verdict = decide(evidence)
-        is_told = verdict.predicted_tre_mm is not None or self._tells_refused
-        estimate = self._unrectify(fit.estimate) if is_told else None
-        rows = _check_rows(check.health, evidence, verdict)
-        frame.watch.lap("judge")
-        foreground = None
-        if view is not None and verdict.status is not Status.LOST:
-            foreground = self._find_foreground(frame, fit, view, checks)
+        find = partial(self._find_foreground, frame, fit.measured.disparity, view, checks)
+        with begin_on_helper(find) as finding:
+            evidence = self._evidence_of_pair(check.health, depth_mm)
+            evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
+            verdict = decide(evidence)
+            is_told = verdict.predicted_tre_mm is not None or self._tells_refused
+            estimate = self._unrectify(fit.estimate) if is_told else None
+            rows = _check_rows(check.health, evidence, verdict)
+            frame.watch.lap("judge")
+        frame.watch.lap("fill")
+        foreground = None if verdict.status is Status.LOST else finding.result()
         return TrackedFrame(
             model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
         )
 
     def _find_foreground(
-        self, frame: Frame, fit: Fit, view: RenderedView, checks: PairChecks
+        self, frame: Frame, measured: DisparityMap, view: RenderedView | None, checks: PairChecks
     ) -> Foreground | None:
         """What stands in front of the bone at its pose; None where the gaps are not filled."""
-        surroundings = checks.surroundings(frame.watch)
-        if surroundings is None:
+        surroundings = None if view is None else checks.surroundings(frame.watch)
+        if view is None or surroundings is None:
             return None
-        measured, geometry = fit.measured.disparity, self._meter.geometry
-        foreground = find_foreground(surroundings, measured, view, geometry)
-        frame.watch.lap("fill")
-        return foreground
+        return find_foreground(surroundings, measured, view, self._meter.geometry)
 
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck

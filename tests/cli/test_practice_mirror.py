@@ -72,9 +72,7 @@ def test_the_picture_s_middle_is_at_the_bone() -> None:
 
 def test_a_recorded_session_holds_the_display_that_its_configuration_names(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
-    code = run(
-        ["--quiet", "run", "--mirror", "--headless", "--frames", "2", "--record", str(folder)]
-    )
+    run(["--quiet", "run", "--mirror", "--headless", "--frames", "2", "--record", str(folder)])
     configured = load(folder / "configuration.toml").display.model
     assert configured == str(folder / "display.yml")
     assert read_display_model(configured).display_name == "sim:display"
