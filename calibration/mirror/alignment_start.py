@@ -56,7 +56,13 @@ def make_first_model(
             remedy="align points at three depths over 60 mm, not all of one flat board",
         )
     _, pose, distance, is_mirrored = best
-    return _model_of(display, pose, distance, is_mirrored)
+    try:
+        return _model_of(display, pose, distance, is_mirrored)
+    except ValueError as error:
+        raise ResultError(
+            "no eye sees the aligned points where the crosses were",
+            remedy="align every cross with its corner, and begin anew",
+        ) from error
 
 
 def _pose(

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
+import numpy as np
+
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignment_start import AlignedDisplay
 from calibration.mirror.alignments import FEWEST_ALIGNMENTS, solve_alignments
@@ -15,7 +17,7 @@ from navapp.control.capture.board_view import BoardView, detect_board
 from navapp.control.executors import Executor, Job
 from navapp.control.mirror_alignment.aimed_corner import AimedCorner
 from navapp.control.mirror_alignment.board_place import BoardLooks, BoardPlace, locate_board
-from navapp.control.mirror_alignment.first_crosses import guess_pixel
+from navapp.control.mirror_alignment.first_crosses import guess_pixel, light_beside
 from navapp.control.mirror_alignment.guidance import Goal, Guide
 from navapp.control.mirror_alignment.interfaces import (
     AlignmentSettings,
@@ -99,6 +101,7 @@ class MirrorAlignment:
         self._frame: StereoFrame | None = None
         self._view: BoardView | None = None
         self._detection: Job[BoardView] | None = None
+        self._rng = np.random.default_rng(settings.seed)
         # At most one of them: where the board is wanted, or the corner under a cross.
         self._goal: Goal | None = None
         self._aimed: AimedCorner | None = None
@@ -173,9 +176,10 @@ class MirrorAlignment:
         match command:
             case NudgeCross(right_px, down_px) if self._aimed is not None:
                 self._cross.nudge(right_px, down_px, self._solution.flips)
-                self._aimed.note_nudge()
+                if (right_px, down_px) != (0, 0):
+                    self._aimed.note_nudge()
             case Confirm() if self._aimed is not None:
-                self._aimed.confirm(self._clock.now_ns())
+                self._confirm(self._aimed)
             case Undo():
                 self._undo()
             case Another():
@@ -191,6 +195,12 @@ class MirrorAlignment:
                 self._save()
             case Leave():
                 self._leave()
+
+    def _confirm(self, aimed: AimedCorner) -> None:
+        if aimed.is_moved:
+            aimed.confirm(self._clock.now_ns())
+            return
+        self._add_event("nothing is kept: it was lit beside; move the cross onto the corner first")
 
     def _undo(self) -> None:
         dropped = self._kept.drop_last()
@@ -313,9 +323,9 @@ class MirrorAlignment:
         if point_mm is None:
             return
         known = self._solution.know(self._kept)
-        self._cross.put(
-            guess_pixel(self._solution.display, self._kept.alignments, known.model, point_mm)
-        )
+        display = self._solution.display
+        expected = guess_pixel(display, self._kept.alignments, known.model, point_mm)
+        self._cross.put(light_beside(display, expected, self._rng))
         self._aimed = AimedCorner(corner, place)
 
     def _give_up_aim(self) -> None:

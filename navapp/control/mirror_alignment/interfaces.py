@@ -32,3 +32,4 @@ class AlignmentSettings:
     display: AlignedDisplay  # that shows the crosses
     valid_ms: float = 500.0  # a cross without a newer picture turns black after this
     keeps_few: bool = False  # fewer alignments than a solve needs are kept when it ends
+    seed: int = 0  # of where a cross is lit beside its corner

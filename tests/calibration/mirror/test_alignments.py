@@ -9,6 +9,7 @@ from calibration.mirror import alignments
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignments import AlignedCalibration, advise, choose_next, solve_alignments
 from navapp.errors import ResultError
+from navapp.geometry.display_model_errors import perpendicular_axes
 from sim_devices.mirror_setups import draw_setup
 from tests.calibration.mirror.simulated_operators import POINT_SD_MM, SimulatedOperator
 from tests.geometry.test_display_model_errors import seen_beside_mm
@@ -112,3 +113,25 @@ def test_the_next_point_is_the_one_that_lowers_the_error_most() -> None:
         judged = dataclasses.replace(model, quality=quality)
         told[k] = float((judged.predict_error(operator.anatomy_mm) ** 2).mean())
     assert min(told, key=lambda k: told[k]) == chosen
+
+
+@pytest.mark.parametrize("seed", few_of(range(30, 42), 4))
+def test_the_plate_stands_as_it_is_solved_within_three_claimed_deviations(seed: int) -> None:
+    operator = operator_of(seed, 0.5)
+    found = solve_alignments(
+        operator.display, aligned(operator, EVERY_THIRD), operator.anatomy_mm
+    )  # fmt: skip
+    solved, true, quality = found.model.glass, operator.true.glass, found.model.quality
+    assert solved is not None
+    assert true is not None
+    assert quality is not None
+    assert quality.covariance is not None
+    turn = np.cross(solved.normal, true.normal)
+    turn *= np.arcsin(np.linalg.norm(turn)) / np.linalg.norm(turn)
+    off_rad = perpendicular_axes(solved.normal[None])[0] @ turn
+    length = off_rad @ np.linalg.solve(quality.covariance[9:11, 9:11], off_rad)
+    assert np.sqrt(length) < 3.0, (
+        np.degrees(off_rad),
+        np.degrees(np.sqrt(np.diag(quality.covariance)[9:11])),
+    )
+    assert solved.normal @ true.normal > 0.0
