@@ -30,6 +30,11 @@ class AlignedDisplay:
     reads_upside_down: bool = False  # the eye sees text on its head when it is shown as it is
     viewing_eye: ViewingEye = "right"
 
+    @property
+    def reading(self) -> str:
+        """How the eye reads what is shown as it is, in words."""
+        return "on its head" if self.reads_upside_down else "upright"
+
 
 def make_first_model(
     display: AlignedDisplay, pixels: FloatArray, points_mm: FloatArray

@@ -146,12 +146,13 @@ def advise(found: AlignedCalibration, n_alignments: int) -> str:
     quality = found.model.quality
     if quality is not None and quality.is_accepted:
         return ""
+    reasons = () if quality is None else quality.reasons
+    reason = reasons[0] if reasons else "it is not accepted"
     if n_alignments < MOST_ALIGNMENTS:
-        reasons = () if quality is None else quality.reasons
-        return f"align another point: {reasons[0]}" if reasons else "align another point"
+        return f"{reason}: align another point"
     return (
-        f"begin anew, with the head at rest and the crosses aligned more finely: "
-        f"{n_alignments} alignments scatter by {found.alignment_sd_px:.1f} px"
+        f"{reason}: begin anew; the {n_alignments} alignments scatter by "
+        f"{found.alignment_sd_px:.1f} px"
     )
 
 

@@ -95,10 +95,12 @@ class MirrorRoom:
 
 
 def alignment_in(room: MirrorRoom, *, has_hand: bool = True, solve=None, **more) -> MirrorAlignment:
-    keeps_few = more.pop("keeps_few", False)
+    keeps_few, replaces = more.pop("keeps_few", False), more.pop("replaces", "")
     return MirrorAlignment(
         room, room.display, room.clock, BOARD, room.rig,
-        AlignmentSettings(room.display_told, keeps_few=keeps_few, seed=room.seed),
+        AlignmentSettings(
+            room.display_told, keeps_few=keeps_few, replaces=replaces, seed=room.seed
+        ),
         executor=InlineExecutor(),
         hand=room if has_hand else None,
         detect=lambda frame, board: room.look(frame),
