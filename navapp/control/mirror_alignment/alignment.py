@@ -205,22 +205,19 @@ class MirrorAlignment:
         if aimed.is_moved:
             aimed.confirm(self._clock.now_ns())
             return
-        self._add_event("nothing is kept: it was lit beside; move the cross onto the corner first")
+        self._add_event("not kept: move the cross onto the corner first")
 
     def _turn(self, *, columns: bool, rows: bool) -> None:
         solution = self._solution
         if solution.found is not None or solution.is_under_way:
-            self._add_event(
-                "the arrows stay as they are, the display is solved with them: forget crosses with "
-                "u, or leave with q and begin anew"
-            )
+            # Two lines on a small screen, newest first.
+            self._add_event(f"u to fewer than {FEWEST_ALIGNMENTS} frees them, or begin anew")
+            self._add_event("the arrows stay: the display is solved with them")
             return
         solution.turn(self._kept, columns=columns, rows=rows)
         if len(self._kept) > 0:
             self._write()
-        self._add_event(
-            f"the arrows are exchanged: the eye reads the display {solution.display.reading}"
-        )
+        self._add_event(f"arrows exchanged; the eye reads text {solution.display.reading}")
 
     def _undo(self) -> None:
         dropped = self._kept.drop_last()

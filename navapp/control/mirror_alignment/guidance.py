@@ -124,6 +124,7 @@ class Guide:
         self._middle_mm = board.points_mm.mean(axis=0)
         self._skipped_corners: set[int] = set()
         self._refused_mm: list[FloatArray] = []  # (3,) of the board's middle
+        self._stays = False  # a better place was refused: a corner comes first
 
     def skip_corner(self, corner: int) -> None:
         """It cannot be had where the board lies."""
@@ -132,10 +133,12 @@ class Guide:
     def skip_goal(self, goal: Goal) -> None:
         """The board cannot be brought to that very place."""
         self._refused_mm.append(goal.middle_mm)
+        self._stays = not goal.is_of_height
 
     def forget_corners(self) -> None:
         """The board lies elsewhere, or an alignment was made: all corners are on offer again."""
         self._skipped_corners.clear()
+        self._stays = False
 
     def middle_of(self, place: BoardPlace) -> FloatArray:
         """(3,) of the board's middle."""
@@ -215,7 +218,7 @@ class Guide:
         """
         middle = self.middle_of(place)
         near = np.linalg.norm(known.kept.middles_mm - middle, axis=1) < SAME_HEIGHT_MM
-        if np.count_nonzero(near) < _FEWEST_AT_PLACE:
+        if self._stays or np.count_nonzero(near) < _FEWEST_AT_PLACE:
             return None
         heights, now = self._heights(known, place)
         here = self._best_gain(known, found, place.points_mm)

@@ -329,7 +329,8 @@ def test_arrows_are_not_exchanged_once_the_display_is_solved(room, turned):
     session.submit(turned)
     assert steps(session).flips == before
     assert session.made[0] == display
-    assert "the arrows stay as they are, the display is solved with them" in told(session)
+    assert session.snapshot.events[-1] == "the arrows stay: the display is solved with them"
+    assert session.snapshot.events[-2] == "u to fewer than 12 frees them, or begin anew"
     # With one cross less it is not solved any more.
     session.submit(Undo())
     session.submit(turned)
@@ -343,7 +344,7 @@ def test_how_the_eye_reads_the_display_is_told(room):
     session.submit(TurnArrows(rows=True))
     assert steps(session).is_upside_down is not is_upside_down
     words = "upright" if is_upside_down else "on its head"
-    assert f"the eye reads the display {words}" in told(session)
+    assert f"arrows exchanged; the eye reads text {words}" in told(session)
 
 
 def test_depths_are_counted_as_the_verdict_counts_them(room):
