@@ -9,13 +9,15 @@ from calibration.mirror.alignment_start import AlignedDisplay
 from navapp.geometry.display_model import N_PARAMETERS, DisplayModel
 from navapp.geometry.display_model_errors import (
     EYE_NUMBERS,
+    perpendicular_axes,
     pixels_by_parameters,
     pixels_by_points,
 )
 from navapp.geometry.transform import FloatArray
 
-# No operator aligns better than that.
-_LEAST_SD_PX, _MOST_SD_PX = 0.3, 20.0
+# No operator aligns better than the first; crosses that were confirmed where they were lit err by
+# less than the last.
+_LEAST_SD_PX, _MOST_SD_PX = 0.3, 100.0
 _HUBER, WORST = 2.0, 4.5
 _MOST_STEPS, _SETTLED = 60, 1e-4
 # Numbers of `DisplayModel.move` that the pixels cannot tell from others: known beforehand to so
@@ -56,7 +58,16 @@ class AlignmentPriors:
         off[6] = model.screen.pitch_mm / self.display.pitch_mm - 1.0
         if model.glass is not None and self.start.glass is not None:
             off[8] = model.glass.thickness_mm - self.start.glass.thickness_mm
+            off[9:11] = _tilt_between(self.start.glass.normal, model.glass.normal)
         return off
+
+
+def _tilt_between(told: FloatArray, solved: FloatArray) -> FloatArray:
+    """(2,) rad by which a normal was tilted, about the two axes of `DisplayModel.move`."""
+    across = np.cross(told, solved)
+    length = float(np.linalg.norm(across))
+    turn = across * (np.arctan2(length, float(told @ solved)) / max(length, 1e-12))
+    return np.asarray(perpendicular_axes(solved[None])[0] @ turn, dtype=np.float64)
 
 
 def spread_out(covariance: FloatArray, priors: AlignmentPriors) -> FloatArray:

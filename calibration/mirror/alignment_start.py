@@ -30,6 +30,11 @@ class AlignedDisplay:
     reads_upside_down: bool = False  # the eye sees text on its head when it is shown as it is
     viewing_eye: ViewingEye = "right"
 
+    @property
+    def reading(self) -> str:
+        """How the eye reads what is shown as it is, in words."""
+        return "on its head" if self.reads_upside_down else "upright"
+
 
 def make_first_model(
     display: AlignedDisplay, pixels: FloatArray, points_mm: FloatArray
@@ -56,7 +61,13 @@ def make_first_model(
             remedy="align points at three depths over 60 mm, not all of one flat board",
         )
     _, pose, distance, is_mirrored = best
-    return _model_of(display, pose, distance, is_mirrored)
+    try:
+        return _model_of(display, pose, distance, is_mirrored)
+    except ValueError as error:
+        raise ResultError(
+            "no eye sees the aligned points where the crosses were",
+            remedy="align every cross with its corner, and begin anew",
+        ) from error
 
 
 def _pose(

@@ -61,7 +61,6 @@ def solve_alignments(
     given: Alignments,
     anatomy_mm: FloatArray | None = None,
     wander_sd_mm: float = WANDER_SD_MM,
-    start: DisplayModel | None = None,
 ) -> AlignedCalibration:
     """Solve eye and screen, estimate the operator's noise, and judge.
 
@@ -70,14 +69,13 @@ def solve_alignments(
         given: at least twelve alignments.
         anatomy_mm: (n, 3) where the error counts; the aligned points when absent.
         wander_sd_mm: standard deviation of the eye's place, an axis.
-        start: an earlier solution.
 
     Raises:
         ResultError: too few alignments, or such that tell no screen.
     """
     check_alignments(given)
-    model = start or make_first_model(display, given.pixels, given.points_mm)
-    priors = AlignmentPriors(model if start is None else replace(start, quality=None), display)
+    model = make_first_model(display, given.pixels, given.points_mm)
+    priors = AlignmentPriors(model, display)
     sd_px, is_used = _FIRST_SD_PX, np.ones(len(given.pixels), dtype=bool)
     for _ in range(_N_ROUNDS):
         model = fit_model(model, given.only(is_used), priors, sd_px, wander_sd_mm)
@@ -148,12 +146,13 @@ def advise(found: AlignedCalibration, n_alignments: int) -> str:
     quality = found.model.quality
     if quality is not None and quality.is_accepted:
         return ""
+    reasons = () if quality is None else quality.reasons
+    reason = reasons[0] if reasons else "it is not accepted"
     if n_alignments < MOST_ALIGNMENTS:
-        reasons = () if quality is None else quality.reasons
-        return f"align another point: {reasons[0]}" if reasons else "align another point"
+        return f"{reason}: align another point"
     return (
-        f"begin anew, with the head at rest and the crosses aligned more finely: "
-        f"{n_alignments} alignments scatter by {found.alignment_sd_px:.1f} px"
+        f"{reason}: begin anew; the {n_alignments} alignments scatter by "
+        f"{found.alignment_sd_px:.1f} px"
     )
 
 

@@ -76,7 +76,9 @@ def make_alignment_page(found: AlignedCalibration) -> str:
         ("alignments", f"{n_used} used, {len(found.is_used) - n_used} not", ""),
         ("scatter of the alignments", f"{found.alignment_sd_px:.2f} px", "standard deviation"),
         ("wandering of the eye", f"{found.wander_sd_mm:.2f} mm", "standard deviation, assumed"),
-    ]
+        ("the eye reads the display", "on its head" if found.model.flips_rows else "upright",
+         "as it was told; alignments cannot tell"),
+    ]  # fmt: skip
     lengths = np.linalg.norm(found.residuals_px, axis=1)
     return _page(
         found.model,

@@ -8,7 +8,12 @@ from navapp.cli.alignment_files import read_alignments
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.display_record import DisplayRecord, read_record
 from navapp.cli.mirror_by_keys import align_by_keys, check_options
-from navapp.cli.mirror_options import USUAL_GLASS_MM, find_pitch_mm
+from navapp.cli.mirror_options import (
+    USUAL_GLASS_DEG,
+    USUAL_GLASS_MM,
+    choose_source,
+    find_pitch_mm,
+)
 from navapp.cli.mirror_views import read_lens, read_views
 from navapp.errors import ResultError, UsageError
 
@@ -18,7 +23,6 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.geometry.display_model import DisplayModel
 
-_SOURCES = ("views", "alignments", "by_keys", "pattern")
 # Those of `DisplayModel`, which takes long to import.
 _EYES = ("left", "right", "camera")
 _EXAMPLE = """\
@@ -78,7 +82,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--diagonal-inch", type=float, metavar="D", help="of the display")
     parser.add_argument("--glass-mm", type=float, metavar="T", help="of the plate (3)")
     parser.add_argument(
-        "--glass-deg", type=float, default=45.0, metavar="A",
+        "--glass-deg", type=float, metavar="A",
         help="between the plate's normal and the line of sight, the display above (45)",
     )  # fmt: skip
     parser.add_argument("--curved", action="store_true", help="solve for the panel's bulge")
@@ -102,7 +106,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
     for path in (options.out, options.report, options.json, options.pattern):
         check_writable(path)
-    source = _choose_source(options)
+    source = choose_source(options)
     configuration = load(find_file(options.config))
     if source == "pattern":
         return _write_pattern(options, configuration)
@@ -127,24 +131,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     write_json(options.json, "calibrate mirror", {**_content(model), **content})
     if options.json != "-":
         _tell(model, diagnostics)
+        if source != "views":
+            reading = "on its head" if content["reads_upside_down_as_told"] else "upright"
+            diagnostics.say(f"the eye reads the display {reading}: told, not measured")
     return 0 if is_accepted else _refuse(model, options)
-
-
-def _choose_source(options: argparse.Namespace) -> str:
-    """Where the display is solved from, or that its pattern is written."""
-    given = [name for name in _SOURCES if getattr(options, name)]
-    if len(given) != 1 or (options.out is None and given != ["pattern"]):
-        raise UsageError(
-            "calibrate mirror needs one source, and a file to write",
-            remedy="give --out DISPLAY.yml with --views DIR, --by-keys or --alignments FILE.json, "
-            "or --pattern FILE.png alone",
-        )
-    for name in ("headless", "save_alignments", "upside_down"):
-        if getattr(options, name) and given != ["by_keys"]:
-            raise UsageError(
-                f"--{name.replace('_', '-')} belongs to --by-keys", remedy="leave it away"
-            )
-    return given[0]
 
 
 def _refuse(model: "DisplayModel", options: argparse.Namespace) -> int:
@@ -196,8 +186,9 @@ def _solve_views(
     lens = None if options.lens is None else read_lens(options.lens, scene.eye_size)
     limits = DisplayLimits()
     glass_mm = USUAL_GLASS_MM if options.glass_mm is None else options.glass_mm
+    glass_deg = USUAL_GLASS_DEG if options.glass_deg is None else options.glass_deg
     found = solve_display(
-        scene, seen, Told(find_pitch_mm(options, size), glass_mm, options.glass_deg),
+        scene, seen, Told(find_pitch_mm(options, size), glass_mm, glass_deg),
         lens=lens, with_bulge=options.curved, limits=limits,
         on_progress=lambda share: diagnostics.progress("solving", share),
     )  # fmt: skip
@@ -233,6 +224,8 @@ def _solve_made(
         "alignments_used": int(found.is_used.sum()),
         "alignments_dropped": [int(k) for k, used in enumerate(found.is_used) if not used],
         "alignment_sd_px": found.alignment_sd_px,
+        # Nothing in the alignments tells it.
+        "reads_upside_down_as_told": display.reads_upside_down,
         "advice": advise(found, len(made.pixels)),
     }
 

@@ -3,11 +3,13 @@
 import argparse
 from contextlib import ExitStack
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from navapp.cli.alignment_files import write_alignments
 from navapp.cli.diagnostics import Diagnostics, check_writable
-from navapp.cli.mirror_options import USUAL_GLASS_MM, find_pitch_mm
+from navapp.cli.mirror_options import USUAL_GLASS_DEG, USUAL_GLASS_MM, find_pitch_mm
 from navapp.errors import DeviceError, ResultError, RigError, UsageError
 
 if TYPE_CHECKING:
@@ -32,6 +34,12 @@ def alignments_path(options: argparse.Namespace) -> Path:
     if options.save_alignments is not None:
         return Path(options.save_alignments)
     return Path(options.out).with_suffix(".alignments.json")
+
+
+def unfinished_path(options: argparse.Namespace) -> Path:
+    """Where they are kept after every cross, until the session has ended."""
+    path = alignments_path(options)
+    return path.with_name(f"{path.stem}.unfinished{path.suffix}")
 
 
 def align_by_keys(
@@ -60,14 +68,13 @@ def align_by_keys(
     if options.rig is not None:
         camera = configuration.camera.model_copy(update={"rig": options.rig})
         configuration = configuration.model_copy(update={"camera": camera})
-    path = alignments_path(options)
-    check_writable(str(path))
+    check_writable(str(alignments_path(options)))
     with ExitStack() as undo:
         opened = open_mirror_alignment(configuration, board, is_headless=options.headless)
         undo.callback(opened.close)
         _check_rig(opened.rig)
         session = make_session(opened, board, options, configuration)
-        undo.callback(_keep, session, path, keeps_few=options.save_alignments is not None)
+        undo.callback(_keep, session, options, diagnostics)
         undo.callback(session.close)
         if options.headless:
             _headless(session, opened, diagnostics)
@@ -75,16 +82,17 @@ def align_by_keys(
             return code
     display, given = session.made
     check_alignments(given)
-    diagnostics.say(f"{len(given.pixels)} alignments are kept in {path}")
     return display, given
 
 
 def check_options(options: argparse.Namespace, configuration: "Configuration") -> None:
-    """Refuse options that do not go together, before any device is opened.
+    """Refuse what cannot be done, before any device is opened.
 
     Raises:
-        UsageError: the sentence says which.
+        UsageError: the sentence says why.
     """
+    from navapp.ui.terminal import check_terminal
+
     if options.board is None:
         raise UsageError(
             "--by-keys needs the board that lies at the site", remedy="give --board BOARD.json"
@@ -92,10 +100,6 @@ def check_options(options: argparse.Namespace, configuration: "Configuration") -
     if options.viewing_eye == "camera":
         raise UsageError(
             "--by-keys is done by a person's eye", remedy="give --viewing-eye left or right"
-        )
-    if options.size is not None:
-        raise UsageError(
-            "--size does not go with --by-keys", remedy="set [display] size_px: it is opened so"
         )
     is_simulated = configuration.camera.backend == "simulated"
     if options.headless and not is_simulated:
@@ -108,6 +112,8 @@ def check_options(options: argparse.Namespace, configuration: "Configuration") -
             "the size of the display in inches is not known",
             remedy="give --diagonal-inch D, from corner to corner of the picture",
         )
+    if not options.headless:
+        check_terminal()
 
 
 def _check_rig(rig: "StereoRig") -> None:
@@ -142,6 +148,7 @@ def make_session(
         _describe_display(opened, options, configuration),
         valid_ms=configuration.display.valid_ms,
         keeps_few=options.save_alignments is not None,
+        replaces=options.out if Path(options.out).exists() else "",
     )
     return MirrorAlignment(
         opened.camera,
@@ -153,8 +160,9 @@ def make_session(
         executor=InlineExecutor() if options.headless else ThreadExecutor("mirror alignment"),
         hand=opened.hand,
         # Without a screen nobody watches what the eye sees.
-        eye=None if opened.practice is None or options.headless else opened.practice.look,
+        eye=None if options.headless else opened.look,
         reopen=opened.reopen,
+        store=partial(write_alignments, unfinished_path(options)),
     )
 
 
@@ -175,7 +183,7 @@ def _describe_display(
         info.height,
         pitch_mm,
         glass_mm=glass_mm if options.glass_mm is None else options.glass_mm,
-        mirror_deg=options.glass_deg,
+        mirror_deg=USUAL_GLASS_DEG if options.glass_deg is None else options.glass_deg,
         reads_upside_down=options.upside_down,
         viewing_eye=_choose_eye(options, configuration),
     )
@@ -189,14 +197,21 @@ def _choose_eye(options: argparse.Namespace, configuration: "Configuration") -> 
     return "left" if configuration.mirror.eyes == "left" else "right"
 
 
-def _keep(session: "MirrorAlignment", path: Path, *, keeps_few: bool) -> None:
+def _keep(
+    session: "MirrorAlignment", options: argparse.Namespace, diagnostics: Diagnostics
+) -> None:
     """Write the alignments, however it ended: there are enough for a solve, or they are wanted."""
     from calibration.mirror.alignments import FEWEST_ALIGNMENTS
-    from navapp.cli.alignment_files import write_alignments
 
     display, given = session.made
-    if len(given.pixels) >= FEWEST_ALIGNMENTS or (keeps_few and len(given.pixels) > 0):
+    n, path, unfinished = len(given.pixels), alignments_path(options), unfinished_path(options)
+    if n >= FEWEST_ALIGNMENTS or (options.save_alignments is not None and n > 0):
         write_alignments(path, display, given)
+        unfinished.unlink(missing_ok=True)
+    else:
+        path = unfinished
+    if n > 0 and options.json != "-":
+        diagnostics.say(f"{n} alignments are kept in {path}")
 
 
 def _on_screen(session: "MirrorAlignment") -> int:
@@ -244,9 +259,9 @@ def _headless(
                 f"no further cross can be aligned after {n_kept} ({snapshot.instruction})",
                 remedy="use a larger board",
             )
-        for text in snapshot.events[told:]:
+        for text in snapshot.events[max(len(snapshot.events) - snapshot.n_events + told, 0) :]:
             diagnostics.detail(text)
-        told = len(snapshot.events)
+        told = snapshot.n_events
 
 
 def _align(session: "MirrorAlignment", opened: "OpenedAlignment", corner: int) -> bool:

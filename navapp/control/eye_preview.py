@@ -1,18 +1,15 @@
 """The operator's small picture of what an eye sees in a simulated mirror, for showing only."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.frames import Image
 from navapp.control.executors import Executor, Job
 from navapp.overlay import make_preview
+from navapp.values.pictures import Look
 
 # From one look to the next, at least; a look that was begun longer ago is not shown.
 _PERIOD_NS = 250_000_000
 _VALID_NS = 4 * _PERIOD_NS
-
-# What the eye sees now, and the same without the display's light; (H, W, 3) uint8 BGR each.
-Look = Callable[[], tuple[Image, Image]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,5 +1,6 @@
 """Opens cameras and a display in the mirror for the alignment of crosses; simulated ones, too."""
 
+import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from navapp.devices.simulated_room import Pace, make_simulated_camera
 from navapp.errors import ConfigurationError
 from navapp.geometry import StereoRig
 from navapp.geometry.transform import FloatArray
+from navapp.values.pictures import EyeLook
 from sim_devices.aligning_eye import AligningEye
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
@@ -38,9 +40,8 @@ class PracticeEye:
     """A simulated eye that looks at the corners of the board in a simulated hand.
 
     Attributes:
-        pitch_mm: of the monitor, as its data sheet says.
-        glass_mm: of the plate, likewise.
-        mirror_deg: between the plate's normal and the line of sight.
+        pitch_mm: of the monitor, from its diagonal to a tenth of an inch, as a data sheet says.
+        glass_mm: of the plate, likewise, to a whole millimetre.
         reads_upside_down: the eye sees the rows of the monitor's picture rise upwards.
     """
 
@@ -51,9 +52,10 @@ class PracticeEye:
         self._points_mm, self._hand, self._camera = board.points_mm, hand, camera
         self._display, self._clock, self._eye = display, clock, eye
         self._sheet = print_board(board, _EYE_SHEET_PX_PER_MM)
-        self.pitch_mm = eye.setup.panel.pitch_mm
-        self.glass_mm = eye.setup.plate.thickness_mm
-        self.mirror_deg = 45.0
+        panel = eye.setup.panel
+        diagonal_inch = panel.pitch_mm * math.hypot(panel.width_px, panel.height_px) / 25.4
+        self.pitch_mm = panel.pitch_mm * round(diagonal_inch, 1) / diagonal_inch
+        self.glass_mm = float(max(1, round(eye.setup.plate.thickness_mm)))
         self.reads_upside_down = eye.setup.reads_upside_down
 
     def look(self, corner: int | None, number: int) -> NDArray[np.uint8]:
@@ -81,9 +83,10 @@ class OpenedAlignment:
     clock: Clock  # of both
     rig: StereoRig
     reopen: Callable[[], StereoCamera]  # opens the camera again when it was lost
-    # hand, practice: of the simulated room; its eye may be watched, and asked by nobody but the
-    # script that stands for the operator. None with real devices.
+    # hand, look, practice: of the simulated room; its eye may be watched by looks, and asked by
+    # nobody but the script that stands for the operator. None with real devices.
     hand: Hand | None = None
+    look: EyeLook | None = None
     practice: PracticeEye | None = None
 
     def close(self) -> None:
@@ -171,4 +174,14 @@ def _open_all(
         open_matching(camera, rig)
         undo.pop_all()
     reopen = make_reopener(camera, lambda: open_matching(camera, rig))
-    return OpenedAlignment(camera, display, clock, rig, reopen, hand, practice)
+    look = None if practice is None else make_eye_look(practice)
+    return OpenedAlignment(camera, display, clock, rig, reopen, hand, look, practice)
+
+
+def make_eye_look(practice: PracticeEye) -> EyeLook:
+    """What the eye sees, and nothing else of it."""
+
+    def look(corner: int | None, number: int) -> NDArray[np.uint8]:
+        return practice.look(corner, number)
+
+    return look

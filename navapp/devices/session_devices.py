@@ -11,7 +11,7 @@ from navapp.config import Configuration
 from navapp.devices.cameras import make_real_camera
 from navapp.devices.peripherals import make_device_set
 from navapp.devices.rig_match import make_reopener, open_matching, read_configured_rig
-from navapp.devices.simulated_mirror import Look, make_look
+from navapp.devices.simulated_mirror import make_look
 from navapp.devices.simulated_room import (
     Pace,
     Simulation,
@@ -22,6 +22,7 @@ from navapp.devices.simulated_room import (
 )
 from navapp.errors import DeviceError
 from navapp.geometry import StereoRig
+from navapp.values.pictures import Look
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.world import World

@@ -1,18 +1,17 @@
 """A display in a simulated half-silvered mirror: its model, and what an eye sees there."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import date, timedelta
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.frames import Image
-from navapp.geometry import StereoRig
 from navapp.geometry.display_model import DisplayModel, DisplayQuality
 from navapp.geometry.display_model_errors import EYE_DISTANCE_MM
 from navapp.geometry.display_model_optics import Glass, VirtualScreen
 from navapp.geometry.transform import FloatArray
+from navapp.values.pictures import Look
 from sim_devices.camera import SimulatedCamera
 from sim_devices.display import SimulatedDisplay
 from sim_devices.mirror_optics import MirrorSetup
@@ -20,9 +19,6 @@ from sim_devices.mirror_setups import make_practice_setup
 from sim_devices.rigs import make_default_rig
 from sim_devices.simulated_eye import SimulatedEye
 from sim_devices.world import World
-
-# What the eye sees now, and the same without the display's light; (H, W, 3) uint8 BGR each.
-Look = Callable[[], tuple[Image, Image]]
 
 # Standard deviations of the numbers of `DisplayModel.move`, of a careful calibration.
 _DEVIATIONS = (
@@ -32,16 +28,15 @@ _VALID_DAYS = 30
 _NEAR_MM = 40.0
 
 
-def make_practice_display(today: date, rig: StereoRig | None = None) -> DisplayModel:
+def make_practice_display(today: date) -> DisplayModel:
     """The display of the built-in simulated mirror, as a calibration for the left eye tells it.
 
     Nothing is calibrated: its places are the true ones, its record is what a calibration reaches.
 
     Args:
         today: day of the record.
-        rig: of the simulated cameras; the simulated room's when absent.
     """
-    setup = make_practice_setup(rig or make_default_rig())
+    setup = make_practice_setup(make_default_rig())
     other_mm = setup.eye_mm + EYE_DISTANCE_MM * setup.right
     model = replace(
         true_display(setup), viewing_eye="left", other_eye_mm=other_mm, display_name="sim:display"
@@ -95,7 +90,7 @@ def make_look(
     """
     eye = SimulatedEye(world, make_practice_setup(world.rig))
 
-    def look() -> tuple[Image, Image]:
+    def look() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         shown = display.visible_image()
         site = eye.render_site(camera.world_time_ns(clock.now_ns()))
         return eye.expose(site, shown), eye.expose(site, None)

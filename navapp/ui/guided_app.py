@@ -16,6 +16,7 @@ from navapp.ui.terminal import own_terminal
 from navapp.ui.theme import NAVAPP_THEME
 
 POLLS_PER_S = 8
+_INTERRUPTED = 130  # exit code, as of a program that ctrl+c ends
 _CHARACTERS = {"+": "plus", "-": "minus"}
 
 
@@ -56,6 +57,11 @@ class GuidedScreen(Screen[None], Generic[SnapshotT]):
 
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (80, "-enough")]  # noqa: RUF012 (as the base class)
     VERTICAL_BREAKPOINTS = [(0, "-low"), (24, "-even"), (40, "-tall")]  # noqa: RUF012
+
+    @property
+    def is_small(self) -> bool:
+        """The terminal is too small for more than the essential."""
+        return self.has_class("-narrow") or self.has_class("-low")
 
     def show(self, snapshot: SnapshotT, symbols: Symbols) -> None:
         """Show a snapshot with these characters."""
@@ -124,12 +130,12 @@ class GuidedApp(QuietApp, Generic[SnapshotT, CommandT]):
             self._session.submit(command)
 
     async def action_quit(self) -> None:
-        """Textual's own way to quit."""
-        self.exit(0)
+        """Textual's own way to quit: an interruption."""
+        self.exit(_INTERRUPTED)
 
     def action_help_quit(self) -> None:
         """What Textual does at ctrl+c."""
-        self.exit(0)
+        self.exit(_INTERRUPTED)
 
 
 class MakeApp(Protocol):

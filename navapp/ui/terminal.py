@@ -22,10 +22,7 @@ def own_terminal(log_path: Path) -> Iterator[None]:
         UsageError: there is no terminal.
         InputError: the log cannot be written.
     """
-    if not (os.isatty(0) and os.isatty(1)):
-        raise UsageError(
-            "the operator's screen needs a terminal", remedy="start it in one, or add --headless"
-        )
+    check_terminal()
     log = _open_log(log_path)
     sys.stdout.flush()
     sys.stderr.flush()
@@ -47,6 +44,18 @@ def own_terminal(log_path: Path) -> Iterator[None]:
         os.dup2(saved[1], 2)
         for descriptor in saved:
             os.close(descriptor)
+
+
+def check_terminal() -> None:
+    """Refuse a screen where nobody would see it.
+
+    Raises:
+        UsageError: there is no terminal.
+    """
+    if not (os.isatty(0) and os.isatty(1)):
+        raise UsageError(
+            "the operator's screen needs a terminal", remedy="start it in one, or add --headless"
+        )
 
 
 def is_terminal_lost() -> bool:

@@ -1,5 +1,6 @@
 """What a display is to show."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from types import MappingProxyType
@@ -8,6 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.values.measured import Origin
+
+# What a simulated eye sees now, and the same without the display's light; (H, W, 3) uint8 BGR each.
+Look = Callable[[], tuple[NDArray[np.uint8], NDArray[np.uint8]]]
+# (h, w, 3) uint8 BGR that it sees around a corner of a board (its id; None: around the board's
+# middle) at its look of that number.
+EyeLook = Callable[[int | None, int], NDArray[np.uint8]]
 
 # BGR by which an operator's picture tells matched depth from guesses, by the side of their source.
 DEPTH_COLOURS = MappingProxyType(

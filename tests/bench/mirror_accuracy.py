@@ -12,7 +12,8 @@ where the true femur's points and line appear: drawn with the true pose and disp
 tracked pose and the solved display. For `--computed` more the marks are computed with noise.
 
 With `--keys`, operators align crosses with an eye that wanders by 3 mm (95 %): N of them in all, a
-third with each noise.
+third with each noise. Some more, one for each fifteen, align twelve with a shaking hand (3 px), in
+a room without pictures, and then confirm what is lit: at once, or after a token move of one pixel.
 
 The exit code is 1 when a limit is missed; each is told beside its figure.
 """
@@ -30,6 +31,7 @@ from tests.bench.mirror_limits import Limits
 from tests.bench.mirror_pictures import N_VIEWS, by_pictures
 from tests.calibration.mirror.simulated_operators import SimulatedOperator
 from tests.calibration.mirror.simulated_views import drawn_views, scene
+from tests.control.mirror_alignment.careless import TOKEN_MOVES, confirm_blindly
 from tests.geometry.test_display_model_errors import seen_beside_mm
 
 _FIRST_COMPUTED, _FIRST_OPERATOR = 31000, 310000
@@ -47,6 +49,7 @@ def main() -> int:
     limits = Limits()
     if options.keys:
         by_keys(options.operators, limits)
+        by_confirming(max(1, options.operators // 15), limits)
     else:
         if options.setups:
             by_pictures(options.setups, limits)
@@ -117,6 +120,24 @@ def by_keys(n_operators: int, limits: Limits) -> None:
             print(f"| accepted within 40, {sd_px} px | {share:.3f} | | |")
     holds = float(np.mean([below for _, _, below in told]))
     limits.line("prediction holds", holds, 0.9, is_upper=False)
+    print()
+
+
+def by_confirming(n_operators: int, limits: Limits) -> None:
+    """Operators who confirm crosses that they did not align: nothing may come of it."""
+    print("| confirmed without aligning | operators | alignments, most | predicted least mm |")
+    print("|---|" + "---|" * 3)
+    n_false = n_accepted = 0
+    for name, move in TOKEN_MOVES.items():
+        ended = [confirm_blindly(seed, 12, move) for seed in range(1, n_operators + 1)]
+        least_mm = min(one.error_mm for one in ended)
+        print(f"| {name} | {n_operators} | {max(one.n_kept for one in ended)} | {least_mm:.2f} |")
+        n_false += sum(one.is_false for one in ended)
+        n_accepted += sum(one.is_accepted for one in ended)
+    print("\n| confirmed without aligning | found | limit | |")
+    print("|---|---|---|---|")
+    limits.line("accepted", n_accepted, 0)
+    limits.line("accepted, with a larger error than predicted", n_false, 0)
 
 
 if __name__ == "__main__":

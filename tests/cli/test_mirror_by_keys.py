@@ -11,6 +11,8 @@ from calibration.targets.boards import read_board
 from navapp.cli.main import _parser, run
 from navapp.cli.mirror_by_keys import make_session
 from navapp.config import parse
+from navapp.control.mirror_alignment.alignment import MirrorAlignment
+from navapp.control.mirror_alignment.kept_crosses import KeptCross
 from navapp.devices.mirror_alignment import make_practice_eye, open_mirror_alignment
 from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model_files import read_display_model
@@ -73,6 +75,9 @@ def test_a_simulated_eye_calibrates_its_display(board: str, tmp_path: Path, seed
     assert calibrate(again, "--alignments", str(made), "--json", str(told_again)) == 0
     assert json.loads(told_again.read_text()) == json.loads(told.read_text())
     assert len(json.loads(made.read_text())["alignments"]) >= 12
+    assert not list(tmp_path.glob("*.unfinished.json"))
+    assert json.loads(told.read_text())["reads_upside_down_as_told"] is model.flips_rows
+    assert "told; alignments cannot tell" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_camera_that_is_lost_keeps_what_was_asked_for(board: str, tmp_path: Path, capsys) -> None:
@@ -85,28 +90,117 @@ def test_a_camera_that_is_lost_keeps_what_was_asked_for(board: str, tmp_path: Pa
     n_kept = len(json.loads(few.read_text())["alignments"])
     assert 1 <= n_kept < 12
     assert not out.exists()
-    # Nothing is kept of too few that nobody asked for.
+    # Too few that nobody asked for replace no finished file.
     few.unlink()
+    finished = tmp_path / "display.alignments.json"
+    finished.write_text("of last week")
     assert calibrate(out, *options, config=config) == 5
-    assert not list(tmp_path.glob("*.alignments.json"))
+    assert finished.read_text() == "of last week"
+    unfinished = tmp_path / "display.alignments.unfinished.json"
+    assert len(json.loads(unfinished.read_text())["alignments"]) == n_kept
 
 
-def test_the_session_never_gets_hold_of_the_mirror_or_of_what_an_eye_aims_at(
-    board: str, tmp_path: Path
-) -> None:
-    parsed = ["calibrate", "mirror", "--by-keys", "--headless", "--board", board, "--out", "d.yml"]
+def opened_session(board: str, *more: str):
+    """A session in the simulated room, and what was opened for it."""
+    parsed = ["calibrate", "mirror", "--by-keys", "--board", board, "--out", "d.yml", *more]
     options, configuration = _parser().parse_args(parsed), parse({}, "x")
-    opened = open_mirror_alignment(configuration, read_board(board), is_headless=True)
-    session = make_session(opened, read_board(board), options, configuration)
+    opened = open_mirror_alignment(configuration, read_board(board), is_headless=options.headless)
+    return make_session(opened, read_board(board), options, configuration), opened
+
+
+@pytest.mark.parametrize("more", [(), ("--headless",)], ids=["screen", "headless"])
+def test_the_session_never_gets_hold_of_the_mirror_or_of_what_an_eye_aims_at(
+    board: str, more: tuple[str, ...]
+) -> None:
+    session, opened = opened_session(board, *more)
+    truth = {"MirrorSetup", "AligningEye", "PracticeEye"}
     try:
-        found = {type(one).__name__ for one in reachable(session, set())}
+        # What the eye sees is pictures for the screen; nothing else asks for it.
+        names = {type(one).__name__ for one in reachable(session, {id(opened.look)})}
+        through = {type(one).__name__ for one in reachable(session, set())}
     finally:
         session.close()
-    assert "StereoRig" in found
-    assert not found & {"MirrorSetup", "AligningEye", "PracticeEye"}
+        opened.close()
+    assert "StereoRig" in names
+    assert not names & truth
+    # The walk does find them where they are, and without a screen nobody looks.
+    assert truth <= {type(one).__name__ for one in reachable(opened, set())}
+    assert bool(through & truth) is not bool(more)
+    assert not hasattr(opened.look, "__self__")
 
 
-def test_a_screen_needs_a_terminal(board: str, tmp_path: Path, capsys) -> None:
+def test_a_person_knows_the_plate_to_a_millimetre_and_the_display_to_a_tenth_of_an_inch(
+    board: str,
+) -> None:
+    session, opened = opened_session(board, "--headless")
+    session.close()
+    opened.close()
+    display, _ = session.made
+    seed = parse({}, "x").camera.simulated.seed
+    true_mm = make_practice_eye(seed).setup.plate.thickness_mm
+    assert true_mm != round(true_mm)
+    assert display.glass_mm == max(1, round(true_mm))
+    inch = display.pitch_mm * np.hypot(display.width_px, display.height_px) / 25.4
+    assert abs(inch * 10.0 - round(inch * 10.0)) < 1e-9
+
+
+@pytest.fixture
+def interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A screen on which crosses are aligned until somebody presses ctrl+c."""
+    from navapp.cli import mirror_by_keys
+
+    def on_screen(session: MirrorAlignment) -> int:
+        room = session._hand
+        assert room is not None
+        for k in range(14):
+            point = np.array([30.0 * (k % 3), 25.0 * (k // 3 % 3), 430.0 + 20.0 * (k % 4)])
+            session._kept.add(KeptCross(k, (900 + 9 * k, 500 + 7 * k), point, 0.1, point))
+            session._write()
+        return 130
+
+    monkeypatch.setattr("navapp.ui.terminal.check_terminal", lambda: None)
+    monkeypatch.setattr(mirror_by_keys, "_on_screen", on_screen)
+
+
+@pytest.mark.usefixtures("interrupted")
+def test_an_interruption_keeps_the_alignments_and_touches_no_display(
+    board: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from calibration.mirror import alignments
+
+    def solve(*_args: object) -> None:
+        raise AssertionError("it is solved")
+
+    monkeypatch.setattr(alignments, "solve_alignments", solve)
+    out = tmp_path / "display.yml"
+    out.write_text("of last week")
+    config = small_room(tmp_path / "navapp.toml", 0)
+    assert calibrate(out, "--board", board, "--by-keys", config=config) == 130
+    assert out.read_text() == "of last week"
+    made = json.loads((tmp_path / "display.alignments.json").read_text())
+    assert len(made["alignments"]) == 14
+    assert not list(tmp_path.glob("*.unfinished.json"))
+
+
+@pytest.mark.slow
+def test_json_on_the_standard_output_is_nothing_but_json(
+    board: str, tmp_path: Path, capsys
+) -> None:
+    config = small_room(tmp_path / "navapp.toml", 0)
+    words = ["calibrate", "mirror", "--out", str(tmp_path / "d.yml"), "--board", board]
+    words += ["--by-keys", "--headless", "--json", "-"]
+    assert run(["--config", str(config), *words]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["accepted"] is True
+
+
+def test_a_screen_needs_a_terminal_before_any_device_is_opened(
+    board: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    def opened(*_args: object, **_more: object) -> None:
+        raise AssertionError("a device is opened")
+
+    monkeypatch.setattr("navapp.devices.open_mirror_alignment", opened)
     assert calibrate(tmp_path / "d.yml", "--board", board, "--by-keys") == 2
     assert "needs a terminal" in capsys.readouterr().err
     assert not (tmp_path / "d.yml").exists()
@@ -132,6 +226,21 @@ BAD = {
     ),
     "a size": (["--by-keys", "--board", "board.json", "--size", "9x9"], "", "--size does not go"),
     "headless alone": (["--alignments", "a.json", "--headless"], "", "belongs to --by-keys"),
+    **{
+        f"{option} with {source[0]}": (
+            [*source, option, *value], "", f"{option} does not go with {source[0]}",
+        )
+        for source, options in {
+            ("--alignments", "a.json"): {
+                "--viewing-eye": ["left"], "--glass-mm": ["0"], "--diagonal-inch": ["24"],
+                "--curved": [], "--glass-deg": ["45"], "--board": ["b.json"], "--rig": ["r"],
+            },
+            ("--by-keys",): {"--curved": [], "--lens": ["l"], "--eye-views": ["1"]},
+            ("--views", "v"): {"--upside-down": [], "--save-alignments": ["s.json"]},
+            ("--pattern", "p.png"): {"--rig": ["r"], "--report": ["r.html"], "--force": []},
+        }.items()
+        for option, value in options.items()
+    },
     "real, headless": (
         ["--by-keys", "--board", "board.json", "--headless"], '[camera]\nbackend = "uvc"\n',
         "simulated room",
@@ -158,8 +267,10 @@ def test_what_cannot_be_done_is_refused(
     what: str, board: str, tmp_path: Path, monkeypatch, capsys
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("navapp.ui.terminal.check_terminal", lambda: None)
     arguments, configured, words = BAD[what]
     config = tmp_path / "navapp.toml"
     config.write_text(configured)
-    command = ["--config", str(config), "calibrate", "mirror", "--out", "d.yml", *arguments]
+    out = [] if "--pattern" in arguments else ["--out", "d.yml"]
+    command = ["--config", str(config), "calibrate", "mirror", *out, *arguments]
     refused(command, capsys, 2, words)

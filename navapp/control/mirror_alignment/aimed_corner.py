@@ -23,6 +23,7 @@ class AimedCorner:
         self._lit_at = place
         self._anchor: BoardPlace | None = place
         self._confirmed_ns: int | None = None
+        self.is_moved = False  # the cross, since it was lit
 
     @property
     def is_confirmed(self) -> bool:
@@ -31,7 +32,7 @@ class AimedCorner:
 
     def note_nudge(self) -> None:
         """The cross was moved: from the next look on the corner must stay."""
-        self._anchor, self._confirmed_ns = None, None
+        self._anchor, self._confirmed_ns, self.is_moved = None, None, True
 
     def confirm(self, now_ns: int) -> None:
         """The cross lies on the corner, now."""
@@ -39,7 +40,7 @@ class AimedCorner:
 
     def is_elsewhere(self, place: BoardPlace) -> bool:
         """The board was carried away."""
-        moved_mm = place.moved_mm(self._lit_at)
+        moved_mm = place.moved_mm(self._lit_at, self.corner)
         return moved_mm != float("inf") and moved_mm > _ELSEWHERE_MM
 
     def follow(self, place: BoardPlace | None) -> None:
@@ -49,7 +50,9 @@ class AimedCorner:
 
     def moved_mm(self, place: BoardPlace | None) -> float | None:
         """How far the corner is from where it was when the cross was moved last."""
-        return None if place is None or self._anchor is None else place.moved_mm(self._anchor)
+        if place is None or self._anchor is None:
+            return None
+        return place.moved_mm(self._anchor, self.corner)
 
     def judge(self, looks: BoardLooks, now_ns: int) -> str | None:
         """What speaks against keeping what was confirmed: empty for nothing.

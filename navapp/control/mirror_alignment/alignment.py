@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from queue import Empty, SimpleQueue
 
+import numpy as np
+
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignment_start import AlignedDisplay
 from calibration.mirror.alignments import FEWEST_ALIGNMENTS, solve_alignments
@@ -15,13 +17,13 @@ from navapp.control.capture.board_view import BoardView, detect_board
 from navapp.control.executors import Executor, Job
 from navapp.control.mirror_alignment.aimed_corner import AimedCorner
 from navapp.control.mirror_alignment.board_place import BoardLooks, BoardPlace, locate_board
-from navapp.control.mirror_alignment.first_crosses import guess_pixel
+from navapp.control.mirror_alignment.first_crosses import guess_pixel, light_beside
 from navapp.control.mirror_alignment.guidance import Goal, Guide
 from navapp.control.mirror_alignment.interfaces import (
     AlignmentSettings,
-    EyeLook,
     MovingHand,
     Solve,
+    Store,
 )
 from navapp.control.mirror_alignment.kept_crosses import KeptCross, KeptCrosses
 from navapp.control.mirror_alignment.shown_cross import ShownCross
@@ -41,8 +43,9 @@ from navapp.control.mirror_alignment.states import (
     Undo,
 )
 from navapp.control.states import NudgeCross
-from navapp.errors import DeviceError
+from navapp.errors import DeviceError, InputError
 from navapp.geometry.rig import StereoRig
+from navapp.values.pictures import EyeLook
 
 _WAIT_S = 0.1
 _MOST_EVENTS = 30
@@ -67,6 +70,7 @@ class MirrorAlignment:
         reopen: opens a lost camera again; None: its loss is the end.
         detect: finds the board in the pictures of a frame.
         solve: the display from alignments.
+        store: takes all alignments whenever one was made or forgotten.
     """
 
     def __init__(
@@ -84,21 +88,25 @@ class MirrorAlignment:
         reopen: Reopen | None = None,
         detect: Callable[[StereoFrame, Board], BoardView] = detect_board,
         solve: Solve = solve_alignments,
+        store: Store | None = None,
     ) -> None:
         self._names = camera.info.name, display.info.name
         self._camera, self._clock = CameraLink(camera, clock, reopen), clock
         self._board, self._rig, self._settings, self._executor = board, rig, settings, executor
-        self._hand, self._eye, self._detect = hand, eye, detect
+        self._hand, self._eye, self._detect, self._store = hand, eye, detect, store
         self._is_following = hand is not None
         self._cross = ShownCross(display, clock, settings.valid_ms)
         self._solution = DisplaySolution(settings.display, executor, solve)
         self._guide = Guide(settings.display, board, rig)
-        self._kept, self._looks, self._events = KeptCrosses(), BoardLooks(), list[str]()
+        self._kept, self._looks = KeptCrosses(), BoardLooks()
+        self._events, self._n_events = list[str](), 0
         self._commands: SimpleQueue[AlignmentCommand] = SimpleQueue()
-        self._is_over = self._is_asked_to_leave = False
+        self._is_over = False
+        self._question = ""  # what was asked before leaving; empty: nothing
         self._frame: StereoFrame | None = None
         self._view: BoardView | None = None
         self._detection: Job[BoardView] | None = None
+        self._rng = np.random.default_rng(settings.seed)
         # At most one of them: where the board is wanted, or the corner under a cross.
         self._goal: Goal | None = None
         self._aimed: AimedCorner | None = None
@@ -169,19 +177,20 @@ class MirrorAlignment:
 
     def _do(self, command: AlignmentCommand) -> None:
         if not isinstance(command, Leave):
-            self._is_asked_to_leave = False
+            self._question = ""
         match command:
             case NudgeCross(right_px, down_px) if self._aimed is not None:
                 self._cross.nudge(right_px, down_px, self._solution.flips)
-                self._aimed.note_nudge()
+                if (right_px, down_px) != (0, 0):
+                    self._aimed.note_nudge()
             case Confirm() if self._aimed is not None:
-                self._aimed.confirm(self._clock.now_ns())
+                self._confirm(self._aimed)
             case Undo():
                 self._undo()
             case Another():
                 self._skip()
             case TurnArrows(columns, rows):
-                self._solution.turn(self._kept, columns=columns, rows=rows)
+                self._turn(columns=columns, rows=rows)
             case Follow(is_on):
                 self._is_following = is_on and self._hand is not None
             case MoveHand(shift_mm) if self._hand is not None:
@@ -192,6 +201,24 @@ class MirrorAlignment:
             case Leave():
                 self._leave()
 
+    def _confirm(self, aimed: AimedCorner) -> None:
+        if aimed.is_moved:
+            aimed.confirm(self._clock.now_ns())
+            return
+        self._add_event("not kept: move the cross onto the corner first")
+
+    def _turn(self, *, columns: bool, rows: bool) -> None:
+        solution = self._solution
+        if solution.found is not None or solution.is_under_way:
+            # Two lines on a small screen, newest first.
+            self._add_event(f"u to fewer than {FEWEST_ALIGNMENTS} frees them, or begin anew")
+            self._add_event("the arrows stay: the display is solved with them")
+            return
+        solution.turn(self._kept, columns=columns, rows=rows)
+        if len(self._kept) > 0:
+            self._write()
+        self._add_event(f"arrows exchanged; the eye reads text {solution.display.reading}")
+
     def _undo(self) -> None:
         dropped = self._kept.drop_last()
         if dropped is None:
@@ -199,6 +226,7 @@ class MirrorAlignment:
         self._add_event(f"alignment {len(self._kept) + 1} is forgotten")
         self._give_up_aim()
         self._goal = None
+        self._write()
         self._solution.begin(self._kept)
 
     def _skip(self) -> None:
@@ -219,14 +247,26 @@ class MirrorAlignment:
         self._add_event(f"nothing is saved: {why}")
 
     def _leave(self) -> None:
-        loses = 0 < len(self._kept) < FEWEST_ALIGNMENTS and not self._settings.keeps_few
-        if loses and not self._is_asked_to_leave:
-            self._is_asked_to_leave = True
-            self._add_event(
-                f"the alignments will be lost ({len(self._kept)} so far): leave again to end"
-            )
+        n, settings, verdict = len(self._kept), self._settings, self._solution.verdict
+        question = ""
+        if 0 < n < FEWEST_ALIGNMENTS and not settings.keeps_few:
+            question = f"{n} alignments make no display: leave again to end without one"
+        elif verdict is not None and verdict.is_accepted and settings.replaces:
+            question = f"{settings.replaces} will be replaced: leave again, or ctrl+c keeps it"
+        if question and not self._question:
+            self._question = question
+            self._add_event(question)
             return
         self._is_over = True
+
+    def _write(self) -> None:
+        """What was made so far: a crash must not cost it."""
+        if self._store is None:
+            return
+        try:
+            self._store(*self.made)
+        except InputError as error:
+            self._add_event(str(error))
 
     def _take_view(self) -> None:
         job = self._detection
@@ -266,6 +306,7 @@ class MirrorAlignment:
         self._add_event(f"alignment {len(self._kept)} is kept: {name}")
         self._guide.forget_corners()
         self._give_up_aim()
+        self._write()
         self._solution.begin(self._kept)
 
     def _take_solution(self) -> None:
@@ -313,9 +354,9 @@ class MirrorAlignment:
         if point_mm is None:
             return
         known = self._solution.know(self._kept)
-        self._cross.put(
-            guess_pixel(self._solution.display, self._kept.alignments, known.model, point_mm)
-        )
+        display = self._solution.display
+        expected = guess_pixel(display, self._kept.alignments, known.model, point_mm)
+        self._cross.put(light_beside(display, expected, self._rng))
         self._aimed = AimedCorner(corner, place)
 
     def _give_up_aim(self) -> None:
@@ -323,7 +364,7 @@ class MirrorAlignment:
         self._cross.put(None)
 
     def _add_event(self, text: str) -> None:
-        self._events = [*self._events, text][-_MOST_EVENTS:]
+        self._events, self._n_events = [*self._events, text][-_MOST_EVENTS:], self._n_events + 1
 
     @property
     def _phase(self) -> AlignmentPhase:
@@ -349,6 +390,7 @@ class MirrorAlignment:
                 self._clock.now_ns(), self._phase, self._names, self._board, self._frame,
                 self._view, self._eye, self._hand is not None, self._is_following,
                 self._looks, self._guide, self._goal, self._aimed, self._cross.pixel,
-                self._solution, self._kept, tuple(self._events), self._trouble,
+                self._solution, self._kept, tuple(self._events), self._n_events, self._trouble,
+                self._question,
             )
         )  # fmt: skip

@@ -37,12 +37,23 @@ class BoardPlace:
         found = np.flatnonzero(self.ids == corner)
         return self.points_mm[found[0]] if len(found) else None
 
-    def moved_mm(self, other: "BoardPlace") -> float:
-        """Median distance of the corners of both; infinite when they share too few."""
+    def moved_mm(self, other: "BoardPlace", corner: int | None = None) -> float:
+        """Median distance of the corners of both; infinite when they share too few.
+
+        Args:
+            other: an earlier place.
+            corner: whose own way counts when it is longer: a turn moves the rim farther than most.
+        """
         _, a, b = np.intersect1d(self.ids, other.ids, return_indices=True)
         if len(a) < _FEWEST_CORNERS:
             return float("inf")
-        return float(np.median(np.linalg.norm(self.points_mm[a] - other.points_mm[b], axis=1)))
+        usual_mm = float(np.median(np.linalg.norm(self.points_mm[a] - other.points_mm[b], axis=1)))
+        point_mm = None if corner is None else self.point_of(corner)
+        if point_mm is None:
+            return usual_mm
+        # By the poses, in which all corners have a say: one corner alone is seen less well.
+        before_mm = other.left_from_board.apply(self.left_from_board.inverse().apply(point_mm))
+        return max(usual_mm, float(np.linalg.norm(point_mm - before_mm)))
 
 
 def locate_board(view: BoardView, board: Board, rig: StereoRig) -> BoardPlace | None:

@@ -1,4 +1,4 @@
-"""Where a cross is lit first: about where the corner will be seen, as far as that is known."""
+"""Where a cross is lit first: beside where the corner is expected, as far as that is known."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from navapp.geometry.transform import FloatArray
 RIM_PX = 30
 _FEWEST_FOR_MODEL, _LEAST_SPREAD_MM = 6, 8.0
 _WORST_ROUGH_PX = 60.0
+# A cross is lit so far from where the corner is expected.
+_LEAST_BESIDE_PX, _MOST_BESIDE_PX = 15.0, 40.0
 
 
 def guess_pixel(
@@ -34,6 +36,24 @@ def guess_pixel(
         pixel = 0.5 * (size - 1.0)
     inside = np.clip(np.rint(pixel), RIM_PX, size - 1 - RIM_PX)
     return int(inside[0]), int(inside[1])
+
+
+def light_beside(
+    display: AlignedDisplay, pixel: tuple[int, int], rng: np.random.Generator
+) -> tuple[int, int]:
+    """A pixel some way beside another one, in any direction.
+
+    A cross that is confirmed where it was lit then disagrees with what is known: it cannot make
+    a solution seem better than the eye's own alignments make it.
+    """
+    size = np.array([display.width_px, display.height_px])
+    far_px, angle = rng.uniform(_LEAST_BESIDE_PX, _MOST_BESIDE_PX), rng.uniform(0.0, 2.0 * np.pi)
+    way = far_px * np.array([np.cos(angle), np.sin(angle)])
+    beside = pixel + way
+    # Beyond the rim the other way is taken.
+    beside = np.where((beside < RIM_PX) | (beside > size - 1 - RIM_PX), pixel - way, beside)
+    u, v = np.rint(beside).astype(int).tolist()
+    return u, v
 
 
 def is_on_display(display: AlignedDisplay, pixels: FloatArray) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from calibration.mirror.alignments import (
     FEWEST_ALIGNMENTS,
     LEAST_RANGE_MM,
     AlignedCalibration,
+    choose_next,
     choose_spread,
     compute_gains,
     count_depths,
@@ -31,7 +32,9 @@ _N_HEIGHTS = -(-FEWEST_ALIGNMENTS // _AT_EACH)
 SAME_HEIGHT_MM, _NEAR_MM = 14.0, 12.0
 # Beyond what is asked for, so that it is surely reached.
 _SPARE_MM = 6.0
-_ASIDE_MM, _NEAR_ASIDE_MM = 60.0, 20.0
+_NEAR_ASIDE_MM = 20.0
+# Better places lie so far aside of the first one, each way: within 60 mm of it.
+_ASIDE_MM = 42.0
 # The board is moved when that helps so much more than any corner where it lies.
 _WORTH_MOVING, _FEWEST_AT_PLACE = 1.5, 3
 _AXIS_OF_CAMERAS = np.array([0.0, 0.0, 1.0])
@@ -120,19 +123,22 @@ class Guide:
         self._display, self._board, self._rig = display, board, rig
         self._middle_mm = board.points_mm.mean(axis=0)
         self._skipped_corners: set[int] = set()
-        self._skipped_heights: list[float] = []
+        self._refused_mm: list[FloatArray] = []  # (3,) of the board's middle
+        self._stays = False  # a better place was refused: a corner comes first
 
     def skip_corner(self, corner: int) -> None:
         """It cannot be had where the board lies."""
         self._skipped_corners.add(corner)
 
     def skip_goal(self, goal: Goal) -> None:
-        """The board cannot be brought there."""
-        self._skipped_heights.append(goal.height_mm)
+        """The board cannot be brought to that very place."""
+        self._refused_mm.append(goal.middle_mm)
+        self._stays = not goal.is_of_height
 
     def forget_corners(self) -> None:
         """The board lies elsewhere, or an alignment was made: all corners are on offer again."""
         self._skipped_corners.clear()
+        self._stays = False
 
     def middle_of(self, place: BoardPlace) -> FloatArray:
         """(3,) of the board's middle."""
@@ -159,17 +165,22 @@ class Guide:
 
     def _find_height(self, known: Known, place: BoardPlace) -> Goal | None:
         """Three heights, one after the other."""
-        heights, now = self._heights(known, place)
-        wanted = [one for one in _HEIGHTS_MM if not self._is_skipped(one)][:_N_HEIGHTS]
-        for height in wanted:
-            if np.count_nonzero(np.abs(heights - height) < SAME_HEIGHT_MM) < _AT_EACH:
-                return self._goal_at(known, place, height, now)
+        heights, _ = self._heights(known, place)
+        goals = [self._goal_at(known, place, height) for height in _HEIGHTS_MM]
+        wanted = [goal for goal in goals if not self._is_refused(goal.middle_mm)][:_N_HEIGHTS]
+        for goal in wanted:
+            if np.count_nonzero(np.abs(heights - goal.height_mm) < SAME_HEIGHT_MM) < _AT_EACH:
+                return None if goal.is_reached(self.middle_of(place)) else goal
         return None
 
     def _find_depth(
         self, known: Known, found: AlignedCalibration, place: BoardPlace
     ) -> Goal | None:
-        """Depths that the verdict asks for: beyond the nearer end of the heights so far."""
+        """Depths that the verdict asks for: beyond the nearer end of the heights so far.
+
+        When both ends were refused, a corner is offered, and after it both ends again: without
+        more depth nothing is accepted.
+        """
         used = known.kept.alignments.points_mm[found.is_used]
         n_depths, range_mm = count_depths(used, found.model.eye_mm)
         if has_depth(n_depths, range_mm):
@@ -177,42 +188,52 @@ class Guide:
         heights, now = self._heights(known, place)
         more = max(LEAST_RANGE_MM + _SPARE_MM - range_mm, SAME_HEIGHT_MM)
         ends = [float(heights.max()) + more, float(heights.min()) - more]
-        ends = sorted(
-            (one for one in ends if not self._is_skipped(one)), key=lambda e: abs(e - now)
-        )
-        return self._goal_at(known, place, ends[0], now) if ends else None
+        goals = [
+            goal
+            for end in sorted(ends, key=lambda end: abs(end - now))
+            if not self._is_refused((goal := self._goal_at(known, place, end)).middle_mm)
+        ]
+        if not goals:
+            self._refused_mm.clear()
+            return None
+        return None if goals[0].is_reached(self.middle_of(place)) else goals[0]
 
-    def _is_skipped(self, height: float) -> bool:
-        return any(abs(height - one) < SAME_HEIGHT_MM for one in self._skipped_heights)
+    def _is_refused(self, middle_mm: FloatArray) -> bool:
+        return any(np.linalg.norm(middle_mm - one) < _NEAR_ASIDE_MM for one in self._refused_mm)
 
-    def _goal_at(self, known: Known, place: BoardPlace, height: float, now: float) -> Goal | None:
+    def _goal_at(self, known: Known, place: BoardPlace, height: float) -> Goal:
+        """Straight along the line of sight."""
+        _, now = self._heights(known, place)
         middle = self.middle_of(place) + (height - now) * known.axes[2]
-        goal = Goal(
+        return Goal(
             middle, known.axes, is_of_height=True, height_mm=height, away_from=known.away_from
         )
-        return None if goal.is_reached(self.middle_of(place)) else goal
 
     def _find_better_place(
         self, known: Known, found: AlignedCalibration, place: BoardPlace
     ) -> Goal | None:
-        """Where corners would help so much more that the board is worth moving."""
+        """Where corners would help so much more that the board is worth moving.
+
+        Places around the first one: the site does not wander.
+        """
         middle = self.middle_of(place)
         near = np.linalg.norm(known.kept.middles_mm - middle, axis=1) < SAME_HEIGHT_MM
-        if np.count_nonzero(near) < _FEWEST_AT_PLACE:
+        if self._stays or np.count_nonzero(near) < _FEWEST_AT_PLACE:
             return None
         heights, now = self._heights(known, place)
         here = self._best_gain(known, found, place.points_mm)
         best: tuple[float, Goal] | None = None
         aside = (-_ASIDE_MM, 0.0, _ASIDE_MM)
         for right, down, height in product(aside, aside, (heights.min(), now, heights.max())):
-            way = np.array([right, down, height - now]) @ known.axes
-            if np.linalg.norm(way) < SAME_HEIGHT_MM or self._is_skipped(float(height)):
+            wanted = known.kept.middles_mm[0] + np.array([right, down, height]) @ known.axes
+            goal = Goal(
+                wanted, known.axes, False, float(height), "eye", self._third_of(known, wanted)
+            )
+            if goal.is_reached(middle) or self._is_refused(wanted):
                 continue
-            moved = place.left_from_board.apply(self._board.points_mm) + way
+            moved = place.left_from_board.apply(self._board.points_mm) + wanted - middle
             gain = self._best_gain(known, found, moved)
             if gain > _WORTH_MOVING * here and (best is None or gain > best[0]):
-                third = self._third_of(known, middle + way)
-                goal = Goal(middle + way, known.axes, False, float(height), "eye", third)
                 best = gain, goal
         return None if best is None else best[1]
 
@@ -262,7 +283,7 @@ class Guide:
         if known.found is None:
             best = choose_spread(known.kept.alignments.points_mm, points)
         else:
-            best = int(np.argmax(compute_gains(known.found, points)))
+            best = choose_next(known.found, points)
         return int(place.ids[offered[best]])
 
     def _done_here(self, known: Known, place: BoardPlace) -> set[int]:

@@ -4,17 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignment_start import AlignedDisplay
 from calibration.mirror.alignments import AlignedCalibration
 
 Solve = Callable[[AlignedDisplay, Alignments], AlignedCalibration]
-# (h, w, 3) BGR that a simulated eye sees around a corner (its id; None: around the board's middle)
-# at its look of that number.
-EyeLook = Callable[[int | None, int], NDArray[np.uint8]]
+# Takes the alignments that were made so far; raises `InputError` when they cannot be kept.
+Store = Callable[[AlignedDisplay, Alignments], None]
 
 
 class MovingHand(Protocol):
@@ -32,3 +30,5 @@ class AlignmentSettings:
     display: AlignedDisplay  # that shows the crosses
     valid_ms: float = 500.0  # a cross without a newer picture turns black after this
     keeps_few: bool = False  # fewer alignments than a solve needs are kept when it ends
+    replaces: str = ""  # name of the display's file that is there already
+    seed: int = 0  # of where a cross is lit beside its corner

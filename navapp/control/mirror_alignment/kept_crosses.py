@@ -28,11 +28,6 @@ class KeptCrosses:
     def __len__(self) -> int:
         return len(self._crosses)
 
-    @property
-    def last(self) -> KeptCross:
-        """The newest one."""
-        return self._crosses[-1]
-
     def add(self, cross: KeptCross) -> None:
         """Keep one."""
         self._crosses.append(cross)

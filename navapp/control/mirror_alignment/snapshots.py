@@ -13,10 +13,10 @@ from navapp.control.mirror_alignment.aimed_corner import AimedCorner
 from navapp.control.mirror_alignment.board_place import BoardLooks
 from navapp.control.mirror_alignment.corner_previews import preview_seen
 from navapp.control.mirror_alignment.guidance import Goal, Guide
-from navapp.control.mirror_alignment.interfaces import EyeLook
 from navapp.control.mirror_alignment.kept_crosses import KeptCrosses
 from navapp.control.mirror_alignment.solution import DisplaySolution
 from navapp.control.mirror_alignment.states import AlignmentPhase, AlignmentSnapshot
+from navapp.values.pictures import EyeLook
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +40,9 @@ class Parts:
     solution: DisplaySolution
     kept: KeptCrosses
     events: tuple[str, ...]
+    n_events: int
     trouble: str
+    question: str
 
 
 def make_snapshot(parts: Parts) -> AlignmentSnapshot:
@@ -65,6 +67,7 @@ def make_snapshot(parts: Parts) -> AlignmentSnapshot:
         row_column=(0, 0) if corner is None else row_and_column(parts.board, corner),
         cross_px=parts.cross_px,
         flips=parts.solution.flips,
+        is_upside_down=display.reads_upside_down,
         moved_mm=None if parts.aimed is None else parts.aimed.moved_mm(parts.looks.newest),
         is_still=parts.looks.is_still,
         instruction=_instruct(parts),
@@ -74,6 +77,7 @@ def make_snapshot(parts: Parts) -> AlignmentSnapshot:
         used=_count_used(parts),
         verdict=parts.solution.verdict,
         events=parts.events,
+        n_events=parts.n_events,
         trouble=parts.trouble,
     )
 
@@ -105,7 +109,10 @@ def _count_depths(parts: Parts) -> tuple[int, float]:
     if len(parts.kept) == 0:
         return 0, 0.0
     model = parts.solution.know(parts.kept).model
-    points = parts.kept.alignments.points_mm
+    found, points = parts.solution.found, parts.kept.alignments.points_mm
+    if found is not None:
+        # As the verdict counts: without strays.
+        points = points[found.is_used]
     far_mm = 1e6 * np.array([0.0, 0.0, -1.0])
     return count_depths(points, far_mm if model is None else model.eye_mm)
 
@@ -123,6 +130,8 @@ def _count_used(parts: Parts) -> NDArray[np.int64]:
 
 def _instruct(parts: Parts) -> str:
     """What to do next, one sentence."""
+    if parts.question:
+        return parts.question
     if parts.phase is AlignmentPhase.SOLVING:
         return "solving"
     if parts.aimed is not None:

@@ -94,7 +94,7 @@ class DisplayVerdict:
 class AlignmentSnapshot:
     """The alignment at one moment."""
 
-    time_ns: int  # of the newest frame
+    time_ns: int  # on the session's clock, when it was made
     phase: AlignmentPhase
     camera: str  # its name; a simulated one begins with `sim:`
     display: str  # its name
@@ -111,6 +111,7 @@ class AlignmentSnapshot:
     cross_px: tuple[int, int] | None  # in the picture that the display is handed
     # flips_columns, flips_rows: the display shows what the eye reads so.
     flips: tuple[bool, bool]
+    is_upside_down: bool  # the eye is told to read the display on its head
     moved_mm: float | None  # of the corner, since the cross was moved last
     is_still: bool  # the board is at rest
     instruction: str  # what to do next
@@ -119,12 +120,13 @@ class AlignmentSnapshot:
     range_mm: float  # from the nearest to the farthest
     used: NDArray[np.int64]  # (3, 3) alignments in each ninth of the display, as the eye reads it
     verdict: DisplayVerdict | None  # None before there are enough
-    events: tuple[str, ...]  # newest last
+    events: tuple[str, ...]  # the last ones, newest last
     # fewest, fewest_depths, least_range_mm, limit_mm: what is asked of them.
     fewest: int = FEWEST_ALIGNMENTS
     fewest_depths: int = FEWEST_DEPTHS
     least_range_mm: float = LEAST_RANGE_MM
     limit_mm: float = ACCEPT_MM
+    n_events: int = 0  # ever
     trouble: str = ""  # of a device; empty when there is none
 
     @property

@@ -5,7 +5,7 @@ from pathlib import Path
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 
-from navapp.control.mirror_alignment.states import AlignmentCommand, AlignmentSnapshot
+from navapp.control.mirror_alignment.states import AlignmentCommand, AlignmentSnapshot, Leave
 from navapp.ui.guided_app import (
     POLLS_PER_S,
     GuidedApp,
@@ -85,6 +85,9 @@ class AlignmentApp(GuidedApp[AlignmentSnapshot, AlignmentCommand]):
         """What the table of keys says, when it makes sense now."""
         found = _KEYS.get(key)
         if found is None or not is_possible(found, snapshot):
+            return None
+        if self._guided_screen.is_small and found.command != Leave():
+            # Nobody sees there what a key would do to a cross.
             return None
         return command_of(found, snapshot)
 

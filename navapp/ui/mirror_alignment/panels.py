@@ -82,7 +82,7 @@ class InstructionLines(Lines[AlignmentView]):
 
 
 class CrossLine(Lines[AlignmentView]):
-    """Where the cross is, and whether the board rests."""
+    """Where the cross is, whether the board rests, and how the eye reads the display."""
 
     def build(self, view: AlignmentView, width: int, height: int) -> list[Content]:
         """One line."""
@@ -99,14 +99,15 @@ class CrossLine(Lines[AlignmentView]):
         if moved is not None and moved < 100.0:
             level = Level.OK if moved <= MOST_MOVED_MM else Level.BAD
             parts.append((f", moved {moved:.1f} mm", level.value))
+        parts += [(" text ", "$text-muted"), "on head" if snapshot.is_upside_down else "upright"]
         return [Content.assemble(*parts).truncate(width)]
 
 
 class ErrorLine(Lines[AlignmentView]):
-    """The predicted error against the limit at which it is enough."""
+    """The predicted error against the limit at which it is enough, and why it is not."""
 
     def build(self, view: AlignmentView, width: int, height: int) -> list[Content]:
-        """One line."""
+        """Two lines."""
         snapshot, symbols, verdict = view.snapshot, view.symbols, view.snapshot.verdict
         error_mm = None if verdict is None else verdict.error_mm
         level = Level.OK if snapshot.is_accepted else Level.ATTENTION
@@ -115,7 +116,9 @@ class ErrorLine(Lines[AlignmentView]):
         parts: list[str | Content | tuple[str, str]] = [
             (" error   ", "$text-muted"), (bar, level.value), f"{told}{snapshot.limit_mm:.2f}",
         ]  # fmt: skip
-        return [Content.assemble(*parts).truncate(width)]
+        reason = "" if verdict is None or not verdict.reasons else verdict.reasons[0]
+        why = Content.styled(f"         {cut(reason, max(width - 10, 0), symbols)}", level.value)
+        return [Content.assemble(*parts).truncate(width), why]
 
 
 class UsedMap(Lines[AlignmentView]):
@@ -189,7 +192,7 @@ class SmallAlignment(Lines[AlignmentView]):
         word, level = view.state
         return [
             Content.styled(word, level.value),
-            Content(view.snapshot.instruction),
+            Content(view.snapshot.trouble or view.snapshot.instruction),
             Content(f"{view.snapshot.n_kept} of {view.snapshot.fewest} crosses"),
             Content.styled("make the terminal 80 x 24", "$text-muted"),
         ]

@@ -22,6 +22,11 @@ WANDER_SD_MM = 3.0 / 2.7955
 POINT_SD_MM = 0.06
 
 
+def _thickness_as_told(setup: MirrorSetup) -> float:
+    """As a person knows it: to a whole millimetre."""
+    return float(max(1, round(setup.plate.thickness_mm)))
+
+
 class SimulatedOperator:
     """Aligns points of a board that is put at four heights around the site.
 
@@ -46,7 +51,7 @@ class SimulatedOperator:
         self.anatomy_mm = setup.site_mm + rng.uniform(-1.0, 1.0, (30, 3)) * (30.0, 30.0, 25.0)
         self.display = AlignedDisplay(
             WIDTH_PX, HEIGHT_PX, PITCH_MM * (1.0 + rng.normal(0.0, 0.001)),
-            setup.plate.thickness_mm + rng.normal(0.0, 0.1),
+            _thickness_as_told(setup), reads_upside_down=setup.reads_upside_down,
         )  # fmt: skip
 
     def align(self, which: int) -> tuple[np.ndarray, np.ndarray]:
@@ -74,8 +79,7 @@ class SimulatedOperator:
             if n < FEWEST_ALIGNMENTS:
                 continue
             given = Alignments(np.array(pixels), np.array(points), np.full(n, POINT_SD_MM))
-            start = None if found is None else found.model
-            found = solve_alignments(self.display, given, self.anatomy_mm, start=start)
+            found = solve_alignments(self.display, given, self.anatomy_mm)
             quality = found.model.quality
             if n >= most or (quality is not None and quality.is_accepted):
                 return found, n

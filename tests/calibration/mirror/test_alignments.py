@@ -9,6 +9,7 @@ from calibration.mirror import alignments
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignments import AlignedCalibration, advise, choose_next, solve_alignments
 from navapp.errors import ResultError
+from navapp.geometry.display_model_errors import perpendicular_axes
 from sim_devices.mirror_setups import draw_setup
 from tests.calibration.mirror.simulated_operators import POINT_SD_MM, SimulatedOperator
 from tests.geometry.test_display_model_errors import seen_beside_mm
@@ -59,8 +60,10 @@ def test_an_operator_who_shakes_is_refused_with_what_to_do() -> None:
     assert quality is not None
     assert not quality.is_accepted
     assert "0.60 mm are allowed" in quality.reasons[0]
-    assert advise(found, 16).startswith("align another point: the predicted 95 % error")
-    assert advise(found, 40).startswith("begin anew, with the head at rest")
+    assert advise(found, 16).startswith("the predicted 95 % error at the anatomy is")
+    assert advise(found, 16).endswith("are allowed: align another point")
+    assert advise(found, 40).startswith("the predicted 95 % error at the anatomy is")
+    assert ": begin anew; the 40 alignments scatter by" in advise(found, 40)
     assert 4.0 < found.alignment_sd_px < 9.0
 
 
@@ -82,6 +85,8 @@ def test_points_of_one_flat_board_are_not_enough() -> None:
     quality = found.model.quality
     assert quality is not None
     assert any("at 2 depths over" in reason for reason in quality.reasons)
+    # Neither head nor hand is to blame.
+    assert advise(found, 40).startswith("the points lie at 2 depths over")
 
 
 def test_eleven_alignments_are_too_few() -> None:
@@ -112,3 +117,42 @@ def test_the_next_point_is_the_one_that_lowers_the_error_most() -> None:
         judged = dataclasses.replace(model, quality=quality)
         told[k] = float((judged.predict_error(operator.anatomy_mm) ** 2).mean())
     assert min(told, key=lambda k: told[k]) == chosen
+
+
+@pytest.mark.parametrize("seed", few_of(range(30, 42), 4))
+def test_the_plate_stands_as_it_is_solved_within_three_claimed_deviations(seed: int) -> None:
+    operator = operator_of(seed, 0.5)
+    found = solve_alignments(
+        operator.display, aligned(operator, EVERY_THIRD), operator.anatomy_mm
+    )  # fmt: skip
+    solved, true, quality = found.model.glass, operator.true.glass, found.model.quality
+    assert solved is not None
+    assert true is not None
+    assert quality is not None
+    assert quality.covariance is not None
+    turn = np.cross(solved.normal, true.normal)
+    turn *= np.arcsin(np.linalg.norm(turn)) / np.linalg.norm(turn)
+    off_rad = perpendicular_axes(solved.normal[None])[0] @ turn
+    length = off_rad @ np.linalg.solve(quality.covariance[9:11, 9:11], off_rad)
+    assert np.sqrt(length) < 3.0, (
+        np.degrees(off_rad),
+        np.degrees(np.sqrt(np.diag(quality.covariance)[9:11])),
+    )
+    assert solved.normal @ true.normal > 0.0
+
+
+@pytest.mark.parametrize("seed", few_of(range(60, 72), 2))
+def test_upright_or_on_its_head_is_not_in_the_alignments(seed: int) -> None:
+    operator = operator_of(seed, 0.5)
+    given = aligned(operator, np.arange(48))
+    upright, on_head = (
+        solve_alignments(
+            dataclasses.replace(operator.display, reads_upside_down=is_upside_down),
+            given, operator.anatomy_mm,
+        )
+        for is_upside_down in (False, True)
+    )  # fmt: skip
+    assert upright.model.flips_rows is not on_head.model.flips_rows
+    assert abs(upright.alignment_sd_px - on_head.alignment_sd_px) < 0.03
+    drawn = [found.model.project(operator.anatomy_mm) for found in (upright, on_head)]
+    assert np.abs(drawn[0] - drawn[1]).max() < 0.3

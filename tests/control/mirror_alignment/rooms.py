@@ -30,7 +30,7 @@ class MirrorRoom:
     """Camera and hand at once; `look` stands in for the search in pictures."""
 
     def __init__(self, seed: int = 1, noise_px: float = 0.02) -> None:
-        self.rng = np.random.default_rng(seed)
+        self.seed, self.rng = seed, np.random.default_rng(seed)
         self.rig, self.noise_px, self.clock = make_default_rig(), noise_px, ManualClock()
         self.setup = draw_setup(self.rng)
         self.eye, self.true = AligningEye(self.setup, seed, 0.5), true_display(self.setup)
@@ -95,10 +95,12 @@ class MirrorRoom:
 
 
 def alignment_in(room: MirrorRoom, *, has_hand: bool = True, solve=None, **more) -> MirrorAlignment:
-    keeps_few = more.pop("keeps_few", False)
+    keeps_few, replaces = more.pop("keeps_few", False), more.pop("replaces", "")
     return MirrorAlignment(
         room, room.display, room.clock, BOARD, room.rig,
-        AlignmentSettings(room.display_told, keeps_few=keeps_few),
+        AlignmentSettings(
+            room.display_told, keeps_few=keeps_few, replaces=replaces, seed=room.seed
+        ),
         executor=InlineExecutor(),
         hand=room if has_hand else None,
         detect=lambda frame, board: room.look(frame),

@@ -95,10 +95,20 @@ def test_a_board_that_lies_badly_is_wanted_elsewhere(room):
     assert isinstance(goal, Goal)
     assert not goal.is_reached(guide.middle_of(place))
     assert "third of the display)" in goal.tell(guide.middle_of(place))
-    # One that cannot be had is not asked for again.
-    guide.skip_goal(goal)
-    other = guide.choose(solved, place)
-    assert not isinstance(other, Goal) or other.height_mm != goal.height_mm
+    # One that cannot be had is not asked for again; another one at the same height is, after the
+    # next cross.
+    refused = [goal]
+    while isinstance(refused[-1], Goal):
+        guide.skip_goal(refused[-1])
+        assert isinstance(guide.choose(solved, place), int)
+        guide.forget_corners()
+        refused.append(guide.choose(solved, place))
+    refused.pop()
+    heights = [one.height_mm for one in refused]
+    assert len(set(heights)) < len(heights)
+    middles = np.array([one.middle_mm for one in refused])
+    apart_mm = np.linalg.norm(middles[:, None] - middles[None], axis=2)
+    assert apart_mm[np.triu_indices(len(middles), 1)].min() > 19.0
 
 
 @pytest.mark.parametrize(

@@ -45,6 +45,7 @@ ALIGNING = AlignmentSnapshot(
     row_column=(3, 4),
     cross_px=(912, 533),
     flips=(True, False),
+    is_upside_down=False,
     moved_mm=0.12,
     is_still=True,
     instruction="move the cross onto row 3, column 4, then ENTER",
@@ -75,7 +76,7 @@ def test_everything_is_said_at_both_sizes(size):
         "navapp calibrate mirror", "sim", "display, right eye", "7 of 12 crosses", "ALIGN",
         "left camera: row 3, column 4", "what the eye sees",
         "move the cross onto row 3, column 4, then ENTER", "912, 533 px", "70 64 of 70",
-        "at rest, moved 0.1 mm", "-.-- mm at the anatomy, 95 %, enough at 0.60",
+        "at rest, moved 0.1 mm", "text upright", "-.-- mm at the anatomy, 95 %, enough at 0.60",
         "2 of 3, 41 of 60 mm", "2  4", "alignment 7 is kept", "arrows 1 px",
         "SHIFT or ijkl 10 px", "ENTER confirm", "u undo", "n other", "s save",
         "x swap left-right", "y swap up-down", "q leave", "m let go", "PgUp PgDn board",
@@ -145,6 +146,7 @@ def test_real_devices_have_no_hand_and_show_both_cameras():
 def test_strays_and_a_board_that_moves_are_told():
     text = play(change(ALIGNING, verdict=REFUSED, is_still=False, moved_mm=1.3))[2]
     assert "0.72 mm at the anatomy" in text
+    assert "the error is 0.72 mm, 0.60 mm are allowed" in text
     assert "1 left out" in text
     assert "moving, moved 1.3 mm" in text
 
@@ -185,3 +187,25 @@ def test_a_small_terminal_says_the_essential():
     assert "ALIGN" in text
     assert "7 of 12 crosses" in text
     assert "make the terminal 80 x 24" in text
+
+
+def test_in_a_small_terminal_nothing_is_kept_blindly():
+    session, _, _ = play(ENOUGH, "left", "enter", "u", "n", "x", "s", "q", size=(79, 24))
+    assert session.commands == [Leave()]
+    session, _, _ = play(ENOUGH, "enter", "q", size=(80, 23))
+    assert session.commands == [Leave()]
+
+
+def test_a_small_terminal_says_a_devices_trouble_first():
+    text = play(change(ALIGNING, trouble="the camera was unplugged"), size=(50, 12))[2]
+    assert "the camera was unplugged" in text
+    assert "then ENTER" not in text
+
+
+def test_writing_on_its_head_is_said():
+    assert "text on head" in play(change(ALIGNING, is_upside_down=True))[2]
+
+
+def test_an_interruption_is_no_ordinary_end():
+    assert play(ENOUGH, "ctrl+c")[1].return_value == 130
+    assert play(ENOUGH, "ctrl+q")[1].return_value == 130
