@@ -43,21 +43,24 @@ run: setup      ## the application on the simulated rig
 	@$(BIN)/navapp run
 
 test: setup  ## style, types, import rules and the tests: some minutes
-	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels
-	# More workers than cores: some tests wait in real time.
-	$(PYTEST) -n 4 --dist loadgroup
+	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels tests
 
 test-all: setup check bytecode  ## the release gate: as test, with every case of every test
 	$(PYTEST) -n 4 --dist loadgroup --release
 	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
-.PHONY: bytecode checked-kernels
+.PHONY: bytecode checked-kernels tests
 bytecode: setup
 	@$(PYTEST) -q --collect-only --release >/dev/null
 
-checked-kernels: setup
+# Neither core is idle for long: what compiles runs beside types, and then beside the tests.
+checked-kernels: setup bytecode
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
+
+# With +, line by line as they come. More workers than cores: some tests wait in real time.
+tests: check bytecode
+	+$(PYTEST) -n 4 --dist loadgroup
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -50,7 +50,7 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Photographed:
     folder = tmp_path_factory.mktemp("mirror") / "views"
     folder.mkdir()
     rng = np.random.default_rng(SEED)
-    setup, camera = draw_setup(rng), eye_camera(rng, 0.5)
+    setup, camera = draw_setup(rng), eye_camera(rng, 0.4)
     scene = Scene(BOARD, PATTERN, make_default_rig(), (camera.width, camera.height))
     centres = []
     for number in range(N_VIEWS):

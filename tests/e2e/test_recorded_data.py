@@ -29,9 +29,10 @@ def plan_of(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[s
         folder = tmp_path_factory.mktemp(phantom) / "plan"
         surface = f"femur={data / phantom / 'femur.ply'}"
         with pytest.MonkeyPatch.context() as patch:
-            if phantom == "phantom_a":  # only followed from poses: nobody asks for its aspects
-                coarse = partial(navapp.preop.build_aspects, settings=AspectSettings(step_deg=45.0))
-                patch.setattr(navapp.preop, "build_aspects", coarse)
+            # The first is only followed from poses: nobody asks for its aspects.
+            step_deg = 45.0 if phantom == "phantom_a" else 16.0
+            coarse = partial(navapp.preop.build_aspects, settings=AspectSettings(step_deg=step_deg))
+            patch.setattr(navapp.preop, "build_aspects", coarse)
             assert run(["--quiet", "plan", "--surface", surface, "--out", str(folder)]) == 0
         return folder
 

@@ -11,6 +11,7 @@ from navapp.geometry.simplify import simplify
 from navapp.preop.side_estimate import SideEstimate, estimate_side
 from navapp.values import BoneModel
 from tests.geometry.shapes import sphere
+from tests.many import few_of
 from tests.preop.knees import fibula_of, knees, obliquely_cut, turned
 
 BONES = Path(os.environ.get("NAVAPP_DATA", "../shared/data")) / "bones"
@@ -92,14 +93,15 @@ def test_real_right_bones_are_never_called_left(name) -> None:
 
 
 @pytest.mark.data
-def test_a_whole_real_knee_is_certain() -> None:
+@pytest.mark.parametrize("step_deg", few_of([60, 15]))
+def test_a_whole_real_knee_is_certain(step_deg: int) -> None:
     bones = {
         name: read_ply(BONES / "knee_dess_R" / f"{name}.ply")[0]
         for name in ("femur", "tibia", "patella", "fibula")
     }
     assert estimated(bones).certainty == "certain"
     assert estimated(bones).side == "right"
-    angles = np.radians(np.arange(-180, 180, 15))
+    angles = np.radians(np.arange(-180, 180, step_deg))
     for angle in angles:
         turn = np.array(
             [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
