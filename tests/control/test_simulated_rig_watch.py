@@ -53,7 +53,9 @@ def until_s(room: SimulatedRoom, seconds: float) -> None:
 
 @pytest.mark.slow
 def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: ExitStack) -> None:
-    room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5), rate_hz=3.0, scale=0.7))
+    room = navigating(
+        SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5), rate_hz=3.0, scale=0.7)
+    )
     until_s(room, 12.0)
     assert room.state == "fault"
     assert room.clock.now_ns() < 8.5 * S
