@@ -18,6 +18,10 @@ BOARD = {
 }  # fmt: skip
 
 
+# Slow: a hand that follows comes to its place in fewer pictures.
+SLOW = "[camera]\nrate_hz = 6.0\n"
+
+
 @pytest.fixture
 def board(tmp_path):
     path = tmp_path / "board.json"
@@ -43,8 +47,9 @@ def true_error_mm(found):
 
 @pytest.mark.slow
 def test_a_hand_that_follows_every_wish_gives_an_accepted_rig(board, tmp_path):
-    out, result = tmp_path / "out", tmp_path / "result.json"
-    code = capture(board, out, "--headless", "--pairs", "8", "--json", str(result))
+    config, out, result = tmp_path / "navapp.toml", tmp_path / "out", tmp_path / "result.json"
+    config.write_text(SLOW)
+    code = capture(board, out, "--headless", "--pairs", "8", "--json", str(result), config=config)
     told = json.loads(result.read_text())
     assert code == 0, told["reasons"]
     assert told["command"] == "calibrate capture"
@@ -97,7 +102,7 @@ def test_a_number_of_pairs_is_at_least_one(board, tmp_path):
 def test_a_camera_that_is_unplugged_for_a_while_costs_no_pair(board, tmp_path):
     config, result = tmp_path / "navapp.toml", tmp_path / "result.json"
     fault = '{kind = "unplug", start_s = 4.0, duration_s = 3.0}'
-    config.write_text(f"[camera.simulated]\nfaults = [{fault}]\n")
+    config.write_text(f"{SLOW}[camera.simulated]\nfaults = [{fault}]\n")
     out = tmp_path / "out"
     arguments = ("--headless", "--pairs", "5", "--json", str(result))
     # That five pairs are too few to be accepted is not the question.
@@ -109,7 +114,7 @@ def test_a_camera_that_is_unplugged_for_a_while_costs_no_pair(board, tmp_path):
 def test_a_camera_that_stays_away_ends_the_capture_and_keeps_its_pairs(board, tmp_path, capsys):
     config, out = tmp_path / "navapp.toml", tmp_path / "out"
     fault = '{kind = "unplug", start_s = 4.0, duration_s = inf}'
-    config.write_text(f"[camera.simulated]\nfaults = [{fault}]\n")
+    config.write_text(f"{SLOW}[camera.simulated]\nfaults = [{fault}]\n")
     assert capture(board, out, "--headless", config=config) == 5
     told = capsys.readouterr().err
     assert "unplugged" in told
