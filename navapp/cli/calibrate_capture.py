@@ -65,11 +65,12 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from calibration.targets.boards import read_board
     from navapp.config import find_file, load
     from navapp.control.capture.folder import CaptureFolder
+    from navapp.control.capture.next_view import N_STARTING
     from navapp.devices import open_capture
 
     check_writable(options.json)
-    if options.pairs is not None and options.pairs < 1:
-        raise UsageError("--pairs must be at least 1")
+    if options.pairs is not None and options.pairs < N_STARTING:
+        raise UsageError(f"--pairs must be at least {N_STARTING}: fewer cannot be solved")
     configuration = load(find_file(options.config))
     if options.headless and configuration.camera.backend != "simulated":
         raise UsageError(

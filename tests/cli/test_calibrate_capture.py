@@ -94,8 +94,11 @@ def test_a_camera_that_is_not_installed_is_refused(board, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_number_of_pairs_is_at_least_one(board, tmp_path):
-    assert capture(board, tmp_path / "out", "--headless", "--pairs", "0") == 2
+@pytest.mark.parametrize("n_pairs", ["0", "3"])
+def test_fewer_pairs_than_can_be_solved_are_refused(board, tmp_path, capsys, n_pairs):
+    """They were waited for without end."""
+    assert capture(board, tmp_path / "out", "--headless", "--pairs", n_pairs) == 2
+    assert "--pairs must be at least 4" in capsys.readouterr().err
 
 
 @pytest.mark.slow
