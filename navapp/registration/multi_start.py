@@ -182,17 +182,15 @@ def distinct(
     poses: Sequence[RigidTransform], centre_mm: FloatArray, n: int | None = None
 ) -> list[RigidTransform]:
     """The first n that repeat no earlier one; `centre_mm` (3,) in the bone's frame."""
-    kept: list[RigidTransform] = []
-    places_mm = np.empty((len(poses), 3))
+    kept, places_mm = list[RigidTransform](), np.empty((len(poses), 3))
     for pose in poses:
         if len(kept) == n:
             break
-        place_mm = pose.apply(centre_mm)
         # Most lie far from each other: comparing their rotations would take most of a search.
-        off_mm = np.abs(places_mm[: len(kept)] - place_mm).max(axis=1, initial=0.0)
+        off_mm = np.abs(places_mm[: len(kept)] - pose.apply(centre_mm)).max(axis=1, initial=0.0)
         near = np.flatnonzero(off_mm <= _SAME_MM)
         if not any(is_same_pose(pose, kept[k], centre_mm) for k in near):
-            places_mm[len(kept)] = place_mm
+            places_mm[len(kept)] = pose.apply(centre_mm)
             kept.append(pose)
     return kept
 

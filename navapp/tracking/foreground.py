@@ -55,7 +55,6 @@ def find_foreground(
     here, there = box.shared_slices(measured.box)
     is_matched = measured.origin[there] == Origin.MATCHED
     marks, is_nearer = is_in_front[here], measured.disparity_px[there] > limit_px[here]
-    # As `np.copyto` with `where`, which is slower.
     marks ^= (marks ^ is_nearer) & is_matched
     return Foreground(surroundings, measured, is_in_front)
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,6 @@ from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import (
-    DisparityMap,
     Foreground,
     PoseEstimate,
     Reason,
@@ -93,8 +91,7 @@ class PoseJudge:
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         fit, view, agreement = self._settle(frame, fit, check)
-        find = partial(self._find_foreground, frame, fit.measured.disparity, view, checks)
-        with begin_on_helper(find) as finding:
+        with begin_on_helper(lambda: self._find_foreground(frame, fit, view, checks)) as finding:
             evidence = self._evidence_of_pair(check.health, depth_mm)
             evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
             verdict = decide(evidence)
@@ -102,20 +99,20 @@ class PoseJudge:
             estimate = self._unrectify(fit.estimate) if is_told else None
             rows = _check_rows(check.health, evidence, verdict)
             frame.watch.lap("judge")
-        frame.watch.lap("fill")
         foreground = None if verdict.status is Status.LOST else finding.result()
+        if foreground is not None:
+            frame.watch.lap("fill")
         return TrackedFrame(
             model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
         )
 
     def _find_foreground(
-        self, frame: Frame, measured: DisparityMap, view: RenderedView | None, checks: PairChecks
+        self, frame: Frame, fit: Fit, view: RenderedView | None, checks: PairChecks
     ) -> Foreground | None:
         """What stands in front of the bone at its pose; None where the gaps are not filled."""
-        surroundings = None if view is None else checks.surroundings(frame.watch)
-        if view is None or surroundings is None:
+        if view is None or (surroundings := checks.surroundings(frame.watch)) is None:
             return None
-        return find_foreground(surroundings, measured, view, self._meter.geometry)
+        return find_foreground(surroundings, fit.measured.disparity, view, self._meter.geometry)
 
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck
