@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView
@@ -91,28 +90,31 @@ class PoseJudge:
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         fit, view, agreement = self._settle(frame, fit, check)
-        with begin_on_helper(lambda: self._find_foreground(frame, fit, view, checks)) as finding:
-            evidence = self._evidence_of_pair(check.health, depth_mm)
-            evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
-            verdict = decide(evidence)
-            is_told = verdict.predicted_tre_mm is not None or self._tells_refused
-            estimate = self._unrectify(fit.estimate) if is_told else None
-            rows = _check_rows(check.health, evidence, verdict)
-            frame.watch.lap("judge")
-        foreground = None if verdict.status is Status.LOST else finding.result()
-        if foreground is not None:
-            frame.watch.lap("fill")
+        evidence = self._evidence_of_pair(check.health, depth_mm)
+        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
+        verdict = decide(evidence)
+        is_told = verdict.predicted_tre_mm is not None or self._tells_refused
+        estimate = self._unrectify(fit.estimate) if is_told else None
+        rows = _check_rows(check.health, evidence, verdict)
+        frame.watch.lap("judge")
+        foreground = None
+        if view is not None and verdict.status is not Status.LOST:
+            foreground = self._find_foreground(frame, fit, view, checks)
         return TrackedFrame(
             model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
         )
 
     def _find_foreground(
-        self, frame: Frame, fit: Fit, view: RenderedView | None, checks: PairChecks
+        self, frame: Frame, fit: Fit, view: RenderedView, checks: PairChecks
     ) -> Foreground | None:
         """What stands in front of the bone at its pose; None where the gaps are not filled."""
-        if view is None or (surroundings := checks.surroundings(frame.watch)) is None:
+        surroundings = checks.surroundings(frame.watch)
+        if surroundings is None:
             return None
-        return find_foreground(surroundings, fit.measured.disparity, view, self._meter.geometry)
+        measured, geometry = fit.measured.disparity, self._meter.geometry
+        foreground = find_foreground(surroundings, measured, view, geometry)
+        frame.watch.lap("fill")
+        return foreground
 
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck
