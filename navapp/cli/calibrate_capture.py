@@ -155,6 +155,7 @@ class _Solver:
 def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
     """The script: follow every wish, finish when it is enough."""
     from navapp.control.capture.states import Finish, Follow
+    from navapp.control.recent_events import list_new_events
 
     capture.submit(Follow(is_on=True))
     told, n_kept, n_waited, well_ns = 0, 0, 0, capture.snapshot.time_ns
@@ -171,10 +172,10 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
                 remedy="use a larger board, or solve what is kept with `navapp calibrate stereo`",
             )
         snapshot = capture.step()
-        for text in snapshot.events[told:]:
+        for text in list_new_events(snapshot, told):
             bound = snapshot.bound_mm
             diagnostics.detail(f"{text}{'' if bound is None else f' ({bound:.2f} mm)'}")
-        told = len(snapshot.events)
+        told = snapshot.n_events
     capture.submit(Finish())
     while snapshot.outcome is None:
         snapshot = capture.step()

@@ -237,6 +237,7 @@ def _headless(
     """The script: a simulated eye aligns every cross, a simulated hand follows every wish."""
     from calibration.mirror.alignments import MOST_ALIGNMENTS
     from navapp.control.mirror_alignment.states import Leave, Save
+    from navapp.control.recent_events import list_new_events
 
     told, waited, n_kept, next_try = 0, 0, 0, 0
     snapshot = session.snapshot
@@ -259,7 +260,7 @@ def _headless(
                 f"no further cross can be aligned after {n_kept} ({snapshot.instruction})",
                 remedy="use a larger board",
             )
-        for text in snapshot.events[max(len(snapshot.events) - snapshot.n_events + told, 0) :]:
+        for text in list_new_events(snapshot, told):
             diagnostics.detail(text)
         told = snapshot.n_events
 

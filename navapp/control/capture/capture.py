@@ -31,12 +31,12 @@ from navapp.control.capture.states import (
     Take,
 )
 from navapp.control.executors import Executor, Job
+from navapp.control.recent_events import RecentEvents
 from navapp.control.states import Progress
 from navapp.errors import DeviceError, NavappError
 from navapp.geometry.transform import FloatArray
 
 _WAIT_S = 0.1
-_MOST_EVENTS = 30
 # So many more pairs are asked for when a rig was not accepted.
 _MORE_AFTER_REFUSAL = 4
 # Poses measured with a guessed camera: the first views differ by more than this allows.
@@ -85,7 +85,7 @@ class Capture:
         self._commands: SimpleQueue[CaptureCommand] = SimpleQueue()
         self._phase = CapturePhase.CAPTURING
         self._kept = KeptPairs(store, self._size)
-        self._shutter, self._events = Shutter(), list[str]()
+        self._shutter, self._events = Shutter(), RecentEvents()
         self._frame: StereoFrame | None = None
         self._board_view: BoardView | None = None
         self._checks: tuple[Check, ...] = ()
@@ -145,7 +145,7 @@ class Capture:
     def _next_frame(self) -> StereoFrame | None:
         if self._camera.is_down:
             if self._camera.wait_for_return(_WAIT_S):
-                self._add_event(f"camera {self._name} is back")
+                self._events.add(f"camera {self._name} is back")
             return None
         try:
             return self._camera.take(_WAIT_S)
@@ -158,7 +158,7 @@ class Capture:
             self._detection = self._frame = self._board_view = self._move = None
             self._checks, self._is_told_to_take = (), False
             self._shutter.forget_last()
-            self._add_event(str(error))
+            self._events.add(str(error))
             return None
 
     def _next_command(self) -> CaptureCommand | None:
@@ -181,7 +181,7 @@ class Capture:
                 self._is_told_to_take = not self._camera.is_down
             case DropLast():
                 if (pair := self._kept.drop_last()) is not None:
-                    self._add_event(f"pair {pair.index} dropped")
+                    self._events.add(f"pair {pair.index} dropped")
                     self._begin_planning()
             case Another() if self._next_view.left_from_board is not None:
                 self._avoid.append(self._next_view.left_from_board.rotation)
@@ -192,7 +192,7 @@ class Capture:
                 self._phase = CapturePhase.SOLVING
                 self._executor.start(self._solving)
             case Finish():
-                self._add_event(
+                self._events.add(
                     f"{len(self._kept)} pairs are too few to solve, {N_STARTING} are needed"
                 )
 
@@ -219,9 +219,9 @@ class Capture:
     def _keep(self, seen: BoardView) -> None:
         pair = self._kept.add(seen)
         if pair is None:
-            self._add_event("nothing was taken: the board is not seen by both cameras")
+            self._events.add("nothing was taken: the board is not seen by both cameras")
             return
-        self._add_event(f"pair {pair.index} kept: {len(pair.common()[0])} marks by both")
+        self._events.add(f"pair {pair.index} kept: {len(pair.common()[0])} marks by both")
         self._begin_planning()
 
     def _begin_planning(self) -> None:
@@ -249,12 +249,12 @@ class Capture:
         known = {one.index for one in self._next_view.misfits}
         for one in job.result.misfits:
             if one.index not in known:
-                self._add_event(f"pair {one.index} does not count: {one.reason}")
+                self._events.add(f"pair {one.index} does not count: {one.reason}")
         was_enough = self.is_enough
         self._next_view = job.result
         self._hand.begin()
         if self.is_enough and not was_enough:
-            self._add_event("this is enough: finish, or take more")
+            self._events.add("this is enough: finish, or take more")
 
     def _take_outcome(self) -> None:
         job = self._solving
@@ -287,9 +287,6 @@ class Capture:
         if not self._hand.step(wanted, frame.captured_ns):
             self._do(Another())
 
-    def _add_event(self, text: str) -> None:
-        self._events = [*self._events, text][-_MOST_EVENTS:]
-
     def _make_snapshot(self) -> CaptureSnapshot:
         seen, next_view = self._board_view, self._next_view
         sides = [seen.left, seen.right] if seen is not None else [None, None]
@@ -315,7 +312,8 @@ class Capture:
             is_enough=self.is_enough,
             covered=self._kept.covered,
             progress=None if job is None else Progress("solving the rig", job.progress),
-            events=tuple(self._events),
+            events=self._events.texts,
+            n_events=self._events.n_told,
             outcome=self._outcome,
         )
 

@@ -100,7 +100,8 @@ class CaptureSnapshot:
     # (2, 6, 8) bool, cells of the left and right picture in which marks were kept.
     covered: NDArray[np.bool_]
     progress: Progress | None  # of the solve
-    events: tuple[str, ...]  # newest last
+    events: tuple[str, ...]  # the last ones, newest last
+    n_events: int = 0  # ever
     outcome: Outcome | None = None  # what became of the last solve; None before
     trouble: str = ""  # what is wrong with it; empty when nothing is
 

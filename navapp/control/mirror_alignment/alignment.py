@@ -42,13 +42,13 @@ from navapp.control.mirror_alignment.states import (
     TurnArrows,
     Undo,
 )
+from navapp.control.recent_events import RecentEvents
 from navapp.control.states import NudgeCross
 from navapp.errors import DeviceError, InputError
 from navapp.geometry.rig import StereoRig
 from navapp.values.pictures import EyeLook
 
 _WAIT_S = 0.1
-_MOST_EVENTS = 30
 _NO_TURN = (0.0, 0.0, 0.0)
 
 
@@ -98,8 +98,7 @@ class MirrorAlignment:
         self._cross = ShownCross(display, clock, settings.valid_ms)
         self._solution = DisplaySolution(settings.display, executor, solve)
         self._guide = Guide(settings.display, board, rig)
-        self._kept, self._looks = KeptCrosses(), BoardLooks()
-        self._events, self._n_events = list[str](), 0
+        self._kept, self._looks, self._events = KeptCrosses(), BoardLooks(), RecentEvents()
         self._commands: SimpleQueue[AlignmentCommand] = SimpleQueue()
         self._is_over = False
         self._question = ""  # what was asked before leaving; empty: nothing
@@ -160,7 +159,7 @@ class MirrorAlignment:
     def _next_frame(self) -> StereoFrame | None:
         if self._camera.is_down:
             if self._camera.wait_for_return(_WAIT_S):
-                self._add_event(f"camera {self._names[0]} is back")
+                self._events.add(f"camera {self._names[0]} is back")
             return None
         try:
             return self._camera.take(_WAIT_S)
@@ -172,7 +171,7 @@ class MirrorAlignment:
             self._detection = self._frame = self._view = None
             self._looks.forget()
             self._give_up_aim()
-            self._add_event(str(error))
+            self._events.add(str(error))
             return None
 
     def _do(self, command: AlignmentCommand) -> None:
@@ -205,25 +204,25 @@ class MirrorAlignment:
         if aimed.is_moved:
             aimed.confirm(self._clock.now_ns())
             return
-        self._add_event("not kept: move the cross onto the corner first")
+        self._events.add("not kept: move the cross onto the corner first")
 
     def _turn(self, *, columns: bool, rows: bool) -> None:
         solution = self._solution
         if solution.found is not None or solution.is_under_way:
             # Two lines on a small screen, newest first.
-            self._add_event(f"u to fewer than {FEWEST_ALIGNMENTS} frees them, or begin anew")
-            self._add_event("the arrows stay: the display is solved with them")
+            self._events.add(f"u to fewer than {FEWEST_ALIGNMENTS} frees them, or begin anew")
+            self._events.add("the arrows stay: the display is solved with them")
             return
         solution.turn(self._kept, columns=columns, rows=rows)
         if len(self._kept) > 0:
             self._write()
-        self._add_event(f"arrows exchanged; the eye reads text {solution.display.reading}")
+        self._events.add(f"arrows exchanged; the eye reads text {solution.display.reading}")
 
     def _undo(self) -> None:
         dropped = self._kept.drop_last()
         if dropped is None:
             return
-        self._add_event(f"alignment {len(self._kept) + 1} is forgotten")
+        self._events.add(f"alignment {len(self._kept) + 1} is forgotten")
         self._give_up_aim()
         self._goal = None
         self._write()
@@ -244,7 +243,7 @@ class MirrorAlignment:
             return
         missing = FEWEST_ALIGNMENTS - len(self._kept)
         why = f"{missing} alignments are missing" if missing > 0 else "it is not accepted yet"
-        self._add_event(f"nothing is saved: {why}")
+        self._events.add(f"nothing is saved: {why}")
 
     def _leave(self) -> None:
         n, settings, verdict = len(self._kept), self._settings, self._solution.verdict
@@ -255,7 +254,7 @@ class MirrorAlignment:
             question = f"{settings.replaces} will be replaced: leave again, or ctrl+c keeps it"
         if question and not self._question:
             self._question = question
-            self._add_event(question)
+            self._events.add(question)
             return
         self._is_over = True
 
@@ -266,7 +265,7 @@ class MirrorAlignment:
         try:
             self._store(*self.made)
         except InputError as error:
-            self._add_event(str(error))
+            self._events.add(str(error))
 
     def _take_view(self) -> None:
         job = self._detection
@@ -285,7 +284,7 @@ class MirrorAlignment:
         self._aimed.follow(place)
         self._keep_if_due(self._aimed, view.frame.captured_ns)
         if place is not None and self._aimed is not None and self._aimed.is_elsewhere(place):
-            self._add_event("the board was moved: another corner is chosen")
+            self._events.add("the board was moved: another corner is chosen")
             self._guide.forget_corners()
             self._give_up_aim()
 
@@ -297,13 +296,13 @@ class MirrorAlignment:
         place, pixel = self._looks.newest, self._cross.pixel
         told = self._looks.average(aimed.corner, aimed.since_ns())
         if against or place is None or pixel is None or told is None:
-            self._add_event(f"nothing is kept: {against or 'the corner is not seen'}")
+            self._events.add(f"nothing is kept: {against or 'the corner is not seen'}")
             return
         point_mm, sd_mm = told
         middle_mm = self._guide.middle_of(place)
         self._kept.add(KeptCross(aimed.corner, pixel, point_mm, sd_mm, middle_mm))
         name = name_corner(self._board, aimed.corner)
-        self._add_event(f"alignment {len(self._kept)} is kept: {name}")
+        self._events.add(f"alignment {len(self._kept)} is kept: {name}")
         self._guide.forget_corners()
         self._give_up_aim()
         self._write()
@@ -314,13 +313,13 @@ class MirrorAlignment:
         if not self._solution.take():
             return
         if self._solution.trouble:
-            self._add_event(f"not solved: {self._solution.trouble}")
+            self._events.add(f"not solved: {self._solution.trouble}")
         for number in sorted(self._strays() - strays_before):
             name = name_corner(self._board, self._kept.corners[number])
-            self._add_event(f"alignment {number + 1} does not agree, it is left out: {name}")
+            self._events.add(f"alignment {number + 1} does not agree, it is left out: {name}")
         verdict = self._solution.verdict
         if verdict is not None and verdict.is_accepted:
-            self._add_event(f"{len(self._kept)} alignments are enough: save, or make more")
+            self._events.add(f"{len(self._kept)} alignments are enough: save, or make more")
 
     def _strays(self) -> set[int]:
         verdict = self._solution.verdict
@@ -363,9 +362,6 @@ class MirrorAlignment:
         self._aimed = None
         self._cross.put(None)
 
-    def _add_event(self, text: str) -> None:
-        self._events, self._n_events = [*self._events, text][-_MOST_EVENTS:], self._n_events + 1
-
     @property
     def _phase(self) -> AlignmentPhase:
         if self._is_over:
@@ -390,7 +386,7 @@ class MirrorAlignment:
                 self._clock.now_ns(), self._phase, self._names, self._board, self._frame,
                 self._view, self._eye, self._hand is not None, self._is_following,
                 self._looks, self._guide, self._goal, self._aimed, self._cross.pixel,
-                self._solution, self._kept, tuple(self._events), self._n_events, self._trouble,
+                self._solution, self._kept, self._events.texts, self._events.n_told, self._trouble,
                 self._question,
             )
         )  # fmt: skip
