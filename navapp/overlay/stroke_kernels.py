@@ -36,7 +36,7 @@ class Room(NamedTuple):
     touched: NDArray[np.int32]  # (2, H * W) pixels of both
     place: NDArray[np.int32]  # (n,) pixels of all strokes, counted row by row
     share: NDArray[np.float32]  # (n,) 0 to 1
-    colour: NDArray[np.int32]  # (n,) number of the stroke, or -1 of a rim
+    number: NDArray[np.int32]  # (n,) of the stroke, or -1 of a rim
 
 
 @njit(cache=True, nogil=True)
@@ -286,7 +286,7 @@ def _move(
         row, column = place // width, place % width
         if n < len(room.place):
             room.place[n], room.share[n] = place, covered[row, column]
-            room.colour[n] = number
+            room.number[n] = number
             n += 1
         covered[row, column] = np.float32(0.0)
     return n

@@ -115,14 +115,14 @@ def _draw(
         room = _enlarge(room)
         n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
     table = np.array(colours, dtype=np.float32)
-    blend_places(image, room.place[:n], room.share[:n], room.colour[:n], table)
+    blend_places(image, room.place[:n], room.share[:n], room.number[:n], table)
 
 
 def _enlarge(room: Room) -> Room:
     """Room for twice as many places."""
     n = 2 * len(room.place)
     place, number = np.empty((2, n), dtype=np.int32)
-    return room._replace(place=place, share=np.empty(n, dtype=np.float32), colour=number)
+    return room._replace(place=place, share=np.empty(n, dtype=np.float32), number=number)
 
 
 @lru_cache(maxsize=4)
@@ -131,5 +131,5 @@ def _room(height: int, width: int, _thread: int) -> Room:
     line, rim = np.zeros((2, height, width), dtype=np.float32)
     touched = np.empty((2, height * width), dtype=np.int32)
     n = int(_MOSTLY_DRAWN * height * width)
-    place, colour = np.empty((2, n), dtype=np.int32)
-    return Room(line, rim, touched, place, np.empty(n, dtype=np.float32), colour)
+    place, number = np.empty((2, n), dtype=np.int32)
+    return Room(line, rim, touched, place, np.empty(n, dtype=np.float32), number)

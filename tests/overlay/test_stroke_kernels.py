@@ -40,7 +40,7 @@ def trace(
     assert not given_room.rim.any()
     found = []
     for number in (0, -1):
-        of = given_room.colour[:n] == number
+        of = given_room.number[:n] == number
         share = np.zeros((Y + HEIGHT, X + WIDTH), np.float32)
         share.ravel()[given_room.place[:n][of]] = given_room.share[:n][of]
         assert len(np.unique(given_room.place[:n][of])) == of.sum()
@@ -122,7 +122,7 @@ def test_strokes_are_traced_one_after_the_other_each_with_its_pen() -> None:
         ground(),
         given,
     )
-    order = given.colour[:n]
+    order = given.number[:n]
     # The first stroke, the second one's rim, then the second one.
     assert list(order[np.flatnonzero(np.diff(order, prepend=9))]) == [0, -1, 1]
     for number, line, half_px in ((0, LINE, 0.5), (-1, LINE + 3.0, 2.5), (1, LINE + 3.0, 1.5)):
