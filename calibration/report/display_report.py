@@ -28,9 +28,12 @@ def write_view_report(path: str | Path, found: DisplayCalibration, limits: Displ
     write_whole(path, make_view_page(found, limits).encode("utf-8"))
 
 
-def write_alignment_report(path: str | Path, found: AlignedCalibration) -> None:
-    """Write the report of a calibration by alignments, whole or not at all."""
-    write_whole(path, make_alignment_page(found).encode("utf-8"))
+def write_alignment_report(path: str | Path, found: AlignedCalibration, reading: str) -> None:
+    """Write the report of a calibration by alignments, whole or not at all.
+
+    The reading is `AlignedDisplay.reading`.
+    """
+    write_whole(path, make_alignment_page(found, reading).encode("utf-8"))
 
 
 def make_view_page(found: DisplayCalibration, limits: DisplayLimits) -> str:
@@ -66,7 +69,7 @@ def make_view_page(found: DisplayCalibration, limits: DisplayLimits) -> str:
     )  # fmt: skip
 
 
-def make_alignment_page(found: AlignedCalibration) -> str:
+def make_alignment_page(found: AlignedCalibration, reading: str) -> str:
     """The report of a calibration by alignments as HTML."""
     quality = found.model.quality
     error_mm = float("nan") if quality is None or quality.error_mm is None else quality.error_mm
@@ -76,9 +79,8 @@ def make_alignment_page(found: AlignedCalibration) -> str:
         ("alignments", f"{n_used} used, {len(found.is_used) - n_used} not", ""),
         ("scatter of the alignments", f"{found.alignment_sd_px:.2f} px", "standard deviation"),
         ("wandering of the eye", f"{found.wander_sd_mm:.2f} mm", "standard deviation, assumed"),
-        ("the eye reads the display", "on its head" if found.model.flips_rows else "upright",
-         "as it was told; alignments cannot tell"),
-    ]  # fmt: skip
+        ("the eye reads the display", reading, "as it was told; alignments cannot tell"),
+    ]
     lengths = np.linalg.norm(found.residuals_px, axis=1)
     return _page(
         found.model,

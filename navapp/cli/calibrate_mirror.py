@@ -116,12 +116,13 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if source == "views":
         model, content = _solve_views(options, configuration, record, diagnostics)
     elif source == "alignments":
-        model, content = _solve_made(*read_alignments(options.alignments), options, record)
+        made = read_alignments(options.alignments)
+        model, content = _solve_made(*made, options, record, diagnostics)
     else:
-        made = align_by_keys(options, configuration, diagnostics)
-        if isinstance(made, int):
-            return made
-        model, content = _solve_made(*made, options, record)
+        aligned = align_by_keys(options, configuration, diagnostics)
+        if isinstance(aligned, int):
+            return aligned
+        model, content = _solve_made(*aligned, options, record, diagnostics)
     if content.get("advice"):
         diagnostics.warn(content["advice"])
     model = record.add_to(model)
@@ -131,9 +132,6 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     write_json(options.json, "calibrate mirror", {**_content(model), **content})
     if options.json != "-":
         _tell(model, diagnostics)
-        if source != "views":
-            reading = "on its head" if content["reads_upside_down_as_told"] else "upright"
-            diagnostics.say(f"the eye reads the display {reading}: told, not measured")
     return 0 if is_accepted else _refuse(model, options)
 
 
@@ -211,6 +209,7 @@ def _solve_made(
     made: "Alignments",
     options: argparse.Namespace,
     record: DisplayRecord,
+    diagnostics: Diagnostics,
 ) -> "tuple[DisplayModel, dict[str, Any]]":
     """From crosses that an eye aligned."""
     from calibration.mirror.alignments import advise, solve_alignments
@@ -219,7 +218,10 @@ def _solve_made(
     if options.report:
         from calibration.report.display_report import write_alignment_report
 
-        write_alignment_report(options.report, replace(found, model=record.add_to(found.model)))
+        named = replace(found, model=record.add_to(found.model))
+        write_alignment_report(options.report, named, display.reading)
+    if options.json != "-":
+        diagnostics.say(f"the eye reads the display {display.reading}: told, not measured")
     return found.model, {
         "alignments_used": int(found.is_used.sum()),
         "alignments_dropped": [int(k) for k, used in enumerate(found.is_used) if not used],

@@ -1,4 +1,4 @@
-"""What a display is to show."""
+"""What a display is to show, and what a simulated eye sees of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
