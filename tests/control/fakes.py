@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.check_points import LocateCorners
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
-from navapp.control.executors import Executor, InlineExecutor, ThreadExecutor
+from navapp.control.executors import Executor, InlineExecutor, Job, ThreadExecutor
 from navapp.control.eye_preview import EyePreview, Look
 from navapp.control.frame_result import FrameResult
 from navapp.control.specification import SessionSpecification
@@ -145,6 +146,20 @@ class FakeTracker:
         if tracked.estimate is None:
             return tracked
         return replace(tracked, estimate=replace(tracked.estimate, camera_from_bone=left_from_bone))
+
+
+class SlowExecutor(InlineExecutor):
+    """Holds jobs back until they are let go."""
+
+    def __init__(self) -> None:
+        self.held: list[Job[Any]] = []
+
+    def start(self, job: Job[Any]) -> None:
+        self.held.append(job)
+
+    def let_go(self) -> None:
+        while self.held:
+            self.held.pop(0).run()
 
 
 class FakeCamera:

@@ -1,49 +1,32 @@
 """The operator's screen shows what an eye sees in a simulated mirror, when asked to."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.event_log import SessionHooks
-from navapp.control.executors import Job, RecordedExecutor
+from navapp.control.executors import RecordedExecutor
 from navapp.control.eye_preview import EyePreview
 from navapp.control.operators import RecordedOperator, read_events
 from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
 from navapp.control.states import Register, Reject, ToggleEye
 from navapp.values import Reason, Status
-from tests.control.fakes import PERIOD_NS, Bench, FakeCamera, answer, navigating
+from tests.control.fakes import PERIOD_NS, Bench, FakeCamera, SlowExecutor, answer, navigating
 from tests.control.test_layer_switching import NoFrames
 
 LIT, SITE, VIDEO = 200, 90, 0
 PERIODS_OF_A_LOOK = -(-250_000_000 // PERIOD_NS)
 
 
-class Later:
-    """Runs jobs when it is told to."""
-
-    def __init__(self) -> None:
-        self.jobs: list[Job[Any]] = []
-
-    def start(self, job: Job[Any]) -> None:
-        self.jobs.append(job)
-
-    def take_due(self, job: Job[Any], sequence: int) -> bool:
-        return job.is_finished
-
-    def close(self) -> None:
-        pass
-
-
 class Slow:
     """A preview that is on, whose looks end when a test says so."""
 
     def __init__(self) -> None:
-        self.later, self.now_ns = Later(), 0
-        self.preview = EyePreview(Eye(), self.later)
+        self.executor, self.now_ns, self.eye = SlowExecutor(), 0, Eye()
+        self.preview = EyePreview(self.eye, self.executor)
         self.preview.toggle()
 
     def update(self, after_ms: int = 0, *, has_guides: bool = True, **what: bool) -> int | None:
@@ -53,7 +36,7 @@ class Slow:
         return None if seen is None else int(seen[0][2, 2, 0])
 
     def end_look(self) -> None:
-        self.later.jobs[-1].run()
+        self.executor.let_go()
 
 
 class Eye:
@@ -144,7 +127,7 @@ def test_a_look_that_hangs_shows_no_old_guides() -> None:
     slow.end_look()
     assert slow.update() is None
     assert slow.update(10) is None
-    assert len(slow.later.jobs) == 3
+    assert slow.eye.n_looks == 2
     slow.end_look()
     assert slow.update(10) == LIT
 

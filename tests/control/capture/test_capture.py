@@ -16,11 +16,11 @@ from navapp.control.capture.states import (
     Outcome,
     Take,
 )
-from navapp.control.executors import InlineExecutor, Job
 from navapp.errors import DeviceLost, InputError, ResultError
 from navapp.geometry.transform import RigidTransform
 from tests.calibration.marks import BOARD
 from tests.control.capture.rooms import DEPTH_MM, Room, capture_in, steps
+from tests.control.fakes import SlowExecutor
 
 
 @pytest.fixture
@@ -238,20 +238,6 @@ def reopening(room, executor=None):
 
     room.open = lambda: None
     return capture_in(room, reopen=reopen, executor=executor)
-
-
-class SlowExecutor(InlineExecutor):
-    """Holds jobs back until they are let go."""
-
-    def __init__(self) -> None:
-        self.held: list[Job] = []
-
-    def start(self, job: Job) -> None:
-        self.held.append(job)
-
-    def let_go(self) -> None:
-        while self.held:
-            self.held.pop(0).run()
 
 
 def test_a_lost_camera_is_said_waited_for_and_everything_kept_stays(room):
