@@ -188,8 +188,8 @@ def distinct(
             break
         # Most lie far from each other: comparing their rotations would take most of a search.
         off_mm = np.abs(places_mm[: len(kept)] - pose.apply(centre_mm)).max(axis=1, initial=0.0)
-        near = np.flatnonzero(off_mm <= _SAME_MM)
-        if not any(is_same_pose(pose, kept[k], centre_mm) for k in near):
+        near = (kept[k] for k in np.flatnonzero(off_mm <= _SAME_MM))
+        if not any(is_same_pose(pose, other, centre_mm) for other in near):
             places_mm[len(kept)] = pose.apply(centre_mm)
             kept.append(pose)
     return kept

@@ -108,13 +108,11 @@ class PoseJudge:
         self, frame: Frame, fit: Fit, view: RenderedView, checks: PairChecks
     ) -> Foreground | None:
         """What stands in front of the bone at its pose; None where the gaps are not filled."""
-        surroundings = checks.surroundings(frame.watch)
-        if surroundings is None:
+        if (surroundings := checks.surroundings(frame.watch)) is None:
             return None
-        measured, geometry = fit.measured.disparity, self._meter.geometry
-        foreground = find_foreground(surroundings, measured, view, geometry)
+        found = find_foreground(surroundings, fit.measured.disparity, view, self._meter.geometry)
         frame.watch.lap("fill")
-        return foreground
+        return found
 
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck
