@@ -62,14 +62,14 @@ class Camera:
 
         NaN at or behind the camera, and where its lens shows nothing.
         """
-        points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 3)
-        depth_mm = np.where(points[:, 2] > 1e-6, points[:, 2], np.nan)
-        x, y = points[:, 0] / depth_mm, points[:, 1] / depth_mm
-        if self.is_distorted:
-            x, y = distort(x, y, self.distortion)
+        # What is compiled is not loaded by those who only read rigs.
+        from navapp.geometry.lens_kernels import project_through_lens
+
+        points = np.ascontiguousarray(points_mm, dtype=np.float64).reshape(-1, 3)
         pixels = np.empty((len(points), 2))
-        pixels[:, 0] = self.matrix[0, 0] * x + self.matrix[0, 2]
-        pixels[:, 1] = self.matrix[1, 1] * y + self.matrix[1, 2]
+        k = np.zeros(14)
+        k[: self.distortion.size] = self.distortion
+        project_through_lens(points, self.matrix, k, pixels)
         return pixels
 
     def rays(self, pixels: ArrayLike) -> FloatArray:

@@ -1,5 +1,7 @@
 """Composes a picture from the video, the layers of a scene and a banner."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,13 +47,15 @@ def compose_video(
     Raises:
         ValueError: a picture of another size than the scene's camera takes.
     """
-    image = np.repeat(left[:, :, None], 3, axis=2) if left.ndim == 2 else left.copy()
-    height, width = image.shape[:2]
-    size = _text_size(width)
-    if scene is not None:
-        if (height, width) != (scene.camera.height, scene.camera.width):
-            raise ValueError(f"the picture is not the camera's: {image.shape[:2]}")
-        paint_layers(image, scene, LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height)))
+    height, width = left.shape[:2]
+    size, make_image = _text_size(width), partial(_copy_in_colour, left)
+    if scene is None:
+        image = make_image()
+    elif (height, width) != (scene.camera.height, scene.camera.width):
+        raise ValueError(f"the picture is not the camera's: {left.shape[:2]}")
+    else:
+        board = LabelBoard(_LEAST_TEXT_SIZE, text_boxes(width, height))
+        image = paint_layers(make_image, scene, board)
     if cross_px is not None and np.isfinite(cross_px).all():
         draw_cross_px(image, cross_px, TARGET)
     is_guiding = scene is not None and not scene.is_candidate
@@ -80,17 +84,28 @@ def compose_mirror(
         cross_px: (2,) of a cross to be compared with its point, as the eye reads the picture.
     """
     height, width = view.camera.height, view.camera.width
-    image = np.zeros((height, width, 3), dtype=np.uint8)
+
+    def make_image() -> Image:
+        return np.zeros((height, width, 3), dtype=np.uint8)
+
     strip_px = round(_STRIP_SHARE * height)
-    if scene is not None:
+    if scene is None:
+        image = make_image()
+    else:
         rims = [Box(0, height - strip_px, width, strip_px)]
-        paint_layers(image, scene, LabelBoard(_MIRROR_TEXT_SIZE * height / 1080.0, rims))
+        board = LabelBoard(_MIRROR_TEXT_SIZE * height / 1080.0, rims)
+        image = paint_layers(make_image, scene, board)
     if cross_px is not None and np.isfinite(cross_px).all():
         draw_cross_px(image, cross_px, TARGET)
     size = _MIRROR_TEXT_SIZE * height / 1080.0
     colour = GUIDE if is_guiding else CANDIDATE
     put_text(image, status, (12, height - round(0.3 * strip_px)), size, colour)
     return view.to_display(image)
+
+
+def _copy_in_colour(image: Image) -> Image:
+    """A copy (H, W, 3) of a picture in grey or in colour."""
+    return np.repeat(image[:, :, None], 3, axis=2) if image.ndim == 2 else image.copy()
 
 
 def text_boxes(width: int, height: int) -> list[Box]:

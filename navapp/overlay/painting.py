@@ -1,9 +1,12 @@
 """Paints what the layers of a scene ask for into a picture."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.transform import FloatArray
+from navapp.geometry.zbuffer import RenderedView
 from navapp.overlay.blend_kernels import blend_colour, mark_dots
 from navapp.overlay.colours import Colour
 from navapp.overlay.drawing import Drawing
@@ -14,16 +17,24 @@ from navapp.overlay.shading import draw_body, draw_bone
 from navapp.overlay.strokes import draw_strokes
 
 
-def paint_layers(image: Image, scene: Scene, labels: LabelBoard) -> None:
-    """The scene's layers in the order of their table, and their words."""
+def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoard) -> Image:
+    """The scene's layers in the order of their table, and their words, in a picture (H, W, 3)."""
+
+    def look_up() -> Image:
+        _ = scene.seen
+        return make_image()
+
     drawing = Drawing()
-    # Both threads need the box. What stands in front is looked up by the helper, while the layers,
-    # which know nothing of it, are asked and the bone is rendered.
+    # Both threads need the box. What stands in front is looked up and the picture made by the
+    # helper, while the layers, which know nothing of them, are asked and the meshes are rendered.
     _ = scene.box
-    with begin_on_helper(lambda: scene.seen):
+    with begin_on_helper(look_up) as looked_up:
         ask_layers(scene, drawing)
         _ = scene.view
-    paint(image, scene, drawing, labels)
+        views = [scene.render(body.mesh) for body in drawing.bodies]
+        image = looked_up.result()
+    paint(image, scene, drawing, views, labels)
+    return image
 
 
 def ask_layers(scene: Scene, drawing: Drawing) -> None:
@@ -33,11 +44,17 @@ def ask_layers(scene: Scene, drawing: Drawing) -> None:
             layer(scene, drawing)
 
 
-def paint(image: Image, scene: Scene, drawing: Drawing, labels: LabelBoard) -> None:
-    """All that was asked for, into a picture (H, W, 3)."""
+def paint(
+    image: Image,
+    scene: Scene,
+    drawing: Drawing,
+    views: Sequence[RenderedView],
+    labels: LabelBoard,
+) -> None:
+    """All that was asked for, into a picture (H, W, 3); one view for each body."""
     draw_bone(image, scene, drawing.tints, drawing.outline)
-    for body in drawing.bodies:
-        draw_body(image, scene, scene.render(body.mesh), body)
+    for body, view in zip(drawing.bodies, views, strict=True):
+        draw_body(image, scene, view, body)
     for points_mm, colour in drawing.dots:
         _draw_dots(image, scene, points_mm, colour)
     draw_strokes(image, scene, drawing.strokes)

@@ -89,7 +89,7 @@ def trace_strokes(
 
 @njit(cache=True, nogil=True)
 def blend_places(
-    image: NDArray[np.uint8],
+    pixels: NDArray[np.uint8],
     place: NDArray[np.int32],
     share: NDArray[np.float32],
     number: NDArray[np.int32],
@@ -98,20 +98,18 @@ def blend_places(
     """Blend colours into some pixels, in their order.
 
     Args:
-        image: (H, W, 3) in place.
-        place: (n,) pixels, counted row by row.
+        pixels: (H * W, 3) of the picture, row by row, in place.
+        place: (n,) numbers of pixels.
         share: (n,) of the colour, 0 to 1.
         number: (n,) row of `colours`, -1 for black.
         colours: (S, 3) of the image's channels.
     """
-    width = image.shape[1]
     for k in range(len(place)):
-        row, column = place[k] // width, place[k] % width
         for channel in range(3):
-            before = np.float32(image[row, column, channel])
+            before = np.float32(pixels[place[k], channel])
             colour = colours[number[k], channel] if number[k] >= 0 else np.float32(0.0)
             after = before + share[k] * (colour - before)
-            image[row, column, channel] = np.uint8(after + np.float32(0.5))
+            pixels[place[k], channel] = np.uint8(after + np.float32(0.5))
 
 
 @njit(cache=True, nogil=True)
@@ -281,12 +279,11 @@ def _move(
     covered: NDArray[np.float32], touched: NDArray[np.int32], number: int, room: Room, n: int
 ) -> int:
     """From the pixels of one stroke to the list of all, whose length is returned."""
-    width = covered.shape[1]
+    shares = covered.reshape(covered.size)
     for place in touched:
-        row, column = place // width, place % width
         if n < len(room.place):
-            room.place[n], room.share[n] = place, covered[row, column]
+            room.place[n], room.share[n] = place, shares[place]
             room.number[n] = number
             n += 1
-        covered[row, column] = np.float32(0.0)
+        shares[place] = np.float32(0.0)
     return n

@@ -115,7 +115,7 @@ def _draw(
         room = _enlarge(room)
         n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
     table = np.array(colours, dtype=np.float32)
-    blend_places(image, room.place[:n], room.share[:n], room.number[:n], table)
+    blend_places(image.reshape(-1, 3), room.place[:n], room.share[:n], room.number[:n], table)
 
 
 def _enlarge(room: Room) -> Room:

@@ -79,7 +79,7 @@ class Recording:
     ) -> None:
         """Draw the bone over a copy of the left picture."""
         scene = Scene(self._plan, _STAGE, pose, self._viewpoint, False, foreground, ("bone",))
-        paint_layers(self.frames[number].left.copy(), scene, LabelBoard(0.45))
+        paint_layers(self.frames[number].left.copy, scene, LabelBoard(0.45))
 
 
 _STAGE = StageSpec(1, "opening", "femur", 2.0, 2.0, (), ("bone",), ())

@@ -124,7 +124,8 @@ def draw(layer: str, given: Scene, image: np.ndarray | None = None) -> np.ndarra
 def painted(given: Scene, drawing: Drawing, image: np.ndarray | None = None) -> np.ndarray:
     """On black unless a picture is given."""
     image = black() if image is None else image
-    paint(image, given, drawing, LabelBoard(0.45))
+    views = [given.render(body.mesh) for body in drawing.bodies]
+    paint(image, given, drawing, views, LabelBoard(0.45))
     return image
 
 

@@ -96,7 +96,7 @@ def test_labels_lie_neither_over_each_other_nor_over_banner_and_mark(scale: floa
     image = np.zeros((height, width, 3), np.uint8)
     rims = text_boxes(width, height)
     board = LabelBoard(0.45, list(rims))
-    paint_layers(image, given, board)
+    paint_layers(lambda: image, given, board)
     assert len(board.taken) >= len(rims) + 5
     assert not any(not one.intersect(other).is_empty for one, other in combinations(board.taken, 2))
 

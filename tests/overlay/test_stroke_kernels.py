@@ -210,7 +210,7 @@ def test_places_are_blended_in_their_order_and_no_others() -> None:
     number = np.array([-1, 0, 1, 1], np.int32)
     colours = np.array([[10.0, 200.0, 250.0], [90.0, 5.0, 160.0]], np.float32)
     image = before.copy()
-    blend_places(image, place, share, number, colours)
+    blend_places(image.reshape(-1, 3), place, share, number, colours)
     expected = before.astype(float).reshape(-1, 3)
     for k, one, which in zip(place, share, number, strict=True):
         colour = colours[which] if which >= 0 else np.zeros(3)
