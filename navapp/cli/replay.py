@@ -59,6 +59,13 @@ def add_parser(subparsers: Any) -> None:
         help="another bone, registered from the prior and followed in turns; repeatable",
     )
     parser.add_argument(
+        "--cut",
+        metavar="PLANE",
+        action="append",
+        default=[],
+        help="a planned cut that has been made: its bone is gone, its face is measured; repeatable",
+    )
+    parser.add_argument(
         "--order",
         choices=("forward", "pingpong", "each"),
         default="forward",
@@ -188,6 +195,7 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.prior_files import read_prior
+    from navapp.cli.made_cuts import cut_plan
     from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.operators import RecordedOperator
@@ -205,7 +213,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         raise UsageError("no plan is given", remedy="give --plan (make one with `navapp plan`)")
     if rig_path is None:
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
-    plan = read_plan(plan_path)
+    plan = cut_plan(read_plan(plan_path), options.cut)
     first, others = _stages(options, plan, stage)
     method = options.method or (None if session is None else session.method)
     is_recorded_so = session is not None and session.follows_refused

@@ -124,6 +124,16 @@ class TriangleMesh:
         return TriangleMesh(self.vertices_mm[used], new_index[kept])
 
 
+def join_meshes(*meshes: TriangleMesh) -> TriangleMesh:
+    """All of them as one; the triangles of the first come first."""
+    firsts = np.cumsum([0, *(len(mesh.vertices_mm) for mesh in meshes)])
+    return TriangleMesh(
+        np.concatenate([mesh.vertices_mm for mesh in meshes]),
+        np.concatenate([mesh.faces + first for mesh, first in zip(meshes, firsts, strict=False)]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+    )
+
+
 def vertex_normals(vertices_mm: FloatArray, faces: IntArray) -> FloatArray:
     """(V, 3) unit normals: the mean of the adjacent faces' normals, weighted by their area.
 

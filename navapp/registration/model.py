@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from navapp.geometry.box import Box
-from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn
@@ -51,8 +51,9 @@ class RegistrationModel:
 
     @cached_property
     def rendered_mesh(self) -> TriangleMesh:
-        """`seen_mesh` in fewer triangles where it has many: what is rendered."""
-        return drawn(self.seen_mesh)
+        """`seen_mesh` in fewer triangles where it has many, and its lid: what is rendered."""
+        mesh, lid = drawn(self.seen_mesh), self.bone.lid
+        return mesh if lid is None else join_meshes(mesh, lid)
 
     @cached_property
     def is_closed(self) -> bool:
@@ -64,10 +65,17 @@ class RegistrationModel:
     def render(
         self, camera_from_bone: RigidTransform, geometry: RectifiedGeometry, box: Box
     ) -> RenderedView:
-        """The bone at a pose in the rectified left camera, in a box of its picture."""
-        return render_rectified(
+        """The bone at a pose in the rectified left camera, in a box of its picture.
+
+        Its lid hides what lies behind, but is not seen itself.
+        """
+        view = render_rectified(
             self.rendered_mesh, camera_from_bone, geometry, box, is_closed=self.is_closed
         )
+        if self.bone.lid is not None:
+            is_lid = view.face_index >= len(self.rendered_mesh.faces) - len(self.bone.lid.faces)
+            view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1
+        return view
 
     @cached_property
     def rendered_face_sigma_mm(self) -> FloatArray:

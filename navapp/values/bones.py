@@ -38,6 +38,8 @@ class BoneModel:
     # standard deviation of the pose error that errors of the surface cause; 0 when nothing is known
     # of them.
     surface_sd_mm: float = 0.0
+    # what closes the bone where a stage has cut it; it hides what lies behind, but is not matched.
+    lid: TriangleMesh | None = None
 
     def __post_init__(self) -> None:
         n = len(self.mesh.vertices_mm)

@@ -16,6 +16,8 @@ from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 PartKind = Literal["implant", "spacer"]
 # Of the mechanical axes; they lie outside the usual field of view and may be absent.
+# A cut may reach beyond its planned rectangle by this share.
+_REACH = 1.3
 HIP_CENTRE, ANKLE_CENTRE = "femur/hip_centre", "tibia/ankle_centre"
 
 
@@ -34,6 +36,23 @@ class ResectionPlane:
         object.__setattr__(self, "normal", _unit(self.normal, "the normal of a plane"))
         width_mm, depth_mm = (_positive(value, "the extent of a plane") for value in self.extent_mm)
         object.__setattr__(self, "extent_mm", (width_mm, depth_mm))
+
+    def heights_mm(self, points_mm: FloatArray) -> FloatArray:
+        """(N,) distance of points (N, 3) from the plane; positive on the side that is removed."""
+        heights_mm: FloatArray = (points_mm - self.point_mm) @ self.normal
+        return heights_mm
+
+    def is_over(self, points_mm: FloatArray) -> NDArray[np.bool_]:
+        """(N,) points over the planned rectangle and a margin: a cut reaches no further.
+
+        The plane meets other parts of the bone too, which stay.
+        """
+        corners = self.corners_mm()
+        sides = np.stack([corners[1] - corners[0], corners[3] - corners[0]])
+        lengths_mm = np.linalg.norm(sides, axis=1)
+        along_mm = (points_mm - self.point_mm) @ (sides / lengths_mm[:, None]).T
+        is_over: NDArray[np.bool_] = (np.abs(along_mm) <= 0.5 * _REACH * lengths_mm).all(axis=1)
+        return is_over
 
     def corners_mm(self) -> FloatArray:
         """(4, 3) corners of the drawn rectangle, in order."""

@@ -1,0 +1,109 @@
+"""Where a plane cuts a mesh: lines, and the area that they enclose."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import FloatArray
+
+_Edge = tuple[int, int]
+
+
+def section_lines(mesh: TriangleMesh, height_mm: FloatArray) -> list[FloatArray]:
+    """Polylines (N, 3) in which a plane cuts a mesh; closed ones end as they begin.
+
+    Args:
+        mesh: that is cut.
+        height_mm: (V,) distance of its vertices from the plane, positive on one side.
+    """
+    lines = []
+    for chain in _chain(*_cut_edges(mesh.faces, height_mm)):
+        low, high = np.array(chain).T
+        share = height_mm[low] / (height_mm[low] - height_mm[high])
+        points = mesh.vertices_mm[low]
+        lines.append(points + share[:, None] * (mesh.vertices_mm[high] - points))
+    return lines
+
+
+def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | None:
+    """The area that closed lines (N, 3) of a plane enclose, as triangles that face along a normal.
+
+    A point is inside when the lines go round it an odd number of times. None without any area.
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    closed = [line for line in lines if len(line) > 3 and np.allclose(line[0], line[-1])]
+    if not closed:
+        return None
+    points = np.concatenate([line[:-1] for line in closed])
+    axes = _axes_across(normal)
+    flat = points @ axes.T
+    try:
+        faces = Delaunay(flat).simplices
+    except QhullError:  # all on one line
+        return None
+    middles = flat[faces].mean(axis=1)
+    is_inside = np.zeros(len(faces), dtype=np.bool_)
+    for line in closed:
+        is_inside ^= _is_enclosed(middles, line @ axes.T)
+    faces = faces[is_inside]
+    if len(faces) == 0:
+        return None
+    a, b, c = (flat[faces[:, k]] for k in range(3))
+    first, second = b - a, c - a
+    is_turned = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0.0
+    faces[is_turned] = faces[is_turned][:, ::-1]
+    return TriangleMesh(points, faces.astype(np.int32), np.tile(normal, (len(points), 1)))
+
+
+def _axes_across(normal: FloatArray) -> FloatArray:
+    """(2, 3) unit directions of a plane, right-handed with its normal."""
+    least = np.eye(3)[int(np.abs(normal).argmin())]
+    first = np.cross(least, normal)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def _is_enclosed(points: FloatArray, line: FloatArray) -> NDArray[np.bool_]:
+    """(N,) whether a closed line (M, 2) goes round points (N, 2) an odd number of times."""
+    start, end = line[:-1], line[1:]
+    x, y = points[:, :1], points[:, 1:]
+    crosses = (start[:, 1] > y) != (end[:, 1] > y)
+    rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
+    at_x = start[:, 0] + (y - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
+    is_odd: NDArray[np.bool_] = (crosses & (x < at_x)).sum(axis=1) % 2 == 1
+    return is_odd
+
+
+def _cut_edges(faces: NDArray[np.int32], height_mm: FloatArray) -> tuple[list[_Edge], list[_Edge]]:
+    """For each cut triangle the edge at which the plane enters it, and the one at which it leaves.
+
+    An edge is named by its vertex below the plane and the one above.
+    """
+    above = height_mm[faces] > 0.0
+    is_cut = above.any(axis=1) & ~above.all(axis=1)
+    starts, ends = [], []
+    for corners, is_above in zip(faces[is_cut].tolist(), above[is_cut].tolist(), strict=True):
+        for k in range(3):
+            here, there = corners[k], corners[(k + 1) % 3]
+            if is_above[k] and not is_above[(k + 1) % 3]:
+                starts.append((there, here))
+            elif not is_above[k] and is_above[(k + 1) % 3]:
+                ends.append((here, there))
+    return starts, ends
+
+
+def _chain(starts: list[_Edge], ends: list[_Edge]) -> list[list[_Edge]]:
+    """Edges in the order in which the plane meets them; triangles look the same way round."""
+    following = dict(zip(starts, ends, strict=True))
+    entered = set(ends)
+    chains = []
+    # Open lines begin at an edge that no triangle leads to.
+    for first in [edge for edge in starts if edge not in entered] + starts:
+        if first not in following:
+            continue
+        chain = [first]
+        while chain[-1] in following:
+            chain.append(following.pop(chain[-1]))
+        chains.append(chain)
+    return chains
