@@ -26,6 +26,7 @@ from navapp.values.contents import (
     StageContent,
     SurgicalContent,
 )
+from navapp.values.faces import MeasuredFace, join_faces
 from navapp.values.measured import (
     DisparityMap,
     Foreground,
@@ -61,6 +62,7 @@ __all__ = [
     "Foreground",
     "FrameTimings",
     "Landmark",
+    "MeasuredFace",
     "Origin",
     "OverlayMode",
     "OverlayPicture",
@@ -84,4 +86,5 @@ __all__ = [
     "Surroundings",
     "TrackedFrame",
     "Verdict",
+    "join_faces",
 ]

@@ -1,0 +1,113 @@
+"""A plane through measured disparities: what a sawn face is, to the eyes of a stereo camera.
+
+In a rectified pair a plane is an affine function of the pixel: with N . X = r for its points X,
+d = f B / z = (B / r) (N_x (u - c_x) + N_y (v - c_y) + f N_z).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import RectifiedGeometry
+from navapp.geometry.transform import FloatArray
+
+# All chosen. Widths of the kernel, px, from far to near, and the least one in sigmas.
+WIDTHS_PX = (1.5, 0.8, 0.4, 0.2)
+_LEAST_WIDTH_SIGMAS = 1.6
+# Residuals inside a square of this size may go together: marks of the saw's teeth, cortex, blood.
+_BLOCK_PX = 24
+_LEAST_BLOCKS = 6
+# What all disparities of a face may have in common.
+_COMMON_PX = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisparityPlane:
+    """d = `coefficients` . (u - c_x, v - c_y, 1), of a rectified pair."""
+
+    coefficients: FloatArray  # (3,) px per px, px per px, px
+    covariance: FloatArray  # (3, 3) of the coefficients
+    is_on: NDArray[np.bool_]  # (N,) measured pixels that lie on it
+    width_px: float  # what lies nearer than this is on it
+
+    def in_camera(self, geometry: RectifiedGeometry) -> tuple[FloatArray, float]:
+        """Unit normal N (3,) towards the camera, and N . X in mm of its points X."""
+        return plane_in_camera(self.coefficients, geometry)
+
+
+def plane_in_camera(
+    coefficients: FloatArray, geometry: RectifiedGeometry
+) -> tuple[FloatArray, float]:
+    """Unit normal N (3,) towards the rectified left camera, and N . X in mm (below 0)."""
+    a, b, c = coefficients
+    scaled = np.array([a, b, c / geometry.focal_px]) / geometry.baseline_mm
+    length = float(np.linalg.norm(scaled))
+    normal: FloatArray = -scaled / length
+    return normal, -1.0 / length
+
+
+def disparity_coefficients(
+    normal: FloatArray, distance_mm: float, geometry: RectifiedGeometry
+) -> FloatArray:
+    """(3,) of the plane N . X = distance in the rectified left camera."""
+    n_x, n_y, n_z = normal
+    per_mm = geometry.baseline_mm / distance_mm
+    return per_mm * np.array([n_x, n_y, geometry.focal_px * n_z])
+
+
+def fit_disparity_plane(
+    places: FloatArray,
+    disparity_px: FloatArray,
+    sigma_px: FloatArray,
+    start: FloatArray,
+    widths_px: tuple[float, ...] = WIDTHS_PX,
+) -> DisparityPlane | None:
+    """The plane that most of the measured pixels share.
+
+    Weighted least squares under a kernel that narrows (Welsch's, the correntropy of the paper's
+    equation 7), so that a hand, tissue and blood do not count. The covariance is that of sums over
+    squares of pixels, whose residuals go together (Liang and Zeger 1986).
+
+    Args:
+        places: (N, 3) of (u - c_x, v - c_y, 1), pixels of the rectified left picture.
+        disparity_px: (N,) measured.
+        sigma_px: (N,) its standard deviation.
+        start: (3,) coefficients to begin with.
+        widths_px: of the kernel, in turn.
+
+    Returns:
+        None when too little of the plane is there to tell how well it is known.
+    """
+    coefficients, weight = np.array(start, dtype=np.float64), np.zeros(len(places))
+    least_px = _LEAST_WIDTH_SIGMAS * sigma_px
+    for width_px in widths_px:
+        for _ in range(4):
+            residual = disparity_px - places @ coefficients
+            kernel_px = np.maximum(width_px, least_px)
+            weight = np.exp(-0.5 * (residual / kernel_px) ** 2) / sigma_px**2
+            normal_matrix = (places * weight[:, None]).T @ places
+            if not np.linalg.cond(normal_matrix) < 1e12:
+                return None
+            step = np.linalg.solve(normal_matrix, (places * weight[:, None]).T @ residual)
+            coefficients = coefficients + step
+    residual = disparity_px - places @ coefficients
+    width_px = 2.0 * max(widths_px[-1], float(np.median(least_px)))
+    is_on = np.abs(residual) < width_px
+    covariance = _covariance(places[is_on], weight[is_on], residual[is_on])
+    return None if covariance is None else DisparityPlane(coefficients, covariance, is_on, width_px)
+
+
+def _covariance(places: FloatArray, weight: FloatArray, residual: FloatArray) -> FloatArray | None:
+    """(3, 3) of the coefficients; None from too few squares of pixels."""
+    squares = np.floor(places[:, :2] / _BLOCK_PX).astype(np.int64)
+    _, block = np.unique(squares, axis=0, return_inverse=True)
+    n = int(block.max(initial=-1)) + 1
+    if n < _LEAST_BLOCKS:
+        return None
+    pulls = places * (weight * residual)[:, None]
+    sums = np.stack([np.bincount(block.ravel(), pulls[:, k], n) for k in range(3)], axis=1)
+    inverse = np.linalg.inv((places * weight[:, None]).T @ places)
+    spread = inverse @ (sums.T @ sums) @ inverse * n / (n - 3)
+    spread[2, 2] += _COMMON_PX**2
+    return np.asarray(spread)

@@ -1,0 +1,114 @@
+"""Cut faces, as measured against their plan."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from navapp.geometry.transform import FloatArray, read_only
+from navapp.values.contents import ResectionPlane
+
+# Of the length of two normal errors, and of the size of one: 95 % lie below so many deviations.
+_LENGTH_95, _SIZE_95 = 2.45, 1.96
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredFace:
+    """A face that a saw left, in the bone's coordinates, beside the plane that was planned.
+
+    It is described by three numbers: the tilts (rad) of its normal towards the two `axes` of the
+    planned plane, and its distance (mm) beyond the planned point along its own normal.
+    """
+
+    plane: ResectionPlane  # planned
+    tilts_offset: FloatArray  # (3,) rad, rad, mm
+    # (3, 3) of those numbers: by the matching alone, and by the pose it was measured with.
+    matching_covariance: FloatArray
+    pose_covariance: FloatArray
+    seen_share: float  # of the whole face, 0 to 1
+    axes: FloatArray = field(init=False)  # (2, 3) unit, across the planned normal
+
+    def __post_init__(self) -> None:
+        for name in ("tilts_offset", "matching_covariance", "pose_covariance"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        object.__setattr__(self, "axes", read_only(axes_of(self.plane)))
+
+    @property
+    def normal(self) -> FloatArray:
+        """(3,) unit, out of the bone that stays."""
+        tilted = self.plane.normal + self.tilts_offset[:2] @ self.axes
+        unit: FloatArray = tilted / np.linalg.norm(tilted)
+        return unit
+
+    @property
+    def offset_mm(self) -> float:
+        """Of the face from the planned point along its normal; positive: less bone is gone."""
+        return float(self.tilts_offset[2])
+
+    @property
+    def point_mm(self) -> FloatArray:
+        """(3,) of the face, beside the planned point."""
+        point: FloatArray = self.plane.point_mm + self.offset_mm * self.normal
+        return point
+
+    @property
+    def angle_deg(self) -> float:
+        """Between the face and its plan."""
+        return math.degrees(math.atan(float(np.hypot(*self.tilts_offset[:2]))))
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(3, 3) of `tilts_offset`, all errors together."""
+        both: FloatArray = self.matching_covariance + self.pose_covariance
+        return both
+
+    @property
+    def bound_deg(self) -> float:
+        """95 % bound of the angle between the measured and the true face."""
+        largest = float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1])
+        return math.degrees(_LENGTH_95 * math.sqrt(max(largest, 0.0)))
+
+    @property
+    def bound_mm(self) -> float:
+        """95 % bound of the error of the offset."""
+        return _SIZE_95 * math.sqrt(max(float(self.covariance[2, 2]), 0.0))
+
+    @property
+    def as_plane(self) -> ResectionPlane:
+        """The face as a plane of the planned extent."""
+        return replace(self.plane, point_mm=self.point_mm, normal=self.normal)
+
+
+def axes_of(plane: ResectionPlane) -> FloatArray:
+    """(2, 3) unit directions across a plane's normal."""
+    corners = plane.corners_mm()
+    sides = np.stack([corners[1] - corners[0], corners[3] - corners[0]])
+    axes: FloatArray = sides / np.linalg.norm(sides, axis=1)[:, None]
+    return axes
+
+
+def join_faces(faces: Sequence[MeasuredFace]) -> MeasuredFace:
+    """What several measurements of one face say together.
+
+    Each counts by the inverse of its covariance. The matcher's errors average out; those of poses
+    may all go the same way (they share the model, the rig and the view), and do not.
+
+    Raises:
+        ValueError: no measurement.
+    """
+    if not faces:
+        raise ValueError("no measurement of a face to join")
+    weights = [np.linalg.inv(face.covariance) for face in faces]
+    inverse = np.linalg.inv(np.sum(weights, axis=0))
+    shares = [inverse @ weight for weight in weights]
+    return MeasuredFace(
+        faces[0].plane,
+        np.sum([share @ face.tilts_offset for share, face in zip(shares, faces, strict=True)], 0),
+        np.sum(
+            [s @ face.matching_covariance @ s.T for s, face in zip(shares, faces, strict=True)], 0
+        ),
+        # Fully correlated: the mean of the covariances bounds that of the mean.
+        np.mean([face.pose_covariance for face in faces], axis=0),
+        max(face.seen_share for face in faces),
+    )
