@@ -2,7 +2,7 @@
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from typing import Any
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, write_json
-from navapp.cli.results import frame_text, summarise, summary_text
+from navapp.cli.results import frame_text, summarise, summarise_faces, summary_text
 from navapp.control.controller import SessionController
 from navapp.control.frame_result import FrameResult
 from navapp.control.operators import Operator
 from navapp.control.runner import run_headless
 from navapp.errors import NavappError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
-from navapp.values import Prior
+from navapp.values import MeasuredFace, Prior
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -122,6 +122,7 @@ def report_result(
     options: argparse.Namespace,
     diagnostics: Diagnostics,
     rig: dict[str, Any] | None = None,
+    faces: Sequence[Mapping[str, MeasuredFace]] = (),
 ) -> int:
     """Write the result, tell its summary, and answer with the exit code.
 
@@ -132,12 +133,13 @@ def report_result(
         options: of the verb.
         diagnostics: takes the summary.
         rig: what a live session found out about its rig.
+        faces: of cuts, as each frame has measured them.
 
     Raises:
         NavappError: that fault.
         ResultError: no frame was OK.
     """
-    summary = summarise(frames, seconds)
+    summary = {**summarise(frames, seconds), "measured": summarise_faces(faces)}
     told = {} if rig is None else {"rig": rig}
     write_json(options.json, options.verb, {"frames": frames, "summary": summary, **told})
     if options.json != "-":

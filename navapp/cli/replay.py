@@ -2,7 +2,7 @@
 
 import argparse
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable
@@ -129,7 +129,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     frames = [frame_to_json(result, {}) for result in log.results]
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
-    return report_result(frames, seconds, failure, options, diagnostics, told)
+    faces = [result.faces for result in log.results]
+    return report_result(frames, seconds, failure, options, diagnostics, told, faces)
 
 
 def _run_session(
@@ -195,7 +196,6 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.prior_files import read_prior
-    from navapp.cli.made_cuts import cut_plan
     from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.operators import RecordedOperator
@@ -213,7 +213,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         raise UsageError("no plan is given", remedy="give --plan (make one with `navapp plan`)")
     if rig_path is None:
         raise UsageError("no rig is given", remedy="give --rig, or [camera] rig")
-    plan = cut_plan(read_plan(plan_path), options.cut)
+    plan = read_plan(plan_path)
     first, others = _stages(options, plan, stage)
     method = options.method or (None if session is None else session.method)
     is_recorded_so = session is not None and session.follows_refused
@@ -228,8 +228,12 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         follows_refused=options.follow_refused or is_recorded_so or None,
         others=others,
         layers=_layers(options.layers),
+        made_cuts=tuple(dict.fromkeys(options.cut)),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
+    if session is None:
+        # Nothing is late: every frame tells what it can.
+        specification = replace(specification, frames_between_faces=1)
     return _Replay(
         specification,
         operator,

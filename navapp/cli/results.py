@@ -8,7 +8,7 @@ import numpy as np
 from navapp.control.frame_result import FrameResult
 from navapp.control.session import describe_moved_rig
 from navapp.control.states import DistrustRig, SessionState, Snapshot
-from navapp.values import FrameTimings, Reason, Status, TrackedFrame
+from navapp.values import FrameTimings, MeasuredFace, Reason, Status, TrackedFrame, join_faces
 
 
 def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> dict[str, Any]:
@@ -31,6 +31,29 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
             name: _answer_to_json(tracked, tracked.timings, tre_mm.get(name))
             for name, tracked in result.others.items()
         },
+        "measured": {name: face_to_json(face) for name, face in result.faces.items()},
+    }
+
+
+def face_to_json(face: MeasuredFace) -> dict[str, Any]:
+    """The face of a cut, in plan coordinates and against its plan."""
+    return {
+        "point_mm": face.point_mm.tolist(),
+        "normal": face.normal.tolist(),
+        "angle_deg": face.angle_deg,
+        "offset_mm": face.offset_mm,
+        "bound_deg": face.bound_deg,
+        "bound_mm": face.bound_mm,
+        "seen_share": face.seen_share,
+    }
+
+
+def summarise_faces(faces: Sequence[Mapping[str, MeasuredFace]]) -> dict[str, Any]:
+    """The faces of cuts, over all frames that have measured them."""
+    names = dict.fromkeys(name for frame in faces for name in frame)
+    return {
+        name: face_to_json(join_faces([frame[name] for frame in faces if name in frame]))
+        for name in names
     }
 
 
@@ -162,10 +185,19 @@ def _count_text(counts: dict[str, int]) -> str:
     )
 
 
+def _face_text(name: str, face: Mapping[str, float]) -> str:
+    return (
+        f"cut {name}: {face['angle_deg']:.2f} deg (+- {face['bound_deg']:.2f}) and "
+        f"{face['offset_mm']:+.2f} mm (+- {face['bound_mm']:.2f}) from its plan, "
+        f"{100.0 * face['seen_share']:.0f} % of it seen"
+    )
+
+
 def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
     lines = [_count_text(summary)]
     lines += [f"other bone, {name}: {_count_text(n)}" for name, n in summary["bodies"].items()]
+    lines += [_face_text(name, face) for name, face in summary["measured"].items()]
     processing_ms, tre = summary["latency_ms"], summary["tre_mm"]
     if summary["fps"] is not None and processing_ms["p50"] is not None:
         lines.append(

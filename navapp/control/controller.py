@@ -29,6 +29,7 @@ from navapp.control.eye_preview import EyePreview
 from navapp.control.frame_presenter import FramePresenter
 from navapp.control.frame_result import FrameResult
 from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
+from navapp.control.made_cuts import MadeCuts
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import OtherBones
@@ -214,6 +215,7 @@ class SessionController:
         picture, overlay_ms = self._presenter.show(frame, snapshot)
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
+        faces = session.measure_faces(frame)
         timings = FrameTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,
@@ -224,6 +226,7 @@ class SessionController:
             replace(timings, overlay_ms=overlay_ms),
             snapshot.is_navigable,
             others,
+            faces,
         )
         # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped
@@ -261,6 +264,7 @@ def _make_session(
         tracks,
         RegistrationJob(trackers, executor),
         OtherBones(tracks, plan, specification.others),
+        MadeCuts(plan, trackers, specification.made_cuts, specification.frames_between_faces),
         specification.stage,
         specification.layers,
         RateMeter(specification.display_delay_ms, specification.display_delay_bound_ms),

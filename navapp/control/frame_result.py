@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
 from navapp.control.states import SessionState
-from navapp.values import FrameTimings, OverlayPicture, StageSpec, TrackedFrame
+from navapp.values import FrameTimings, MeasuredFace, OverlayPicture, StageSpec, TrackedFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,6 +22,8 @@ class FrameResult:
     is_navigable: bool  # guides are in the picture
     # other bones than the active one, whose turn it was in this very frame.
     others: Mapping[str, TrackedFrame] = field(default_factory=dict)
+    # faces of cuts that were measured in this very frame, by the plane's name.
+    faces: Mapping[str, MeasuredFace] = field(default_factory=dict)
 
 
 FrameListener = Callable[[FrameResult], None]

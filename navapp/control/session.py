@@ -5,6 +5,7 @@ from drivers.frames import StereoFrame
 from navapp.control.bone_tracks import BoneTracks, Candidate
 from navapp.control.event_log import EventLog
 from navapp.control.frame_result import FrameResult
+from navapp.control.made_cuts import MadeCuts
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import OperatorPicture
 from navapp.control.rates import RateMeter
@@ -21,7 +22,7 @@ from navapp.control.states import (
 from navapp.errors import RigError
 from navapp.geometry.transform import RigidTransform
 from navapp.overlay import LAYERS
-from navapp.values import Reason, StageSpec, Status, TrackedFrame, Verdict
+from navapp.values import MeasuredFace, Reason, StageSpec, Status, TrackedFrame, Verdict
 
 
 class Session:
@@ -33,6 +34,7 @@ class Session:
         tracks: of the session's bones.
         registration: searches for the stage's bone.
         others: the other bones that are followed.
+        cuts: that have been made.
         stage: to start in.
         layers: drawn in every stage; None: the stage's own.
         meter: of its frames.
@@ -45,6 +47,7 @@ class Session:
         tracks: BoneTracks,
         registration: RegistrationJob,
         others: OtherBones,
+        cuts: MadeCuts,
         stage: StageSpec,
         layers: tuple[str, ...] | None = None,
         meter: RateMeter | None = None,
@@ -54,6 +57,7 @@ class Session:
         self._tracks = tracks
         self._registration = registration
         self._others = others
+        self._cuts = cuts
         self._state = SessionState.STARTING
         self._tracked: TrackedFrame | None = None
         self._shows_depth = False
@@ -171,6 +175,12 @@ class Session:
         if self._state is SessionState.FAULT:
             return {}
         return self._others.follow(self._stage, frame, self._tracked)
+
+    def measure_faces(self, frame: StereoFrame) -> dict[str, MeasuredFace]:
+        """Measure the faces of cuts of the stage's bone in a frame; in a fault none."""
+        if self._state is SessionState.FAULT:
+            return {}
+        return self._cuts.measure(frame, self._tracked)
 
     @property
     def shows_depth(self) -> bool:

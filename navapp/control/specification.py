@@ -35,6 +35,8 @@ class SessionSpecification:
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
     display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
+    made_cuts: tuple[str, ...] = ()  # planes of the plan that are cut from the start
+    frames_between_faces: int = 5  # faces of cuts are measured in every so many frames
 
     @property
     def display_model(self) -> DisplayModel | None:
@@ -66,6 +68,7 @@ def specify_session(
     others: tuple[str, ...] = (),
     layers: tuple[str, ...] | None = None,
     calibrated_display: CalibratedDisplay | None = None,
+    made_cuts: tuple[str, ...] = (),
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -82,6 +85,7 @@ def specify_session(
         others: bones that are registered and followed unasked.
         layers: drawn in every stage; None: the stage's own.
         calibrated_display: in the mirror; None: the display shows the video.
+        made_cuts: planes of the plan that are cut from the start.
     """
     display = configuration.display
     return SessionSpecification(
@@ -100,4 +104,5 @@ def specify_session(
         is_recording=is_live and configuration.recording.folder is not None,
         layers=layers,
         display=calibrated_display,
+        made_cuts=made_cuts,
     )

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,8 +11,19 @@ from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.preop import build_aspects
+from navapp.resection import CutBone, FaceMeter
 from navapp.tracking import Goal, Tracker, TrackerSettings, make_tracker
-from navapp.values import AspectGraph, BoneModel, Plan, Prior, StageSpec, TrackedFrame
+from navapp.values import (
+    AspectGraph,
+    BoneModel,
+    MeasuredFace,
+    Plan,
+    PoseEstimate,
+    Prior,
+    StageSpec,
+    Status,
+    TrackedFrame,
+)
 
 # Makes the tracker of one bone; the aspects are None where no search needs them.
 MakeTracker = Callable[[StereoRig, BoneModel, TrackerSettings, AspectGraph | None], Tracker]
@@ -43,8 +55,10 @@ class Trackers:
         self._rig, self._plan, self._prior, self._settings = rig, plan, prior, settings
         self._make_tracker = make_tracker
         self._lock = threading.Lock()
+        self._bones = {name: CutBone(bone) for name, bone in plan.bones.items()}
         self._trackers: dict[str, Tracker] = {}
         self._with_aspects: dict[str, Tracker] = {}
+        self._face_meters: dict[str, FaceMeter] = {}
 
     def tracker(self, bone: str) -> Tracker:
         """The tracker that follows a bone."""
@@ -54,9 +68,40 @@ class Trackers:
             return known
         # The production chain needs no views to follow a bone; those of the paper do.
         is_ours = self._settings.method == "bimcc"
-        made = self._make(bone, None if is_ours else self._plan.aspects.get(bone))
+        aspects = None if is_ours else self._plan.aspects.get(bone)
+        made = self._make(self.bone(bone).model, aspects)
         with self._lock:
             return self._with_aspects.get(bone) or self._trackers.setdefault(bone, made)
+
+    def bone(self, name: str) -> CutBone:
+        """A bone as it is now."""
+        with self._lock:
+            return self._bones[name]
+
+    def set_bone(self, bone: CutBone) -> None:
+        """From now on a bone is another one: its tracker is made anew."""
+        name = bone.planned.name
+        with self._lock:
+            self._bones[name] = bone
+            self._trackers.pop(name, None)
+            self._with_aspects.pop(name, None)
+
+    def measure_face(
+        self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
+    ) -> MeasuredFace | None:
+        """The face of a cut in a frame; None when it is not well seen."""
+        with self._lock:
+            meter = self._face_meters.get(bone.planned.name)
+        if meter is None:
+            made = FaceMeter(self._rig, bone.planned)
+            with self._lock:
+                meter = self._face_meters.setdefault(bone.planned.name, made)
+        known = bone.faces.get(name)
+        expected = None if known is None else known.as_plane
+        face = meter.measure(
+            frame.left, frame.right, estimate, tuple(bone.made.values()), bone.made[name], expected
+        )
+        return face if face is not None and face.is_told else None
 
     def corners_mm(self, bone: str) -> FloatArray:
         """(8, 3) of the box around a bone's model."""
@@ -83,7 +128,42 @@ class Trackers:
     ) -> list[TrackedFrame]:
         """Search for a stage's bone in a frame, from the prior; best answer first, may be empty."""
         tracker, goal = self._searching_tracker(stage.bone), self.goal(stage)
-        return tracker.register(frame.left, frame.right, self._prior, goal, on_progress)
+        answers = tracker.register(frame.left, frame.right, self._prior, goal, on_progress)
+        return self._look_closer(stage, frame, answers)
+
+    def _look_closer(
+        self, stage: StageSpec, frame: StereoFrame, answers: list[TrackedFrame]
+    ) -> list[TrackedFrame]:
+        """The same answers, or better ones of a cut bone that was found, but too loosely.
+
+        Where its faces are, relative to the pose, the same picture tells: then less of the bone
+        beside them is unsure.
+        """
+        bone = self.bone(stage.bone)
+        if not bone.unmeasured or not answers or answers[0].estimate is None:
+            return answers
+        best, estimate = answers[0], answers[0].estimate
+        if best.verdict.status is not Status.DEGRADED:
+            return answers
+        faces = {
+            name: face
+            for name in bone.unmeasured
+            if (face := self._face_beside(frame, bone, estimate, name)) is not None
+        }
+        if not faces:
+            return answers
+        tracker = self._make(bone.with_faces(faces).model, None)
+        prior = Prior({stage.bone: estimate.camera_from_bone})
+        closer = tracker.register(frame.left, frame.right, prior, self.goal(stage))
+        is_better = bool(closer) and closer[0].verdict.rank < best.verdict.rank
+        return closer if is_better else answers
+
+    def _face_beside(
+        self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
+    ) -> MeasuredFace | None:
+        """A face relative to a pose, whatever the pose's own error."""
+        exact = replace(estimate, covariance=np.zeros((6, 6)))
+        return self.measure_face(frame, bone, exact, name)
 
     def _searching_tracker(self, bone: str) -> Tracker:
         """The bone's tracker, with aspects when there is no pose to start from."""
@@ -95,14 +175,16 @@ class Trackers:
         if known is not None:
             return known
         half_angle_deg, built = self._prior.approach_half_angle_deg, self._plan.aspects.get(bone)
-        if built is None:
-            aspects = build_aspects(self._plan.bones[bone], axis, half_angle_deg)
+        cut = self.bone(bone)
+        # What was built beforehand has the edges of the whole bone.
+        if built is None or cut.made:
+            aspects = build_aspects(cut.model, axis, half_angle_deg)
         else:
             aspects = built.within(ViewCone(axis, half_angle_deg))
-        made = self._make(bone, aspects)
+        made = self._make(cut.model, aspects)
         with self._lock:
             self._trackers.pop(bone, None)
             return self._with_aspects.setdefault(bone, made)
 
-    def _make(self, bone: str, aspects: AspectGraph | None) -> Tracker:
-        return self._make_tracker(self._rig, self._plan.bones[bone], self._settings, aspects)
+    def _make(self, bone: BoneModel, aspects: AspectGraph | None) -> Tracker:
+        return self._make_tracker(self._rig, bone, self._settings, aspects)

@@ -1,1 +1,6 @@
-"""What has been cut, drilled and put in: the bone that is left, and what was made against plan."""
+"""What has been cut of the bones, and what was made against the plan."""
+
+from navapp.resection.cut_bone import CutBone
+from navapp.resection.face_meter import FaceMeter
+
+__all__ = ["CutBone", "FaceMeter"]

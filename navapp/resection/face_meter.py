@@ -26,7 +26,7 @@ from navapp.resection.face_fit import (
     fit_disparity_plane,
     plane_in_camera,
 )
-from navapp.resection.remaining_bone import remove_cuts
+from navapp.resection.remaining_bone import Cut, remove_cuts
 from navapp.stereo import match_surface, refine_on_model
 from navapp.values import BoneModel, DisparityMap, MeasuredFace, Origin, PoseEstimate
 from navapp.values.contents import ResectionPlane
@@ -39,7 +39,7 @@ _RIM_PX = 6
 _MARGIN_PX = 12
 # Neighbouring pixels share their windows: every second one each way tells as much.
 _STRIDE_PX = 2
-_MAX_ROUNDS, _REST_PX = 4, 0.01
+_MAX_ROUNDS, _REST_PX = 6, 0.02
 _FAR_WIDTHS_PX = (4.0, 2.0, 1.0)
 _LEAST_PIXELS = 300
 # Another cut's bone is gone as well, and its edge is as wide.
@@ -87,28 +87,27 @@ class FaceMeter:
         Returns:
             None when too little of it is seen.
         """
-        left_from_bone = estimate.camera_from_bone
-        rectified_from_bone = self._geometry.rectified_from_left @ left_from_bone
-        plane, fit, view = expected or planned, None, None
-        pair: RectifiedPair | None = None
-        for number in range(_MAX_ROUNDS):
+        rectified_from_bone = self._geometry.rectified_from_left @ estimate.camera_from_bone
+        plane, pair = expected or planned, None
+        # From the plan, where a saw may have missed it, the first look is a wide one.
+        is_far = expected is None
+        for _ in range(_MAX_ROUNDS):
             coefficients = self._coefficients(plane, rectified_from_bone)
             view = self._view(plane, made, planned, rectified_from_bone)
             if view is None:
                 return None
             if pair is None or view.box.intersect(pair.box) != view.box:
                 pair = self._rectify(left, right, view.box, coefficients)
-            is_far = number == 0 and expected is None
             fit = self._fit(replace(pair, box=view.box), view, coefficients, is_far=is_far)
             if fit is None:
                 return None
             plane = self._plane_in_bone(fit, plane, rectified_from_bone)
-            if not is_far and self._moved_px(fit.coefficients - coefficients, view) < _REST_PX:
-                break
-        assert fit is not None
-        assert view is not None
-        share = fit.is_on.sum() * _STRIDE_PX**2 / max(view.n_whole, 1)
-        return self._face(fit, estimate, planned, min(float(share), 1.0))
+            moved_px = self._moved_px(fit.coefficients - coefficients, view)
+            if not is_far and moved_px < _REST_PX:
+                share = fit.is_on.sum() * _STRIDE_PX**2 / max(view.n_whole, 1)
+                return self._face(fit, estimate, planned, min(float(share), 1.0))
+            is_far = False
+        return None
 
     def _coefficients(
         self, plane: ResectionPlane, rectified_from_bone: RigidTransform
@@ -183,9 +182,9 @@ class FaceMeter:
         far, near = max(depths_mm) + _BAND_MM, max(min(depths_mm) - _BAND_MM, 1.0)
         return self._geometry.disparity_px(far), self._geometry.disparity_px(near)
 
-    def _places(self, pixels: NDArray[np.generic]) -> FloatArray:
+    def _places(self, pixels: NDArray[np.int64]) -> FloatArray:
         """(N, 3) of (u - c_x, v - c_y, 1)."""
-        middle = self._geometry.centre_x_px, self._geometry.centre_y_px
+        middle = np.array([self._geometry.centre_x_px, self._geometry.centre_y_px])
         return np.column_stack([pixels - middle, np.ones(len(pixels))])
 
     def _fit(
@@ -236,7 +235,7 @@ class FaceMeter:
         u = np.arange(box.width) + (box.x - self._geometry.centre_x_px)
         v = np.arange(box.height) + (box.y - self._geometry.centre_y_px)
         a, b, c = coefficients
-        return (a * u + b * v[:, None] + c).astype(np.float32)
+        return np.asarray(a * u + b * v[:, None] + c, dtype=np.float32)
 
     def _plane_in_bone(
         self, fit: DisparityPlane, plane: ResectionPlane, rectified_from_bone: RigidTransform
@@ -309,7 +308,7 @@ def _tilts_offset(
 
 def _make_rest(bone: BoneModel, made: tuple[ResectionPlane, ...]) -> TriangleMesh:
     """What is left of a bone, to hide what lies behind it."""
-    left = remove_cuts(bone, made, unsure_mm=0.0)
+    left = remove_cuts(bone, [Cut(plane, 0.0) for plane in made])
     is_left = ~left.is_removed[bone.mesh.faces].any(axis=1)
     return drawn(TriangleMesh(bone.mesh.vertices_mm, bone.mesh.faces[is_left], bone.mesh.normals))
 

@@ -11,6 +11,8 @@ from navapp.values.contents import ResectionPlane
 
 # Of the length of two normal errors, and of the size of one: 95 % lie below so many deviations.
 _LENGTH_95, _SIZE_95 = 2.45, 1.96
+# A face of which less is seen, or that is known less well, is not told; chosen.
+LEAST_SHARE, MOST_DEG, MOST_MM = 0.25, 1.0, 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +75,17 @@ class MeasuredFace:
     def bound_mm(self) -> float:
         """95 % bound of the error of the offset."""
         return _SIZE_95 * math.sqrt(max(float(self.covariance[2, 2]), 0.0))
+
+    @property
+    def is_told(self) -> bool:
+        """Known well enough to be told, and to cut the model by."""
+        is_seen = self.seen_share >= LEAST_SHARE
+        return is_seen and self.bound_deg <= MOST_DEG and self.bound_mm <= MOST_MM
+
+    @property
+    def relative_to_pose(self) -> "MeasuredFace":
+        """The same without the error of the pose: where the face is when the pose is right."""
+        return replace(self, pose_covariance=np.zeros((3, 3)))
 
     @property
     def as_plane(self) -> ResectionPlane:

@@ -1,0 +1,113 @@
+"""The cuts of a session: made, withdrawn, and their faces measured."""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+from drivers.frames import StereoFrame
+from navapp.control.trackers import Trackers
+from navapp.errors import UsageError
+from navapp.resection import CutBone
+from navapp.values import MeasuredFace, Plan, Status, TrackedFrame, join_faces
+
+# All chosen. So many measurements of a face make it known; the newest so many are kept.
+_ENOUGH, _KEPT = 3, 60
+
+
+class MadeCuts:
+    """What has been cut of the session's bones; started and asked from the loop alone.
+
+    Faces are measured in turns that are counted in frames: a recorded session replays to them.
+
+    Args:
+        plan: with the planes.
+        trackers: of its bones.
+        made: names of planes that are cut from the start.
+        frames_between: a face is measured in every so many frames.
+
+    Raises:
+        UsageError: the plan has no such plane.
+    """
+
+    def __init__(
+        self, plan: Plan, trackers: Trackers, made: Sequence[str] = (), frames_between: int = 1
+    ) -> None:
+        self._plan, self._trackers = plan, trackers
+        self._frames_between = frames_between
+        self._n_frames = 0
+        self._measured: dict[str, deque[MeasuredFace]] = {}
+        for name in made:
+            self.confirm(name)
+
+    def confirm(self, name: str) -> CutBone:
+        """A planned cut has been made: its bone as it is now.
+
+        Raises:
+            UsageError: the plan has no such plane, or no model of its bone.
+        """
+        plane = self._plan.content.planes.get(name)
+        if plane is None:
+            known = ", ".join(self._plan.content.planes)
+            remedy = f"choose of {known}" if known else "make the plan with --contents"
+            raise UsageError(f"the plan has no plane '{name}'", subject=name, remedy=remedy)
+        if plane.bone not in self._plan.bones:
+            raise UsageError(
+                f"the plan has no model of the {plane.bone}, which '{name}' cuts",
+                subject=name,
+                remedy="make the plan with that bone",
+            )
+        self._measured.pop(name, None)
+        bone = self._trackers.bone(plane.bone).cut(name, plane)
+        self._trackers.set_bone(bone)
+        return bone
+
+    def withdraw(self, name: str) -> CutBone:
+        """A cut has not been made after all.
+
+        Raises:
+            UsageError: it was not said to be made.
+        """
+        plane = self._plan.content.planes.get(name)
+        if plane is None or name not in self._trackers.bone(plane.bone).made:
+            raise UsageError(f"the cut '{name}' was not confirmed", subject=name)
+        self._measured.pop(name, None)
+        bone = self._trackers.bone(plane.bone).restore(name)
+        self._trackers.set_bone(bone)
+        return bone
+
+    @property
+    def faces(self) -> Mapping[str, MeasuredFace]:
+        """What all measurements of each face say together."""
+        return {name: join_faces(tuple(faces)) for name, faces in self._measured.items()}
+
+    def bone(self, name: str) -> CutBone:
+        """A bone as it is now."""
+        return self._trackers.bone(name)
+
+    def measure(self, frame: StereoFrame, tracked: TrackedFrame | None) -> dict[str, MeasuredFace]:
+        """The faces of a bone in a frame in which its pose is OK, if it is their turn."""
+        self._n_frames += 1
+        if tracked is None or tracked.estimate is None:
+            return {}
+        is_ok = tracked.verdict.status is Status.OK
+        if not is_ok or self._n_frames % self._frames_between:
+            return {}
+        bone, estimate = self._trackers.bone(tracked.bone), tracked.estimate
+        found = {
+            name: face
+            for name in bone.made
+            if (face := self._trackers.measure_face(frame, bone, estimate, name)) is not None
+        }
+        for name, face in found.items():
+            self._measured.setdefault(name, deque(maxlen=_KEPT)).append(face)
+        self._learn(bone)
+        return found
+
+    def _learn(self, bone: CutBone) -> None:
+        """Where faces have become known, less of the bone beside them is unsure."""
+        known = {
+            name: join_faces(tuple(self._measured[name]))
+            for name in bone.unmeasured
+            if len(self._measured.get(name, ())) >= _ENOUGH
+        }
+        if known:
+            self._trackers.set_bone(bone.with_faces(known))

@@ -1,0 +1,58 @@
+"""A bone of the plan with the cuts that have been made, and what is known of their faces."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from navapp.resection.remaining_bone import Cut, remove_cuts
+from navapp.values import BoneModel, MeasuredFace, ResectionPlane
+
+# All chosen. A saw misses its plan: bone so near to a planned face may be gone, until the face is
+# measured. Then what is left: a triangle's height, and what the measurement leaves open.
+UNSURE_MM, SURE_MM = 1.5, 0.3
+# The tilt of a face is unsure, too: so far from its middle most of it lies.
+_HALF_FACE_MM = 25.0
+
+
+@dataclass(frozen=True, eq=False)
+class CutBone:
+    """A bone of the plan, cut; changed by making another one."""
+
+    planned: BoneModel
+    made: Mapping[str, ResectionPlane] = field(default_factory=dict)  # by name, as planned
+    faces: Mapping[str, MeasuredFace] = field(default_factory=dict)  # of those that are measured
+    version: int = 0  # counts the changes
+
+    @cached_property
+    def model(self) -> BoneModel:
+        """What is left of the bone, to be registered to."""
+        left = remove_cuts(self.planned, [self._cut(name) for name in self.made])
+        return replace(left, version=self.planned.version + self.version)
+
+    @property
+    def unmeasured(self) -> tuple[str, ...]:
+        """Names of the cuts whose face is not known yet."""
+        return tuple(name for name in self.made if name not in self.faces)
+
+    def cut(self, name: str, plane: ResectionPlane) -> "CutBone":
+        """With one more cut; its face is not measured."""
+        faces = {other: face for other, face in self.faces.items() if other != name}
+        return CutBone(self.planned, {**self.made, name: plane}, faces, self.version + 1)
+
+    def restore(self, name: str) -> "CutBone":
+        """Without a cut."""
+        made = {other: plane for other, plane in self.made.items() if other != name}
+        faces = {other: face for other, face in self.faces.items() if other != name}
+        return CutBone(self.planned, made, faces, self.version + 1)
+
+    def with_faces(self, faces: Mapping[str, MeasuredFace]) -> "CutBone":
+        """With the faces of some of its cuts as measured."""
+        return CutBone(self.planned, self.made, {**self.faces, **faces}, self.version + 1)
+
+    def _cut(self, name: str) -> Cut:
+        face = self.faces.get(name)
+        if face is None:
+            return Cut(self.made[name], UNSURE_MM)
+        tilt_mm = _HALF_FACE_MM * math.tan(math.radians(face.bound_deg))
+        return Cut(face.as_plane, min(SURE_MM + face.bound_mm + tilt_mm, UNSURE_MM))
