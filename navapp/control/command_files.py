@@ -10,6 +10,7 @@ from navapp.control.states import (
     CheckMirror,
     Command,
     ConfirmCross,
+    ConfirmCut,
     DistrustRig,
     EnterStage,
     Interrupt,
@@ -23,6 +24,7 @@ from navapp.control.states import (
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
+    WithdrawCut,
 )
 from navapp.errors import SequenceError
 from navapp.geometry.transform import RigidTransform
@@ -42,15 +44,21 @@ _PLAIN: dict[str, type] = {
 }
 # Older recordings do not say which candidate was meant: the one that was under review.
 _DECISIONS: dict[str, type[Accept] | type[Reject]] = {"accept": Accept, "reject": Reject}
-_NAMES = {kind: name for name, kind in (_PLAIN | _DECISIONS).items()}
+# Commands about something that has a name.
+_NAMED: dict[str, type[ToggleLayer] | type[ConfirmCut] | type[WithdrawCut]] = {
+    "layer": ToggleLayer,
+    "confirm_cut": ConfirmCut,
+    "withdraw_cut": WithdrawCut,
+}
+_NAMES = {kind: name for name, kind in (_PLAIN | _DECISIONS | _NAMED).items()}
 
 
 def command_to_json(command: Command) -> dict[str, Any]:
     """A command as a JSON object."""
     if isinstance(command, EnterStage):
         return {"command": "stage", "number": command.number}
-    if isinstance(command, ToggleLayer):
-        return {"command": "layer", "name": command.name}
+    if isinstance(command, ToggleLayer | ConfirmCut | WithdrawCut):
+        return {"command": _NAMES[type(command)], "name": command.name}
     if isinstance(command, NudgeCross):
         nudge_px = [command.right_px, command.down_px]
         return {"command": "nudge_cross", "nudge_px": nudge_px}
@@ -74,8 +82,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
     try:
         if name == "stage":
             return EnterStage(int(value["number"]))
-        if name == "layer":
-            return ToggleLayer(str(value["name"]))
+        if name in _NAMED:
+            return _NAMED[name](str(value["name"]))
         if name == "nudge_cross":
             right_px, down_px = value["nudge_px"]
             return NudgeCross(int(right_px), int(down_px))

@@ -16,6 +16,7 @@ from navapp.control.states import (
     CheckMirror,
     Command,
     ConfirmCross,
+    ConfirmCut,
     DistrustRig,
     EnterStage,
     EventLevel,
@@ -31,6 +32,7 @@ from navapp.control.states import (
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
+    WithdrawCut,
 )
 from navapp.errors import UsageError
 from navapp.overlay import LAYERS
@@ -91,6 +93,8 @@ class CommandHandler:
                 self._on_cross(command)
             case EnterStage():
                 self._on_enter_stage(command)
+            case ConfirmCut() | WithdrawCut():
+                self._on_cut(command)
             case Reconnect():
                 self._camera.retry_now()
                 self._monitored.restore()
@@ -214,6 +218,15 @@ class CommandHandler:
             return
         if stage.number != self._session.stage.number:
             self._session.enter_stage(stage)
+
+    def _on_cut(self, command: ConfirmCut | WithdrawCut) -> None:
+        try:
+            if isinstance(command, ConfirmCut):
+                self._session.confirm_cut(command.name)
+            else:
+                self._session.withdraw_cut(command.name)
+        except UsageError as error:
+            self._refuse("cut", str(error))
 
     def _on_quit(self) -> None:
         self._display.darken()

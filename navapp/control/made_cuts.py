@@ -1,13 +1,14 @@
 """The cuts of a session: made, withdrawn, and their faces measured."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from drivers.frames import StereoFrame
+from navapp.control.states import CutLine
 from navapp.control.trackers import Trackers
 from navapp.errors import UsageError
 from navapp.resection import CutBone
-from navapp.values import MeasuredFace, Plan, Status, TrackedFrame, join_faces
+from navapp.values import MeasuredFace, Plan, StageSpec, Status, TrackedFrame, join_faces
 
 # All chosen. So many measurements of a face make it known; the newest so many are kept.
 _ENOUGH, _KEPT = 3, 60
@@ -35,6 +36,9 @@ class MadeCuts:
         self._frames_between = frames_between
         self._n_frames = 0
         self._measured: dict[str, deque[MeasuredFace]] = {}
+        # What all measurements of a face say together, and how much of it was seen last.
+        self._joined: dict[str, MeasuredFace] = {}
+        self._seen: dict[str, float | None] = {}
         for name in made:
             self.confirm(name)
 
@@ -55,7 +59,7 @@ class MadeCuts:
                 subject=name,
                 remedy="make the plan with that bone",
             )
-        self._measured.pop(name, None)
+        self._forget(name)
         bone = self._trackers.bone(plane.bone).cut(name, plane)
         self._trackers.set_bone(bone)
         return bone
@@ -69,19 +73,28 @@ class MadeCuts:
         plane = self._plan.content.planes.get(name)
         if plane is None or name not in self._trackers.bone(plane.bone).made:
             raise UsageError(f"the cut '{name}' was not confirmed", subject=name)
-        self._measured.pop(name, None)
+        self._forget(name)
         bone = self._trackers.bone(plane.bone).restore(name)
         self._trackers.set_bone(bone)
         return bone
 
-    @property
-    def faces(self) -> Mapping[str, MeasuredFace]:
-        """What all measurements of each face say together."""
-        return {name: join_faces(tuple(faces)) for name, faces in self._measured.items()}
+    def _forget(self, name: str) -> None:
+        for known in (self._measured, self._joined, self._seen):
+            known.pop(name, None)
 
-    def bone(self, name: str) -> CutBone:
-        """A bone as it is now."""
-        return self._trackers.bone(name)
+    def version(self, bone: str) -> int:
+        """Of a bone; 0 without a model of it."""
+        known = self._trackers.bones.get(bone)
+        return 0 if known is None else known.model.version
+
+    def describe(self, stage: StageSpec) -> tuple[CutLine, ...]:
+        """The cuts of a stage: planned, made, measured."""
+        bone = self._trackers.bones.get(stage.bone)
+        made = {} if bone is None else bone.made
+        return tuple(
+            CutLine(name, name in made, self._joined.get(name), self._seen.get(name))
+            for name in self._plan.planes_of(stage)
+        )
 
     def measure(self, frame: StereoFrame, tracked: TrackedFrame | None) -> dict[str, MeasuredFace]:
         """The faces of a bone in a frame in which its pose is OK, if it is their turn."""
@@ -92,20 +105,22 @@ class MadeCuts:
         if not is_ok or self._n_frames % self._frames_between:
             return {}
         bone, estimate = self._trackers.bone(tracked.bone), tracked.estimate
-        found = {
-            name: face
-            for name in bone.made
-            if (face := self._trackers.measure_face(frame, bone, estimate, name)) is not None
-        }
+        found = {}
+        for name in bone.made:
+            face = self._trackers.measure_face(frame, bone, estimate, name)
+            self._seen[name] = None if face is None else face.seen_share
+            if face is not None and face.is_told:
+                found[name] = face
         for name, face in found.items():
             self._measured.setdefault(name, deque(maxlen=_KEPT)).append(face)
+            self._joined[name] = join_faces(tuple(self._measured[name]))
         self._learn(bone)
         return found
 
     def _learn(self, bone: CutBone) -> None:
         """Where faces have become known, less of the bone beside them is unsure."""
         known = {
-            name: join_faces(tuple(self._measured[name]))
+            name: self._joined[name]
             for name in bone.unmeasured
             if len(self._measured.get(name, ())) >= _ENOUGH
         }

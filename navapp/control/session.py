@@ -12,6 +12,7 @@ from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.states import (
     Command,
+    CutLine,
     Event,
     EventLevel,
     Interrupt,
@@ -22,6 +23,7 @@ from navapp.control.states import (
 from navapp.errors import RigError
 from navapp.geometry.transform import RigidTransform
 from navapp.overlay import LAYERS
+from navapp.resection import CutBone
 from navapp.values import MeasuredFace, Reason, StageSpec, Status, TrackedFrame, Verdict
 
 
@@ -176,11 +178,51 @@ class Session:
             return {}
         return self._others.follow(self._stage, frame, self._tracked)
 
+    def confirm_cut(self, name: str) -> None:
+        """A planned cut has been made.
+
+        Raises:
+            UsageError: the plan has no such cut.
+        """
+        self._take_cut(self._cuts.confirm(name), f"cut {name} confirmed")
+
+    def withdraw_cut(self, name: str) -> None:
+        """A cut has not been made after all.
+
+        Raises:
+            UsageError: it was not confirmed.
+        """
+        self._take_cut(self._cuts.withdraw(name), f"cut {name} withdrawn")
+
+    def _take_cut(self, bone: CutBone, text: str) -> None:
+        name = bone.planned.name
+        if name == self._stage.bone:
+            # What was judged by the old model says nothing of the new one.
+            self._tracked = None
+            self._tracks.forget_verdicts()
+        version = bone.model.version
+        self.add_event("cut", f"{text}: version {version} of the {name} is in force")
+
+    @property
+    def cuts(self) -> tuple[CutLine, ...]:
+        """Of the stage: planned, made, measured."""
+        return self._cuts.describe(self._stage)
+
+    @property
+    def bone_version(self) -> int:
+        """Of the stage's bone; 0 without a model of it."""
+        return self._cuts.version(self._stage.bone)
+
     def measure_faces(self, frame: StereoFrame) -> dict[str, MeasuredFace]:
         """Measure the faces of cuts of the stage's bone in a frame; in a fault none."""
         if self._state is SessionState.FAULT:
             return {}
-        return self._cuts.measure(frame, self._tracked)
+        before = self.bone_version
+        faces = self._cuts.measure(frame, self._tracked)
+        if self.bone_version != before:
+            text = f"faces measured: version {self.bone_version} of the {self._stage.bone}"
+            self.add_event("cut", f"{text} is in force")
+        return faces
 
     @property
     def shows_depth(self) -> bool:

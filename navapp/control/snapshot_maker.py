@@ -67,6 +67,8 @@ class SnapshotMaker:
             has_eye=self.eye.is_possible,
             shows_eye=shows_eye,
             layers=session.layers,
+            cuts=session.cuts,
+            bone_version=session.bone_version,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
             events=session.events,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from navapp.control.length_check import LengthCheck
 from navapp.control.mirror_error import MirrorError
 from navapp.geometry.transform import RigidTransform
-from navapp.values import Reason, StageSpec, Verdict
+from navapp.values import MeasuredFace, Reason, StageSpec, Verdict
 
 
 class SessionState(Enum):
@@ -111,6 +111,20 @@ class EnterStage:
 
 
 @dataclass(frozen=True, slots=True)
+class ConfirmCut:
+    """A planned cut has been made: what lies beyond its plane no longer belongs to the bone."""
+
+    name: str  # of the plane
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawCut:
+    """A cut that was confirmed has not been made after all."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class Reconnect:
     """Open lost devices again and bring the mirror to its place, now."""
 
@@ -147,6 +161,8 @@ Command = (
     | NudgeCross
     | ConfirmCross
     | EnterStage
+    | ConfirmCut
+    | WithdrawCut
     | Reconnect
     | Interrupt
     | DistrustRig
@@ -256,6 +272,16 @@ class OtherBone:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CutLine:
+    """A cut of the stage: planned, made, measured."""
+
+    name: str  # of the plane
+    is_made: bool  # an operator has confirmed it
+    face: MeasuredFace | None = None  # all measurements together; None: not measurable yet
+    seen_share: float | None = None  # of the face in the newest look; None: not seen at all
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
     """All that a client may show; immutable."""
 
@@ -284,6 +310,8 @@ class Snapshot:
     has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead
     shows_eye: bool = False  # it is shown
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
+    cuts: tuple[CutLine, ...] = ()  # of the stage
+    bone_version: int = 0  # of the stage's bone: counts the cuts confirmed, measured, withdrawn
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()
     events: tuple[Event, ...] = ()  # the newest, oldest first

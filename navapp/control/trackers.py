@@ -1,7 +1,7 @@
 """The trackers of a session's bones: made when they are needed, shared by loop and worker."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -78,6 +78,12 @@ class Trackers:
         with self._lock:
             return self._bones[name]
 
+    @property
+    def bones(self) -> Mapping[str, CutBone]:
+        """All of them as they are now."""
+        with self._lock:
+            return dict(self._bones)
+
     def set_bone(self, bone: CutBone) -> None:
         """From now on a bone is another one: its tracker is made anew."""
         name = bone.planned.name
@@ -89,19 +95,17 @@ class Trackers:
     def measure_face(
         self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
     ) -> MeasuredFace | None:
-        """The face of a cut in a frame; None when it is not well seen."""
+        """The face of a cut in a frame; None when it is not seen."""
         with self._lock:
             meter = self._face_meters.get(bone.planned.name)
         if meter is None:
-            made = FaceMeter(self._rig, bone.planned)
+            new = FaceMeter(self._rig, bone.planned)
             with self._lock:
-                meter = self._face_meters.setdefault(bone.planned.name, made)
+                meter = self._face_meters.setdefault(bone.planned.name, new)
         known = bone.faces.get(name)
         expected = None if known is None else known.as_plane
-        face = meter.measure(
-            frame.left, frame.right, estimate, tuple(bone.made.values()), bone.made[name], expected
-        )
-        return face if face is not None and face.is_told else None
+        made = tuple(bone.made.values())
+        return meter.measure(frame.left, frame.right, estimate, made, bone.made[name], expected)
 
     def corners_mm(self, bone: str) -> FloatArray:
         """(8, 3) of the box around a bone's model."""
@@ -148,7 +152,7 @@ class Trackers:
         faces = {
             name: face
             for name in bone.unmeasured
-            if (face := self._face_beside(frame, bone, estimate, name)) is not None
+            if (face := self._face_beside(frame, bone, estimate, name)) is not None and face.is_told
         }
         if not faces:
             return answers

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,14 +39,6 @@ SKIN_MM = 1.0
 _ASIDE_MM = 5.0
 # Of what is drawn beneath something, or where that is not known.
 BENEATH_WEIGHT = 0.55
-
-
-class _OfBone(Protocol):
-    @property
-    def bone(self) -> str: ...
-
-
-T = TypeVar("T", bound=_OfBone)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,34 +98,24 @@ class Scene:
     @property
     def planes(self) -> Mapping[str, ResectionPlane]:
         """The stage's, by name."""
-        return self._of_stage(self.plan.content.planes, "planes")
+        return self.plan.planes_of(self.stage)
 
     @property
     def drills(self) -> Mapping[str, DrillAxis]:
         """The stage's, by name."""
-        return self._of_stage(self.plan.content.drills, "drills")
+        return self.plan.of_stage(self.plan.content.drills, "drills", self.stage)
 
     @property
     def parts(self) -> Mapping[str, Part]:
         """The stage's, by name."""
-        return self._of_stage(self.plan.content.parts, "parts")
+        return self.plan.of_stage(self.plan.content.parts, "parts", self.stage)
 
     @property
     def risks(self) -> Mapping[str, RiskStructure]:
         """The stage's, by name; curves without a safety distance move with the femur."""
         alone = {name: RiskStructure("femur", 0.0) for name in self.plan.curves}
-        return self._of_stage({**alone, **self.plan.content.risks}, "risks")
-
-    def _of_stage(self, known: Mapping[str, T], kind: str) -> Mapping[str, T]:
-        """What the plan names for the stage; where it names nothing of a kind, all of the bone."""
-        bone = self.stage.bone
-        content = self.plan.content.stages.get(self.stage.name)
-        named = () if content is None else getattr(content, kind)
-        return {
-            name: one
-            for name, one in known.items()
-            if one.bone == bone and (name in named or not named)
-        }
+        risks = {**alone, **self.plan.content.risks}
+        return self.plan.of_stage(risks, "risks", self.stage)
 
     def render(self, mesh: TriangleMesh) -> RenderedView:
         """A mesh in the bone's coordinates; only the box around it."""

@@ -54,5 +54,5 @@ class CutBone:
         face = self.faces.get(name)
         if face is None:
             return Cut(self.made[name], UNSURE_MM)
-        tilt_mm = _HALF_FACE_MM * math.tan(math.radians(face.bound_deg))
+        tilt_mm = _HALF_FACE_MM * math.radians(face.bound_deg)
         return Cut(face.as_plane, min(SURE_MM + face.bound_mm + tilt_mm, UNSURE_MM))

@@ -13,7 +13,9 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray
 
 # All chosen. Widths of the kernel, px, from far to near, and the least one in sigmas.
-WIDTHS_PX = (1.5, 0.8, 0.4, 0.2)
+_WIDTHS_PX = (0.6, 0.6, 0.4, 0.25, 0.2)
+# Most of a nearly parallel plane lies within so much of another.
+_WINDOW_PX = 0.6
 _LEAST_WIDTH_SIGMAS = 1.6
 # Residuals inside a square of this size may go together: marks of the saw's teeth, cortex, blood.
 _BLOCK_PX = 24
@@ -61,7 +63,7 @@ def fit_disparity_plane(
     disparity_px: FloatArray,
     sigma_px: FloatArray,
     start: FloatArray,
-    widths_px: tuple[float, ...] = WIDTHS_PX,
+    reach_px: float,
 ) -> DisparityPlane | None:
     """The plane that most of the measured pixels share.
 
@@ -73,15 +75,17 @@ def fit_disparity_plane(
         places: (N, 3) of (u - c_x, v - c_y, 1), pixels of the rectified left picture.
         disparity_px: (N,) measured.
         sigma_px: (N,) its standard deviation.
-        start: (3,) coefficients to begin with.
-        widths_px: of the kernel, in turn.
+        start: (3,) coefficients of a plane that is nearly parallel to the one looked for,
+        reach_px: and no further from it.
 
     Returns:
         None when too little of the plane is there to tell how well it is known.
     """
-    coefficients, weight = np.array(start, dtype=np.float64), np.zeros(len(places))
+    weight = np.zeros(len(places))
+    coefficients = np.array(start, dtype=np.float64)
+    coefficients[2] += _find_densest(disparity_px - places @ coefficients, reach_px)
     least_px = _LEAST_WIDTH_SIGMAS * sigma_px
-    for width_px in widths_px:
+    for width_px in _WIDTHS_PX:
         for _ in range(4):
             residual = disparity_px - places @ coefficients
             kernel_px = np.maximum(width_px, least_px)
@@ -92,10 +96,21 @@ def fit_disparity_plane(
             step = np.linalg.solve(normal_matrix, (places * weight[:, None]).T @ residual)
             coefficients = coefficients + step
     residual = disparity_px - places @ coefficients
-    width_px = 2.0 * max(widths_px[-1], float(np.median(least_px)))
+    width_px = 2.0 * max(_WIDTHS_PX[-1], float(np.median(least_px)))
     is_on = np.abs(residual) < width_px
     covariance = _covariance(places[is_on], weight[is_on], residual[is_on])
     return None if covariance is None else DisparityPlane(coefficients, covariance, is_on, width_px)
+
+
+def _find_densest(residual: FloatArray, reach_px: float) -> float:
+    """The middle of the window that holds most of the residuals within reach; 0 without any."""
+    near = np.sort(residual[np.abs(residual) <= reach_px + 0.5 * _WINDOW_PX])
+    if len(near) == 0:
+        return 0.0
+    ends = np.searchsorted(near, near + _WINDOW_PX, side="right")
+    first = int((ends - np.arange(len(near))).argmax())
+    middle = float(np.median(near[first : ends[first]]))
+    return min(max(middle, -reach_px), reach_px)
 
 
 def _covariance(places: FloatArray, weight: FloatArray, residual: FloatArray) -> FloatArray | None:

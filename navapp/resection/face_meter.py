@@ -20,27 +20,29 @@ from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.resection.face_fit import (
-    WIDTHS_PX,
     DisparityPlane,
     disparity_coefficients,
     fit_disparity_plane,
     plane_in_camera,
 )
 from navapp.resection.remaining_bone import Cut, remove_cuts
-from navapp.stereo import match_surface, refine_on_model
+from navapp.stereo import MODEL_REFINEMENT, match_surface, refine_on_model
 from navapp.values import BoneModel, DisparityMap, MeasuredFace, Origin, PoseEstimate
 from navapp.values.contents import ResectionPlane
 from navapp.values.faces import axes_of
 
 # All chosen. A saw's face is looked for so far from where it is expected, along the view.
 _BAND_MM = 8.0
-# Matching windows that reach over the rim of a face see both sides of it.
-_RIM_PX = 6
+# Windows of the matcher that reach over the rim of a face see both sides of it.
+_RIM_PX = MODEL_REFINEMENT.radius_px
 _MARGIN_PX = 12
 # Neighbouring pixels share their windows: every second one each way tells as much.
 _STRIDE_PX = 2
 _MAX_ROUNDS, _REST_PX = 6, 0.02
-_FAR_WIDTHS_PX = (4.0, 2.0, 1.0)
+# The matcher sees no further from the plane that it is given.
+_NEAR_PX = 1.0
+# A saw misses its plan by no more: what is flat, but lies further off, is something else.
+_MOST_OFF_MM, _MOST_TILT_DEG = 4.0, 6.0
 _LEAST_PIXELS = 300
 # Another cut's bone is gone as well, and its edge is as wide.
 _BESIDE_MM = 1.0
@@ -105,7 +107,8 @@ class FaceMeter:
             moved_px = self._moved_px(fit.coefficients - coefficients, view)
             if not is_far and moved_px < _REST_PX:
                 share = fit.is_on.sum() * _STRIDE_PX**2 / max(view.n_whole, 1)
-                return self._face(fit, estimate, planned, min(float(share), 1.0))
+                face = self._face(fit, estimate, planned, min(float(share), 1.0))
+                return face if _is_of_plan(face) else None
             is_far = False
         return None
 
@@ -194,21 +197,29 @@ class FaceMeter:
         if is_far:
             band_px = self._band_px(view.box, coefficients)
             found = match_surface(pair, band_px, fills=False).disparity
-            return self._fit_pixels(found, view.is_face, coefficients, _FAR_WIDTHS_PX)
+            reach_px = self._reach_px(view.box, coefficients)
+            return self._fit_pixels(found, view.is_face, coefficients, reach_px)
         found = self._refine(pair, view, coefficients)
-        fit = self._fit_pixels(found, view.is_face, coefficients)
+        fit = self._fit_pixels(found, view.is_face, coefficients, _NEAR_PX)
         if fit is None:
             return None
         # What covers a part of the face is seen by the windows beside it as well.
         inside = view.is_face & ~_grow(_without_specks(view.is_face & ~self._is_on(found, fit)))
-        return self._fit_pixels(found, inside, fit.coefficients) or fit
+        return self._fit_pixels(found, inside, fit.coefficients, _NEAR_PX) or fit
+
+    def _reach_px(self, box: Box, coefficients: FloatArray) -> float:
+        """How far a saw may have missed, in disparity: along the view at most."""
+        middle = self._places(np.array([[box.x + box.width // 2, box.y + box.height // 2]]))
+        depth_mm = self._geometry.depth_mm(float(middle[0] @ coefficients))
+        nearer_px = self._geometry.disparity_px(depth_mm - _MOST_OFF_MM)
+        return nearer_px - self._geometry.disparity_px(depth_mm)
 
     def _fit_pixels(
         self,
         found: DisparityMap,
         mask: NDArray[np.bool_],
         start: FloatArray,
-        widths_px: tuple[float, ...] = WIDTHS_PX,
+        reach_px: float,
     ) -> DisparityPlane | None:
         rows, columns = np.nonzero(mask & (found.origin == Origin.MATCHED))
         thin = (rows % _STRIDE_PX == 0) & (columns % _STRIDE_PX == 0)
@@ -218,7 +229,7 @@ class FaceMeter:
         places = self._places(np.column_stack([columns + found.x, rows + found.y]))
         disparity_px = found.disparity_px[rows, columns].astype(np.float64)
         sigma_px = found.sigma_px[rows, columns].astype(np.float64)
-        return fit_disparity_plane(places, disparity_px, sigma_px, start, widths_px)
+        return fit_disparity_plane(places, disparity_px, sigma_px, start, reach_px)
 
     def _is_on(self, found: DisparityMap, fit: DisparityPlane) -> NDArray[np.bool_]:
         """(h, w) whether a pixel was matched on a plane."""
@@ -304,6 +315,11 @@ def _tilts_offset(
     tilts = axes @ in_bone / float(in_bone @ planned.normal)
     offset_mm = distance_mm - float(normal @ left_from_bone.apply(planned.point_mm[None])[0])
     return np.array([*tilts, offset_mm])
+
+
+def _is_of_plan(face: MeasuredFace) -> bool:
+    is_near = abs(face.offset_mm) <= _MOST_OFF_MM
+    return is_near and face.angle_deg <= _MOST_TILT_DEG
 
 
 def _make_rest(bone: BoneModel, made: tuple[ResectionPlane, ...]) -> TriangleMesh:

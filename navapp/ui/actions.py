@@ -255,6 +255,15 @@ ACTIONS: tuple[Action, ...] = (
         needs_width=True,
     ),
     Action(
+        "cuts",
+        "k",
+        "cuts",
+        "see the cuts of the stage, planned and measured; say that one has been made",
+        lambda snapshot: bool(snapshot.cuts),
+        slot="cuts",
+        needs_width=True,
+    ),
+    Action(
         "mirror",
         "m",
         "check",

@@ -12,15 +12,18 @@ from textual.binding import BindingType
 from textual.screen import Screen
 
 from navapp.control.states import (
+    ConfirmCut,
     DeviceHealth,
     EventLevel,
     Quit,
     SessionState,
     Snapshot,
     ToggleLayer,
+    WithdrawCut,
 )
 from navapp.errors import DeviceError, NavappError, RigError
 from navapp.ui.actions import ACTION_OF_KEY_EVERYWHERE, ACTION_OF_NAME, bindings, is_possible
+from navapp.ui.cuts_page import CutsPage, cut_of_key
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
@@ -46,6 +49,7 @@ _ASKING_STATES = (SessionState.NAVIGATING, SessionState.SUSPENDED)
 _PAGES = {
     "help": HelpPage,
     "layers": LayersPage,
+    "cuts": CutsPage,
     "devices": DevicesPage,
     "events": EventsPage,
 }
@@ -139,6 +143,13 @@ class NavigationApp(QuietApp):
     def action_toggle_layer(self, name: str) -> None:
         """Draw a layer, or no longer: from the page that lists them."""
         self._session.submit(ToggleLayer(name))
+
+    def action_change_cut(self, key: str) -> None:
+        """Say that a cut has been made, or has not been made after all: from the cuts' page."""
+        cut = cut_of_key(self._view.snapshot, key)
+        if cut is not None and not self._view.is_silent:
+            change = WithdrawCut if cut.is_made else ConfirmCut
+            self._session.submit(change(cut.name))
 
     def _ask_to_quit(self, view: View) -> None:
         def finish(is_sure: bool | None) -> None:

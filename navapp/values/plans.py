@@ -4,14 +4,23 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.bones import AspectGraph, BoneModel
-from navapp.values.contents import SurgicalContent
+from navapp.values.contents import ResectionPlane, SurgicalContent
 from navapp.values.digests import add_value
+
+
+class _OfBone(Protocol):
+    @property
+    def bone(self) -> str: ...
+
+
+T = TypeVar("T", bound=_OfBone)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +96,20 @@ class Plan:
         """(N, 3) target points of those names that the plan has; may be empty."""
         found = [self.targets[name].reshape(-1, 3) for name in names if name in self.targets]
         return np.concatenate(found) if found else np.empty((0, 3))
+
+    def planes_of(self, stage: StageSpec) -> dict[str, ResectionPlane]:
+        """The planes of a stage's bone: those that its plan names, or all of them."""
+        return self.of_stage(self.content.planes, "planes", stage)
+
+    def of_stage(self, known: Mapping[str, T], kind: str, stage: StageSpec) -> dict[str, T]:
+        """What the plan names of a kind for a stage; where it names nothing, all of its bone."""
+        content = self.content.stages.get(stage.name)
+        named = () if content is None else getattr(content, kind)
+        return {
+            name: one
+            for name, one in known.items()
+            if one.bone == stage.bone and (name in named or not named)
+        }
 
     def stage(self, spec: StageSpec) -> StageSpec:
         """A stage as this plan has it: with its bone and, when it names any, its targets."""

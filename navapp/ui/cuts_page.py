@@ -1,0 +1,102 @@
+"""The page of the stage's cuts: which are made, and what of them was measured against plan."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.content import Content
+
+from navapp.control.states import CutLine, Snapshot
+from navapp.ui.gauges import draw_bar
+from navapp.ui.page_keys import PageKeys
+from navapp.ui.screens import PageScreen
+from navapp.ui.symbols import Symbols
+from navapp.ui.text_view import TextView
+from navapp.ui.title_line import TitleLine
+from navapp.ui.view import View
+from navapp.values import MeasuredFace, StageSpec
+
+# The cuts of a stage in their order.
+CUT_KEYS = "bcdfghij"
+_NAME_WIDTH, _BAR_WIDTH = 24, 10
+
+
+class CutTable(TextView):
+    """All cuts of the stage with their letters."""
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """A line a cut, and a second one where its face was measured or looked for."""
+        snapshot, lines = view.snapshot, []
+        for key, cut in zip(CUT_KEYS, snapshot.cuts, strict=False):
+            word = "made" if cut.is_made else "planned"
+            lines.append(
+                Content.assemble(
+                    (f" {key}  ", "bold $primary"), f"{cut.name:<{_NAME_WIDTH}} {word}"
+                )
+            )
+            lines += _tell_face(cut, snapshot.stage, view.symbols)
+        version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
+        notes = (
+            version,
+            " Bone beyond a cut that is made no longer counts, nor 1.5 mm beside it until its",
+            " face is measured. +- is the 95 % bound, the pose's error included.",
+        )
+        return [*lines, Content(""), *(Content.styled(note, "$text-muted") for note in notes)]
+
+
+def _tell_face(cut: CutLine, stage: StageSpec, symbols: Symbols) -> list[Content]:
+    """What is known of a face that was made."""
+    if not cut.is_made:
+        return []
+    if cut.face is not None:
+        return _tell_measured(cut.face, stage, symbols)
+    seen = "it is not seen"
+    if cut.seen_share is not None:
+        seen = f"{100.0 * cut.seen_share:.0f} % of the cut is seen"
+    return [Content.styled(f"      not measurable: {seen}", "$warning")]
+
+
+def _tell_measured(face: MeasuredFace, stage: StageSpec, symbols: Symbols) -> list[Content]:
+    rows = (
+        ("tilt", face.angle_deg, face.bound_deg, stage.tolerance_deg, "deg"),
+        ("offset", face.offset_mm, face.bound_mm, stage.tolerance_mm, "mm"),
+    )
+    return [
+        Content.assemble(
+            f"      {what:<7}{value:+6.2f} {unit:<4}+-{bound:5.2f}  ",
+            (draw_bar(abs(value), tolerance, _BAR_WIDTH, symbols), _style(value, bound, tolerance)),
+            (f"  tolerance {tolerance:.1f}", "$text-muted"),
+        )
+        for what, value, bound, tolerance, unit in rows
+    ]
+
+
+def _style(value: float, bound: float, tolerance: float) -> str:
+    """Within the tolerance for sure, perhaps, or not."""
+    if abs(value) + bound <= tolerance:
+        return "$success"
+    return "$warning" if abs(value) - bound <= tolerance else "$error"
+
+
+def cut_of_key(snapshot: Snapshot, key: str) -> CutLine | None:
+    """The cut that a letter of the page means."""
+    number = CUT_KEYS.index(key)
+    return snapshot.cuts[number] if number < len(snapshot.cuts) else None
+
+
+class CutsPage(PageScreen):
+    """Cuts, confirmed and withdrawn by their letters."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("k", "dismiss", "back", show=False),
+        *(Binding(key, f"app.change_cut('{key}')", f"cut {key}", show=False) for key in CUT_KEYS),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """Title, cuts, last line."""
+        yield TitleLine()
+        with Vertical(classes="page") as page:
+            page.border_title = "cuts of the stage"
+            yield CutTable("cuts")
+        yield PageKeys(" back  a letter: that cut has been made, or has not been made after all")

@@ -1,0 +1,63 @@
+"""Lines in which a plane cuts a mesh, and the area that they enclose."""
+
+import numpy as np
+import pytest
+
+from navapp.geometry.mesh import TriangleMesh, join_meshes
+from navapp.geometry.mesh_sections import fill_section, section_lines
+from tests.geometry.shapes import cube, sphere
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def height(mesh: TriangleMesh, level_mm: float) -> np.ndarray:
+    return mesh.vertices_mm[:, 2] - level_mm
+
+
+def test_a_sphere_is_cut_in_a_closed_circle() -> None:
+    ball = sphere(20.0, 40)
+    (line,) = section_lines(ball, height(ball, 12.0))
+    np.testing.assert_allclose(line[0], line[-1])
+    np.testing.assert_allclose(line[:, 2], 12.0, atol=1e-9)
+    np.testing.assert_allclose(np.hypot(line[:, 0], line[:, 1]), 16.0, atol=0.1)
+
+
+def test_an_open_mesh_is_cut_in_an_open_line() -> None:
+    ball = sphere(20.0, 24)
+    half = TriangleMesh(ball.vertices_mm, ball.faces[ball.vertices_mm[ball.faces, 0].min(1) > 1e-6])
+    (line,) = section_lines(half, height(half, 3.0))
+    assert not np.allclose(line[0], line[-1])
+
+
+@pytest.mark.parametrize("normal", [UP, -UP])
+def test_the_area_of_a_section_faces_along_the_normal(normal: np.ndarray) -> None:
+    ball = sphere(20.0, 60)
+    lid = fill_section(section_lines(ball, height(ball, 12.0)), normal)
+    assert lid is not None
+    assert lid.face_areas_mm2().sum() == pytest.approx(np.pi * 16.0**2, rel=0.01)
+    a, b, c = (lid.vertices_mm[lid.faces[:, k]] for k in range(3))
+    assert (np.cross(b - a, c - a) @ normal > 0.0).all()
+
+
+def test_a_hole_and_an_island_are_told_from_the_area() -> None:
+    wall, hole = sphere(20.0, 60), sphere(10.0, 60).flip()
+    apart = sphere(5.0, 60, (40.0, 0.0, 0.0))
+    body = join_meshes(wall, hole, apart)
+    lid = fill_section(section_lines(body, height(body, 0.5)), UP)
+    assert lid is not None
+    expected = np.pi * (20.0**2 - 10.0**2 + 5.0**2)
+    assert lid.face_areas_mm2().sum() == pytest.approx(expected, rel=0.01)
+
+
+def test_where_nothing_is_cut_there_is_no_area() -> None:
+    block = cube(10.0)
+    assert section_lines(block, height(block, 20.0)) == []
+    assert fill_section([], UP) is None
+    assert fill_section([np.zeros((5, 3))], UP) is None
+
+
+def test_joined_meshes_keep_their_order() -> None:
+    one, other = cube(10.0), sphere(3.0, 8)
+    both = join_meshes(one, other)
+    np.testing.assert_array_equal(both.faces[: len(one.faces)], one.faces)
+    assert both.volume_mm3() == pytest.approx(one.volume_mm3() + other.volume_mm3(), rel=1e-3)

@@ -1,0 +1,75 @@
+"""A plane through disparities."""
+
+import numpy as np
+import pytest
+
+from navapp.resection.face_fit import (
+    disparity_coefficients,
+    fit_disparity_plane,
+    plane_in_camera,
+)
+from tests.stereo.pairs import geometry
+
+PLANE = np.array([0.02, -0.03, 130.0])
+SHIFT = np.array([0.002, 0.002, 0.5])
+
+
+def places(n: int = 90) -> np.ndarray:
+    u, v = np.meshgrid(np.arange(-n, n, 2.0), np.arange(-n, n, 2.0))
+    return np.column_stack([u.ravel(), v.ravel(), np.ones(u.size)])
+
+
+def measured(seed: int, share_off: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, disparities with noise that goes together over a window, and their deviation."""
+    import cv2
+
+    rng = np.random.default_rng(seed)
+    where = places()
+    side = int(np.sqrt(len(where)))
+    white = rng.normal(0.0, 1.0, (side, side))
+    noise = cv2.blur(white, (5, 5)) * 5.0 * 0.05
+    disparity = where @ PLANE + noise.ravel()
+    is_off = where[:, 0] < -90.0 + 180.0 * share_off
+    disparity[is_off] += 2.5
+    return where, disparity, np.full(len(where), 0.1)
+
+
+def test_a_plane_becomes_disparities_and_back() -> None:
+    pair = geometry()
+    normal = np.array([0.2, -0.3, -0.9])
+    normal /= np.linalg.norm(normal)
+    coefficients = disparity_coefficients(normal, -410.0, pair)
+    found, distance_mm = plane_in_camera(coefficients, pair)
+    np.testing.assert_allclose(found, normal, atol=1e-12)
+    assert distance_mm == pytest.approx(-410.0)
+    # A point of the plane has the disparity that its depth says.
+    point = -410.0 * normal
+    u, v = (pair.project(point[None])[0] - (pair.centre_x_px, pair.centre_y_px)).tolist()
+    assert coefficients @ (u, v, 1.0) == pytest.approx(pair.disparity_px(float(point[2])))
+
+
+@pytest.mark.parametrize("share_off", [0.0, 0.35])
+def test_the_covariance_belongs_to_the_error(share_off: float) -> None:
+    off = []
+    for seed in range(40):
+        fit = fit_disparity_plane(*measured(seed, share_off), PLANE + SHIFT, 3.0)
+        assert fit is not None
+        error = fit.coefficients - PLANE
+        off.append(error @ np.linalg.solve(fit.covariance, error))
+        assert np.abs(error @ places().T).max() < 0.15
+    # Of three numbers: the mean of chi-square is 3.
+    assert 0.5 < np.mean(off) < 6.0
+
+
+def test_what_lies_elsewhere_is_not_on_it() -> None:
+    where, disparity, sigma = measured(1, 0.35)
+    fit = fit_disparity_plane(where, disparity, sigma, PLANE, 1.0)
+    assert fit is not None
+    np.testing.assert_array_equal(fit.is_on[where[:, 0] < -30.0], False)
+    assert fit.is_on[where[:, 0] > -20.0].mean() > 0.98
+
+
+@pytest.mark.parametrize("kept", [slice(0, 40), slice(0, 2)])
+def test_too_little_tells_nothing(kept: slice) -> None:
+    values = [one[kept] for one in measured(1)]
+    assert fit_disparity_plane(*values, PLANE, 1.0) is None

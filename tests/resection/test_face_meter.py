@@ -1,0 +1,86 @@
+"""Faces of cuts, measured in pictures."""
+
+import numpy as np
+import pytest
+
+from navapp.resection import FaceMeter
+from navapp.values import MeasuredFace, ResectionPlane, join_faces
+from tests.resection.cuts import MADE, PLANNED, POSE_SD, Cover, bone, estimate, pictures, pose, rig
+
+
+@pytest.fixture(scope="module")
+def meter() -> FaceMeter:
+    return FaceMeter(rig(), bone())
+
+
+def errors(face: MeasuredFace, made: ResectionPlane = MADE) -> tuple[float, float]:
+    """Angle to the made plane in deg, and distance at the planned point in mm."""
+    angle = np.degrees(np.arccos(min(1.0, float(face.normal @ made.normal))))
+    along = float((made.point_mm - face.point_mm) @ made.normal / (face.normal @ made.normal))
+    return float(angle), along
+
+
+def test_a_face_is_found_where_it_was_made(meter: FaceMeter) -> None:
+    placed = estimate(pose())
+    face = meter.measure(*pictures(pose()), placed, [PLANNED], PLANNED)
+    assert face is not None
+    angle_deg, off_mm = errors(face)
+    assert angle_deg < 0.15
+    assert abs(off_mm) < 0.06
+    assert face.angle_deg == pytest.approx(1.3, abs=0.15)
+    assert face.offset_mm == pytest.approx(-0.7, abs=0.07)
+    assert face.is_told
+    assert face.seen_share > 0.7
+    assert angle_deg <= face.bound_deg
+    assert abs(off_mm) <= face.bound_mm
+
+
+def test_a_pose_that_is_off_is_in_the_bound(meter: FaceMeter) -> None:
+    left, right = pictures(pose())
+    rng = np.random.default_rng(3)
+    scales = np.repeat(POSE_SD, 3)
+    covered = []
+    for _ in range(12):
+        centre_mm = pose().apply(bone().mesh.centroid_mm[None])[0]
+        moved = pose().move(scales * rng.standard_normal(6), centre_mm)
+        face = meter.measure(left, right, estimate(moved), [PLANNED], PLANNED)
+        assert face is not None
+        angle_deg, off_mm = errors(face)
+        covered += [angle_deg <= face.bound_deg, abs(off_mm) <= face.bound_mm]
+        # The pose's own deviation is most of it.
+        assert face.bound_deg >= np.degrees(2.0 * POSE_SD[1])
+    assert np.mean(covered) >= 0.9
+
+
+def test_what_covers_a_part_of_the_face_does_not_move_it(meter: FaceMeter) -> None:
+    face = meter.measure(*pictures(pose(), cover=Cover(-8.0)), estimate(pose()), [PLANNED], PLANNED)
+    assert face is not None
+    angle_deg, off_mm = errors(face)
+    assert angle_deg <= face.bound_deg
+    assert abs(off_mm) <= min(face.bound_mm, 0.08)
+    assert 0.3 < face.seen_share < 0.75
+
+
+def test_a_face_that_is_hidden_or_looks_away_is_not_measured(meter: FaceMeter) -> None:
+    hidden = pictures(pose(), cover=Cover(100.0))
+    found = meter.measure(*hidden, estimate(pose()), [PLANNED], PLANNED)
+    assert found is None or not found.is_told
+    away = pose(tilt_deg=170.0)
+    assert meter.measure(*pictures(pose()), estimate(away), [PLANNED], PLANNED) is None
+
+
+def test_measurements_join_but_errors_of_the_pose_stay(meter: FaceMeter) -> None:
+    faces = []
+    for seed in range(4):
+        face = meter.measure(*pictures(pose(), seed=seed), estimate(pose()), [PLANNED], PLANNED)
+        assert face is not None
+        faces.append(face)
+    joined = join_faces(faces)
+    assert joined.bound_deg <= max(face.bound_deg for face in faces)
+    least = np.sqrt(np.diag(faces[0].pose_covariance))
+    assert (np.sqrt(np.diag(joined.covariance)) >= 0.99 * least).all()
+    matching = [np.trace(face.matching_covariance) for face in faces]
+    assert np.trace(joined.matching_covariance) < 0.5 * np.mean(matching)
+    assert errors(joined)[0] < 0.12
+    with pytest.raises(ValueError, match="no measurement"):
+        join_faces([])

@@ -1,0 +1,77 @@
+"""What is left of a bone after cuts."""
+
+import numpy as np
+import pytest
+
+from navapp.registration import RegistrationModel
+from navapp.resection.cut_bone import SURE_MM, UNSURE_MM, CutBone
+from navapp.resection.remaining_bone import Cut, remove_cuts
+from navapp.values import MeasuredFace, ResectionPlane
+from tests.resection.cuts import MADE, PLANNED, bone
+
+
+def face(offset_mm: float = -0.7, sd: float = 0.0) -> MeasuredFace:
+    covariance = sd**2 * np.eye(3)
+    return MeasuredFace(PLANNED, np.array([0.0, 0.0, offset_mm]), covariance, covariance, 0.8)
+
+
+def test_without_cuts_a_bone_is_itself() -> None:
+    whole = bone()
+    assert remove_cuts(whole, []) is whole
+    assert CutBone(whole).model.lid is None
+
+
+@pytest.mark.parametrize("unsure_mm", [0.3, 1.5])
+def test_what_lies_beyond_a_cut_and_beside_it_is_gone(unsure_mm: float) -> None:
+    left = remove_cuts(bone(), [Cut(PLANNED, unsure_mm)])
+    is_gone = left.mesh.vertices_mm[:, 2] > 12.0 - unsure_mm
+    np.testing.assert_array_equal(left.is_removed, is_gone)
+    seen = left.make_seen_surface()
+    assert seen.vertices_mm[np.unique(seen.faces)][:, 2].max() < 12.0 - unsure_mm
+
+
+def test_a_cut_reaches_no_further_than_its_rectangle() -> None:
+    small = ResectionPlane("femur", PLANNED.point_mm, PLANNED.normal, (20.0, 60.0))
+    left = remove_cuts(bone(), [Cut(small, 0.0)])
+    assert np.abs(left.mesh.vertices_mm[left.is_removed, 0]).max() <= 13.0
+
+
+def test_the_lid_closes_the_bone_and_is_not_seen() -> None:
+    model = RegistrationModel(remove_cuts(bone(), [Cut(PLANNED, 1.5)]))
+    lid = model.bone.lid
+    assert lid is not None
+    flat = lid.face_areas_mm2()[np.ptp(lid.vertices_mm[lid.faces, 2], axis=1) < 1e-6].sum()
+    assert flat == pytest.approx(np.pi * (30.0**2 - 10.5**2), rel=0.01)
+    assert len(model.rendered_mesh.faces) > len(lid.faces)
+    assert (model.rendered_face_sigma_mm > 0.0).all()
+
+
+def test_a_measured_face_leaves_less_unsure() -> None:
+    cut = CutBone(bone()).cut("top", PLANNED)
+    assert cut.unmeasured == ("top",)
+    known = cut.with_faces({"top": face()})
+    assert known.unmeasured == ()
+    for one, limit_mm in ((cut, 12.0 - UNSURE_MM), (known, 11.3 - SURE_MM)):
+        is_gone = one.model.mesh.vertices_mm[:, 2] > limit_mm
+        np.testing.assert_array_equal(one.model.is_removed, is_gone)
+    # One that is known badly leaves as much as before.
+    loose = cut.with_faces({"top": face(sd=0.5)})
+    np.testing.assert_array_equal(
+        loose.model.is_removed,
+        remove_cuts(bone(), [Cut(face().as_plane, UNSURE_MM)]).is_removed,
+    )
+
+
+def test_a_cut_that_is_withdrawn_gives_the_bone_back() -> None:
+    whole = CutBone(bone())
+    cut = whole.cut("top", PLANNED).cut("side", MADE)
+    back = cut.restore("top").restore("side")
+    assert not back.model.is_removed.any()
+    assert back.model.lid is None
+    versions = [one.model.version for one in (whole, cut, back)]
+    assert versions == [0, 2, 4]
+
+
+def test_a_cut_made_again_is_not_measured() -> None:
+    once = CutBone(bone()).cut("top", PLANNED).with_faces({"top": face()})
+    assert once.cut("top", PLANNED).unmeasured == ("top",)
