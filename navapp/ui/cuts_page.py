@@ -39,8 +39,8 @@ class CutTable(TextView):
         version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
         notes = (
             version,
-            " Bone beyond a cut that is made no longer counts, nor 1.5 mm beside it until its",
-            " face is measured. +- is the 95 % bound, the pose's error included.",
+            " Bone beyond a cut that is made no longer counts, nor 1.5 mm beside it",
+            " until its face is measured. +- is the 95 % bound, that of the pose in it.",
         )
         return [*lines, Content(""), *(Content.styled(note, "$text-muted") for note in notes)]
 

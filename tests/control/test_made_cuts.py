@@ -1,0 +1,176 @@
+"""Cuts are confirmed, measured and withdrawn in a session."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.states import ConfirmCut, EnterStage, Snapshot, WithdrawCut
+from navapp.errors import UsageError
+from navapp.resection import FaceMeter
+from navapp.values import MeasuredFace, Plan, ResectionPlane, Status, SurgicalContent
+from tests.control.fakes import Bench, a_plan, answer, navigating
+
+# Across the bowl of the plan's bones: beyond it lies its rim.
+TOP = ResectionPlane("femur", np.array([0.0, 0.0, 8.0]), np.array([0.0, 0.0, 1.0]), (100.0, 100.0))
+SIDE = ResectionPlane(
+    "femur", np.array([25.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), (100.0, 100.0)
+)
+
+
+def cut_plan() -> Plan:
+    planes = {"top": TOP, "side": SIDE, "flat": replace(TOP, bone="tibia")}
+    return replace(a_plan(), content=SurgicalContent(planes=planes), digest="")
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return navigating(Bench(plan=cut_plan()))
+
+
+class Faces:
+    """Stands for what is measured of faces: by name, None is not seen."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.shares: dict[str, float | None] = {}
+        self.expected: list[ResectionPlane | None] = []
+        monkeypatch.setattr(FaceMeter, "measure", self._measure)
+
+    def _measure(self, left, right, estimate, made, planned, expected=None) -> MeasuredFace | None:
+        self.expected.append(expected)
+        share = self.shares.get("top" if planned is TOP else "side")
+        if share is None:
+            return None
+        little = np.diag([1e-6, 1e-6, 1e-3])
+        return MeasuredFace(planned, np.array([0.01, 0.0, -0.4]), little, little, share)
+
+
+@pytest.fixture
+def faces(monkeypatch: pytest.MonkeyPatch) -> Faces:
+    return Faces(monkeypatch)
+
+
+def told(snapshot: Snapshot) -> dict[str, bool]:
+    return {cut.name: cut.is_made for cut in snapshot.cuts}
+
+
+def used_by_tracker(bench: Bench) -> np.ndarray:
+    """(V,) vertices of the femur that its tracker registers to."""
+    return ~bench.trackers["femur"].bone.is_removed
+
+
+def test_the_cuts_of_the_stages_bone_are_told(bench: Bench) -> None:
+    assert told(bench.snapshot) == {"top": False, "side": False}
+    assert told(bench.do(EnterStage(5))) == {"flat": False}
+
+
+def test_what_is_cut_no_longer_belongs_to_the_model(bench: Bench) -> None:
+    assert used_by_tracker(bench).all()
+    snapshot = bench.do(ConfirmCut("top"))
+    assert told(snapshot) == {"top": True, "side": False}
+    assert snapshot.bone_version == 1
+    assert not snapshot.is_navigable
+    assert "cut top confirmed: version 1 of the femur is in force" in bench.events[-1].text
+    assert bench.frames(1).is_navigable
+    heights_mm = cut_plan().bones["femur"].mesh.vertices_mm[:, 2]
+    np.testing.assert_array_equal(used_by_tracker(bench), heights_mm <= 6.5)
+
+
+def test_a_cut_that_is_withdrawn_comes_back(bench: Bench) -> None:
+    bench.do(ConfirmCut("top"))
+    snapshot = bench.do(WithdrawCut("top"))
+    assert told(snapshot) == {"top": False, "side": False}
+    assert snapshot.bone_version == 2
+    bench.frames(1)
+    assert used_by_tracker(bench).all()
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        (ConfirmCut("nose"), "the plan has no plane 'nose'"),
+        (WithdrawCut("top"), "the cut 'top' was not confirmed"),
+        (WithdrawCut("nose"), "the cut 'nose' was not confirmed"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_with_a_reason(bench: Bench, command, why: str) -> None:
+    before = bench.snapshot
+    after = bench.do(command)
+    assert why in bench.refused()
+    assert told(after) == told(before)
+    assert after.is_navigable == before.is_navigable
+
+
+def test_another_bones_cut_leaves_the_pose_alone(bench: Bench) -> None:
+    snapshot = bench.do(ConfirmCut("flat"))
+    assert snapshot.is_navigable
+    assert snapshot.bone_version == 0
+
+
+def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces) -> None:
+    faces.shares["top"] = 0.8
+    bench.do(ConfirmCut("top"))
+    versions = [bench.frames(1).bone_version for _ in range(40)]
+    assert versions[0] == 1
+    assert versions[-1] == 2
+    measured = [result.faces for result in bench.results if result.faces]
+    # In every fifth frame.
+    assert 6 <= len(measured) <= 9
+    assert versions.index(2) <= 20
+    (top, _) = bench.snapshot.cuts
+    assert top.face is not None
+    assert top.face.offset_mm == pytest.approx(-0.4)
+    assert top.seen_share == 0.8
+    # Once it is known, it is looked for there.
+    assert faces.expected[0] is None
+    assert faces.expected[-1] is not None
+    assert faces.expected[-1].point_mm[2] == pytest.approx(7.6, abs=1e-3)
+    assert any("faces measured: version 2" in event.text for event in bench.events)
+
+
+def test_a_face_of_which_little_is_seen_is_not_told(bench: Bench, faces: Faces) -> None:
+    faces.shares["top"] = 0.1
+    bench.do(ConfirmCut("top"))
+    bench.frames(40)
+    (top, side) = bench.snapshot.cuts
+    assert top.face is None
+    assert top.seen_share == 0.1
+    assert side.seen_share is None
+    assert not any(result.faces for result in bench.results)
+    assert bench.snapshot.bone_version == 1
+
+
+def test_nothing_is_measured_with_a_pose_that_is_not_ok(bench: Bench, faces: Faces) -> None:
+    faces.shares["top"] = 0.8
+    bench.do(ConfirmCut("top"))
+    bench.script.tracked = answer(Status.DEGRADED)
+    bench.frames(20)
+    assert not faces.expected
+
+
+def test_a_cut_confirmed_again_is_measured_again(bench: Bench, faces: Faces) -> None:
+    faces.shares["top"] = 0.8
+    bench.do(ConfirmCut("top"))
+    bench.frames(30)
+    snapshot = bench.do(ConfirmCut("top"))
+    assert snapshot.cuts[0].face is None
+    assert snapshot.cuts[0].seen_share is None
+
+
+@pytest.mark.parametrize("command", [ConfirmCut("femur_distal"), WithdrawCut("femur_distal")])
+def test_commands_are_recorded(command) -> None:
+    assert command_from_json(command_to_json(command)) == command
+
+
+def test_a_plan_without_that_plane_is_refused_before_the_start() -> None:
+    with pytest.raises(UsageError, match=r"no plane 'nose'.*choose of top, side, flat"):
+        Bench(plan=cut_plan(), made_cuts=("nose",))
+
+
+def test_a_session_can_begin_with_cuts_made() -> None:
+    bench = navigating(Bench(plan=cut_plan(), made_cuts=("top", "side")))
+    assert told(bench.snapshot) == {"top": True, "side": True}
+    vertices_mm = cut_plan().bones["femur"].mesh.vertices_mm
+    is_left = (vertices_mm[:, 2] <= 6.5) & (vertices_mm[:, 0] <= 23.5)
+    np.testing.assert_array_equal(used_by_tracker(bench), is_left)

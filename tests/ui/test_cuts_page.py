@@ -1,0 +1,65 @@
+"""The page of the stage's cuts."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from textual.pilot import Pilot
+
+from navapp.control.stages import STAGES
+from navapp.control.states import ConfirmCut, CutLine, WithdrawCut
+from navapp.ui.actions import ACTIONS
+from navapp.ui.cuts_page import CUT_KEYS, CutsPage, CutTable
+from navapp.values import MeasuredFace, ResectionPlane
+from tests.ui import snapshots
+from tests.ui.test_app import BellCounter, play
+
+PLANE = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, -1.0]))
+SMALL = np.diag([1e-6, 1e-6, 1e-3])
+FACE = MeasuredFace(PLANE, np.array([np.tan(np.radians(1.3)), 0.0, -0.55]), SMALL, SMALL, 0.8)
+CUTS = (
+    CutLine("femur_distal", is_made=True, face=FACE, seen_share=0.8),
+    CutLine("femur_anterior", is_made=True, seen_share=0.38),
+    CutLine("femur_posterior", is_made=True),
+    CutLine("femur_anterior_chamfer", is_made=False),
+)
+
+
+def test_the_letters_mean_nothing_else_on_the_page() -> None:
+    kept = {action.key for action in ACTIONS if action.name in ("quit", "cuts", "accept", "reject")}
+    assert not kept & set(CUT_KEYS)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
+def test_cuts_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        assert isinstance(app.screen, CutsPage)
+        text = app.text_of(CutTable)
+        lines = [line.rstrip() for line in text.splitlines()]
+        assert lines[0].split() == ["b", "femur_distal", "made"]
+        assert "tilt    +1.30 deg +- 0.20" in lines[1]
+        assert "offset  -0.55 mm  +- 0.09" in lines[2]
+        assert "tolerance 1.0" in lines[2]
+        assert lines[3].split() == ["c", "femur_anterior", "made"]
+        assert lines[4].strip() == "not measurable: 38 % of the cut is seen"
+        assert lines[6].strip() == "not measurable: it is not seen"
+        assert lines[7].split() == ["f", "femur_anterior_chamfer", "planned"]
+        assert "version 3 of the femur is in force" in text
+        assert max(map(len, lines)) <= size[0] - 4
+        await pilot.press("b", "f", "g")
+
+    given = snapshots.navigating(cuts=CUTS, bone_version=3, stage=STAGES[2])
+    app = play(given, script, size)
+    assert app.session.commands == [
+        WithdrawCut("femur_distal"),
+        ConfirmCut("femur_anterior_chamfer"),
+    ]
+
+
+def test_without_cuts_there_is_no_page() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        assert not isinstance(app.screen, CutsPage)
+
+    play(snapshots.navigating(), script, (80, 24))
