@@ -28,7 +28,7 @@ def choose_operator(
     """
     is_changed = bool(
         options.prior or options.bone or options.also or options.method or options.start
-        or options.follow_refused
+        or options.follow_refused or options.cut
     )  # fmt: skip
     if session is None or is_changed or options.order != "forward":
         plain = ReplayOperator(each_frame=options.order == "each", follows_refused=follows_refused)

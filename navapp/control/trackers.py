@@ -56,22 +56,25 @@ class Trackers:
         self._make_tracker = make_tracker
         self._lock = threading.Lock()
         self._bones = {name: CutBone(bone) for name, bone in plan.bones.items()}
-        self._trackers: dict[str, Tracker] = {}
-        self._with_aspects: dict[str, Tracker] = {}
+        # By name and version of the bone: what is made of an old one is never used for a new one.
+        self._trackers: dict[tuple[str, int], Tracker] = {}
+        self._with_aspects: dict[tuple[str, int], Tracker] = {}
         self._face_meters: dict[str, FaceMeter] = {}
 
     def tracker(self, bone: str) -> Tracker:
         """The tracker that follows a bone."""
         with self._lock:
-            known = self._with_aspects.get(bone) or self._trackers.get(bone)
+            now = self._bones[bone]
+            key = bone, now.version
+            known = self._with_aspects.get(key) or self._trackers.get(key)
         if known is not None:
             return known
         # The production chain needs no views to follow a bone; those of the paper do.
         is_ours = self._settings.method == "bimcc"
         aspects = None if is_ours else self._plan.aspects.get(bone)
-        made = self._make(self.bone(bone).model, aspects)
+        made = self._make(now.model, aspects)
         with self._lock:
-            return self._with_aspects.get(bone) or self._trackers.setdefault(bone, made)
+            return self._with_aspects.get(key) or self._trackers.setdefault(key, made)
 
     def bone(self, name: str) -> CutBone:
         """A bone as it is now."""
@@ -89,8 +92,9 @@ class Trackers:
         name = bone.planned.name
         with self._lock:
             self._bones[name] = bone
-            self._trackers.pop(name, None)
-            self._with_aspects.pop(name, None)
+            for made in (self._trackers, self._with_aspects):
+                for key in [key for key in made if key[0] == name]:
+                    del made[key]
 
     def measure_face(
         self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
@@ -175,20 +179,21 @@ class Trackers:
         if bone in self._prior.left_from_bone or axis is None:
             return self.tracker(bone)
         with self._lock:
-            known = self._with_aspects.get(bone)
+            now = self._bones[bone]
+            key = bone, now.version
+            known = self._with_aspects.get(key)
         if known is not None:
             return known
         half_angle_deg, built = self._prior.approach_half_angle_deg, self._plan.aspects.get(bone)
-        cut = self.bone(bone)
         # What was built beforehand has the edges of the whole bone.
-        if built is None or cut.made:
-            aspects = build_aspects(cut.model, axis, half_angle_deg)
+        if built is None or now.made:
+            aspects = build_aspects(now.model, axis, half_angle_deg)
         else:
             aspects = built.within(ViewCone(axis, half_angle_deg))
-        made = self._make(cut.model, aspects)
+        made = self._make(now.model, aspects)
         with self._lock:
-            self._trackers.pop(bone, None)
-            return self._with_aspects.setdefault(bone, made)
+            self._trackers.pop(key, None)
+            return self._with_aspects.setdefault(key, made)
 
     def _make(self, bone: BoneModel, aspects: AspectGraph | None) -> Tracker:
         return self._make_tracker(self._rig, bone, self._settings, aspects)

@@ -3,13 +3,31 @@
 import threading
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from navapp.control.stages import STAGES
 from navapp.control.trackers import Trackers
+from navapp.resection import FaceMeter
 from navapp.tracking import TrackerSettings
-from navapp.values import AspectGraph, Prior
-from tests.control.fakes import FakeTracker, Script, a_frame, a_plan, a_pose, a_rig, wait_for
+from navapp.values import (
+    AspectGraph,
+    MeasuredFace,
+    PoseEstimate,
+    Prior,
+    ResectionPlane,
+    Status,
+)
+from tests.control.fakes import (
+    FakeTracker,
+    Script,
+    a_frame,
+    a_plan,
+    a_pose,
+    a_rig,
+    answer,
+    wait_for,
+)
 
 OPENING = STAGES[0]
 FROM_ABOVE = Prior(approach_axis=(0.0, 0.0, 1.0), approach_half_angle_deg=30.0)
@@ -117,3 +135,52 @@ def test_nobody_waits_for_a_tracker_of_another_bone(maker: Maker) -> None:
     maker.gate.set()
     slow.join(5.0)
     wait_for(lambda: ("femur", False) in maker.made, "the femur's tracker")
+
+
+def test_a_tracker_of_an_older_bone_is_not_used_for_a_newer_one(maker: Maker) -> None:
+    """The bone is cut while another thread makes its tracker."""
+    plane = ResectionPlane("femur", np.array([0.0, 0.0, 8.0]), np.array([0.0, 0.0, 1.0]))
+    known = trackers(maker)
+    maker.gate.clear()
+    slow = threading.Thread(target=known.tracker, args=("femur",))
+    slow.start()
+    assert maker.waiting.wait(5.0)
+    known.set_bone(known.bone("femur").cut("top", plane))
+    maker.gate.set()
+    slow.join(5.0)
+    assert known.tracker("femur").bone.is_removed.any()
+
+
+class LooseMaker(Maker):
+    """Its trackers find a bone of which more than half is gone too loosely."""
+
+    def __call__(self, rig, bone, settings, aspects) -> FakeTracker:
+        tracker = super().__call__(rig, bone, settings, aspects)
+        is_loose = bone.is_removed.mean() > 0.5
+        tracker.script = Script(found=[answer(Status.DEGRADED if is_loose else Status.OK)])
+        return tracker
+
+
+@pytest.mark.parametrize("is_seen", [True, False])
+def test_faces_in_the_same_picture_make_a_loose_registration_a_sure_one(
+    monkeypatch: pytest.MonkeyPatch, is_seen: bool
+) -> None:
+    normal = np.array([0.0, 0.0, 1.0])
+    plane = ResectionPlane("femur", np.array([0.0, 0.0, 8.0]), normal, (100.0, 100.0))
+    asked: list[PoseEstimate] = []
+
+    def measure(meter, left, right, estimate, made, planned, expected=None):
+        asked.append(estimate)
+        little = np.diag([1e-6, 1e-6, 1e-4])
+        face = MeasuredFace(planned, np.array([0.0, 0.0, 6.0]), little, little, 0.9)
+        return face if is_seen else None
+
+    monkeypatch.setattr(FaceMeter, "measure", measure)
+    known = Trackers(a_rig(), a_plan(), Prior({"femur": a_pose()}), TrackerSettings(), LooseMaker())
+    known.set_bone(known.bone("femur").cut("top", plane))
+    (best,) = known.register(OPENING, a_frame())
+    assert best.verdict.status is (Status.OK if is_seen else Status.DEGRADED)
+    # The pose's own error moves bone and face together.
+    assert not asked[0].covariance.any()
+    # The session's bone is not changed by what one picture says.
+    assert known.bone("femur").unmeasured == ("top",)
