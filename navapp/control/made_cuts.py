@@ -7,6 +7,7 @@ from drivers.frames import StereoFrame
 from navapp.control.states import CutLine
 from navapp.control.trackers import Trackers
 from navapp.errors import UsageError
+from navapp.geometry.mesh import TriangleMesh
 from navapp.resection import CutBone
 from navapp.values import MeasuredFace, Plan, StageSpec, Status, TrackedFrame, join_faces
 
@@ -86,6 +87,11 @@ class MadeCuts:
         """Of a bone; 0 without a model of it."""
         known = self._trackers.bones.get(bone)
         return 0 if known is None else known.model.version
+
+    def surface(self, bone: str) -> TriangleMesh | None:
+        """What is left of a bone; None: all of it, or it has no model."""
+        known = self._trackers.bones.get(bone)
+        return None if known is None else known.surface
 
     def describe(self, stage: StageSpec) -> tuple[CutLine, ...]:
         """The cuts of a stage: planned, made, measured."""

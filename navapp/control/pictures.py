@@ -159,8 +159,17 @@ def _scene(
         return None
     if not (snapshot.is_navigable or is_candidate):
         return None
-    layers = snapshot.layers
-    return Scene(plan, snapshot.stage, pose, viewpoint, is_candidate, foreground, layers)
+    return Scene(
+        plan,
+        snapshot.stage,
+        pose,
+        viewpoint,
+        is_candidate,
+        foreground,
+        snapshot.layers,
+        snapshot.bone_surface,
+        frozenset(cut.name for cut in snapshot.cuts if cut.is_made),
+    )
 
 
 def _is_lost(snapshot: Snapshot) -> bool:

@@ -21,6 +21,7 @@ from navapp.control.states import (
     SessionState,
 )
 from navapp.errors import RigError
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.overlay import LAYERS
 from navapp.resection import CutBone
@@ -212,6 +213,11 @@ class Session:
     def bone_version(self) -> int:
         """Of the stage's bone; 0 without a model of it."""
         return self._cuts.version(self._stage.bone)
+
+    @property
+    def bone_surface(self) -> TriangleMesh | None:
+        """What is left of the stage's bone; None: all of it."""
+        return self._cuts.surface(self._stage.bone)
 
     def measure_faces(self, frame: StereoFrame) -> dict[str, MeasuredFace]:
         """Measure the faces of cuts of the stage's bone in a frame; in a fault none."""

@@ -69,6 +69,7 @@ class SnapshotMaker:
             layers=session.layers,
             cuts=session.cuts,
             bone_version=session.bone_version,
+            bone_surface=session.bone_surface,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
             events=session.events,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from navapp.control.length_check import LengthCheck
 from navapp.control.mirror_error import MirrorError
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.values import MeasuredFace, Reason, StageSpec, Verdict
 
@@ -312,6 +313,7 @@ class Snapshot:
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
     cuts: tuple[CutLine, ...] = ()  # of the stage
     bone_version: int = 0  # of the stage's bone: counts the cuts confirmed, measured, withdrawn
+    bone_surface: TriangleMesh | None = None  # what is left of it; None: all
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()
     events: tuple[Event, ...] = ()  # the newest, oldest first

@@ -25,6 +25,50 @@ def section_lines(mesh: TriangleMesh, height_mm: FloatArray) -> list[FloatArray]
     return lines
 
 
+def clip_below(mesh: TriangleMesh, height_mm: FloatArray) -> TriangleMesh:
+    """The part of a mesh on the negative side of a plane; triangles across it are cut in two.
+
+    Its first vertices are those of the mesh. The arguments are those of `section_lines`.
+    """
+    is_below = height_mm <= 0.0
+    n_below = is_below[mesh.faces].sum(axis=1)
+    whole = mesh.faces[n_below == 3]
+    # Each with its odd corner first: the one below, or the one above.
+    one, two = (
+        _turn(mesh.faces[n_below == n], is_below[mesh.faces[n_below == n]] == (n == 1))
+        for n in (1, 2)
+    )
+    edges = np.concatenate([one[:, [0, 1]], one[:, [0, 2]], two[:, [0, 1]], two[:, [0, 2]]])
+    edges, index = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+    start, end = edges.T
+    share = (height_mm[start] / (height_mm[start] - height_mm[end]))[:, None]
+    points, normals = (
+        values[start] + share * (values[end] - values[start])
+        for values in (mesh.vertices_mm, mesh.normals)
+    )
+    a, b, c, d = np.split(
+        index.ravel() + len(mesh.vertices_mm), np.cumsum([len(one)] * 2 + [len(two)])
+    )
+    faces = [
+        whole,
+        np.column_stack([one[:, 0], a, b]),
+        np.column_stack([c, two[:, 1], two[:, 2]]),
+        np.column_stack([c, two[:, 2], d]),
+    ]
+    return TriangleMesh(
+        np.concatenate([mesh.vertices_mm, points]),
+        np.concatenate(faces).astype(np.int32),
+        np.concatenate([mesh.normals, normals]),
+    )
+
+
+def _turn(faces: NDArray[np.int32], is_first: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Triangles (F, 3) with the marked corner first, the same way round."""
+    first = is_first.argmax(axis=1)
+    columns = (first[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(faces, columns, axis=1)
+
+
 def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | None:
     """The area that closed lines (N, 3) of a plane enclose, as triangles that face along a normal.
 

@@ -53,6 +53,8 @@ class Scene:
     # None: nothing is known of what stands in front of the bone.
     foreground: Foreground | None = None
     layers: tuple[str, ...] = ()  # to be drawn, in the order of the table of layers
+    surface: TriangleMesh | None = None  # what is left of the bone; None: all of it
+    made_cuts: frozenset[str] = frozenset()  # names of planes: they need no guides any more
 
     @property
     def mesh(self) -> TriangleMesh:
@@ -61,8 +63,8 @@ class Scene:
 
     @property
     def drawn_mesh(self) -> TriangleMesh:
-        """The bone in as many triangles as a picture can show."""
-        return drawn(self.mesh)
+        """What is left of the bone, in as many triangles as a picture can show."""
+        return drawn(self.mesh if self.surface is None else self.surface)
 
     @property
     def camera(self) -> Camera:
@@ -97,8 +99,9 @@ class Scene:
 
     @property
     def planes(self) -> Mapping[str, ResectionPlane]:
-        """The stage's, by name."""
-        return self.plan.planes_of(self.stage)
+        """The stage's that are still to be cut, by name."""
+        planes = self.plan.planes_of(self.stage)
+        return {name: plane for name, plane in planes.items() if name not in self.made_cuts}
 
     @property
     def drills(self) -> Mapping[str, DrillAxis]:

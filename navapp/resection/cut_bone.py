@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from navapp.resection.remaining_bone import Cut, remove_cuts
+from navapp.geometry.mesh import TriangleMesh
+from navapp.resection.remaining_bone import Cut, cut_surface, remove_cuts
 from navapp.values import BoneModel, MeasuredFace, ResectionPlane
 
 # All chosen. A saw misses its plan: bone so near to a planned face may be gone, until the face is
@@ -29,6 +30,14 @@ class CutBone:
         """What is left of the bone, to be registered to."""
         left = remove_cuts(self.planned, [self._cut(name) for name in self.made])
         return replace(left, version=self.planned.version + self.version)
+
+    @cached_property
+    def surface(self) -> TriangleMesh | None:
+        """What is left of it, with its faces where they are known or planned; None when whole."""
+        if not self.made:
+            return None
+        planes = [self._cut(name).plane for name in self.made]
+        return cut_surface(self.planned.mesh, planes)
 
     @property
     def unmeasured(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from navapp.resection.face_fit import (
     fit_disparity_plane,
     plane_in_camera,
 )
-from navapp.resection.remaining_bone import Cut, remove_cuts
+from navapp.resection.remaining_bone import Cut, find_piece, remove_cuts
 from navapp.stereo import MODEL_REFINEMENT, match_surface, refine_on_model
 from navapp.values import BoneModel, DisparityMap, MeasuredFace, Origin, PoseEstimate
 from navapp.values.contents import ResectionPlane
@@ -131,8 +131,8 @@ class FaceMeter:
         if normal @ rectified_from_bone.apply(plane.point_mm[None])[0] >= 0.0:
             return None
         mesh = self._bone.mesh
-        lines = section_lines(mesh, plane.heights_mm(mesh.vertices_mm))
-        face = fill_section([line for line in lines if planned.is_over(line).all()], plane.normal)
+        lines = section_lines(mesh, find_piece(mesh, Cut(plane, 0.0)))
+        face = fill_section(lines, plane.normal)
         if face is None:
             return None
         pixels = self._geometry.project(rectified_from_bone.apply(face.vertices_mm))

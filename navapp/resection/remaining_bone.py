@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
-from navapp.geometry.mesh_sections import fill_section, section_lines
+from navapp.geometry.mesh_sections import clip_below, fill_section, section_lines
+from navapp.geometry.transform import FloatArray
 from navapp.values import BoneModel, ResectionPlane
 
 
@@ -18,27 +19,52 @@ class Cut(NamedTuple):
     unsure_mm: float  # bone so near to the plane may be gone as well
 
 
+def find_piece(mesh: TriangleMesh, cut: Cut) -> FloatArray:
+    """(V,) mm by which vertices lie beyond a cut: above 0 those of the piece that it takes off.
+
+    A plane meets other parts of the bone, too, which stay (-1). The piece is what hangs together
+    beyond it and lies over its planned rectangle. Beyond begins as far below the plane as is
+    unsure.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    height_mm = cut.plane.heights_mm(mesh.vertices_mm) + cut.unsure_mm
+    is_beyond = height_mm > 0.0
+    edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    start, end = edges[is_beyond[edges].all(axis=1)].T
+    n = len(height_mm)
+    graph = coo_matrix((np.ones(len(start), dtype=np.int8), (start, end)), shape=(n, n))
+    _, piece = connected_components(graph, directed=False)
+    is_taken = np.isin(piece, piece[is_beyond & cut.plane.is_over(mesh.vertices_mm)])
+    return np.where(is_beyond & ~is_taken, -1.0, height_mm)
+
+
 def remove_cuts(bone: BoneModel, cuts: Sequence[Cut]) -> BoneModel:
-    """The bone without what lies beyond its cuts, and without what is unsure beside them.
+    """The bone without the pieces of its cuts, and without what is unsure beside them.
 
     Its mesh keeps all its vertices: what is gone is marked. A lid closes the bone below the cuts.
     """
     if not cuts:
         return bone
-    mesh = bone.mesh
+    mesh, lids = bone.mesh, []
     is_gone = np.zeros(len(mesh.vertices_mm), dtype=np.bool_)
-    for plane, unsure_mm in cuts:
-        is_beyond = plane.heights_mm(mesh.vertices_mm) > -unsure_mm
-        is_gone |= is_beyond & plane.is_over(mesh.vertices_mm)
-    lids = [lid for cut in cuts if (lid := _make_lid(cut, mesh)) is not None]
+    for cut in cuts:
+        height_mm = find_piece(mesh, cut)
+        is_gone |= height_mm > 0.0
+        lid = fill_section(section_lines(mesh, height_mm), cut.plane.normal)
+        lids += [] if lid is None else [lid]
     # Triangles on the edge of what is unsure: they hide what lies behind, too.
     n_gone = is_gone[mesh.faces].sum(axis=1)
     rim = TriangleMesh(mesh.vertices_mm, mesh.faces[(n_gone > 0) & (n_gone < 3)], mesh.normals)
     return replace(bone, is_removed=bone.is_removed | is_gone, lid=join_meshes(rim, *lids))
 
 
-def _make_lid(cut: Cut, mesh: TriangleMesh) -> TriangleMesh | None:
-    """The bone's section where it is surely left; None without any."""
-    plane, unsure_mm = cut
-    lines = section_lines(mesh, plane.heights_mm(mesh.vertices_mm) + unsure_mm)
-    return fill_section([line for line in lines if plane.is_over(line).all()], plane.normal)
+def cut_surface(mesh: TriangleMesh, planes: Sequence[ResectionPlane]) -> TriangleMesh:
+    """A bone's surface after cuts, with their faces: to be looked at."""
+    for plane in planes:
+        height_mm = find_piece(mesh, Cut(plane, 0.0))
+        face = fill_section(section_lines(mesh, height_mm), plane.normal)
+        mesh = clip_below(mesh, height_mm)
+        mesh = mesh if face is None else join_meshes(mesh, face)
+    return mesh

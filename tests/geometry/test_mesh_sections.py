@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
-from navapp.geometry.mesh_sections import fill_section, section_lines
+from navapp.geometry.mesh_sections import clip_below, fill_section, section_lines
 from tests.geometry.shapes import cube, sphere
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -61,3 +61,25 @@ def test_joined_meshes_keep_their_order() -> None:
     both = join_meshes(one, other)
     np.testing.assert_array_equal(both.faces[: len(one.faces)], one.faces)
     assert both.volume_mm3() == pytest.approx(one.volume_mm3() + other.volume_mm3(), rel=1e-3)
+
+
+@pytest.mark.parametrize("level_mm", [-7.3, 0.4, 12.0])
+def test_a_clipped_ball_and_its_lid_hold_what_the_cap_leaves(level_mm: float) -> None:
+    ball = sphere(20.0, 60)
+    heights_mm = height(ball, level_mm)
+    below = clip_below(ball, heights_mm)
+    np.testing.assert_array_equal(below.vertices_mm[: len(ball.vertices_mm)], ball.vertices_mm)
+    used = below.vertices_mm[np.unique(below.faces)]
+    assert used[:, 2].max() == pytest.approx(level_mm)
+    lid = fill_section(section_lines(ball, heights_mm), UP)
+    assert lid is not None
+    cap_mm = 20.0 - level_mm
+    cap_mm3 = np.pi * cap_mm**2 * (60.0 - cap_mm) / 3.0
+    left_mm3 = join_meshes(below, lid).volume_mm3()
+    assert left_mm3 == pytest.approx(4.0 / 3.0 * np.pi * 20.0**3 - cap_mm3, rel=0.01)
+
+
+@pytest.mark.parametrize(("level_mm", "share"), [(30.0, 1.0), (-30.0, 0.0)])
+def test_a_plane_beside_a_mesh_leaves_all_or_nothing(level_mm: float, share: float) -> None:
+    ball = sphere(20.0, 20)
+    assert len(clip_below(ball, height(ball, level_mm)).faces) == share * len(ball.faces)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.registration import RegistrationModel
 from navapp.resection.cut_bone import SURE_MM, UNSURE_MM, CutBone
 from navapp.resection.remaining_bone import Cut, remove_cuts
-from navapp.values import MeasuredFace, ResectionPlane
+from navapp.values import BoneModel, MeasuredFace, ResectionPlane
 from tests.resection.cuts import MADE, PLANNED, bone
 
 
@@ -30,10 +31,16 @@ def test_what_lies_beyond_a_cut_and_beside_it_is_gone(unsure_mm: float) -> None:
     assert seen.vertices_mm[np.unique(seen.faces)][:, 2].max() < 12.0 - unsure_mm
 
 
-def test_a_cut_reaches_no_further_than_its_rectangle() -> None:
-    small = ResectionPlane("femur", PLANNED.point_mm, PLANNED.normal, (20.0, 60.0))
-    left = remove_cuts(bone(), [Cut(small, 0.0)])
-    assert np.abs(left.mesh.vertices_mm[left.is_removed, 0]).max() <= 13.0
+def test_a_cut_takes_the_whole_piece_over_its_rectangle_and_no_other() -> None:
+    ball = bone().mesh
+    beside = TriangleMesh(ball.vertices_mm + (100.0, 0.0, 0.0), ball.faces)
+    two = BoneModel("femur", join_meshes(ball, beside))
+    small = ResectionPlane("femur", PLANNED.point_mm, PLANNED.normal, (20.0, 20.0))
+    left = remove_cuts(two, [Cut(small, 0.0)])
+    one = remove_cuts(bone(), [Cut(PLANNED, 0.0)])
+    n = len(ball.vertices_mm)
+    np.testing.assert_array_equal(left.is_removed[:n], one.is_removed)
+    assert not left.is_removed[n:].any()
 
 
 def test_the_lid_closes_the_bone_and_is_not_seen() -> None:
@@ -75,3 +82,19 @@ def test_a_cut_that_is_withdrawn_gives_the_bone_back() -> None:
 def test_a_cut_made_again_is_not_measured() -> None:
     once = CutBone(bone()).cut("top", PLANNED).with_faces({"top": face()})
     assert once.cut("top", PLANNED).unmeasured == ("top",)
+
+
+def test_the_surface_that_is_looked_at_ends_at_the_faces() -> None:
+    whole = CutBone(bone())
+    assert whole.surface is None
+    cut = whole.cut("top", PLANNED)
+    for one, level_mm in ((cut, 12.0), (cut.with_faces({"top": face()}), 11.3)):
+        surface = one.surface
+        assert surface is not None
+        used = surface.vertices_mm[np.unique(surface.faces)]
+        assert used[:, 2].max() == pytest.approx(level_mm)
+        # Closed: its face is there.
+        assert surface.volume_mm3() == pytest.approx(
+            np.pi * (4.0 / 3.0 * 30.0**3 - (30.0 - level_mm) ** 2 * (60.0 + level_mm) / 3.0),
+            rel=0.01,
+        )
