@@ -33,7 +33,7 @@ def test_what_lies_beyond_a_cut_and_beside_it_is_gone(unsure_mm: float) -> None:
 
 def test_a_cut_takes_the_whole_piece_over_its_rectangle_and_no_other() -> None:
     ball = bone().mesh
-    beside = TriangleMesh(ball.vertices_mm + (100.0, 0.0, 0.0), ball.faces)
+    beside = TriangleMesh(ball.vertices_mm + np.array([100.0, 0.0, 0.0]), ball.faces)
     two = BoneModel("femur", join_meshes(ball, beside))
     small = ResectionPlane("femur", PLANNED.point_mm, PLANNED.normal, (20.0, 20.0))
     left = remove_cuts(two, [Cut(small, 0.0)])
