@@ -1,7 +1,7 @@
 """The cuts of a session: made, withdrawn, and their faces measured."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from drivers.frames import StereoFrame
 from navapp.control.states import CutLine
@@ -18,13 +18,14 @@ _ENOUGH, _KEPT = 3, 60
 class MadeCuts:
     """What has been cut of the session's bones; started and asked from the loop alone.
 
-    Faces are measured in turns that are counted in frames: a recorded session replays to them.
+    Faces are measured in turns that are counted in frames, one in each: a recorded session replays
+    to them.
 
     Args:
         plan: with the planes.
         trackers: of its bones.
         made: names of planes that are cut from the start.
-        frames_between: a face is measured in every so many frames.
+        frames_between: a face is measured in every so many frames; with 1, all in each.
 
     Raises:
         UsageError: the plan has no such plane.
@@ -102,26 +103,44 @@ class MadeCuts:
             for name in self._plan.planes_of(stage)
         )
 
-    def measure(self, frame: StereoFrame, tracked: TrackedFrame | None) -> dict[str, MeasuredFace]:
-        """The faces of a bone in a frame in which its pose is OK, if it is their turn."""
+    def measure(
+        self, frame: StereoFrame, tracked: TrackedFrame | None, *, is_accepted: bool
+    ) -> dict[str, MeasuredFace]:
+        """Faces of a bone in a frame in which its pose is OK: one in its turn, or all in every one.
+
+        With a pose that nobody has accepted they are told, where every frame tells what it can, but
+        not kept.
+        """
+        turn, rest = divmod(self._n_frames, self._frames_between)
         self._n_frames += 1
-        if tracked is None or tracked.estimate is None:
+        if tracked is None or tracked.verdict.status is not Status.OK or rest:
             return {}
-        is_ok = tracked.verdict.status is Status.OK
-        if not is_ok or self._n_frames % self._frames_between:
+        bone, is_each = self._trackers.bone(tracked.bone), self._frames_between == 1
+        names = tuple(bone.made)
+        if names and not is_each:
+            names = (names[turn % len(names)],)
+        if tracked.estimate is None or not (is_accepted or is_each):
             return {}
-        bone, estimate = self._trackers.bone(tracked.bone), tracked.estimate
-        found = {}
-        for name in bone.made:
-            face = self._trackers.measure_face(frame, bone, estimate, name)
+        looked = {
+            name: self._trackers.measure_face(frame, bone, tracked.estimate, name) for name in names
+        }
+        found = {name: face for name, face in looked.items() if face is not None and face.is_told}
+        if is_accepted:
+            self._keep(bone, looked, found)
+        return found
+
+    def _keep(
+        self,
+        bone: CutBone,
+        looked: Mapping[str, MeasuredFace | None],
+        found: Mapping[str, MeasuredFace],
+    ) -> None:
+        for name, face in looked.items():
             self._seen[name] = None if face is None else face.seen_share
-            if face is not None and face.is_told:
-                found[name] = face
-        for name, face in found.items():
-            self._measured.setdefault(name, deque(maxlen=_KEPT)).append(face)
+        for name, told in found.items():
+            self._measured.setdefault(name, deque(maxlen=_KEPT)).append(told)
             self._joined[name] = join_faces(tuple(self._measured[name]))
         self._learn(bone)
-        return found
 
     def _learn(self, bone: CutBone) -> None:
         """Where faces have become known, less of the bone beside them is unsure."""

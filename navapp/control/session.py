@@ -224,7 +224,8 @@ class Session:
         if self._state is SessionState.FAULT:
             return {}
         before = self.bone_version
-        faces = self._cuts.measure(frame, self._tracked)
+        is_accepted = self._state is SessionState.NAVIGATING
+        faces = self._cuts.measure(frame, self._tracked, is_accepted=is_accepted)
         if self.bone_version != before:
             text = f"faces measured: version {self.bone_version} of the {self._stage.bone}"
             self.add_event("cut", f"{text} is in force")

@@ -1,12 +1,13 @@
 """Cuts are confirmed, measured and withdrawn in a session."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
-from navapp.control.states import ConfirmCut, EnterStage, Snapshot, WithdrawCut
+from navapp.control.states import ConfirmCut, EnterStage, Register, Snapshot, WithdrawCut
 from navapp.errors import UsageError
 from navapp.resection import FaceMeter
 from navapp.values import MeasuredFace, Plan, ResectionPlane, Status, SurgicalContent
@@ -147,6 +148,30 @@ def test_nothing_is_measured_with_a_pose_that_is_not_ok(bench: Bench, faces: Fac
     bench.script.tracked = answer(Status.DEGRADED)
     bench.frames(20)
     assert not faces.expected
+
+
+def test_with_several_cuts_the_faces_take_turns(bench: Bench, faces: Faces) -> None:
+    faces.shares = {"top": 0.8, "side": 0.6}
+    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmCut("side"))
+    bench.frames(40)
+    measured = [tuple(result.faces) for result in bench.results if result.faces]
+    assert set(measured) == {("top",), ("side",)}
+    assert all(one != other for one, other in pairwise(measured))
+    assert bench.snapshot.bone_version == 4
+
+
+def test_nothing_is_kept_of_a_candidate_that_nobody_has_accepted(faces: Faces) -> None:
+    faces.shares["top"] = 0.8
+    bench = Bench(plan=cut_plan(), made_cuts=("top",))
+    bench.frames(1)
+    bench.do(Register())
+    bench.frames(30)
+    assert bench.snapshot.is_candidate
+    assert not faces.expected
+    bench.accept()
+    bench.frames(20)
+    assert bench.snapshot.cuts[0].face is not None
 
 
 def test_a_cut_confirmed_again_is_measured_again(bench: Bench, faces: Faces) -> None:
