@@ -53,6 +53,7 @@ class Action:
     label: str  # one or two words for the footer
     description: str  # a sentence for help and palette
     is_enabled: Callable[[Snapshot], bool]  # whether it makes sense now
+    needs: str  # what it needs for that, in a few words; empty where it always makes sense
     # made from the snapshot; None for what the screen does by itself.
     command: Callable[[Snapshot], Command] | None = None
     # place in the footer; actions that share one exclude each other. Empty: not there.
@@ -123,6 +124,7 @@ def _nudge_action(shift: str, arrow: str, step_px: int) -> Action:
         "move",
         f"check of the mirror: move the cross by {step_px} px",
         _is_checking,
+        "a check of the mirror under way",
         lambda _: NudgeCross(right * step_px, down * step_px),
     )
 
@@ -134,6 +136,7 @@ def _stage_action(number: int) -> Action:
         f"stage {number}",
         f"go to stage {number}",
         lambda snapshot: _can_change_stage(snapshot) and snapshot.stage.number != number,
+        f"another stage than {number} in force, and no registration that runs",
         lambda _: EnterStage(number),
     )
 
@@ -145,6 +148,7 @@ ACTIONS: tuple[Action, ...] = (
         "blank",
         "make the display dark, at once; works on every screen",
         _always,
+        "",
         lambda _: Blank(),
         slot="blank",
         is_everywhere=True,
@@ -155,6 +159,7 @@ ACTIONS: tuple[Action, ...] = (
         "show",
         "leave blank: show the guides on the display again",
         lambda snapshot: snapshot.is_blanked,
+        "a display that was blanked",
         lambda _: Show(),
         slot="show",
     ),
@@ -164,6 +169,7 @@ ACTIONS: tuple[Action, ...] = (
         "accept",
         "accept the candidate under review",
         is_acceptable,
+        "a candidate on the screen that the judge does not call lost",
         lambda snapshot: Accept(snapshot.candidate_id),
         slot="accept",
     ),
@@ -173,6 +179,7 @@ ACTIONS: tuple[Action, ...] = (
         "reject",
         "reject the candidate under review",
         lambda snapshot: snapshot.is_candidate,
+        "a candidate on the screen",
         lambda snapshot: Reject(snapshot.candidate_id),
         slot="reject",
     ),
@@ -187,6 +194,7 @@ ACTIONS: tuple[Action, ...] = (
             SessionState.NAVIGATING,
             SessionState.SUSPENDED,
         ),
+        "a camera that sees, and no registration that runs",
         lambda _: Register(),
         slot="register",
     ),
@@ -196,6 +204,7 @@ ACTIONS: tuple[Action, ...] = (
         "cancel",
         "cancel the registration that is running",
         _in_states(SessionState.REGISTERING),
+        "a registration that runs",
         lambda _: Cancel(),
         slot="register",
     ),
@@ -205,6 +214,7 @@ ACTIONS: tuple[Action, ...] = (
         "back",
         "go back to the previous stage",
         _has_neighbour(-1),
+        "a stage before this one, and no registration that runs",
         _to_neighbour(-1),
         slot="previous",
         needs_width=True,
@@ -215,6 +225,7 @@ ACTIONS: tuple[Action, ...] = (
         "next",
         "go on to the next stage",
         _has_neighbour(1),
+        "a stage after this one, and no registration that runs",
         _to_neighbour(1),
         slot="next",
     ),
@@ -225,6 +236,7 @@ ACTIONS: tuple[Action, ...] = (
         "reopen",
         "open lost devices, turn the mirror back",
         _has_failed_device,
+        "a device that is lost or in trouble",
         lambda _: Reconnect(),
     ),
     Action(
@@ -233,6 +245,7 @@ ACTIONS: tuple[Action, ...] = (
         "depth",
         "colour the picture by its depth: matched, or guessed from which side; dense: in front",
         _always,
+        "",
         lambda _: ToggleDepth(),
         slot="depth",
         needs_width=True,
@@ -243,6 +256,7 @@ ACTIONS: tuple[Action, ...] = (
         "eye",
         "with run --mirror: see what an eye sees in the simulated mirror",
         lambda snapshot: snapshot.is_simulated,
+        "the simulated room",
         lambda _: ToggleEye(),
     ),
     Action(
@@ -251,6 +265,7 @@ ACTIONS: tuple[Action, ...] = (
         "layers",
         "see the layers of the overlay, switch them on and off",
         _always,
+        "",
         slot="layers",
         needs_width=True,
     ),
@@ -260,6 +275,7 @@ ACTIONS: tuple[Action, ...] = (
         "cuts",
         "see the cuts of the stage, planned and measured; say that one has been made",
         lambda snapshot: bool(snapshot.cuts),
+        "a stage whose bone has planned cuts",
         slot="cuts",
         needs_width=True,
     ),
@@ -269,6 +285,7 @@ ACTIONS: tuple[Action, ...] = (
         "check",
         "check what is seen in the mirror, or give the check up",
         lambda snapshot: snapshot.has_mirror,
+        "a display in the mirror",
         lambda _: CheckMirror(),
     ),
     *(_nudge_action(shift, arrow, step_px) for shift, step_px in _STEPS_PX for arrow in _ARROWS),
@@ -278,20 +295,22 @@ ACTIONS: tuple[Action, ...] = (
         "confirm",
         "check of the mirror: the cross lies on its point",
         _is_checking,
+        "a check of the mirror under way",
         lambda _: ConfirmCross(),
     ),
-    Action("devices", "d", "devices", "see the devices in detail", _always, slot="devices"),
+    Action("devices", "d", "devices", "see the devices in detail", _always, "", slot="devices"),
     Action(
         "events",
         "e",
         "events",
         "see all events",
         _always,
+        "",
         slot="events",
         needs_width=True,
     ),
     Action(
-        "help", "?", "help", "see all keys, and the legend of the overlay", _always, slot="help"
+        "help", "?", "help", "see all keys, and the legend of the overlay", _always, "", slot="help"
     ),
     Action(
         "quit",
@@ -299,6 +318,7 @@ ACTIONS: tuple[Action, ...] = (
         "quit",
         "end the session; asks first while navigating",
         _always,
+        "",
         lambda _: Quit(),
         slot="quit",
     ),
@@ -311,6 +331,12 @@ ACTION_OF_KEY_EVERYWHERE = {action.key: action for action in ACTIONS if action.i
 def bindings() -> list[BindingType]:
     """Of the application."""
     return [action.binding() for action in ACTIONS]
+
+
+def say_why_not(action: Action, is_silent: bool) -> str:
+    """Why an action that is not possible was not done, in one line."""
+    why = "a session that answers" if is_silent else action.needs
+    return f"{action.label} needs {why}"
 
 
 def is_possible(action: Action, snapshot: Snapshot, is_silent: bool) -> bool:

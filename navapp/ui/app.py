@@ -22,7 +22,13 @@ from navapp.control.states import (
     WithdrawCut,
 )
 from navapp.errors import DeviceError, NavappError, RigError
-from navapp.ui.actions import ACTION_OF_KEY_EVERYWHERE, ACTION_OF_NAME, bindings, is_possible
+from navapp.ui.actions import (
+    ACTION_OF_KEY_EVERYWHERE,
+    ACTION_OF_NAME,
+    bindings,
+    is_possible,
+    say_why_not,
+)
 from navapp.ui.cuts_page import CutsPage, cut_of_key
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
@@ -132,6 +138,9 @@ class NavigationApp(QuietApp):
         """Do an action of the table, when it is possible on the newest snapshot shown."""
         action, view = ACTION_OF_NAME[name], self._view
         if not is_possible(action, view.snapshot, view.is_silent):
+            # No key is dropped in silence.
+            self.bell()
+            self.notify(say_why_not(action, view.is_silent), severity="warning")
             return
         if name == "quit":
             self._ask_to_quit(view)

@@ -54,3 +54,10 @@ def test_an_eye_is_asked_for_in_a_simulated_room_only() -> None:
     assert is_possible(ACTION_OF_NAME["eye"], snapshots.navigating(), is_silent=False)
     real = replace(snapshots.navigating(), is_simulated=False)
     assert not is_possible(ACTION_OF_NAME["eye"], real, is_silent=False)
+
+
+def test_what_is_not_always_possible_says_what_it_needs() -> None:
+    starting = snapshots.starting()
+    for action in ACTIONS:
+        is_always = is_possible(action, starting, is_silent=True)
+        assert bool(action.needs) is not is_always, action.name

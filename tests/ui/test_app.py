@@ -129,7 +129,26 @@ def test_digits_go_to_their_stage_but_not_to_the_second_which_is_in_force() -> N
 def test_keys_that_make_no_sense_now_submit_nothing(
     snapshot: Snapshot, keys: tuple[str, ...]
 ) -> None:
-    assert play(snapshot, press(*keys)).session.commands == []
+    app = play(snapshot, press(*keys))
+    assert app.session.commands == []
+    # But they say so.
+    assert app.n_bells == len(keys)
+
+
+def test_a_key_that_cannot_act_says_what_it_needs() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("r")
+        await pilot.pause()
+        (toast,) = app._notifications
+        assert toast.message == "reject needs a candidate on the screen"
+        app.session.current = snapshots.navigating()
+        await pilot.press("c")
+        await pilot.pause()
+        assert [one.message for one in app._notifications][-1] == (
+            "cancel needs a registration that runs"
+        )
+
+    play(snapshots.navigating(), script)
 
 
 @pytest.mark.parametrize(
