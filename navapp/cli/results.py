@@ -197,7 +197,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
     lines = [_count_text(summary)]
     lines += [f"other bone, {name}: {_count_text(n)}" for name, n in summary["bodies"].items()]
-    lines += [_face_text(name, face) for name, face in summary["measured"].items()]
+    lines += [_face_text(name, face) for name, face in summary.get("measured", {}).items()]
     processing_ms, tre = summary["latency_ms"], summary["tre_mm"]
     if summary["fps"] is not None and processing_ms["p50"] is not None:
         lines.append(

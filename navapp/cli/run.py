@@ -131,7 +131,8 @@ def _run_headless(
         seconds = run_session(controller, ScriptedOperator(script), log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
-    return report_result(frames, seconds, controller.failure, options, diagnostics, rig)
+    faces = [result.faces for result in log.results]
+    return report_result(frames, seconds, controller.failure, options, diagnostics, rig, faces)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

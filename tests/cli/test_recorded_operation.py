@@ -27,7 +27,7 @@ def session(*, is_moved: bool = True) -> RecordedSession:
 def options(**given) -> argparse.Namespace:
     plain = {
         "rig": None, "prior": None, "bone": None, "also": [], "method": None, "start": 0,
-        "order": "forward", "follow_refused": False,
+        "order": "forward", "follow_refused": False, "cut": [],
     }  # fmt: skip
     return argparse.Namespace(**(plain | given))
 
@@ -47,6 +47,7 @@ def states(recorded: RecordedSession, given: argparse.Namespace) -> list[str]:
     [
         {}, {"prior": "p"}, {"bone": "femur"}, {"also": ["tibia"]}, {"method": "icp"},
         {"order": "each"}, {"start": 2}, {"follow_refused": True},
+        {"cut": ["femur_distal"]},
     ],
     ids=str,
 )  # fmt: skip

@@ -2,20 +2,24 @@
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from navapp.cli.results import (
     frame_text,
     frame_to_json,
     rig_alarm_to_json,
     summarise,
+    summarise_faces,
     summary_text,
 )
 from navapp.control.frame_result import FrameResult
 from navapp.control.states import DistrustRig
-from navapp.values import Reason, Status
+from navapp.values import MeasuredFace, Reason, ResectionPlane, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
 
 # What is said of the frame and not of a bone.
-OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies"}
+OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies", "measured"}
 TIBIA = answer(Status.DEGRADED, Reason.COVERAGE_LOW, pose=a_pose("tibia", x_mm=4.0))
 
 
@@ -82,3 +86,24 @@ def test_a_replay_says_where_its_session_found_the_rig_moved() -> None:
         "alarm": "rig moved, recalibrate (bumped)",
         "moved_after_frame": 5,
     }
+
+
+def test_faces_are_told_against_their_plan_and_joined_over_frames() -> None:
+    plane = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    little = np.diag([1e-6, 1e-6, 1e-4])
+    faces = [
+        MeasuredFace(plane, np.array([0.0, np.tan(np.radians(1.0)), off]), little, little, share)
+        for off, share in ((-0.5, 0.6), (-0.3, 0.8))
+    ]
+    told = [{"top": face} for face in faces]
+    frame = frame_to_json(replace(a_result(), faces=told[0]), {})
+    assert frame["measured"]["top"]["offset_mm"] == -0.5
+    assert frame["measured"]["top"]["angle_deg"] == pytest.approx(1.0)
+    assert frame["measured"]["top"]["point_mm"][2] == pytest.approx(-0.5, abs=1e-3)
+    measured = summarise_faces([*told, {}])
+    assert measured["top"]["offset_mm"] == pytest.approx(-0.4)
+    assert measured["top"]["seen_share"] == 0.8
+    lines = summary_text({**summarise([frame], 1.0), "measured": measured}).splitlines()
+    assert (
+        "cut top: 1.00 deg (+- 0.17) and -0.40 mm (+- 0.02) from its plan, 80 % of it seen" in lines
+    )
