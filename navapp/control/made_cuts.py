@@ -48,12 +48,12 @@ class MadeCuts:
         """A planned cut has been made: its bone as it is now.
 
         Raises:
-            UsageError: the plan has no such plane, or no model of its bone.
+            UsageError: the plan has no such plane or no model of its bone, or it is confirmed.
         """
         plane = self._plan.content.planes.get(name)
         if plane is None:
-            known = ", ".join(self._plan.content.planes)
-            remedy = f"choose of {known}" if known else "make the plan with --contents"
+            names = ", ".join(self._plan.content.planes)
+            remedy = f"choose of {names}" if names else "make the plan with --contents"
             raise UsageError(f"the plan has no plane '{name}'", subject=name, remedy=remedy)
         if plane.bone not in self._plan.bones:
             raise UsageError(
@@ -61,8 +61,11 @@ class MadeCuts:
                 subject=name,
                 remedy="make the plan with that bone",
             )
+        known = self._trackers.bone(plane.bone)
+        if name in known.made:
+            raise UsageError(f"the cut '{name}' is confirmed already", subject=name)
         self._forget(name)
-        bone = self._trackers.bone(plane.bone).cut(name, plane)
+        bone = known.cut(name, plane)
         self._trackers.set_bone(bone)
         return bone
 
@@ -80,6 +83,16 @@ class MadeCuts:
         self._trackers.set_bone(bone)
         return bone
 
+    def forget_faces(self, bone: str) -> None:
+        """What was measured with an earlier registration of a bone counts no longer."""
+        known = self._trackers.bones.get(bone)
+        if known is None or not any(name in self._seen for name in known.made):
+            return
+        for name in known.made:
+            self._forget(name)
+        if known.faces:
+            self._trackers.set_bone(known.without_faces())
+
     def _forget(self, name: str) -> None:
         for known in (self._measured, self._joined, self._seen):
             known.pop(name, None)
@@ -87,7 +100,7 @@ class MadeCuts:
     def version(self, bone: str) -> int:
         """Of a bone; 0 without a model of it."""
         known = self._trackers.bones.get(bone)
-        return 0 if known is None else known.model.version
+        return 0 if known is None else known.version
 
     def surface(self, bone: str) -> TriangleMesh | None:
         """What is left of a bone; None: all of it, or it has no model."""

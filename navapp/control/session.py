@@ -201,8 +201,10 @@ class Session:
             # What was judged by the old model says nothing of the new one.
             self._tracked = None
             self._tracks.forget_verdicts()
-        version = bone.model.version
-        self.add_event("cut", f"{text}: version {version} of the {name} is in force")
+        self.add_event("cut", f"{text}: version {bone.version} of the {name} is in force")
+        if name == self._stage.bone and self._state is SessionState.REGISTERING:
+            # What runs searches for the bone as it was.
+            self.begin_registration()
 
     @property
     def cuts(self) -> tuple[CutLine, ...]:
@@ -312,6 +314,7 @@ class Session:
 
     def accept(self, candidate: Candidate) -> None:
         """Navigate by the candidate that is under review."""
+        self._cuts.forget_faces(self._stage.bone)
         self._tracks.accept(self._stage)
         text = add_bound("registration accepted", candidate.tracked.verdict)
         self.change_state(SessionState.NAVIGATING, text)

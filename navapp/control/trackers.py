@@ -20,10 +20,14 @@ from navapp.values import (
     Plan,
     PoseEstimate,
     Prior,
+    Reason,
     StageSpec,
     Status,
     TrackedFrame,
 )
+
+# What is said of a bone that was found, but of which too little is matched.
+_LOOSE = frozenset({Reason.COVERAGE_LOW, Reason.POSE_UNCERTAIN})
 
 # Makes the tracker of one bone; the aspects are None where no search needs them.
 MakeTracker = Callable[[StereoRig, BoneModel, TrackerSettings, AspectGraph | None], Tracker]
@@ -136,22 +140,25 @@ class Trackers:
     ) -> list[TrackedFrame]:
         """Search for a stage's bone in a frame, from the prior; best answer first, may be empty."""
         tracker, goal = self._searching_tracker(stage.bone), self.goal(stage)
+        bone = self.bone(stage.bone)
         answers = tracker.register(frame.left, frame.right, self._prior, goal, on_progress)
-        return self._look_closer(stage, frame, answers)
+        return self._look_closer(stage, bone, frame, answers)
 
     def _look_closer(
-        self, stage: StageSpec, frame: StereoFrame, answers: list[TrackedFrame]
+        self, stage: StageSpec, bone: CutBone, frame: StereoFrame, answers: list[TrackedFrame]
     ) -> list[TrackedFrame]:
-        """The same answers, or better ones of a cut bone that was found, but too loosely.
+        """The same answers, or a better first one of a cut bone that was found, but too loosely.
 
-        Where its faces are, relative to the pose, the same picture tells: then less of the bone
-        beside them is unsure.
+        Where its faces are, relative to the cameras, the same picture tells, whatever the error of
+        the pose: then less of the bone beside them is unsure, and more of it is matched. The faces
+        themselves fix nothing.
         """
-        bone = self.bone(stage.bone)
         if not bone.unmeasured or not answers or answers[0].estimate is None:
             return answers
         best, estimate = answers[0], answers[0].estimate
-        if best.verdict.status is not Status.DEGRADED:
+        if best.verdict.status is not Status.DEGRADED or not _LOOSE.issuperset(
+            best.verdict.reasons
+        ):
             return answers
         faces = {
             name: face
@@ -164,7 +171,7 @@ class Trackers:
         prior = Prior({stage.bone: estimate.camera_from_bone})
         closer = tracker.register(frame.left, frame.right, prior, self.goal(stage))
         is_better = bool(closer) and closer[0].verdict.rank < best.verdict.rank
-        return closer if is_better else answers
+        return [closer[0], *answers[1:]] if is_better else answers
 
     def _face_beside(
         self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str

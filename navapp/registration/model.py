@@ -63,17 +63,21 @@ class RegistrationModel:
         return not has_border and mesh.volume_mm3() > 0.0
 
     def render(
-        self, camera_from_bone: RigidTransform, geometry: RectifiedGeometry, box: Box
+        self,
+        camera_from_bone: RigidTransform,
+        geometry: RectifiedGeometry,
+        box: Box,
+        *,
+        has_lid: bool = False,
     ) -> RenderedView:
         """The bone at a pose in the rectified left camera, in a box of its picture.
 
-        Its lid hides what lies behind, but is not seen itself.
+        Its lid hides what lies behind, but is not seen itself unless that is asked for.
         """
-        view = render_rectified(
-            self.rendered_mesh, camera_from_bone, geometry, box, is_closed=self.is_closed
-        )
-        if self.bone.lid is not None:
-            is_lid = view.face_index >= len(self.rendered_mesh.faces) - len(self.bone.lid.faces)
+        mesh, lid = self.rendered_mesh, self.bone.lid
+        view = render_rectified(mesh, camera_from_bone, geometry, box, is_closed=self.is_closed)
+        if lid is not None and not has_lid:
+            is_lid = view.face_index >= len(mesh.faces) - len(lid.faces)
             view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1
         return view
 

@@ -29,7 +29,7 @@ class CutBone:
     def model(self) -> BoneModel:
         """What is left of the bone, to be registered to."""
         left = remove_cuts(self.planned, [self._cut(name) for name in self.made])
-        return replace(left, version=self.planned.version + self.version)
+        return replace(left, version=self.version)
 
     @cached_property
     def surface(self) -> TriangleMesh | None:
@@ -54,6 +54,10 @@ class CutBone:
         made = {other: plane for other, plane in self.made.items() if other != name}
         faces = {other: face for other, face in self.faces.items() if other != name}
         return CutBone(self.planned, made, faces, self.version + 1)
+
+    def without_faces(self) -> "CutBone":
+        """With its cuts, and nothing known of their faces."""
+        return CutBone(self.planned, self.made, {}, self.version + 1)
 
     def with_faces(self, faces: Mapping[str, MeasuredFace]) -> "CutBone":
         """With the faces of some of its cuts as measured."""

@@ -11,15 +11,20 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray
+from navapp.stereo import MODEL_REFINEMENT
 
 # All chosen. Widths of the kernel, px, from far to near, and the least one in sigmas.
 _WIDTHS_PX = (0.6, 0.6, 0.4, 0.25, 0.2)
+_MOST_STEPS, _REST_PX = 30, 1e-3
 # Most of a nearly parallel plane lies within so much of another.
 _WINDOW_PX = 0.6
 _LEAST_WIDTH_SIGMAS = 1.6
 # Residuals inside a square of this size may go together: marks of the saw's teeth, cortex, blood.
 _BLOCK_PX = 24
 _LEAST_BLOCKS = 6
+# Neighbouring squares share what a matching window sees across their border: of a triangular
+# correlation as long as a window, sums over squares hold all but a third of window over square.
+_ACROSS_BLOCKS = (1.0 - (2 * MODEL_REFINEMENT.radius_px + 1) / (3.0 * _BLOCK_PX)) ** -2
 # What all disparities of a face may have in common.
 _COMMON_PX = 0.02
 
@@ -29,7 +34,7 @@ class DisparityPlane:
     """d = `coefficients` . (u - c_x, v - c_y, 1), of a rectified pair."""
 
     coefficients: FloatArray  # (3,) px per px, px per px, px
-    covariance: FloatArray  # (3, 3) of the coefficients
+    covariance: FloatArray  # (3, 3) of the coefficients, `_COMMON_PX` included
     is_on: NDArray[np.bool_]  # (N,) measured pixels that lie on it
     width_px: float  # what lies nearer than this is on it
 
@@ -86,7 +91,7 @@ def fit_disparity_plane(
     coefficients[2] += _find_densest(disparity_px - places @ coefficients, reach_px)
     least_px = _LEAST_WIDTH_SIGMAS * sigma_px
     for width_px in _WIDTHS_PX:
-        for _ in range(4):
+        for _ in range(_MOST_STEPS):
             residual = disparity_px - places @ coefficients
             kernel_px = np.maximum(width_px, least_px)
             weight = np.exp(-0.5 * (residual / kernel_px) ** 2) / sigma_px**2
@@ -95,10 +100,15 @@ def fit_disparity_plane(
                 return None
             step = np.linalg.solve(normal_matrix, (places * weight[:, None]).T @ residual)
             coefficients = coefficients + step
+            if np.abs(places @ step).max() < _REST_PX:
+                break
     residual = disparity_px - places @ coefficients
     width_px = 2.0 * max(_WIDTHS_PX[-1], float(np.median(least_px)))
     is_on = np.abs(residual) < width_px
-    covariance = _covariance(places[is_on], weight[is_on], residual[is_on])
+    kernel_px = np.maximum(_WIDTHS_PX[-1], least_px)
+    # How fast the pull of a residual grows: less than its weight says, near the kernel's edge.
+    growth = weight * (1.0 - (residual / kernel_px) ** 2)
+    covariance = _covariance(places[is_on], weight[is_on], growth[is_on], residual[is_on])
     return None if covariance is None else DisparityPlane(coefficients, covariance, is_on, width_px)
 
 
@@ -113,8 +123,10 @@ def _find_densest(residual: FloatArray, reach_px: float) -> float:
     return min(max(middle, -reach_px), reach_px)
 
 
-def _covariance(places: FloatArray, weight: FloatArray, residual: FloatArray) -> FloatArray | None:
-    """(3, 3) of the coefficients; None from too few squares of pixels."""
+def _covariance(
+    places: FloatArray, weight: FloatArray, growth: FloatArray, residual: FloatArray
+) -> FloatArray | None:
+    """(3, 3) of the coefficients; None from too few squares of pixels, or without a sure plane."""
     squares = np.floor(places[:, :2] / _BLOCK_PX).astype(np.int64)
     _, block = np.unique(squares, axis=0, return_inverse=True)
     n = int(block.max(initial=-1)) + 1
@@ -122,7 +134,10 @@ def _covariance(places: FloatArray, weight: FloatArray, residual: FloatArray) ->
         return None
     pulls = places * (weight * residual)[:, None]
     sums = np.stack([np.bincount(block.ravel(), pulls[:, k], n) for k in range(3)], axis=1)
-    inverse = np.linalg.inv((places * weight[:, None]).T @ places)
-    spread = inverse @ (sums.T @ sums) @ inverse * n / (n - 3)
+    stiffness = (places * growth[:, None]).T @ places
+    if not np.linalg.eigvalsh(stiffness)[0] > 0.0:
+        return None
+    inverse = np.linalg.inv(stiffness)
+    spread = inverse @ (sums.T @ sums) @ inverse * n / (n - 3) * _ACROSS_BLOCKS
     spread[2, 2] += _COMMON_PX**2
     return np.asarray(spread)

@@ -44,6 +44,11 @@ _NEAR_PX = 1.0
 # A saw misses its plan by no more: what is flat, but lies further off, is something else.
 _MOST_OFF_MM, _MOST_TILT_DEG = 4.0, 6.0
 _LEAST_PIXELS = 300
+# A face that is seen at a grazing angle tells nothing; one of which most lies beside the picture
+# neither.
+_LEAST_COSINE, _MOST_PICTURES = 0.17, 20
+# Errors that all of a bone's surface shares turn a pose by as much as they are over this length.
+_LEVER_MM = 30.0
 # Another cut's bone is gone as well, and its edge is as wide.
 _BESIDE_MM = 1.0
 
@@ -54,7 +59,8 @@ class _View:
 
     box: Box
     is_face: NDArray[np.bool_]  # (h, w) without its rim
-    n_whole: int
+    n_whole: int  # without their rim as well; outside of the picture, too
+    depths_mm: tuple[float, float]  # least and largest
 
 
 class FaceMeter:
@@ -63,7 +69,7 @@ class FaceMeter:
     def __init__(self, rig: StereoRig, bone: BoneModel) -> None:
         self._rectifier = Rectifier(rig)
         self._geometry = self._rectifier.geometry
-        self._bone = bone
+        self._bone, self._quality = bone, rig.quality
         self._centre_mm = bone.mesh.centroid_mm
         self._rest = lru_cache(maxsize=8)(_make_rest)
 
@@ -99,7 +105,7 @@ class FaceMeter:
             if view is None:
                 return None
             if pair is None or view.box.intersect(pair.box) != view.box:
-                pair = self._rectify(left, right, view.box, coefficients)
+                pair = self._rectify(left, right, view)
             fit = self._fit(replace(pair, box=view.box), view, coefficients, is_far=is_far)
             if fit is None:
                 return None
@@ -128,27 +134,34 @@ class FaceMeter:
     ) -> _View | None:
         """Where the face is seen; None when it looks away, or out of view."""
         normal = rectified_from_bone.rotate(plane.normal[None])[0]
-        if normal @ rectified_from_bone.apply(plane.point_mm[None])[0] >= 0.0:
+        point_mm = rectified_from_bone.apply(plane.point_mm[None])[0]
+        if -(normal @ point_mm) < _LEAST_COSINE * np.linalg.norm(point_mm):
             return None
         mesh = self._bone.mesh
         lines = section_lines(mesh, find_piece(mesh, Cut(plane, 0.0)))
         face = fill_section(lines, plane.normal)
         if face is None:
             return None
-        pixels = self._geometry.project(rectified_from_bone.apply(face.vertices_mm))
-        around = Box.around(pixels)
-        if around is None:
+        corners_mm = rectified_from_bone.apply(face.vertices_mm)
+        around = Box.around(self._geometry.project(corners_mm))
+        if around is None or corners_mm[:, 2].min() <= 0.0:
             return None
-        box = around.grow(_MARGIN_PX).clip(self._geometry.width, self._geometry.height)
-        if box.is_empty:
+        around = around.grow(_MARGIN_PX)
+        box = around.clip(self._geometry.width, self._geometry.height)
+        is_near = around.width * around.height > _MOST_PICTURES * box.width * box.height
+        if box.is_empty or is_near:
             return None
         others = [one for one in made if one is not planned]
         rest = self._rest(self._bone, tuple(made))
         both = render_rectified(join_meshes(rest, face), rectified_from_bone, self._geometry, box)
-        alone = render_rectified(face, rectified_from_bone, self._geometry, box)
-        is_kept = self._is_kept(alone.depth_mm, box, others, rectified_from_bone)
-        is_seen = (both.face_index >= len(rest.faces)) & is_kept
-        return _View(box, _erode(is_seen), int(np.count_nonzero(_erode(alone.mask & is_kept))))
+        alone = render_rectified(face, rectified_from_bone, self._geometry, around)
+        is_kept = self._is_kept(alone.depth_mm, around, others, rectified_from_bone)
+        is_seen = (both.face_index >= len(rest.faces)) & is_kept[box.relative_to(around).slices]
+        is_face, n_whole = _erode(is_seen), int(np.count_nonzero(_erode(alone.mask & is_kept)))
+        if np.count_nonzero(is_face) < _LEAST_PIXELS:
+            return None
+        depths_mm = float(corners_mm[:, 2].min()), float(corners_mm[:, 2].max())
+        return _View(box, is_face, n_whole, depths_mm)
 
     def _is_kept(
         self,
@@ -170,20 +183,15 @@ class FaceMeter:
         is_kept[rows, columns] = ~is_gone
         return is_kept
 
-    def _rectify(
-        self, left: Image, right: Image, box: Box, coefficients: FloatArray
-    ) -> RectifiedPair:
-        return self._rectifier.rectify(
-            left, right, box, self._band_px(box, coefficients), is_grey=True
-        )
+    def _rectify(self, left: Image, right: Image, view: _View) -> RectifiedPair:
+        band_px = self._band_px(view)
+        return self._rectifier.rectify(left, right, view.box, band_px, is_grey=True)
 
-    def _band_px(self, box: Box, coefficients: FloatArray) -> tuple[float, float]:
-        """Smallest and largest disparity of the plane in a box, and around it."""
-        corners = self._places(np.array([[box.x, box.y], [box.x + box.width, box.y + box.height]]))
-        mixed = np.array([[corners[i, 0], corners[j, 1], 1.0] for i in (0, 1) for j in (0, 1)])
-        depths_mm = [self._geometry.depth_mm(d) for d in mixed @ coefficients if d > 0.0]
-        far, near = max(depths_mm) + _BAND_MM, max(min(depths_mm) - _BAND_MM, 1.0)
-        return self._geometry.disparity_px(far), self._geometry.disparity_px(near)
+    def _band_px(self, view: _View) -> tuple[float, float]:
+        """Smallest and largest disparity on the face, and around it."""
+        near_mm, far_mm = view.depths_mm
+        near_mm, far_mm = max(near_mm - _BAND_MM, 1.0), far_mm + _BAND_MM
+        return self._geometry.disparity_px(far_mm), self._geometry.disparity_px(near_mm)
 
     def _places(self, pixels: NDArray[np.int64]) -> FloatArray:
         """(N, 3) of (u - c_x, v - c_y, 1)."""
@@ -195,8 +203,7 @@ class FaceMeter:
     ) -> DisparityPlane | None:
         """The plane of what was matched on the face; None where too little is."""
         if is_far:
-            band_px = self._band_px(view.box, coefficients)
-            found = match_surface(pair, band_px, fills=False).disparity
+            found = match_surface(pair, self._band_px(view), fills=False).disparity
             reach_px = self._reach_px(view.box, coefficients)
             return self._fit_pixels(found, view.is_face, coefficients, reach_px)
         found = self._refine(pair, view, coefficients)
@@ -205,7 +212,7 @@ class FaceMeter:
             return None
         # What covers a part of the face is seen by the windows beside it as well.
         inside = view.is_face & ~_grow(_without_specks(view.is_face & ~self._is_on(found, fit)))
-        return self._fit_pixels(found, inside, fit.coefficients, _NEAR_PX) or fit
+        return self._fit_pixels(found, inside, fit.coefficients, _NEAR_PX)
 
     def _reach_px(self, box: Box, coefficients: FloatArray) -> float:
         """How far a saw may have missed, in disparity: along the view at most."""
@@ -297,13 +304,23 @@ class FaceMeter:
             ],
             axis=1,
         )
+        common = np.diag(self._common_sd(left_from_bone) ** 2)
         return MeasuredFace(
             planned,
             value,
             by_fit @ fit.covariance @ by_fit.T,
-            by_pose @ estimate.covariance @ by_pose.T,
+            by_pose @ estimate.covariance @ by_pose.T + common,
             seen_share,
         )
+
+    def _common_sd(self, left_from_bone: RigidTransform) -> FloatArray:
+        """(3,) of tilts and offset: what the plan's surface and the rig add to any pose's error."""
+        bone = self._bone
+        depth_mm = float(left_from_bone.apply(self._centre_mm[None])[0, 2])
+        cartilage_mm = float(np.sqrt(np.mean(bone.cartilage_sd_mm**2)))
+        rig_mm = 0.0 if self._quality is None else self._quality.error_mm(depth_mm)
+        sd_mm = np.sqrt(cartilage_mm**2 + bone.surface_sd_mm**2 + (0.5 * rig_mm) ** 2)
+        return np.array([sd_mm / _LEVER_MM, sd_mm / _LEVER_MM, sd_mm])
 
 
 def _tilts_offset(

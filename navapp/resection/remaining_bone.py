@@ -16,7 +16,7 @@ class Cut(NamedTuple):
     """A cut that has been made."""
 
     plane: ResectionPlane  # as planned, or as measured
-    unsure_mm: float  # bone so near to the plane may be gone as well
+    unsure_mm: float  # bone so far below the plane may be gone as well
 
 
 def find_piece(mesh: TriangleMesh, cut: Cut) -> FloatArray:
@@ -62,9 +62,19 @@ def remove_cuts(bone: BoneModel, cuts: Sequence[Cut]) -> BoneModel:
 
 def cut_surface(mesh: TriangleMesh, planes: Sequence[ResectionPlane]) -> TriangleMesh:
     """A bone's surface after cuts, with their faces: to be looked at."""
+    skin, faces = mesh, []
     for plane in planes:
         height_mm = find_piece(mesh, Cut(plane, 0.0))
         face = fill_section(section_lines(mesh, height_mm), plane.normal)
-        mesh = clip_below(mesh, height_mm)
-        mesh = mesh if face is None else join_meshes(mesh, face)
-    return mesh
+        for other in planes:
+            if face is not None and other is not plane:
+                face = clip_below(face, _height_over_mm(face, other))
+        faces += [] if face is None else [face]
+        skin = clip_below(skin, find_piece(skin, Cut(plane, 0.0)))
+    return join_meshes(skin, *faces)
+
+
+def _height_over_mm(mesh: TriangleMesh, plane: ResectionPlane) -> FloatArray:
+    """(V,) height over a plane; -1 beyond its planned rectangle."""
+    height_mm = plane.heights_mm(mesh.vertices_mm)
+    return np.where(plane.is_over(mesh.vertices_mm), height_mm, np.minimum(height_mm, -1.0))

@@ -110,7 +110,10 @@ class PoseJudge:
         """What stands in front of the bone at its pose; None where the gaps are not filled."""
         if (surroundings := checks.surroundings(frame.watch)) is None:
             return None
-        found = find_foreground(surroundings, fit.measured.disparity, view, self._meter.geometry)
+        model, geometry = self._meter.model, self._meter.geometry
+        if model.bone.lid is not None:  # what lies over the face of a cut hides the bone as well
+            view = model.render(fit.pose, geometry, view.box, has_lid=True)
+        found = find_foreground(surroundings, fit.measured.disparity, view, geometry)
         frame.watch.lap("fill")
         return found
 

@@ -16,6 +16,7 @@ from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 from navapp.values import MeasuredFace, StageSpec
+from navapp.values.faces import LEAST_SHARE
 
 # The cuts of a stage in their order.
 CUT_KEYS = "bcdfghij"
@@ -51,24 +52,39 @@ def _tell_face(cut: CutLine, stage: StageSpec, symbols: Symbols) -> list[Content
         return []
     if cut.face is not None:
         return _tell_measured(cut.face, stage, symbols)
-    seen = "it is not seen"
+    seen = "it is not seen, or was not looked for yet"
     if cut.seen_share is not None:
         seen = f"{100.0 * cut.seen_share:.0f} % of the cut is seen"
+        seen += "" if cut.seen_share < LEAST_SHARE else ", its bounds are too large"
     return [Content.styled(f"      not measurable: {seen}", "$warning")]
 
 
 def _tell_measured(face: MeasuredFace, stage: StageSpec, symbols: Symbols) -> list[Content]:
     rows = (
-        ("tilt", face.angle_deg, face.bound_deg, stage.tolerance_deg, "deg"),
-        ("offset", face.offset_mm, face.bound_mm, stage.tolerance_mm, "mm"),
+        (
+            "tilt",
+            f"{face.angle_deg:.2f}",
+            face.angle_deg,
+            face.bound_deg,
+            stage.tolerance_deg,
+            "deg",
+        ),
+        (
+            "offset",
+            f"{face.offset_mm:+.2f}",
+            face.offset_mm,
+            face.bound_mm,
+            stage.tolerance_mm,
+            "mm",
+        ),
     )
     return [
         Content.assemble(
-            f"      {what:<7}{value:+6.2f} {unit:<4}+-{bound:5.2f}  ",
+            f"      {what:<7}{told:>6} {unit:<4}+-{bound:5.2f}  ",
             (draw_bar(abs(value), tolerance, _BAR_WIDTH, symbols), _style(value, bound, tolerance)),
             (f"  tolerance {tolerance:.1f}", "$text-muted"),
         )
-        for what, value, bound, tolerance, unit in rows
+        for what, told, value, bound, tolerance, unit in rows
     ]
 
 

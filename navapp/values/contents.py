@@ -15,9 +15,9 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
 PartKind = Literal["implant", "spacer"]
-# Of the mechanical axes; they lie outside the usual field of view and may be absent.
-# A cut may reach beyond its planned rectangle by this share.
+# A cut may be as much longer and broader than its planned rectangle.
 _REACH = 1.3
+# Of the mechanical axes; they lie outside the usual field of view and may be absent.
 HIP_CENTRE, ANKLE_CENTRE = "femur/hip_centre", "tibia/ankle_centre"
 
 

@@ -19,8 +19,9 @@ LEAST_SHARE, MOST_DEG, MOST_MM = 0.25, 1.0, 0.4
 class MeasuredFace:
     """A face that a saw left, in the bone's coordinates, beside the plane that was planned.
 
-    It is described by three numbers: the tilts (rad) of its normal towards the two `axes` of the
-    planned plane, and its distance (mm) beyond the planned point along its own normal.
+    It is described by three numbers: the tangents of its normal's tilts from the planned normal
+    towards the two `axes` of the planned plane, and its distance in mm from the planned point along
+    its own normal; positive: less bone is gone.
     """
 
     plane: ResectionPlane  # planned
@@ -121,7 +122,17 @@ def join_faces(faces: Sequence[MeasuredFace]) -> MeasuredFace:
         np.sum(
             [s @ face.matching_covariance @ s.T for s, face in zip(shares, faces, strict=True)], 0
         ),
-        # Fully correlated: the mean of the covariances bounds that of the mean.
-        np.mean([face.pose_covariance for face in faces], axis=0),
+        _add_all_one_way(
+            [s @ face.pose_covariance @ s.T for s, face in zip(shares, faces, strict=True)]
+        ),
         max(face.seen_share for face in faces),
     )
+
+
+def _add_all_one_way(covariances: Sequence[FloatArray]) -> FloatArray:
+    """(3, 3) of a sum of errors (3,) that may all go the same way: their deviations add up."""
+    root = np.zeros((3, 3))
+    for covariance in covariances:
+        values, axes = np.linalg.eigh(covariance)
+        root += (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T
+    return root @ root

@@ -1,5 +1,6 @@
 """Cuts are confirmed, measured and withdrawn in a session."""
 
+import threading
 from dataclasses import replace
 from itertools import pairwise
 
@@ -7,11 +8,12 @@ import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.executors import ThreadExecutor
 from navapp.control.states import ConfirmCut, EnterStage, Register, Snapshot, WithdrawCut
 from navapp.errors import UsageError
 from navapp.resection import FaceMeter
 from navapp.values import MeasuredFace, Plan, ResectionPlane, Status, SurgicalContent
-from tests.control.fakes import Bench, a_plan, answer, navigating
+from tests.control.fakes import Bench, a_plan, answer, navigating, wait_for
 
 # Across the bowl of the plan's bones: beyond it lies its rim.
 TOP = ResectionPlane("femur", np.array([0.0, 0.0, 8.0]), np.array([0.0, 0.0, 1.0]), (100.0, 100.0))
@@ -174,10 +176,14 @@ def test_nothing_is_kept_of_a_candidate_that_nobody_has_accepted(faces: Faces) -
     assert bench.snapshot.cuts[0].face is not None
 
 
-def test_a_cut_confirmed_again_is_measured_again(bench: Bench, faces: Faces) -> None:
+def test_a_cut_withdrawn_and_made_again_is_measured_again(bench: Bench, faces: Faces) -> None:
     faces.shares["top"] = 0.8
     bench.do(ConfirmCut("top"))
     bench.frames(30)
+    bench.do(ConfirmCut("top"))
+    assert "is confirmed already" in bench.refused()
+    assert bench.snapshot.cuts[0].face is not None
+    bench.do(WithdrawCut("top"))
     snapshot = bench.do(ConfirmCut("top"))
     assert snapshot.cuts[0].face is None
     assert snapshot.cuts[0].seen_share is None
@@ -199,3 +205,38 @@ def test_a_session_can_begin_with_cuts_made() -> None:
     vertices_mm = cut_plan().bones["femur"].mesh.vertices_mm
     is_left = (vertices_mm[:, 2] <= 6.5) & (vertices_mm[:, 0] <= 23.5)
     np.testing.assert_array_equal(used_by_tracker(bench), is_left)
+
+
+def test_a_new_registration_forgets_what_was_measured_with_the_old_one(
+    bench: Bench, faces: Faces
+) -> None:
+    faces.shares["top"] = 0.8
+    bench.do(ConfirmCut("top"))
+    assert bench.frames(30).bone_version == 2
+    bench.do(Register())
+    bench.frames(3)
+    snapshot = bench.accept()
+    assert snapshot.cuts[0].is_made
+    assert snapshot.cuts[0].face is None
+    assert snapshot.bone_version == 3
+    bench.frames(1)
+    heights_mm = cut_plan().bones["femur"].mesh.vertices_mm[:, 2]
+    np.testing.assert_array_equal(used_by_tracker(bench), heights_mm <= 6.5)
+
+
+def test_a_search_begins_anew_when_the_bone_is_cut_meanwhile() -> None:
+    bench = Bench(plan=cut_plan(), executor=ThreadExecutor())
+    bench.frames(1)
+    bench.script.gate = threading.Event()
+    bench.do(Register())
+    bench.frames(1)
+    assert bench.script.started.wait(5.0)
+    bench.script.started.clear()
+    bench.do(ConfirmCut("top"))
+    bench.frames(1)
+    assert bench.script.started.wait(5.0)
+    bench.script.gate.set()
+    wait_for(lambda: bench.frames(1).is_candidate, "a candidate")
+    assert bench.script.calls.count("register femur") == 2
+    assert bench.trackers["femur"].bone.is_removed.any()
+    bench.controller.close()

@@ -15,6 +15,7 @@ from navapp.values import (
     MeasuredFace,
     PoseEstimate,
     Prior,
+    Reason,
     ResectionPlane,
     Status,
 )
@@ -157,7 +158,8 @@ class LooseMaker(Maker):
     def __call__(self, rig, bone, settings, aspects) -> FakeTracker:
         tracker = super().__call__(rig, bone, settings, aspects)
         is_loose = bone.is_removed.mean() > 0.5
-        tracker.script = Script(found=[answer(Status.DEGRADED if is_loose else Status.OK)])
+        loose = answer(Status.DEGRADED, Reason.POSE_UNCERTAIN)
+        tracker.script = Script(found=[loose if is_loose else answer(Status.OK)])
         return tracker
 
 

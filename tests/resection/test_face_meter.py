@@ -1,8 +1,11 @@
 """Faces of cuts, measured in pictures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from navapp.geometry.transform import RigidTransform
 from navapp.resection import FaceMeter
 from navapp.values import MeasuredFace, ResectionPlane, join_faces
 from tests.resection.cuts import MADE, PLANNED, POSE_SD, Cover, bone, estimate, pictures, pose, rig
@@ -84,3 +87,35 @@ def test_measurements_join_but_errors_of_the_pose_stay(meter: FaceMeter) -> None
     assert errors(joined)[0] < 0.12
     with pytest.raises(ValueError, match="no measurement"):
         join_faces([])
+
+
+@pytest.mark.parametrize("tilt_deg", [60.0, 75.0, 82.0, 86.0, 88.3, 89.0, 90.0, 95.0])
+def test_a_face_seen_at_a_grazing_angle_tells_nothing_and_breaks_nothing(
+    meter: FaceMeter, tilt_deg: float
+) -> None:
+    face = meter.measure(*pictures(pose()), estimate(pose(tilt_deg)), [PLANNED], PLANNED)
+    assert face is None or tilt_deg < 85.0
+
+
+def test_what_lies_beside_the_picture_is_not_seen(meter: FaceMeter) -> None:
+    whole = RigidTransform("left", "femur", pose().matrix)
+    moved = RigidTransform.from_parts(
+        "left", "femur", whole.rotation, whole.translation_mm + np.array([0.0, -42.0, 0.0])
+    )
+    face = meter.measure(*pictures(moved), estimate(moved), [PLANNED], PLANNED)
+    assert face is not None
+    assert 0.2 < face.seen_share < 0.75
+
+
+def test_errors_that_the_plan_and_the_rig_share_are_in_the_bound(meter: FaceMeter) -> None:
+    taken = *pictures(pose()), estimate(pose()), [PLANNED], PLANNED
+    plain = meter.measure(*taken)
+    n = len(bone().mesh.vertices_mm)
+    segmented = replace(bone(), surface_sd_mm=0.1)
+    covered = replace(bone(), cartilage_sd_mm=np.full(n, 0.1))
+    for one in (segmented, covered):
+        face = FaceMeter(rig(), one).measure(*taken)
+        assert face is not None
+        assert plain is not None
+        assert face.bound_mm == pytest.approx(np.hypot(plain.bound_mm, 1.96 * 0.1), rel=0.02)
+        assert face.bound_deg > 1.5 * plain.bound_deg

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh, join_meshes
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel
 from navapp.resection.cut_bone import SURE_MM, UNSURE_MM, CutBone
 from navapp.resection.remaining_bone import Cut, remove_cuts
 from navapp.values import BoneModel, MeasuredFace, ResectionPlane
+from tests.registration.shapes import GEOMETRY
 from tests.resection.cuts import MADE, PLANNED, bone
 
 
@@ -49,8 +52,20 @@ def test_the_lid_closes_the_bone_and_is_not_seen() -> None:
     assert lid is not None
     flat = lid.face_areas_mm2()[np.ptp(lid.vertices_mm[lid.faces, 2], axis=1) < 1e-6].sum()
     assert flat == pytest.approx(np.pi * (30.0**2 - 10.5**2), rel=0.01)
-    assert len(model.rendered_mesh.faces) > len(lid.faces)
     assert (model.rendered_face_sigma_mm > 0.0).all()
+    # Seen from above: the lid is there, but told from what is seen.
+    away = RigidTransform.from_parts(
+        "left_rect", "femur", rotation_from_vector((np.pi, 0.0, 0.0)), (0.0, 0.0, 450.0)
+    )
+    box = Box(0, 0, GEOMETRY.width, GEOMETRY.height)
+    seen, whole = model.render(away, GEOMETRY, box), model.render(away, GEOMETRY, box, has_lid=True)
+    assert whole.mask.sum() > 1.5 * seen.mask.sum()
+    np.testing.assert_array_equal(seen.mask, np.isfinite(seen.depth_mm))
+    # Without a lid the inside would be seen through the hole.
+    np.testing.assert_array_equal(seen.depth_mm[seen.mask], whole.depth_mm[seen.mask])
+    middle = round(GEOMETRY.centre_y_px), round(GEOMETRY.centre_x_px)
+    assert whole.depth_mm[middle] == pytest.approx(450.0 - 10.5, abs=0.1)
+    assert not seen.mask[middle]
 
 
 def test_a_measured_face_leaves_less_unsure() -> None:
@@ -98,3 +113,15 @@ def test_the_surface_that_is_looked_at_ends_at_the_faces() -> None:
             np.pi * (4.0 / 3.0 * 30.0**3 - (30.0 - level_mm) ** 2 * (60.0 + level_mm) / 3.0),
             rel=0.01,
         )
+
+
+def test_the_faces_of_two_cuts_that_cross_close_the_bone() -> None:
+    side = ResectionPlane("femur", np.array([12.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    surface = CutBone(bone()).cut("top", PLANNED).cut("side", side).surface
+    assert surface is not None
+    used = surface.vertices_mm[np.unique(surface.faces)]
+    assert used[:, [0, 2]].max() == pytest.approx(12.0)
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-30.0, 30.0, (400_000, 3))
+    is_left = (np.linalg.norm(points, axis=1) < 30.0) & (points[:, [0, 2]] < 12.0).all(axis=1)
+    assert surface.volume_mm3() == pytest.approx(is_left.mean() * 60.0**3, rel=0.02)

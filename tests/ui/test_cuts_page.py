@@ -38,12 +38,14 @@ def test_cuts_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> No
         text = app.text_of(CutTable)
         lines = [line.rstrip() for line in text.splitlines()]
         assert lines[0].split() == ["b", "femur_distal", "made"]
-        assert "tilt    +1.30 deg +- 0.20" in lines[1]
+        assert "tilt     1.30 deg +- 0.20" in lines[1]
         assert "offset  -0.55 mm  +- 0.09" in lines[2]
         assert "tolerance 1.0" in lines[2]
         assert lines[3].split() == ["c", "femur_anterior", "made"]
-        assert lines[4].strip() == "not measurable: 38 % of the cut is seen"
-        assert lines[6].strip() == "not measurable: it is not seen"
+        assert (
+            lines[4].strip() == "not measurable: 38 % of the cut is seen, its bounds are too large"
+        )
+        assert lines[6].strip() == "not measurable: it is not seen, or was not looked for yet"
         assert lines[7].split() == ["f", "femur_anterior_chamfer", "planned"]
         assert "version 3 of the femur is in force" in text
         assert max(map(len, lines)) <= size[0] - 4
