@@ -10,7 +10,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.geometry.simplify import drawn
+from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, find_vertices
@@ -55,13 +55,6 @@ class RegistrationModel:
         mesh, lid = drawn(self.seen_mesh), self.bone.lid
         return mesh if lid is None else join_meshes(mesh, lid)
 
-    @cached_property
-    def is_closed(self) -> bool:
-        """What is rendered has no border and looks outward."""
-        mesh = self.rendered_mesh
-        has_border = open_border(len(mesh.vertices_mm), mesh.faces).any()
-        return not has_border and mesh.volume_mm3() > 0.0
-
     def render(
         self,
         camera_from_bone: RigidTransform,
@@ -70,12 +63,9 @@ class RegistrationModel:
         *,
         has_lid: bool = False,
     ) -> RenderedView:
-        """The bone at a pose in the rectified left camera, in a box of its picture.
-
-        Its lid hides what lies behind, but is not seen itself unless that is asked for.
-        """
+        """The bone at a pose in a box of the rectified left view; its lid hides, unseen or seen."""
         mesh, lid = self.rendered_mesh, self.bone.lid
-        view = render_rectified(mesh, camera_from_bone, geometry, box, is_closed=self.is_closed)
+        view = render_rectified(mesh, camera_from_bone, geometry, box, is_closed=is_closed(mesh))
         if lid is not None and not has_lid:
             is_lid = view.face_index >= len(mesh.faces) - len(lid.faces)
             view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1
@@ -85,8 +75,7 @@ class RegistrationModel:
     def rendered_face_sigma_mm(self) -> FloatArray:
         """(F,) `sigma_mm` of the triangles that are rendered."""
         _, nearest = cKDTree(self.points_mm).query(self.rendered_mesh.vertices_mm, workers=2)
-        mean_mm: FloatArray = self.sigma_mm[nearest][self.rendered_mesh.faces].mean(axis=1)
-        return mean_mm
+        return np.asarray(self.sigma_mm[nearest][self.rendered_mesh.faces].mean(axis=1))
 
     @cached_property
     def arrays(self) -> ModelArrays:

@@ -189,7 +189,8 @@ class PoseJudge:
         if agreement is None or agreement.n_visible == 0:
             return replace(known, missing=Reason.OUT_OF_VIEW)
         is_seen = model.bone.mesh.visible_vertices(estimate.camera_from_bone)
-        cartilage_sd_mm = _rms(model.bone.cartilage_sd_mm[is_seen])
+        seen_sd_mm = model.bone.cartilage_sd_mm[is_seen]
+        cartilage_sd_mm = float(np.sqrt(np.mean(seen_sd_mm**2))) if len(seen_sd_mm) else 0.0
         plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_sd_mm, model.bone.surface_sd_mm)
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
         bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate))
@@ -247,10 +248,5 @@ class PoseJudge:
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:
     """What a pair says of its rig; None when its pictures or its points are too poor to tell."""
     light = (Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE)
-    if math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons):
-        return None
-    return RowCheck(health.row_offset_px, evidence.row_error_mm > OK_ERROR_MM)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+    is_poor = math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons)
+    return None if is_poor else RowCheck(health.row_offset_px, evidence.row_error_mm > OK_ERROR_MM)

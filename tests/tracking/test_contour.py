@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from navapp.geometry.simplify import is_closed
 from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.outline import OutlineMeter
@@ -22,7 +23,11 @@ def test_the_outline_moves_onto_the_edges_of_both_pictures() -> None:
 
     def mean_square_px2(pose) -> float:
         view = render_rectified(
-            model.rendered_mesh, pose, meter.geometry, measured.box, is_closed=model.is_closed
+            model.rendered_mesh,
+            pose,
+            meter.geometry,
+            measured.box,
+            is_closed=is_closed(model.rendered_mesh),
         )
         return float(np.mean(outline.block(begun.pair, pose, view, measured).residual ** 2))
 
