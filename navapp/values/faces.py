@@ -84,11 +84,6 @@ class MeasuredFace:
         return is_seen and self.bound_deg <= MOST_DEG and self.bound_mm <= MOST_MM
 
     @property
-    def relative_to_pose(self) -> "MeasuredFace":
-        """The same without the error of the pose: where the face is when the pose is right."""
-        return replace(self, pose_covariance=np.zeros((3, 3)))
-
-    @property
     def as_plane(self) -> ResectionPlane:
         """The face as a plane of the planned extent."""
         return replace(self.plane, point_mm=self.point_mm, normal=self.normal)
