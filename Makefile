@@ -11,12 +11,13 @@ STAMP  := $(VENV)/.stamp-$(shell cat pyproject.toml constraints.txt | cksum | cu
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 # Compiled code does not check its indices: kernels run again with the check, and with a cache of
 # their own, because the cache does not know about that switch. Most of the time goes into
-# compiling: quickly rather than well, and each kernel once, in one worker.
+# compiling: quickly rather than well, and each kernel once, in one worker; a test that is the first
+# to ask for many kernels waits for all of them.
 KERNELS := $(shell find navapp sim_devices drivers calibration -name '*kernels.py' | sort)
 CHECKED_CACHE := $(VENV)/numba-boundscheck-$(shell cat $(KERNELS) | cksum | cut -d' ' -f1)
 CHECKED := NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 \
     NUMBA_CACHE_DIR=$(CHECKED_CACHE) \
-    $(PYTEST) -q -n 1 --every-kernel
+    $(PYTEST) -q -n 1 --timeout 900 --every-kernel
 # Every kernel is run by one of them at least: --every-kernel sees to it.
 KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests)
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
