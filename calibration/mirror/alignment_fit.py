@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mirror.alignment_start import AlignedDisplay
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.display_model import N_PARAMETERS, DisplayModel
 from navapp.geometry.display_model_errors import (
     EYE_NUMBERS,
-    perpendicular_axes,
     pixels_by_parameters,
     pixels_by_points,
 )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calibration.mirror.seen_views import KINDS, Marks
 from calibration.mirror.view_state import N_LENS, N_SCREEN, N_SHARED, N_VIEW, ViewState, predict
 from calibration.rig.equilibration import compute_unit_sizes, equilibrate
-from navapp.geometry.display_model_errors import perpendicular_axes
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calibration.mirror.seen_views import Marks
 from navapp.geometry.camera import Camera, distort
-from navapp.geometry.display_model_errors import perpendicular_axes
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.display_model_optics import Glass, VirtualScreen
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, rotation_from_vector

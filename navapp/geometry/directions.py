@@ -72,3 +72,12 @@ def turn_between(source: FloatArray, target: FloatArray) -> FloatArray:
             return np.eye(3)
         return rotation_from_vector(np.pi * np.cross(a, make_view_rotation(a)[0]))
     return rotation_from_vector(across * (np.arctan2(sine, float(a @ b)) / sine))
+
+
+def perpendicular_axes(directions: FloatArray) -> FloatArray:
+    """(N, 2, 3) two unit directions perpendicular to each of (N, 3)."""
+    ahead = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    least = np.argmin(np.abs(ahead), axis=1)
+    first = np.cross(ahead, np.eye(3)[least])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(ahead, first)], axis=1)

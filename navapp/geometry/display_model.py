@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from navapp.geometry import display_model_errors as errors
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.display_model_optics import Glass, VirtualScreen
 from navapp.geometry.display_model_view import (
     LEAST_DISTANCE_MM,
@@ -131,7 +132,7 @@ class DisplayModel:
                 screen.pitch_mm * (1.0 + float(d[6])), screen.bulge_mm + float(d[7])
             )
         if glass is not None and d[8:11].any():
-            axes = errors.perpendicular_axes(glass.normal[None])[0]
+            axes = perpendicular_axes(glass.normal[None])[0]
             normal = rotation_from_vector(d[9:11] @ axes) @ glass.normal
             thickness = abs(glass.thickness_mm + float(d[8]))
             glass = Glass(thickness, normal, glass.refractive_index)

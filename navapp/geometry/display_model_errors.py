@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri
 
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.transform import FloatArray
 
 if TYPE_CHECKING:
@@ -123,12 +124,3 @@ def screen_shift_mm(model: "DisplayModel", points_mm: FloatArray) -> float:
     seen = points_mm if model.glass is None else model.glass.apparent_mm(points_mm, eye)
     away = model.screen.normal * np.sign(model.screen.normal @ (model.screen.middle_mm - eye))
     return float(((seen - model.screen.points_mm(model.project(points_mm))) @ away).mean())
-
-
-def perpendicular_axes(directions: FloatArray) -> FloatArray:
-    """(N, 2, 3) two unit directions perpendicular to each of (N, 3)."""
-    ahead = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    least = np.argmin(np.abs(ahead), axis=1)
-    first = np.cross(ahead, np.eye(3)[least])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(ahead, first)], axis=1)

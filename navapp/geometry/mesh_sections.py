@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 
@@ -23,6 +24,32 @@ def section_lines(mesh: TriangleMesh, height_mm: FloatArray) -> list[FloatArray]
         points = mesh.vertices_mm[low]
         lines.append(points + share[:, None] * (mesh.vertices_mm[high] - points))
     return lines
+
+
+def find_piece(
+    mesh: TriangleMesh, height_mm: FloatArray, is_over: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """(V,) vertices of the piece that a cut takes off a mesh.
+
+    A plane meets other parts of a mesh, too. The piece is what hangs together beyond the plane and
+    lies, in part at least, over the place of the cut.
+
+    Args:
+        mesh: that is cut.
+        height_mm: (V,) distance of its vertices from the plane, positive beyond.
+        is_over: (V,) vertices over the place of the cut.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    is_beyond = height_mm > 0.0
+    edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    start, end = edges[is_beyond[edges].all(axis=1)].T
+    n = len(height_mm)
+    graph = coo_matrix((np.ones(len(start), dtype=np.int8), (start, end)), shape=(n, n))
+    _, part = connected_components(graph, directed=False)
+    is_piece: NDArray[np.bool_] = is_beyond & np.isin(part, part[is_beyond & is_over])
+    return is_piece
 
 
 def clip_below(mesh: TriangleMesh, height_mm: FloatArray) -> TriangleMesh:
@@ -80,7 +107,7 @@ def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | 
     if not closed:
         return None
     points = np.concatenate([line[:-1] for line in closed])
-    axes = _axes_across(normal)
+    axes = perpendicular_axes(normal[None])[0]
     flat = points @ axes.T
     try:
         faces = Delaunay(flat).simplices
@@ -98,14 +125,6 @@ def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | 
     is_turned = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0.0
     faces[is_turned] = faces[is_turned][:, ::-1]
     return TriangleMesh(points, faces.astype(np.int32), np.tile(normal, (len(points), 1)))
-
-
-def _axes_across(normal: FloatArray) -> FloatArray:
-    """(2, 3) unit directions of a plane, right-handed with its normal."""
-    least = np.eye(3)[int(np.abs(normal).argmin())]
-    first = np.cross(least, normal)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])
 
 
 def _is_enclosed(points: FloatArray, line: FloatArray) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.mesh_sections import section_lines
+from navapp.geometry.mesh_sections import find_piece, section_lines
 from navapp.geometry.transform import FloatArray
 from navapp.values import ResectionPlane
 
@@ -23,11 +23,14 @@ def cut_lines(mesh: TriangleMesh, plane: ResectionPlane) -> tuple[FloatArray, ..
 
 @lru_cache(maxsize=64)
 def depth_beyond(mesh: TriangleMesh, planes: tuple[ResectionPlane, ...]) -> FloatArray:
-    """(V,) how far each vertex lies beyond the plane furthest from it, mm; 0 where it stays."""
+    """(V,) how far each vertex of the pieces that the planes take off lies beyond, mm; else 0.
+
+    Of several planes the one furthest away counts.
+    """
     beyond_mm = np.zeros(len(mesh.vertices_mm))
     for plane in planes:
         height_mm = plane.heights_mm(mesh.vertices_mm)
-        is_cut = (height_mm > 0.0) & plane.is_over(mesh.vertices_mm)
+        is_cut = find_piece(mesh, height_mm, plane.is_over(mesh.vertices_mm))
         beyond_mm = np.maximum(beyond_mm, np.where(is_cut, height_mm, 0.0))
     return beyond_mm
 

@@ -25,11 +25,10 @@ from navapp.resection.face_fit import (
     fit_disparity_plane,
     plane_in_camera,
 )
-from navapp.resection.remaining_bone import Cut, find_piece, remove_cuts
+from navapp.resection.remaining_bone import Cut, heights_over, remove_cuts
 from navapp.stereo import MODEL_REFINEMENT, match_surface, refine_on_model
 from navapp.values import BoneModel, DisparityMap, MeasuredFace, Origin, PoseEstimate
 from navapp.values.contents import ResectionPlane
-from navapp.values.faces import axes_of
 
 # All chosen. A saw's face is looked for so far from where it is expected, along the view.
 _BAND_MM = 8.0
@@ -138,7 +137,7 @@ class FaceMeter:
         if -(normal @ point_mm) < _LEAST_COSINE * np.linalg.norm(point_mm):
             return None
         mesh = self._bone.mesh
-        lines = section_lines(mesh, find_piece(mesh, Cut(plane, 0.0)))
+        lines = section_lines(mesh, heights_over(mesh, Cut(plane, 0.0)))
         face = fill_section(lines, plane.normal)
         if face is None:
             return None
@@ -328,8 +327,7 @@ def _tilts_offset(
 ) -> FloatArray:
     """(3,) as of `MeasuredFace`, of the plane N . X = distance in the left camera."""
     in_bone = left_from_bone.inverse().rotate(normal[None])[0]
-    axes = axes_of(planned)
-    tilts = axes @ in_bone / float(in_bone @ planned.normal)
+    tilts = planned.axes @ in_bone / float(in_bone @ planned.normal)
     offset_mm = distance_mm - float(normal @ left_from_bone.apply(planned.point_mm[None])[0])
     return np.array([*tilts, offset_mm])
 

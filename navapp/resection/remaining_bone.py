@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
-from navapp.geometry.mesh_sections import clip_below, fill_section, section_lines
+from navapp.geometry.mesh_sections import clip_below, fill_section, find_piece, section_lines
 from navapp.geometry.transform import FloatArray
 from navapp.values import BoneModel, ResectionPlane
 
@@ -19,25 +19,15 @@ class Cut(NamedTuple):
     unsure_mm: float  # bone so far below the plane may be gone as well
 
 
-def find_piece(mesh: TriangleMesh, cut: Cut) -> FloatArray:
-    """(V,) mm by which vertices lie beyond a cut: above 0 those of the piece that it takes off.
+def heights_over(mesh: TriangleMesh, cut: Cut) -> FloatArray:
+    """(V,) mm by which vertices lie beyond a cut, or beyond what is unsure below it.
 
-    A plane meets other parts of the bone, too, which stay (-1). The piece is what hangs together
-    beyond it and lies over its planned rectangle. Beyond begins as far below the plane as is
-    unsure.
+    Above 0 are those of the piece that it takes off, and no others: parts of the bone that lie
+    beyond its plane elsewhere have -1.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     height_mm = cut.plane.heights_mm(mesh.vertices_mm) + cut.unsure_mm
-    is_beyond = height_mm > 0.0
-    edges = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    start, end = edges[is_beyond[edges].all(axis=1)].T
-    n = len(height_mm)
-    graph = coo_matrix((np.ones(len(start), dtype=np.int8), (start, end)), shape=(n, n))
-    _, piece = connected_components(graph, directed=False)
-    is_taken = np.isin(piece, piece[is_beyond & cut.plane.is_over(mesh.vertices_mm)])
-    return np.where(is_beyond & ~is_taken, -1.0, height_mm)
+    is_piece = find_piece(mesh, height_mm, cut.plane.is_over(mesh.vertices_mm))
+    return np.where((height_mm > 0.0) & ~is_piece, -1.0, height_mm)
 
 
 def remove_cuts(bone: BoneModel, cuts: Sequence[Cut]) -> BoneModel:
@@ -50,7 +40,7 @@ def remove_cuts(bone: BoneModel, cuts: Sequence[Cut]) -> BoneModel:
     mesh, lids = bone.mesh, []
     is_gone = np.zeros(len(mesh.vertices_mm), dtype=np.bool_)
     for cut in cuts:
-        height_mm = find_piece(mesh, cut)
+        height_mm = heights_over(mesh, cut)
         is_gone |= height_mm > 0.0
         lid = fill_section(section_lines(mesh, height_mm), cut.plane.normal)
         lids += [] if lid is None else [lid]
@@ -64,13 +54,13 @@ def cut_surface(mesh: TriangleMesh, planes: Sequence[ResectionPlane]) -> Triangl
     """A bone's surface after cuts, with their faces: to be looked at."""
     skin, faces = mesh, []
     for plane in planes:
-        height_mm = find_piece(mesh, Cut(plane, 0.0))
+        height_mm = heights_over(mesh, Cut(plane, 0.0))
         face = fill_section(section_lines(mesh, height_mm), plane.normal)
         for other in planes:
             if face is not None and other is not plane:
                 face = clip_below(face, _height_over_mm(face, other))
         faces += [] if face is None else [face]
-        skin = clip_below(skin, find_piece(skin, Cut(plane, 0.0)))
+        skin = clip_below(skin, heights_over(skin, Cut(plane, 0.0)))
     return join_meshes(skin, *faces)
 
 

@@ -47,21 +47,22 @@ class ResectionPlane:
 
         The plane meets other parts of the bone too, which stay.
         """
-        corners = self.corners_mm()
-        sides = np.stack([corners[1] - corners[0], corners[3] - corners[0]])
-        lengths_mm = np.linalg.norm(sides, axis=1)
-        along_mm = (points_mm - self.point_mm) @ (sides / lengths_mm[:, None]).T
-        is_over: NDArray[np.bool_] = (np.abs(along_mm) <= 0.5 * _REACH * lengths_mm).all(axis=1)
-        return is_over
+        along_mm = np.abs((points_mm - self.point_mm) @ self.axes.T)
+        is_inside = along_mm <= 0.5 * _REACH * np.array(self.extent_mm)
+        return np.asarray(is_inside.all(axis=1))
 
-    def corners_mm(self) -> FloatArray:
-        """(4, 3) corners of the drawn rectangle, in order."""
+    @property
+    def axes(self) -> FloatArray:
+        """(2, 3) unit directions across the normal: of the width, and of the depth."""
         along = np.eye(3)[1 if abs(self.normal[0]) > 0.9 else 0]
         across = along - (along @ self.normal) * self.normal
         across /= np.linalg.norm(across)
-        sides = np.stack([across, np.cross(self.normal, across)])
+        return np.stack([across, np.cross(self.normal, across)])
+
+    def corners_mm(self) -> FloatArray:
+        """(4, 3) corners of the drawn rectangle, in order."""
         signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        corners: FloatArray = self.point_mm + (0.5 * signs * self.extent_mm) @ sides
+        corners: FloatArray = self.point_mm + (0.5 * signs * self.extent_mm) @ self.axes
         return corners
 
 

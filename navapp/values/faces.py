@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class MeasuredFace:
     """A face that a saw left, in the bone's coordinates, beside the plane that was planned.
 
     It is described by three numbers: the tangents of its normal's tilts from the planned normal
-    towards the two `axes` of the planned plane, and its distance in mm from the planned point along
+    towards the two axes of the planned plane, and its distance in mm from the planned point along
     its own normal; positive: less bone is gone.
     """
 
@@ -30,17 +30,15 @@ class MeasuredFace:
     matching_covariance: FloatArray
     pose_covariance: FloatArray
     seen_share: float  # of the whole face, 0 to 1
-    axes: FloatArray = field(init=False)  # (2, 3) unit, across the planned normal
 
     def __post_init__(self) -> None:
         for name in ("tilts_offset", "matching_covariance", "pose_covariance"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
-        object.__setattr__(self, "axes", read_only(axes_of(self.plane)))
 
     @property
     def normal(self) -> FloatArray:
         """(3,) unit, out of the bone that stays."""
-        tilted = self.plane.normal + self.tilts_offset[:2] @ self.axes
+        tilted = self.plane.normal + self.tilts_offset[:2] @ self.plane.axes
         unit: FloatArray = tilted / np.linalg.norm(tilted)
         return unit
 
@@ -87,14 +85,6 @@ class MeasuredFace:
     def as_plane(self) -> ResectionPlane:
         """The face as a plane of the planned extent."""
         return replace(self.plane, point_mm=self.point_mm, normal=self.normal)
-
-
-def axes_of(plane: ResectionPlane) -> FloatArray:
-    """(2, 3) unit directions across a plane's normal."""
-    corners = plane.corners_mm()
-    sides = np.stack([corners[1] - corners[0], corners[3] - corners[0]])
-    axes: FloatArray = sides / np.linalg.norm(sides, axis=1)[:, None]
-    return axes
 
 
 def join_faces(faces: Sequence[MeasuredFace]) -> MeasuredFace:

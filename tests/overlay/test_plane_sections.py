@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.overlay.plane_sections import cut_lines, depth_beyond
 from navapp.values import ResectionPlane
 from tests.geometry.shapes import cube, sphere
@@ -95,9 +95,10 @@ def test_depth_beyond_is_the_height_over_the_plane_furthest_away() -> None:
     assert (found == 0).any()
 
 
-def test_bone_beside_the_rectangle_stays() -> None:
+def test_another_part_of_the_bone_beyond_the_plane_stays() -> None:
     ball = sphere(20.0, 24)
-    found = depth_beyond(ball, (plane((0.0, 0.0, 0.0), UP, (10.0, 10.0)),))
-    is_cut = found > 0
-    assert is_cut.any()
-    assert np.abs(ball.vertices_mm[is_cut][:, :2]).max() <= 6.5
+    beside = sphere(20.0, 24, (60.0, 0.0, 0.0))
+    found = depth_beyond(join_meshes(ball, beside), (plane((0.0, 0.0, 0.0), UP, (10.0, 10.0)),))
+    n = len(ball.vertices_mm)
+    np.testing.assert_allclose(found[:n], np.maximum(ball.vertices_mm[:, 2], 0.0), atol=1e-9)
+    assert not found[n:].any()

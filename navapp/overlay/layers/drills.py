@@ -4,6 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import DRILL
 from navapp.overlay.drawing import Drawing
@@ -31,20 +32,12 @@ def draw_drills(scene: Scene, drawing: Drawing) -> None:
 @lru_cache(maxsize=64)
 def _lines(drill: DrillAxis) -> tuple[FloatArray, list[FloatArray], FloatArray]:
     """Axes (2, 3) across it; points (N, 3) of the axis and of the hole's end, and of its entry."""
-    axes = _across(drill.direction)
+    axes = perpendicular_axes(drill.direction[None])[0]
     end = drill.entry_mm + drill.depth_mm * drill.direction
     start = drill.entry_mm - _OUTSIDE_MM * drill.direction
     radius_mm = 0.5 * drill.diameter_mm
     axis_and_end = [sample_line(np.stack([start, end])), _circle(end, axes, radius_mm)]
     return axes, axis_and_end, _circle(drill.entry_mm, axes, radius_mm)
-
-
-def _across(direction: FloatArray) -> FloatArray:
-    """(2, 3) unit axes at right angles to a direction and to each other."""
-    helper = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    first = np.cross(direction, helper)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(direction, first)])
 
 
 def _circle(centre: FloatArray, axes: FloatArray, radius_mm: float) -> FloatArray:

@@ -9,7 +9,7 @@ from calibration.mirror import alignments
 from calibration.mirror.alignment_fit import Alignments
 from calibration.mirror.alignments import AlignedCalibration, advise, choose_next, solve_alignments
 from navapp.errors import ResultError
-from navapp.geometry.display_model_errors import perpendicular_axes
+from navapp.geometry.directions import perpendicular_axes
 from sim_devices.mirror_setups import draw_setup
 from tests.calibration.mirror.simulated_operators import POINT_SD_MM, SimulatedOperator
 from tests.geometry.test_display_model_errors import seen_beside_mm
