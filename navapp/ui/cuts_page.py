@@ -8,6 +8,7 @@ from textual.containers import Vertical
 from textual.content import Content
 
 from navapp.control.states import CutLine, Snapshot
+from navapp.resection.cut_bone import UNSURE_MM
 from navapp.ui.gauges import draw_bar
 from navapp.ui.page_keys import PageKeys
 from navapp.ui.screens import PageScreen
@@ -19,7 +20,7 @@ from navapp.values import MeasuredFace, StageSpec
 from navapp.values.faces import LEAST_SHARE
 
 # The cuts of a stage in their order.
-CUT_KEYS = "bcdfghij"
+CUT_KEYS = "bcdfghijmnopstuw"
 _NAME_WIDTH, _BAR_WIDTH = 24, 10
 
 
@@ -40,7 +41,7 @@ class CutTable(TextView):
         version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
         notes = (
             version,
-            " Bone beyond a cut that is made no longer counts, nor 1.5 mm beside it",
+            f" Bone beyond a cut that is made no longer counts, nor {UNSURE_MM} mm beside it",
             " until its face is measured. +- is the 95 % bound, that of the pose in it.",
         )
         return [*lines, Content(""), *(Content.styled(note, "$text-muted") for note in notes)]

@@ -29,7 +29,7 @@ from navapp.values import BoneModel
 
 ORDERS = ("forward", "pingpong", "each")
 # Frames of these are unrelated poses: each is registered on its own.
-_UNRELATED = ("registration",)
+UNRELATED = ("registration",)
 _LOOP_FRAMES = 120
 
 
@@ -88,7 +88,7 @@ def find_sequences(phantom: Path, only: str) -> list[Path]:
 
 
 def _orders(sequence: Path, asked: list[str]) -> list[str]:
-    return ["each"] if sequence.name in _UNRELATED else asked
+    return ["each"] if sequence.name in UNRELATED else asked
 
 
 def replayed(
