@@ -271,8 +271,8 @@ def _align(session: "MirrorAlignment", opened: "OpenedAlignment", corner: int) -
     Returns:
         Whether it was confirmed.
     """
+    from navapp.control.commands import NudgeCross
     from navapp.control.mirror_alignment.states import Confirm, TurnArrows
-    from navapp.control.states import NudgeCross
 
     snapshot, practice = session.snapshot, opened.practice
     if practice is None or snapshot.cross_px is None:

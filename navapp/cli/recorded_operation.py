@@ -3,9 +3,9 @@
 import argparse
 
 from navapp.cli.session_folder import RecordedSession
+from navapp.control.commands import CheckMirror, DistrustRig
 from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
 from navapp.control.operators import CombinedOperator, Operator, RecordedOperator, ReplayOperator
-from navapp.control.states import CheckMirror, DistrustRig
 
 # After which frame a session found its rig moved, and how.
 MovedRig = tuple[int, DistrustRig]

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from navapp.control.commands import DistrustRig
 from navapp.control.frame_result import FrameResult
 from navapp.control.session import describe_moved_rig
-from navapp.control.states import DistrustRig, SessionState, Snapshot
+from navapp.control.states import SessionState, Snapshot
 from navapp.values import FrameTimings, MeasuredFace, Reason, Status, TrackedFrame, join_faces
 
 

@@ -156,8 +156,8 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
 
 
 def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    from navapp.control.commands import Quit
     from navapp.control.runner import SessionRunner
-    from navapp.control.states import Quit
     from navapp.ui.app import run_app
 
     n_frames = 0

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Cancel,

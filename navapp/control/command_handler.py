@@ -2,14 +2,7 @@
 
 from navapp.control.bone_tracks import Candidate
 from navapp.control.camera_link import CameraLink
-from navapp.control.device_monitor import MonitoredDevices
-from navapp.control.display_link import DisplayLink
-from navapp.control.eye_preview import EyePreview
-from navapp.control.mirror_checking import MirrorChecking
-from navapp.control.rig_watch import RigWatch
-from navapp.control.session import Session
-from navapp.control.stages import stage_by_number
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Cancel,
@@ -19,7 +12,6 @@ from navapp.control.states import (
     ConfirmCut,
     DistrustRig,
     EnterStage,
-    EventLevel,
     Interrupt,
     NudgeCross,
     Propose,
@@ -27,13 +19,20 @@ from navapp.control.states import (
     Reconnect,
     Register,
     Reject,
-    SessionState,
     Show,
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
     WithdrawCut,
 )
+from navapp.control.device_monitor import MonitoredDevices
+from navapp.control.display_link import DisplayLink
+from navapp.control.eye_preview import EyePreview
+from navapp.control.mirror_checking import MirrorChecking
+from navapp.control.rig_watch import RigWatch
+from navapp.control.session import Session
+from navapp.control.stages import stage_by_number
+from navapp.control.states import EventLevel, SessionState
 from navapp.errors import UsageError
 from navapp.overlay import LAYERS
 from navapp.values import Plan, Status

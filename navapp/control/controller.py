@@ -20,6 +20,7 @@ from navapp.control.bone_tracks import BoneTracks
 from navapp.control.camera_link import CameraLink
 from navapp.control.check_points import LocateCorners
 from navapp.control.command_handler import CommandHandler
+from navapp.control.commands import Blank, Command
 from navapp.control.device_handlers import MirrorHandler, ProjectorHandler
 from navapp.control.device_monitor import MonitoredDevices, tell_changes
 from navapp.control.display_link import DisplayLink
@@ -40,7 +41,7 @@ from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.snapshot_maker import SnapshotMaker
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Blank, Command, Snapshot
+from navapp.control.states import Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import Rectifier

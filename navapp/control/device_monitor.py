@@ -12,7 +12,12 @@ from navapp.control.device_handlers import (
     ProjectorHandler,
 )
 from navapp.control.session import Session
-from navapp.control.states import DeviceHealth, DeviceLine, EventLevel, Snapshot
+from navapp.control.states import (
+    DeviceHealth,
+    DeviceLine,
+    EventLevel,
+    Snapshot,
+)
 from navapp.errors import DeviceError
 
 # Between two questions, and after which an answer that was not renewed counts no more. A mirror

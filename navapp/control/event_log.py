@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 from drivers.clock import Clock
 from navapp.control.camera_link import Reopen
+from navapp.control.commands import Command
 from navapp.control.frame_result import FrameListener, FrameResult
 from navapp.control.recorder import RecordingStopped
-from navapp.control.states import Command, Event, EventLevel
+from navapp.control.states import Event, EventLevel
 from navapp.errors import UsageError
 
 _EVENTS_SHOWN = 60

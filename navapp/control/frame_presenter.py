@@ -9,7 +9,11 @@ from navapp.control.eye_preview import EyePreview
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.pictures import Composer, Image, OperatorPicture
 from navapp.control.session import Session
-from navapp.control.states import EventLevel, SessionState, Snapshot
+from navapp.control.states import (
+    EventLevel,
+    SessionState,
+    Snapshot,
+)
 from navapp.overlay import DepthMarks, make_preview
 from navapp.values import Foreground, OverlayMode, OverlayPicture, Reason
 

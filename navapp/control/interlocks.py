@@ -3,7 +3,11 @@
 from dataclasses import replace
 
 from navapp.control.mirror_error import MirrorError
-from navapp.control.states import OtherBone, SessionState, Snapshot
+from navapp.control.states import (
+    OtherBone,
+    SessionState,
+    Snapshot,
+)
 from navapp.values import Reason, Status
 
 # A pose older than this shows where the bone was, not where it is, whatever is configured.

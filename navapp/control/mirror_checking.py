@@ -20,7 +20,12 @@ from navapp.control.check_points import (
     choose_on_bone,
     draw_places_px,
 )
-from navapp.control.states import CrossCheck, MirrorCheck, SessionState, Snapshot
+from navapp.control.states import (
+    CrossCheck,
+    MirrorCheck,
+    SessionState,
+    Snapshot,
+)
 from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry

@@ -15,8 +15,7 @@ from pydantic import Field
 
 from navapp.config import Section, validate
 from navapp.control.command_files import command_from_json
-from navapp.control.stages import stage_by_name
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Command,
@@ -25,10 +24,10 @@ from navapp.control.states import (
     Propose,
     Register,
     Reject,
-    SessionState,
     Show,
-    Snapshot,
 )
+from navapp.control.stages import stage_by_name
+from navapp.control.states import SessionState, Snapshot
 from navapp.errors import SequenceError
 from navapp.values import Status
 

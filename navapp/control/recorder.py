@@ -16,8 +16,9 @@ from typing import Any, Protocol, TextIO
 
 from drivers.frames import StereoFrame
 from navapp.control.command_files import command_to_json
+from navapp.control.commands import Command
 from navapp.control.frame_result import FrameResult
-from navapp.control.states import Command, Event
+from navapp.control.states import Event
 from navapp.errors import InputError, NavappError
 from navapp.values import TrackedFrame
 

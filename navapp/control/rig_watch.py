@@ -10,10 +10,11 @@ import numpy as np
 from drivers.frames import StereoFrame
 from navapp.control.board_watch import BoardWatch
 from navapp.control.bone_motion import BoneMotion
+from navapp.control.commands import DistrustRig
 from navapp.control.display_link import DisplayLink
 from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.session import Session
-from navapp.control.states import DistrustRig, EventLevel
+from navapp.control.states import EventLevel
 from navapp.values import RowCheck
 
 # Longer than a breath takes: a leg that moves between the two exposures of a pair moves to and fro,

@@ -3,9 +3,10 @@
 import threading
 from collections.abc import Callable
 
+from navapp.control.commands import Command
 from navapp.control.controller import SessionController
 from navapp.control.operators import Operator
-from navapp.control.states import Command, SessionState, Snapshot
+from navapp.control.states import SessionState, Snapshot
 
 _PATIENCE_NS = 10_000_000_000
 

@@ -3,6 +3,7 @@
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from navapp.control.bone_tracks import BoneTracks, Candidate
+from navapp.control.commands import Command, Interrupt
 from navapp.control.event_log import EventLog
 from navapp.control.frame_result import FrameResult
 from navapp.control.made_cuts import MadeCuts
@@ -11,11 +12,9 @@ from navapp.control.pictures import OperatorPicture
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.states import (
-    Command,
     CutLine,
     Event,
     EventLevel,
-    Interrupt,
     OtherBone,
     Rates,
     SessionState,

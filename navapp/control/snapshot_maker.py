@@ -17,7 +17,12 @@ from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
 from navapp.control.stages import STAGES
-from navapp.control.states import DeviceLine, Progress, SessionState, Snapshot
+from navapp.control.states import (
+    DeviceLine,
+    Progress,
+    SessionState,
+    Snapshot,
+)
 from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, TrackedFrame
 

@@ -5,25 +5,27 @@ from dataclasses import dataclass
 
 from textual.binding import Binding, BindingType
 
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Cancel,
     CheckMirror,
     Command,
     ConfirmCross,
-    DeviceHealth,
     EnterStage,
     NudgeCross,
     Quit,
     Reconnect,
     Register,
     Reject,
-    SessionState,
     Show,
-    Snapshot,
     ToggleDepth,
     ToggleEye,
+)
+from navapp.control.states import (
+    DeviceHealth,
+    SessionState,
+    Snapshot,
 )
 from navapp.values import Status
 

@@ -11,15 +11,17 @@ from textual import events
 from textual.binding import BindingType
 from textual.screen import Screen
 
-from navapp.control.states import (
+from navapp.control.commands import (
     ConfirmCut,
-    DeviceHealth,
-    EventLevel,
     Quit,
-    SessionState,
-    Snapshot,
     ToggleLayer,
     WithdrawCut,
+)
+from navapp.control.states import (
+    DeviceHealth,
+    EventLevel,
+    SessionState,
+    Snapshot,
 )
 from navapp.errors import DeviceError, NavappError, RigError
 from navapp.ui.actions import (

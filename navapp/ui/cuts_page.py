@@ -4,17 +4,14 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical
 from textual.content import Content
 
 from navapp.control.states import CutLine, Snapshot
 from navapp.resection.cut_bone import UNSURE_MM
 from navapp.ui.gauges import draw_bar
-from navapp.ui.page_keys import PageKeys
 from navapp.ui.screens import PageScreen
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import TextView
-from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 from navapp.values import MeasuredFace, StageSpec
 from navapp.values.faces import LEAST_SHARE
@@ -110,10 +107,11 @@ class CutsPage(PageScreen):
         *(Binding(key, f"app.change_cut('{key}')", f"cut {key}", show=False) for key in CUT_KEYS),
     ]
 
-    def compose(self) -> ComposeResult:
-        """Title, cuts, last line."""
-        yield TitleLine()
-        with Vertical(classes="page") as page:
-            page.border_title = "cuts of the stage"
-            yield CutTable("cuts")
-        yield PageKeys(" back  a letter: that cut has been made, or has not been made after all")
+    page_title, keys = (
+        "cuts of the stage",
+        " back  a letter: that cut has been made, or has not been made after all",
+    )
+
+    def compose_page(self) -> ComposeResult:
+        """Cuts."""
+        yield CutTable("cuts")

@@ -5,13 +5,10 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical
 from textual.content import Content
 
-from navapp.ui.page_keys import PageKeys
 from navapp.ui.screens import PageScreen
 from navapp.ui.text_view import TextView
-from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 
 
@@ -82,13 +79,11 @@ class LayersPage(PageScreen):
         ),
     ]
 
-    def compose(self) -> ComposeResult:
-        """Title, layers, last line."""
-        yield TitleLine()
-        with Vertical(classes="page") as page:
-            page.border_title = "layers of the overlay"
-            yield LayerTable("layers")
-        yield PageKeys(" back  a letter switches its layer")
+    page_title, keys = "layers of the overlay", " back  a letter switches its layer"
+
+    def compose_page(self) -> ComposeResult:
+        """Layers."""
+        yield LayerTable("layers")
 
 
 class OverlayLegend(TextView):

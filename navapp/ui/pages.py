@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical, VerticalScroll
+from textual.containers import VerticalScroll
 from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
@@ -15,11 +15,9 @@ from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
 from navapp.ui.devices_panel import format_device_line
 from navapp.ui.event_list import format_event_line
 from navapp.ui.layers_page import OverlayLegend
-from navapp.ui.page_keys import PageKeys
 from navapp.ui.picture_view import NOTICE
 from navapp.ui.screens import PageScreen, ViewScreen
 from navapp.ui.text_view import TextView
-from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 
 # The first of several actions -> their keys and what they do, in one line.
@@ -59,14 +57,13 @@ class HelpPage(PageScreen):
         Binding("question_mark", "dismiss", "back", show=False)
     ]
 
-    def compose(self) -> ComposeResult:
-        """Title, keys and legend, last line."""
-        yield TitleLine()
-        with VerticalScroll(classes="page") as page:
-            page.border_title = "keys"
-            yield KeyTable("keys")
-            yield OverlayLegend("legend")
-        yield PageKeys(" back  arrows, PgDn: the legend of the overlay")
+    page_title, keys = "keys", " back  arrows, PgDn: the legend of the overlay"
+    container = VerticalScroll
+
+    def compose_page(self) -> ComposeResult:
+        """Keys and legend."""
+        yield KeyTable("keys")
+        yield OverlayLegend("legend")
 
 
 class DeviceDetails(TextView):
@@ -90,13 +87,11 @@ class DevicesPage(PageScreen):
         ACTION_OF_NAME["reconnect"].binding(),
     ]
 
-    def compose(self) -> ComposeResult:
-        """Title, devices, last line."""
-        yield TitleLine()
-        with Vertical(classes="page") as page:
-            page.border_title = "devices"
-            yield DeviceDetails("details")
-        yield PageKeys(" back  o reopen lost devices")
+    page_title, keys = "devices", " back  o reopen lost devices"
+
+    def compose_page(self) -> ComposeResult:
+        """Devices."""
+        yield DeviceDetails("details")
 
 
 class EventsPage(PageScreen):
@@ -104,13 +99,12 @@ class EventsPage(PageScreen):
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("e", "dismiss", "back", show=False)]
 
-    def compose(self) -> ComposeResult:
-        """Title, events, last line."""
-        yield TitleLine()
-        with VerticalScroll(classes="page") as page:
-            page.border_title = "events"
-            yield Static(id="all-events")
-        yield PageKeys(" back  arrows, PgUp, PgDn scroll")
+    page_title, keys = "events", " back  arrows, PgUp, PgDn scroll"
+    container = VerticalScroll
+
+    def compose_page(self) -> ComposeResult:
+        """Events."""
+        yield Static(id="all-events")
 
     def show(self, view: View, *, is_text_due: bool) -> None:
         """Take over new events when there are any."""

@@ -4,10 +4,13 @@ from typing import ClassVar, Generic, TypeVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen, Screen
 
+from navapp.ui.page_keys import PageKeys
 from navapp.ui.picture_view import PictureView
 from navapp.ui.text_view import TextView
+from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 
 ResultT = TypeVar("ResultT")
@@ -42,6 +45,18 @@ class PageScreen(ViewScreen[None], ModalScreen[None]):
         Binding("escape,q", "dismiss", "back", show=False),
     ]
 
+    page_title: ClassVar[str]
+    keys: ClassVar[str]  # what else can be done here, in the last line
+    container: ClassVar[type[Vertical | VerticalScroll]] = Vertical
+
     def compose(self) -> ComposeResult:
+        """Title, what the page shows, last line."""
+        yield TitleLine()
+        with self.container(classes="page") as page:
+            page.border_title = self.page_title
+            yield from self.compose_page()
+        yield PageKeys(self.keys)
+
+    def compose_page(self) -> ComposeResult:
         """Each page its own."""
         raise NotImplementedError

@@ -2,7 +2,8 @@
 
 from typing import Protocol
 
-from navapp.control.states import Command, Snapshot
+from navapp.control.commands import Command
+from navapp.control.states import Snapshot
 
 
 class Session(Protocol):

@@ -3,7 +3,12 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from navapp.control.states import DeviceHealth, EventLevel, SessionState, Snapshot
+from navapp.control.states import (
+    DeviceHealth,
+    EventLevel,
+    SessionState,
+    Snapshot,
+)
 from navapp.ui.symbols import Symbols
 from navapp.values import Reason
 

@@ -21,8 +21,7 @@ from navapp.cli.live_session import make_controller, prepare_session
 from navapp.cli.main import _parser
 from navapp.cli.practice_mirror import add_practice_mirror
 from navapp.config import parse
-from navapp.control.controller import SessionController
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     CheckMirror,
     Command,
@@ -30,6 +29,7 @@ from navapp.control.states import (
     EnterStage,
     Register,
 )
+from navapp.control.controller import SessionController
 from navapp.devices import OpenedDevices
 from sim_devices.mirror_setups import make_practice_setup
 from sim_devices.simulated_eye import SimulatedEye

@@ -7,9 +7,14 @@ import pytest
 
 from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
 from navapp.cli.session_folder import RecordedSession
+from navapp.control.commands import (
+    Accept,
+    CheckMirror,
+    DistrustRig,
+    Register,
+)
 from navapp.control.operators import RecordedEvents
 from navapp.control.runner import run_headless
-from navapp.control.states import Accept, CheckMirror, DistrustRig, Register
 from tests.control.fakes import Bench, FakeCamera
 
 FOUND = DistrustRig("100 mm are 100.13 mm")

@@ -13,8 +13,8 @@ from navapp.cli.results import (
     summarise_faces,
     summary_text,
 )
+from navapp.control.commands import DistrustRig
 from navapp.control.frame_result import FrameResult
-from navapp.control.states import DistrustRig
 from navapp.values import MeasuredFace, Reason, ResectionPlane, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
 

@@ -23,13 +23,23 @@ from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
 from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.check_points import LocateCorners
+from navapp.control.commands import (
+    Accept,
+    Command,
+    Register,
+    Reject,
+)
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import Executor, InlineExecutor, Job, ThreadExecutor
 from navapp.control.eye_preview import EyePreview, Look
 from navapp.control.frame_result import FrameResult
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Accept, Command, DeviceLine, Event, Register, Reject, Snapshot
+from navapp.control.states import (
+    DeviceLine,
+    Event,
+    Snapshot,
+)
 from navapp.errors import DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from navapp.control.event_log import SessionHooks
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Cancel,
@@ -15,6 +14,7 @@ from navapp.control.states import (
     Reject,
     Show,
 )
+from navapp.control.event_log import SessionHooks
 from navapp.values import Reason
 from tests.control.fakes import (
     LOST,

@@ -4,16 +4,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from navapp.control.event_log import SessionHooks
-from navapp.control.executors import InlineExecutor
-from navapp.control.interlocks import check_interlocks
-from navapp.control.recorder import RecordingStopped
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Cancel,
     EnterStage,
-    EventLevel,
     Interrupt,
     Propose,
     Reconnect,
@@ -23,6 +18,11 @@ from navapp.control.states import (
     ToggleDepth,
     ToggleLayer,
 )
+from navapp.control.event_log import SessionHooks
+from navapp.control.executors import InlineExecutor
+from navapp.control.interlocks import check_interlocks
+from navapp.control.recorder import RecordingStopped
+from navapp.control.states import EventLevel
 from navapp.errors import DeviceLost, DeviceNotFound
 from navapp.values import Prior, Reason, Status
 from tests.control.fakes import (

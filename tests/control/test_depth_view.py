@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from navapp.control.command_files import command_from_json, command_to_json
-from navapp.control.states import ToggleDepth
+from navapp.control.commands import ToggleDepth
 from navapp.geometry.box import Box
 from navapp.values import DisparityMap, Foreground, Origin, Surroundings
 from tests.control.fakes import Bench, answer, navigating

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.commands import (
+    Register,
+    Reject,
+    ToggleEye,
+)
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import RecordedExecutor
 from navapp.control.eye_preview import EyePreview
 from navapp.control.operators import RecordedOperator, read_events
 from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
-from navapp.control.states import Register, Reject, ToggleEye
 from navapp.values import Reason, Status
 from tests.control.fakes import PERIOD_NS, Bench, FakeCamera, SlowExecutor, answer, navigating
 from tests.control.test_layer_switching import NoFrames

@@ -4,7 +4,11 @@ import pytest
 
 from navapp.control.interlocks import MAX_POSE_AGE_MS, check_interlocks, is_current
 from navapp.control.stages import STAGES
-from navapp.control.states import OtherBone, SessionState, Snapshot
+from navapp.control.states import (
+    OtherBone,
+    SessionState,
+    Snapshot,
+)
 from navapp.values import Reason, Status, Verdict
 from tests.control.fakes import a_pose
 

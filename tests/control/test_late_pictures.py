@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from navapp.control.commands import Blank, Register
 from navapp.control.interlocks import grow_older
-from navapp.control.states import Blank, Event, Register, Snapshot
+from navapp.control.states import Event, Snapshot
 from navapp.values import Reason
 from sim_devices.display import SimulatedDisplay
 from tests.control.fakes import CLEAR, Bench, navigating

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.commands import EnterStage, ToggleLayer
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import RecordedExecutor
 from navapp.control.operators import RecordedOperator, read_events
 from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
-from navapp.control.states import EnterStage, ToggleLayer
 from navapp.overlay import LAYERS
 from tests.control.fakes import CLEAR, Bench, FakeCamera, navigating
 

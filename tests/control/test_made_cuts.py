@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.commands import (
+    ConfirmCut,
+    EnterStage,
+    Register,
+    WithdrawCut,
+)
 from navapp.control.executors import ThreadExecutor
-from navapp.control.states import ConfirmCut, EnterStage, Register, Snapshot, WithdrawCut
+from navapp.control.states import Snapshot
 from navapp.errors import UsageError
 from navapp.resection import FaceMeter
 from navapp.values import MeasuredFace, Plan, ResectionPlane, Status, SurgicalContent

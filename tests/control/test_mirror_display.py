@@ -15,19 +15,19 @@ from navapp.config import parse
 from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.check_points import LEAST_APART_MM, LocateCorners
 from navapp.control.command_files import command_from_json, command_to_json
-from navapp.control.device_handlers import ProjectorHandler
-from navapp.control.pictures import banner
-from navapp.control.states import (
+from navapp.control.commands import (
     Blank,
     CheckMirror,
     ConfirmCross,
     DistrustRig,
     EnterStage,
-    MirrorCheck,
     NudgeCross,
     Show,
     ToggleLayer,
 )
+from navapp.control.device_handlers import ProjectorHandler
+from navapp.control.pictures import banner
+from navapp.control.states import MirrorCheck
 from navapp.errors import ConfigurationError, DeviceLost
 from navapp.geometry.display_model import DisplayModel, DisplayQuality
 from navapp.geometry.display_model_files import write_display_model

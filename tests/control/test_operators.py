@@ -3,6 +3,15 @@ from pathlib import Path
 
 import pytest
 
+from navapp.control.commands import (
+    Accept,
+    Blank,
+    EnterStage,
+    Propose,
+    Register,
+    Reject,
+    Show,
+)
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import RecordedExecutor, ThreadExecutor
 from navapp.control.operators import (
@@ -15,7 +24,6 @@ from navapp.control.operators import (
 )
 from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
-from navapp.control.states import Accept, Blank, EnterStage, Propose, Register, Reject, Show
 from navapp.errors import ConfigurationError, DeviceLost, SequenceError, UsageError
 from navapp.geometry.transform import rotation_angle_deg
 from navapp.values import Reason, Status
@@ -154,7 +162,7 @@ def test_a_live_session_replays_with_the_same_states() -> None:
         camera=FakeCamera(None, n_frames=30),
         hooks=SessionHooks(on_command=(lambda c, s: told.append((s, c)),)),
     )
-    from navapp.control.states import Cancel
+    from navapp.control.commands import Cancel
 
     live.script.found = [answer(), answer(pose=a_pose(x_mm=5.0))]
     for number in (1, 2):

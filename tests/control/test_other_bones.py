@@ -4,13 +4,13 @@ from itertools import pairwise
 
 import pytest
 
-from navapp.control.interlocks import is_current
-from navapp.control.states import (
+from navapp.control.commands import (
     DistrustRig,
     EnterStage,
-    OtherBone,
     Register,
 )
+from navapp.control.interlocks import is_current
+from navapp.control.states import OtherBone
 from navapp.errors import DeviceLost
 from navapp.values import Reason, Status
 from tests.control.fakes import LOST, PERIOD_NS, Bench, a_plan, a_pose, answer, navigating

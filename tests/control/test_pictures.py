@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from navapp.control.commands import Register
 from navapp.control.pictures import Composer, banner, fit_to_display
-from navapp.control.states import Register
 from navapp.overlay import compose_video
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_plan, a_pose, a_rig, answer

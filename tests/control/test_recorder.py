@@ -4,10 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from navapp.control.commands import (
+    EnterStage,
+    Propose,
+    Register,
+)
 from navapp.control.event_log import SessionHooks
 from navapp.control.operators import read_events
 from navapp.control.recorder import BackgroundSink, SessionRecorder
-from navapp.control.states import EnterStage, Propose, Register
 from navapp.errors import InputError
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, a_pose, answer

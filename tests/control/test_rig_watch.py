@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 
 from navapp.control.board_watch import BoardWatch
-from navapp.control.event_log import SessionHooks
-from navapp.control.executors import InlineExecutor
-from navapp.control.rig_watch import RowWatch
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
-    DeviceHealth,
     DistrustRig,
     EnterStage,
-    EventLevel,
     Interrupt,
     Propose,
     Reconnect,
     Register,
     Show,
 )
+from navapp.control.event_log import SessionHooks
+from navapp.control.executors import InlineExecutor
+from navapp.control.rig_watch import RowWatch
+from navapp.control.states import DeviceHealth, EventLevel
 from navapp.errors import DeviceLost, RigError
 from navapp.geometry.transform import RigidTransform
 from navapp.values import Reason, RowCheck

@@ -1,8 +1,12 @@
 import threading
 
+from navapp.control.commands import (
+    Accept,
+    Quit,
+    Register,
+)
 from navapp.control.operators import ScriptedOperator
 from navapp.control.runner import SessionRunner, run_headless
-from navapp.control.states import Accept, Quit, Register
 from navapp.errors import DeviceLost, DeviceNotFound
 from tests.control.fakes import Bench, wait_for
 

@@ -6,13 +6,12 @@ import pytest
 from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import PowerState
 from drivers.no_projector import NoProjector
+from navapp.control.commands import Reconnect, Register
 from navapp.control.device_handlers import MIRROR_TOLERANCE_DEG
 from navapp.control.states import (
     DeviceHealth,
     DeviceLine,
     EventLevel,
-    Reconnect,
-    Register,
 )
 from navapp.errors import DeviceLost, DeviceNotFound, DeviceTimeout, WrongDevice
 from navapp.values import Reason

@@ -6,8 +6,9 @@ from contextlib import ExitStack
 
 import pytest
 
+from navapp.control.commands import Reconnect
 from navapp.control.executors import InlineExecutor
-from navapp.control.states import DeviceHealth, EventLevel, Reconnect
+from navapp.control.states import DeviceHealth, EventLevel
 from navapp.errors import DeviceError
 from navapp.values import Reason
 from sim_devices.firmware.pseudo_terminal import PseudoTerminal

@@ -9,9 +9,10 @@ import pytest
 from calibration.rig.known_length import LengthMeter
 from calibration.targets.boards import parse_board
 from navapp.control.board_watch import BoardWatch
+from navapp.control.commands import Accept, Register
 from navapp.control.executors import InlineExecutor
 from navapp.control.length_check import Finding
-from navapp.control.states import Accept, EventLevel, Register
+from navapp.control.states import EventLevel
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.values import Reason, Status
 from sim_devices.faults import Fault, FaultKind, FaultScript

@@ -10,13 +10,18 @@ from drivers.fixed_mirror import FixedMirror
 from drivers.interfaces import DeviceSet
 from drivers.no_projector import NoProjector
 from navapp.control.board_watch import BoardWatch
+from navapp.control.commands import (
+    Accept,
+    Propose,
+    Register,
+    Reject,
+)
 from navapp.control.controller import SessionController
 from navapp.control.event_log import SessionHooks
 from navapp.control.executors import InlineExecutor, ThreadExecutor
 from navapp.control.operators import ScriptedOperator
 from navapp.control.runner import SessionRunner, run_headless
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Accept, Propose, Register, Reject
 from navapp.errors import WrongDevice
 from navapp.values import Plan, Status
 from sim_devices.camera import Scene, SimulatedCamera

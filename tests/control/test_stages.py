@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from navapp.control.commands import EnterStage
 from navapp.control.stages import STAGES, stage_by_name, stage_by_number, stage_of
-from navapp.control.states import EnterStage
 from navapp.errors import UsageError
 from navapp.overlay import LAYERS
 from navapp.preop.contents_file_tables import StagesTable

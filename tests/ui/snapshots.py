@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.control.commands import Command
 from navapp.control.stages import STAGES
 from navapp.control.states import (
-    Command,
     DeviceHealth,
     DeviceLine,
     Event,

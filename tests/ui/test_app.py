@@ -7,28 +7,30 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Static
 
-from navapp.control.stages import STAGES
-from navapp.control.states import (
+from navapp.control.commands import (
     Accept,
     Blank,
     Cancel,
     CheckMirror,
     Command,
     ConfirmCross,
-    CrossCheck,
     EnterStage,
-    Event,
-    EventLevel,
     NudgeCross,
     Quit,
     Reconnect,
     Register,
     Reject,
-    SessionState,
     Show,
-    Snapshot,
     ToggleDepth,
     ToggleEye,
+)
+from navapp.control.stages import STAGES
+from navapp.control.states import (
+    CrossCheck,
+    Event,
+    EventLevel,
+    SessionState,
+    Snapshot,
 )
 from navapp.ui.app import NavigationApp
 from navapp.ui.layers_page import LayersPage

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from textual.pilot import Pilot
 
+from navapp.control.commands import ConfirmCut, WithdrawCut
 from navapp.control.stages import STAGES
-from navapp.control.states import ConfirmCut, CutLine, WithdrawCut
+from navapp.control.states import CutLine
 from navapp.ui.actions import ACTIONS
 from navapp.ui.cuts_page import CUT_KEYS, CutsPage, CutTable
 from navapp.values import MeasuredFace, ResectionPlane

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
+from navapp.control.commands import ToggleLayer
 from navapp.control.stages import STAGES
-from navapp.control.states import ToggleLayer
 from navapp.overlay import LAYERS
 from navapp.ui.actions import ACTION_OF_NAME
 from navapp.ui.layers_page import LAYER_KEYS, LEGEND, LayersPage, LayerTable, OverlayLegend

@@ -14,6 +14,7 @@ from drivers.frames import StereoFrame
 from drivers.interfaces import Display, StereoCamera
 from navapp.control.camera_link import CameraLink, Reopen
 from navapp.control.capture.board_view import BoardView, detect_board
+from navapp.control.commands import NudgeCross
 from navapp.control.executors import Executor, Job
 from navapp.control.mirror_alignment.aimed_corner import AimedCorner
 from navapp.control.mirror_alignment.board_place import BoardLooks, BoardPlace, locate_board
@@ -43,7 +44,6 @@ from navapp.control.mirror_alignment.states import (
     Undo,
 )
 from navapp.control.recent_events import RecentEvents
-from navapp.control.states import NudgeCross
 from navapp.errors import DeviceError, InputError
 from navapp.geometry.rig import StereoRig
 from navapp.values.pictures import EyeLook

@@ -13,7 +13,7 @@ from calibration.mirror.alignments import (
     LEAST_RANGE_MM,
     has_depth,
 )
-from navapp.control.states import NudgeCross
+from navapp.control.commands import NudgeCross
 
 
 class AlignmentPhase(Enum):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from navapp.control.commands import NudgeCross
 from navapp.control.mirror_alignment.states import (
     AlignmentCommand,
     AlignmentPhase,
@@ -15,7 +16,6 @@ from navapp.control.mirror_alignment.states import (
     TurnArrows,
     Undo,
 )
-from navapp.control.states import NudgeCross
 
 _FINE_PX, _COARSE_PX, _HAND_MM = 1, 10, 20.0
 

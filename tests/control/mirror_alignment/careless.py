@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.mirror.alignments import MOST_ALIGNMENTS, solve_alignments
+from navapp.control.commands import NudgeCross
 from navapp.control.mirror_alignment.alignment import MirrorAlignment
 from navapp.control.mirror_alignment.states import Confirm
-from navapp.control.states import NudgeCross
 from sim_devices.aligning_eye import AligningEye
 from tests.control.mirror_alignment.rooms import (
     MirrorRoom,

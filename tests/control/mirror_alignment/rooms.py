@@ -8,11 +8,11 @@ from drivers.clock import ManualClock
 from drivers.frames import StereoFrame
 from drivers.interfaces import CameraInfo
 from navapp.control.capture.board_view import BoardView
+from navapp.control.commands import NudgeCross
 from navapp.control.executors import InlineExecutor
 from navapp.control.mirror_alignment.alignment import MirrorAlignment
 from navapp.control.mirror_alignment.interfaces import AlignmentSettings
 from navapp.control.mirror_alignment.states import AlignmentSnapshot, Confirm
-from navapp.control.states import NudgeCross
 from navapp.devices.simulated_mirror import true_display
 from navapp.geometry.display_model import DisplayQuality
 from navapp.geometry.transform import RigidTransform

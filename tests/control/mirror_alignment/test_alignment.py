@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.mirror.alignments import count_depths, solve_alignments
+from navapp.control.commands import NudgeCross
 from navapp.control.mirror_alignment.states import (
     AlignmentPhase,
     Another,
@@ -17,7 +18,6 @@ from navapp.control.mirror_alignment.states import (
     TurnArrows,
     Undo,
 )
-from navapp.control.states import NudgeCross
 from navapp.errors import DeviceLost, InputError
 from tests.calibration.marks import BOARD
 from tests.control.mirror_alignment.rooms import (

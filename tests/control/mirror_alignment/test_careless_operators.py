@@ -2,8 +2,8 @@
 
 import pytest
 
+from navapp.control.commands import NudgeCross
 from navapp.control.mirror_alignment.states import Confirm
-from navapp.control.states import NudgeCross
 from tests.control.mirror_alignment.careless import TOKEN_MOVES, confirm_blindly
 from tests.control.mirror_alignment.rooms import MirrorRoom, align, alignment_in, steps, until_aimed
 from tests.many import few_of

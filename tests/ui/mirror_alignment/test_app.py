@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from navapp.control.commands import NudgeCross
 from navapp.control.mirror_alignment.states import (
     AlignmentPhase,
     AlignmentSnapshot,
@@ -18,7 +19,6 @@ from navapp.control.mirror_alignment.states import (
     TurnArrows,
     Undo,
 )
-from navapp.control.states import NudgeCross
 from navapp.ui.mirror_alignment.app import AlignmentApp
 from navapp.ui.symbols import ASCII, UNICODE
 from tests.ui.guided import play_on

@@ -1,0 +1,150 @@
+"""What an operator can ask of a session."""
+
+from dataclasses import dataclass
+
+from navapp.geometry.transform import RigidTransform
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """Start the first registration (again) from the session's prior."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """Stop the registration that is running."""
+
+
+@dataclass(frozen=True, slots=True)
+class Propose:
+    """Offer a pose by hand as the candidate; it is judged as it stands, not refined."""
+
+    left_from_bone: RigidTransform
+
+
+@dataclass(frozen=True, slots=True)
+class Accept:
+    """Take the candidate that the operator has seen; refused when another one is under review."""
+
+    # as the snapshot tells it; None (of recordings that do not hold it) means whichever is under
+    # review.
+    candidate_id: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reject:
+    """Drop the candidate that the operator has seen; refused when another one is under review."""
+
+    candidate_id: int | None  # as of `Accept`
+
+
+@dataclass(frozen=True, slots=True)
+class Blank:
+    """Make the display black until `Show`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Show:
+    """Show pictures on the display again."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleDepth:
+    """Colour the operator's picture by the classes of the depth map, or no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleEye:
+    """Show the operator what an eye sees in the simulated mirror, or the video again."""
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleLayer:
+    """Draw a layer of the overlay that is not drawn, or no longer draw it."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class CheckMirror:
+    """Begin the check of the mirror, or give up the one that is under way."""
+
+
+@dataclass(frozen=True, slots=True)
+class NudgeCross:
+    """Move the cross of the check, as the eye sees it."""
+
+    right_px: int
+    down_px: int
+
+
+@dataclass(frozen=True, slots=True)
+class ConfirmCross:
+    """The cross lies on its point: go to the next one, or end the check after the last."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnterStage:
+    """Go to a stage by its number, 1 to 5."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class ConfirmCut:
+    """A planned cut has been made: what lies beyond its plane no longer belongs to the bone."""
+
+    name: str  # of the plane
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawCut:
+    """A cut that was confirmed has not been made after all."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reconnect:
+    """Open lost devices again and bring the mirror to its place, now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interrupt:
+    """The camera was lost at this point of a recorded session: forget what it was looking at."""
+
+
+@dataclass(frozen=True, slots=True)
+class DistrustRig:
+    """The rig has moved: nothing that it measures is believed any more in this session."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Quit:
+    """End the session."""
+
+
+Command = (
+    Register
+    | Cancel
+    | Propose
+    | Accept
+    | Reject
+    | Blank
+    | Show
+    | ToggleDepth
+    | ToggleEye
+    | ToggleLayer
+    | CheckMirror
+    | NudgeCross
+    | ConfirmCross
+    | EnterStage
+    | ConfirmCut
+    | WithdrawCut
+    | Reconnect
+    | Interrupt
+    | DistrustRig
+    | Quit
+)
