@@ -75,7 +75,14 @@ def prepare_session(
             check_start(prior, stage.bone)
         undo.pop_all()
     specification = specify_session(
-        configuration, opened.rig, plan, prior, stage, is_live=True, calibrated_display=display
+        configuration,
+        opened.rig,
+        plan,
+        prior,
+        stage,
+        is_live=True,
+        calibrated_display=display,
+        has_gates=True,
     )
     return LiveSession(configuration, opened, specification, board)
 

@@ -231,14 +231,18 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         made_cuts=tuple(dict.fromkeys(options.cut)),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
+    is_recorded = isinstance(operator, RecordedOperator)
     if session is None:
         # Nothing is late: every frame tells what it can.
         specification = replace(specification, frames_between_faces=1)
+    elif is_recorded:
+        # Who only follows has nobody to answer for conditions.
+        specification = replace(specification, has_gates=session.has_gates)
     return _Replay(
         specification,
         operator,
         executor,
-        isinstance(operator, RecordedOperator),
+        is_recorded,
         list_warnings(session, options),
         find_moved_rig(session, options),
     )

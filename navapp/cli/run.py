@@ -11,12 +11,12 @@ from navapp.cli.diagnostics import Diagnostics, check_writable
 from navapp.cli.live_session import LiveSession, make_controller, prepare_session
 from navapp.cli.methods import add_method
 from navapp.cli.practice_mirror import add_practice_mirror
-from navapp.errors import ConfigurationError, InputError, UsageError
+from navapp.errors import ConfigurationError, InputError, ResultError, UsageError
 
 if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.frame_result import FrameResult
-    from navapp.control.operators import ScriptStep
+    from navapp.control.scripted_operator import ScriptStep
 
 _EXAMPLE = """\
 examples:
@@ -95,7 +95,7 @@ def _with_options(configuration: "Configuration", options: argparse.Namespace) -
 
 
 def _script(path: str | None) -> "tuple[ScriptStep, ...]":
-    from navapp.control.operators import DEFAULT_SCRIPT, read_script
+    from navapp.control.scripted_operator import DEFAULT_SCRIPT, read_script
 
     if path is None:
         return DEFAULT_SCRIPT
@@ -121,18 +121,21 @@ def _run_headless(
 ) -> int:
     from navapp.cli.headless import FrameLog, report_result, run_session
     from navapp.cli.results import frame_to_json, rig_to_json
-    from navapp.control.operators import ScriptedOperator
+    from navapp.control.scripted_operator import ScriptedOperator
 
-    log = FrameLog(options.frames, diagnostics)
+    log, operator = FrameLog(options.frames, diagnostics), ScriptedOperator(script)
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
         controller = make_controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
-        seconds = run_session(controller, ScriptedOperator(script), log)
+        seconds = run_session(controller, operator, log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
     faces = [result.faces for result in log.results]
-    return report_result(frames, seconds, controller.failure, options, diagnostics, rig, faces)
+    failure = controller.failure
+    if failure is None and operator.failure:
+        failure = ResultError(operator.failure, remedy="see the frames in --json")
+    return report_result(frames, seconds, failure, options, diagnostics, rig, faces)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

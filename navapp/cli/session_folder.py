@@ -35,6 +35,7 @@ class RecordedSession:
     method: Method
     follows_refused: bool
     first_stage: str
+    has_gates: bool
     events: RecordedEvents
 
 
@@ -67,6 +68,7 @@ def start_recording(
         "method": specification.method,
         "follow_refused": specification.follows_refused,
         "first_stage": specification.stage.name,
+        "gates": specification.has_gates,
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
     return SessionRecorder(
@@ -122,6 +124,7 @@ def read_session(folder: str | Path) -> RecordedSession:
         _parse_method(method, folder),
         content.get("follow_refused") is True,
         first_stage,
+        content.get("gates") is True,
         read_events(events_path),
     )
 

@@ -159,6 +159,8 @@ class StagesSection(Section):
 
     first: str = "opening"
     """Name or number of the stage that a session starts in."""
+    check_minutes: Annotated[float, Field(gt=0.0)] = 30.0
+    """How long a check on the patient counts, before a stage that asks for one is entered."""
 
 
 class RecordingSection(Section):

@@ -9,12 +9,14 @@ from navapp.control.commands import (
     Cancel,
     CheckMirror,
     Command,
+    ConfirmCondition,
     ConfirmCross,
     ConfirmCut,
     DistrustRig,
     EnterStage,
     Interrupt,
     NudgeCross,
+    OverrideGate,
     Propose,
     Quit,
     Reconnect,
@@ -24,6 +26,7 @@ from navapp.control.commands import (
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
+    WithdrawCondition,
     WithdrawCut,
 )
 from navapp.errors import SequenceError
@@ -45,10 +48,13 @@ _PLAIN: dict[str, type] = {
 # Older recordings do not say which candidate was meant: the one that was under review.
 _DECISIONS: dict[str, type[Accept] | type[Reject]] = {"accept": Accept, "reject": Reject}
 # Commands about something that has a name.
-_NAMED: dict[str, type[ToggleLayer] | type[ConfirmCut] | type[WithdrawCut]] = {
+_Named = ToggleLayer | ConfirmCut | WithdrawCut | ConfirmCondition | WithdrawCondition
+_NAMED: dict[str, type[_Named]] = {
     "layer": ToggleLayer,
     "confirm_cut": ConfirmCut,
     "withdraw_cut": WithdrawCut,
+    "confirm": ConfirmCondition,
+    "withdraw": WithdrawCondition,
 }
 _NAMES = {kind: name for name, kind in (_PLAIN | _DECISIONS | _NAMED).items()}
 
@@ -57,7 +63,9 @@ def command_to_json(command: Command) -> dict[str, Any]:
     """A command as a JSON object."""
     if isinstance(command, EnterStage):
         return {"command": "stage", "number": command.number}
-    if isinstance(command, ToggleLayer | ConfirmCut | WithdrawCut):
+    if isinstance(command, OverrideGate):
+        return {"command": "override", "number": command.number, "reason": command.reason}
+    if isinstance(command, _Named):
         return {"command": _NAMES[type(command)], "name": command.name}
     if isinstance(command, NudgeCross):
         nudge_px = [command.right_px, command.down_px]
@@ -82,6 +90,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
     try:
         if name == "stage":
             return EnterStage(int(value["number"]))
+        if name == "override":
+            return OverrideGate(int(value["number"]), str(value["reason"]))
         if name in _NAMED:
             return _NAMED[name](str(value["name"]))
         if name == "nudge_cross":

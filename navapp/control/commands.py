@@ -91,6 +91,28 @@ class EnterStage:
 
 
 @dataclass(frozen=True, slots=True)
+class OverrideGate:
+    """Go to a stage whose gate has just been told as not met, all the same."""
+
+    number: int  # of the stage
+    reason: str  # for the record
+
+
+@dataclass(frozen=True, slots=True)
+class ConfirmCondition:
+    """A condition of the time-out or of a gate that a person answers for is met."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawCondition:
+    """A condition that was confirmed is not met after all."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class ConfirmCut:
     """A planned cut has been made: what lies beyond its plane no longer belongs to the bone."""
 
@@ -141,6 +163,9 @@ Command = (
     | NudgeCross
     | ConfirmCross
     | EnterStage
+    | OverrideGate
+    | ConfirmCondition
+    | WithdrawCondition
     | ConfirmCut
     | WithdrawCut
     | Reconnect

@@ -29,7 +29,9 @@ from navapp.control.executors import Executor, InlineExecutor
 from navapp.control.eye_preview import EyePreview
 from navapp.control.frame_presenter import FramePresenter
 from navapp.control.frame_result import FrameResult
+from navapp.control.gates import Gates
 from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
+from navapp.control.layer_choice import LayerChoice
 from navapp.control.made_cuts import MadeCuts
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
@@ -151,7 +153,7 @@ class SessionController:
             command = self._queue.popleft() if self._queue else None
         if command is not None:
             session.tell_command(command)
-            self._commands.handle(command)
+            self._commands.handle(command, self._maker.make())
         else:
             session.take_over(session.sequence + 1)
             self._rig_watch.take_over()
@@ -266,7 +268,8 @@ def _make_session(
         RegistrationJob(trackers, executor),
         OtherBones(tracks, plan, specification.others),
         MadeCuts(plan, trackers, specification.made_cuts, specification.frames_between_faces),
+        Gates(plan, are_asked=specification.has_gates, check_minutes=specification.check_minutes),
         specification.stage,
-        specification.layers,
+        LayerChoice(specification.layers),
         RateMeter(specification.display_delay_ms, specification.display_delay_bound_ms),
     )

@@ -62,6 +62,8 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
         reasons.append(Reason.NOT_NAVIGATING)
     if snapshot.state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
         reasons += _of_pose(snapshot)
+    if not all(line.is_met for line in snapshot.time_out):
+        reasons.append(Reason.TIME_OUT_OPEN)
     return tuple(reasons)
 
 

@@ -1,37 +1,26 @@
-"""Operators that are not people: a script, a recording, and the plain one of a replay.
+"""Operators that are not people: a recording, and the plain one of a replay.
 
 An operator sees snapshots, as a person does, and answers with commands.
 """
 
 import json
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import Any, Protocol
 
-import numpy as np
-from pydantic import Field
-
-from navapp.config import Section, validate
 from navapp.control.command_files import command_from_json
 from navapp.control.commands import (
     Accept,
-    Blank,
     Command,
     DistrustRig,
     EnterStage,
-    Propose,
     Register,
     Reject,
-    Show,
 )
-from navapp.control.stages import stage_by_name
 from navapp.control.states import SessionState, Snapshot
 from navapp.errors import SequenceError
 from navapp.values import Status
-
-_MAX_ATTEMPTS = 8
 
 
 class Operator(Protocol):
@@ -75,87 +64,6 @@ class CombinedOperator:
     def commands(self, snapshot: Snapshot) -> list[Command]:
         """Those of all operators."""
         return [one for operator in self._operators for one in operator.commands(snapshot)]
-
-
-class ScriptStep(Section):
-    """One line of an operator's script."""
-
-    do: Literal["register", "propose", "stage", "blank", "show"]
-    """propose offers the found pose, turned, to see the judge refuse it."""
-    turn_deg: float = 15.0
-    """Of a proposed pose."""
-    stage: str = ""
-    """Of a stage step: name or number."""
-    at_frame: Annotated[int, Field(ge=0)] = 0
-    """Not before this frame."""
-
-
-class Script(Section):
-    """An operator's script as a TOML file holds it."""
-
-    step: Annotated[tuple[ScriptStep, ...], Field(min_length=1)]
-    """[[step]] tables, in order."""
-
-
-# Offers a wrong pose first, which the judge must refuse.
-DEFAULT_SCRIPT = (ScriptStep(do="propose"), ScriptStep(do="register"))
-
-
-class ScriptedOperator:
-    """Follows a script; accepts a candidate only when the judge says OK, rejects all others."""
-
-    def __init__(self, steps: tuple[ScriptStep, ...] = DEFAULT_SCRIPT) -> None:
-        self._steps = deque(steps)
-        self._n_attempts = 0
-        self._phase: Literal["idle", "registering", "proposed"] = "idle"
-
-    def commands(self, snapshot: Snapshot) -> list[Command]:
-        """The next action of the script, when its time has come."""
-        if snapshot.state is SessionState.REVIEW:
-            return self._decide(snapshot)
-        if not self._steps or snapshot.sequence < self._steps[0].at_frame:
-            return []
-        step = self._steps[0]
-        if step.do in ("register", "propose"):
-            return self._begin(snapshot)
-        self._steps.popleft()
-        if step.do == "stage":
-            return [EnterStage(stage_by_name(step.stage).number)]
-        return [Blank() if step.do == "blank" else Show()]
-
-    def _begin(self, snapshot: Snapshot) -> list[Command]:
-        if snapshot.state not in (SessionState.READY, SessionState.SUSPENDED):
-            return []
-        self._n_attempts += 1
-        if self._n_attempts > _MAX_ATTEMPTS:
-            self._steps.clear()
-            return []
-        self._phase = "registering"
-        return [Register()]
-
-    def _decide(self, snapshot: Snapshot) -> list[Command]:
-        """On a candidate: turn it, accept it or reject it."""
-        if snapshot.verdict is None:
-            return []
-        step = self._steps[0] if self._steps else ScriptStep(do="register")
-        pose = snapshot.left_from_bone
-        if step.do == "propose" and self._phase == "registering" and pose is not None:
-            self._phase = "proposed"
-            turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
-            # About a point of the bone: where the model's origin is, in the camera.
-            return [Reject(snapshot.candidate_id), Propose(pose.move(turn, pose.translation_mm))]
-        if snapshot.verdict.status is not Status.OK:
-            if self._phase == "proposed":
-                self._next_step()
-            return [Reject(snapshot.candidate_id)]
-        self._next_step()
-        return [Accept(snapshot.candidate_id)]
-
-    def _next_step(self) -> None:
-        self._phase = "idle"
-        self._n_attempts = 0
-        if self._steps:
-            self._steps.popleft()
 
 
 class RecordedOperator:
@@ -221,20 +129,8 @@ def read_events(path: str | Path) -> RecordedEvents:
             take_overs.append(sequence)
         elif value.get("kind") == "refused" and commands and commands[-1][0] == sequence:
             # The refusal follows its command at once. What refused it may be missing in a replay,
-            # a lost camera for example, and the command would be carried out.
-            commands.pop()
+            # a lost camera for example, and the command would be carried out. A gate refuses again,
+            # and is overridden only then.
+            commands[-1:] = [one for one in commands[-1:] if isinstance(one[1], EnterStage)]
         is_complete = value.get("type") == "end"
     return RecordedEvents(commands, take_overs, is_complete)
-
-
-def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]:
-    """Steps of an operator's script: `[[step]]` tables with do, turn_deg, stage, at_frame.
-
-    Raises:
-        ConfigurationError: an unknown key, action or stage.
-    """
-    steps = validate(Script, content, name).step
-    for step in steps:
-        if step.do == "stage":
-            stage_by_name(step.stage)
-    return steps

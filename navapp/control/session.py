@@ -1,17 +1,23 @@
 """What a session knows, and every way in which frames and commands change it."""
 
+from collections.abc import Sequence
+
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from navapp.control.bone_tracks import BoneTracks, Candidate
 from navapp.control.commands import Command, Interrupt
 from navapp.control.event_log import EventLog
 from navapp.control.frame_result import FrameResult
+from navapp.control.gates import Gates
+from navapp.control.interlocks import is_current
+from navapp.control.layer_choice import LayerChoice
 from navapp.control.made_cuts import MadeCuts
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import OperatorPicture
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.states import (
+    ConditionLine,
     CutLine,
     Event,
     EventLevel,
@@ -22,7 +28,6 @@ from navapp.control.states import (
 from navapp.errors import RigError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
-from navapp.overlay import LAYERS
 from navapp.resection import CutBone
 from navapp.values import MeasuredFace, Reason, StageSpec, Status, TrackedFrame, Verdict
 
@@ -37,8 +42,9 @@ class Session:
         registration: searches for the stage's bone.
         others: the other bones that are followed.
         cuts: that have been made.
+        gates: between the stages.
         stage: to start in.
-        layers: drawn in every stage; None: the stage's own.
+        layers: that are drawn; by default those of the stage.
         meter: of its frames.
     """
 
@@ -50,8 +56,9 @@ class Session:
         registration: RegistrationJob,
         others: OtherBones,
         cuts: MadeCuts,
+        gates: Gates,
         stage: StageSpec,
-        layers: tuple[str, ...] | None = None,
+        layers: LayerChoice | None = None,
         meter: RateMeter | None = None,
     ) -> None:
         self._clock = clock
@@ -60,12 +67,13 @@ class Session:
         self._registration = registration
         self._others = others
         self._cuts = cuts
+        self._gates = gates
+        self._refused_stage: int | None = None
         self._state = SessionState.STARTING
         self._tracked: TrackedFrame | None = None
         self._shows_depth = False
-        self._only_layers = layers
-        self._switched_layers: frozenset[str] = frozenset()
-        self._tracked_at_ns = 0
+        self._layers = layers or LayerChoice()
+        self._tracked_at_ns = self._time_ns = 0
         self._picture: OperatorPicture | None = None
         self._meter = meter or RateMeter()
         self._is_over = False
@@ -152,6 +160,7 @@ class Session:
     def begin_frame(self, frame: StereoFrame) -> None:
         """A frame is about to be handled; the first one ends the start."""
         self._log.begin_frame(frame.sequence)
+        self._time_ns = frame.captured_ns
         if self._state is SessionState.STARTING:
             self.change_state(SessionState.READY, "pictures arrive")
 
@@ -205,10 +214,68 @@ class Session:
             # What runs searches for the bone as it was.
             self.begin_registration()
 
+    def cuts_of(self, stage: StageSpec) -> tuple[CutLine, ...]:
+        """The cuts of a stage: planned, made, measured."""
+        return self._cuts.describe(stage)
+
     @property
-    def cuts(self) -> tuple[CutLine, ...]:
-        """Of the stage: planned, made, measured."""
-        return self._cuts.describe(self._stage)
+    def time_ns(self) -> int:
+        """Capture of the newest frame: conditions go by it, so that they replay."""
+        return self._time_ns
+
+    @property
+    def rig_problem(self) -> str:
+        """Why the rig is not believed; empty while it is."""
+        return "" if self._rig_error is None else self._rig_error.problem
+
+    def is_bone_ok(self, stage: StageSpec) -> bool:
+        """Whether a stage's bone is accepted, and its newest pose is OK and not too old."""
+        if stage.bone == self._stage.bone:
+            is_ok = self._tracked is not None and self._tracked.verdict.status is Status.OK
+            return is_ok and self._state is SessionState.NAVIGATING
+        others = self._others.describe(self._stage, self._time_ns)
+        return any(other.name == stage.bone and is_current(other) for other in others)
+
+    @property
+    def time_out(self) -> tuple[ConditionLine, ...]:
+        """What must be so before the first guides."""
+        return self._gates.time_out(self)
+
+    @property
+    def refused_stage(self) -> int | None:
+        """The stage whose gate was told as not met, and may be overridden."""
+        return self._refused_stage
+
+    def gate(self, number: int) -> tuple[ConditionLine, ...]:
+        """What must be so before a stage is entered from the one in force."""
+        return self._gates.before(number, self._stage, self)
+
+    def confirm_condition(self, name: str) -> None:
+        """A person says that a condition is met.
+
+        Raises:
+            UsageError: no person answers for it.
+        """
+        self._gates.confirm(name, self)
+        self.add_event("gate", f"confirmed: {name}")
+
+    def withdraw_condition(self, name: str) -> None:
+        """A condition is not met after all.
+
+        Raises:
+            UsageError: it was not confirmed.
+        """
+        self._gates.withdraw(name)
+        self.add_event("gate", f"withdrawn: {name}", EventLevel.WARNING)
+
+    def refuse_stage(self, stage: StageSpec, open_lines: Sequence[ConditionLine]) -> None:
+        """Tell item by item why a stage is not entered; now its gate may be overridden."""
+        self._refused_stage = stage.number
+        text = f"stage {stage.number} {stage.name} refused: {len(open_lines)} open"
+        self.add_event("refused", text, EventLevel.WARNING)
+        for line in open_lines:
+            note = f" ({line.note})" if line.note else ""
+            self.add_event("gate", f"open: {line.text}{note}", EventLevel.WARNING)
 
     @property
     def bone_version(self) -> int:
@@ -245,12 +312,11 @@ class Session:
     @property
     def layers(self) -> tuple[str, ...]:
         """Names of the layers drawn: the stage's, but for what the operator has switched."""
-        drawn = self._only_layers if self._only_layers is not None else self._stage.layers
-        return tuple(name for name in LAYERS if (name in drawn) != (name in self._switched_layers))
+        return self._layers.of(self._stage)
 
     def toggle_layer(self, name: str) -> None:
         """Draw a layer, or no longer, in the stage in force and until it is left."""
-        self._switched_layers ^= {name}
+        self._layers.toggle(name)
         self.add_event("layer", f"layer {name} {'on' if name in self.layers else 'off'}")
 
     def keep_picture(self, picture: OperatorPicture) -> None:
@@ -311,8 +377,10 @@ class Session:
         self._tracks.propose(self._stage.bone, pose, self.now_ns)
         self.change_state(SessionState.REVIEW, "a pose was proposed by hand")
 
-    def accept(self, candidate: Candidate) -> None:
-        """Navigate by the candidate that is under review."""
+    def accept(self) -> None:
+        """Navigate by the candidate under review, if there is one."""
+        if (candidate := self._tracks.candidate) is None:
+            return
         self._cuts.forget_faces(self._stage.bone)
         self._tracks.accept(self._stage)
         text = add_bound("registration accepted", candidate.tracked.verdict)
@@ -388,7 +456,8 @@ class Session:
 
     def _put_in_force(self, stage: StageSpec) -> None:
         self._stage = stage
-        self._switched_layers = frozenset()
+        self._refused_stage = None
+        self._layers.reset()
         # What was judged by the old stage's targets and tolerance says nothing in the new one.
         self._tracked = None
         self._tracks.forget_verdicts()

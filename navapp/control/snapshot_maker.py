@@ -47,8 +47,6 @@ class SnapshotMaker:
         now_ns = session.now_ns
         tracked, picture = session.tracked, session.picture
         shows_eye = picture is not None and picture.is_of_eye
-        # A candidate that was not followed into a frame yet is not on the screen.
-        is_candidate = session.state is SessionState.REVIEW and tracked is not None
         reports = self.monitored.reports
         rig, plan = self.specification.rig, self.specification.plan
         bone = plan.bones.get(session.stage.bone)
@@ -61,7 +59,7 @@ class SnapshotMaker:
             is_blanked=self.display.is_blanked,
             verdict=None if tracked is None else tracked.verdict,
             left_from_bone=None if tracked is None else tracked.left_from_bone,
-            candidate_id=session.candidate_id if is_candidate else None,
+            candidate_id=session.candidate_id,
             pose_age_ms=session.pose_age_ms(now_ns),
             others=session.other_bones(now_ns),
             valid_ms=self.specification.overlay_valid_ms,
@@ -72,7 +70,10 @@ class SnapshotMaker:
             has_eye=self.eye.is_possible,
             shows_eye=shows_eye,
             layers=session.layers,
-            cuts=session.cuts,
+            time_out=session.time_out,
+            gate=session.gate(session.refused_stage or session.stage.number + 1),
+            refused_stage=session.refused_stage,
+            cuts=session.cuts_of(session.stage),
             bone_version=session.bone_version,
             bone_surface=session.bone_surface,
             rates=session.rates(self.camera.n_dropped),

@@ -37,6 +37,9 @@ class SessionSpecification:
     display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
     made_cuts: tuple[str, ...] = ()  # planes of the plan that are cut from the start
     frames_between_faces: int = 5  # faces of cuts are measured in every so many frames
+    # guides wait for the time-out, and stages for what their gates ask for.
+    has_gates: bool = False
+    check_minutes: float = 30.0  # a check on the patient counts so long
 
     @property
     def display_model(self) -> DisplayModel | None:
@@ -69,6 +72,7 @@ def specify_session(
     layers: tuple[str, ...] | None = None,
     calibrated_display: CalibratedDisplay | None = None,
     made_cuts: tuple[str, ...] = (),
+    has_gates: bool = False,
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -86,6 +90,7 @@ def specify_session(
         layers: drawn in every stage; None: the stage's own.
         calibrated_display: in the mirror; None: the display shows the video.
         made_cuts: planes of the plan that are cut from the start.
+        has_gates: guides wait for the time-out, and stages for what their gates ask for.
     """
     display = configuration.display
     return SessionSpecification(
@@ -105,4 +110,6 @@ def specify_session(
         layers=layers,
         display=calibrated_display,
         made_cuts=made_cuts,
+        has_gates=has_gates,
+        check_minutes=configuration.stages.check_minutes,
     )

@@ -1,12 +1,26 @@
 """The five surgical stages: one declarative table.
 
 Tolerances are those of the plan's targets at that stage. Layers (`navapp.overlay.layers`) are drawn
-whatever the order given. Gates are what the operator confirms by entering the next stage.
+whatever the order given. `entry` and `exit` are the conditions of its gates (`control.gates`).
 Source: the paper, section 4 (opening, drilling, implant, patella, spacer).
 """
 
 from navapp.errors import UsageError
-from navapp.values import Plan, StageSpec
+from navapp.values import Condition, ConditionKind, Plan, StageSpec
+
+# Before the first guides of a session.
+TIME_OUT: tuple[Condition, ...] = (
+    Condition("patient", "this is the plan's patient"),
+    Condition("side", "this is the plan's side"),
+    Condition("plan", "this is the plan that was decided on"),
+    Condition("rig", "the rig is calibrated", ConditionKind.RIG_VALID),
+)
+
+_BONE_OK = Condition("bone_ok", "registration accepted, pose OK", ConditionKind.BONE_OK)
+_CHECKED = Condition(
+    "checked_on_patient", "checked on the patient: known points lie where shown", is_repeated=True
+)
+_CUTS = Condition("cuts", "cuts measured within tolerance", ConditionKind.CUTS_MEASURED)
 
 STAGES: tuple[StageSpec, ...] = (
     StageSpec(
@@ -17,7 +31,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=2.0,
         targets=("femur/medial_condyle", "femur/lateral_condyle", "femur/notch"),
         layers=("bone", "defects", "risks", "targets", "scale"),
-        gates=("bone exposed", "registration accepted"),
+        exit=(Condition("bone_exposed", "the bone is exposed"), _BONE_OK),
     ),
     StageSpec(
         number=2,
@@ -27,8 +41,11 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=1.0,
         targets=("femur/notch",),
         layers=("bone", "risks", "drills", "targets", "scale"),
-        gates=("entry point checked with the tip",),
-        measurements=("drill angle", "drill offset", "drill depth"),
+        entry=(_CHECKED,),
+        exit=(
+            Condition("entry_point", "the entry point was checked with the tip"),
+            Condition("hole_drilled", "the hole is drilled to its depth"),
+        ),
     ),
     StageSpec(
         number=3,
@@ -38,8 +55,12 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=1.0,
         targets=("femur/medial_condyle", "femur/lateral_condyle"),
         layers=("bone", "removal", "risks", "parts", "planes", "scale"),
-        gates=("cuts checked", "component size confirmed"),
-        measurements=("varus or valgus", "flexion", "rotation", "resection"),
+        entry=(_CHECKED,),
+        exit=(
+            _CUTS,
+            Condition("component_size", "the component's size is confirmed"),
+            Condition("component_seated", "the component is seated"),
+        ),
     ),
     StageSpec(
         number=4,
@@ -49,8 +70,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=2.0,
         targets=("patella/centre",),
         layers=("bone", "removal", "parts", "planes", "scale"),
-        gates=("thickness measured",),
-        measurements=("thickness", "tilt"),
+        exit=(_CUTS, Condition("thickness", "the patella's thickness was measured")),
     ),
     StageSpec(
         number=5,
@@ -60,8 +80,8 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=1.0,
         targets=("tibia/medial_plateau", "tibia/lateral_plateau"),
         layers=("bone", "removal", "parts", "planes", "scale"),
-        gates=("gaps measured",),
-        measurements=("medial gap", "lateral gap", "slope"),
+        entry=(_CHECKED,),
+        exit=(_CUTS, Condition("gaps", "the gaps were measured in extension and at 90 deg")),
     ),
 )
 

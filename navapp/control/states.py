@@ -137,6 +137,17 @@ class CutLine:
     seen_share: float | None = None  # of the face in the newest look; None: not seen at all
 
 
+@dataclass(frozen=True, slots=True)
+class ConditionLine:
+    """A condition of the time-out or of a gate, as it stands."""
+
+    name: str  # for programs
+    text: str  # for people
+    is_met: bool
+    is_personal: bool = False  # a person confirms it, by its name
+    note: str = ""  # more about it: what is asked for, or when it was confirmed
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
     """All that a client may show; immutable."""
@@ -149,8 +160,8 @@ class Snapshot:
     is_blanked: bool = False
     verdict: Verdict | None = None  # on the newest pose, None before there is one
     left_from_bone: RigidTransform | None = None  # the newest pose, None when there is none
-    # of the pose that waits for the operator's decision: another one for every candidate of a
-    # session; None when none waits.
+    # of the candidate that waits for the operator's decision: another one for every candidate of a
+    # session; None when none waits. It is on the screen when there is a verdict.
     candidate_id: int | None = None
     pose_age_ms: float | None = None  # of that pose, now
     valid_ms: float = 500.0  # a pose that is older is not where the bone is
@@ -166,6 +177,10 @@ class Snapshot:
     has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead
     shows_eye: bool = False  # it is shown
     layers: tuple[str, ...] = ()  # names of those that are drawn where guides are
+    time_out: tuple[ConditionLine, ...] = ()  # before the first guides; empty: none is asked for
+    # the stage whose gate was told as not met, and may be overridden; None: none was.
+    refused_stage: int | None = None
+    gate: tuple[ConditionLine, ...] = ()  # before that stage, or else the next one
     cuts: tuple[CutLine, ...] = ()  # of the stage
     bone_version: int = 0  # of the stage's bone: counts the cuts confirmed, measured, withdrawn
     bone_surface: TriangleMesh | None = None  # what is left of it; None: all
@@ -201,6 +216,11 @@ class Snapshot:
         return not self.reasons
 
     @property
+    def gate_stage(self) -> int:
+        """Number of the stage that `gate` stands before."""
+        return self.refused_stage or self.stage.number + 1
+
+    @property
     def is_candidate(self) -> bool:
         """The pose waits for the operator's decision."""
-        return self.candidate_id is not None
+        return self.candidate_id is not None and self.verdict is not None

@@ -22,12 +22,8 @@ from navapp.control.commands import (
     ToggleDepth,
     ToggleEye,
 )
-from navapp.control.states import (
-    DeviceHealth,
-    SessionState,
-    Snapshot,
-)
-from navapp.values import Status
+from navapp.control.rules import why_refused
+from navapp.control.states import Snapshot
 
 _KEY_LABELS = {
     "space": "SPACE",
@@ -41,6 +37,8 @@ _KEY_LABELS = {
     "shift+up": "SHIFT UP",
     "shift+down": "SHIFT DOWN",
 }
+# What needs no answer of the session.
+_HEEDLESS = ("blank", "quit")
 # A step of a cross in the check of the mirror, and one with the shift key.
 _STEPS_PX = (("", 1), ("shift+", 10))
 _ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
@@ -54,8 +52,6 @@ class Action:
     key: str  # as Textual names it; single characters stand for themselves
     label: str  # one or two words for the footer
     description: str  # a sentence for help and palette
-    is_enabled: Callable[[Snapshot], bool]  # whether it makes sense now
-    needs: str  # what it needs for that, in a few words; empty where it always makes sense
     # made from the snapshot; None for what the screen does by itself.
     command: Callable[[Snapshot], Command] | None = None
     # place in the footer; actions that share one exclude each other. Empty: not there.
@@ -74,48 +70,8 @@ class Action:
         return Binding(self.key, f"app.act('{self.name}')", self.description, show=False)
 
 
-def _always(_snapshot: Snapshot) -> bool:
-    return True
-
-
-def _in_states(*states: SessionState) -> Callable[[Snapshot], bool]:
-    return lambda snapshot: snapshot.state in states
-
-
-def is_acceptable(snapshot: Snapshot) -> bool:
-    """A candidate waits that the judge does not call lost; another one is refused anyway."""
-    verdict = snapshot.verdict
-    return snapshot.is_candidate and verdict is not None and verdict.status is not Status.LOST
-
-
-def _can_change_stage(snapshot: Snapshot) -> bool:
-    return snapshot.state in (
-        SessionState.READY,
-        SessionState.REVIEW,
-        SessionState.NAVIGATING,
-        SessionState.SUSPENDED,
-    )
-
-
-def _has_neighbour(step: int) -> Callable[[Snapshot], bool]:
-    return lambda snapshot: (
-        _can_change_stage(snapshot) and 1 <= snapshot.stage.number + step <= len(snapshot.stages)
-    )
-
-
 def _to_neighbour(step: int) -> Callable[[Snapshot], Command]:
     return lambda snapshot: EnterStage(snapshot.stage.number + step)
-
-
-def _has_failed_device(snapshot: Snapshot) -> bool:
-    # A rig that has moved is not opened again.
-    healths = {device.health for device in snapshot.devices if device.kind != "rig"}
-    is_failed = bool(healths & {DeviceHealth.TROUBLE, DeviceHealth.LOST})
-    return is_failed or (snapshot.state is SessionState.FAULT and not snapshot.rig_alarm)
-
-
-def _is_checking(snapshot: Snapshot) -> bool:
-    return snapshot.cross_check is not None
 
 
 def _nudge_action(shift: str, arrow: str, step_px: int) -> Action:
@@ -125,8 +81,6 @@ def _nudge_action(shift: str, arrow: str, step_px: int) -> Action:
         f"{shift}{arrow}",
         "move",
         f"check of the mirror: move the cross by {step_px} px",
-        _is_checking,
-        "a check of the mirror under way",
         lambda _: NudgeCross(right * step_px, down * step_px),
     )
 
@@ -137,8 +91,6 @@ def _stage_action(number: int) -> Action:
         str(number),
         f"stage {number}",
         f"go to stage {number}",
-        lambda snapshot: _can_change_stage(snapshot) and snapshot.stage.number != number,
-        f"another stage than {number} in force, and no registration that runs",
         lambda _: EnterStage(number),
     )
 
@@ -149,8 +101,6 @@ ACTIONS: tuple[Action, ...] = (
         "space",
         "blank",
         "make the display dark, at once; works on every screen",
-        _always,
-        "",
         lambda _: Blank(),
         slot="blank",
         is_everywhere=True,
@@ -160,9 +110,14 @@ ACTIONS: tuple[Action, ...] = (
         "v",
         "show",
         "leave blank: show the guides on the display again",
-        lambda snapshot: snapshot.is_blanked,
-        "a display that was blanked",
         lambda _: Show(),
+        slot="show",
+    ),
+    Action(
+        "gates",
+        "t",
+        "gates",
+        "see the time-out and what the next stage asks for; confirm it, or go on all the same",
         slot="show",
     ),
     Action(
@@ -170,8 +125,6 @@ ACTIONS: tuple[Action, ...] = (
         "a",
         "accept",
         "accept the candidate under review",
-        is_acceptable,
-        "a candidate on the screen that the judge does not call lost",
         lambda snapshot: Accept(snapshot.candidate_id),
         slot="accept",
     ),
@@ -180,8 +133,6 @@ ACTIONS: tuple[Action, ...] = (
         "r",
         "reject",
         "reject the candidate under review",
-        lambda snapshot: snapshot.is_candidate,
-        "a candidate on the screen",
         lambda snapshot: Reject(snapshot.candidate_id),
         slot="reject",
     ),
@@ -190,13 +141,6 @@ ACTIONS: tuple[Action, ...] = (
         "g",
         "register",
         "register: find the bone from the session's start pose",
-        _in_states(
-            SessionState.READY,
-            SessionState.REVIEW,
-            SessionState.NAVIGATING,
-            SessionState.SUSPENDED,
-        ),
-        "a camera that sees, and no registration that runs",
         lambda _: Register(),
         slot="register",
     ),
@@ -205,8 +149,6 @@ ACTIONS: tuple[Action, ...] = (
         "c",
         "cancel",
         "cancel the registration that is running",
-        _in_states(SessionState.REGISTERING),
-        "a registration that runs",
         lambda _: Cancel(),
         slot="register",
     ),
@@ -215,8 +157,6 @@ ACTIONS: tuple[Action, ...] = (
         "[",
         "back",
         "go back to the previous stage",
-        _has_neighbour(-1),
-        "a stage before this one, and no registration that runs",
         _to_neighbour(-1),
         slot="previous",
         needs_width=True,
@@ -226,8 +166,6 @@ ACTIONS: tuple[Action, ...] = (
         "]",
         "next",
         "go on to the next stage",
-        _has_neighbour(1),
-        "a stage after this one, and no registration that runs",
         _to_neighbour(1),
         slot="next",
     ),
@@ -237,8 +175,6 @@ ACTIONS: tuple[Action, ...] = (
         "o",
         "reopen",
         "open lost devices, turn the mirror back",
-        _has_failed_device,
-        "a device that is lost or in trouble",
         lambda _: Reconnect(),
     ),
     Action(
@@ -246,8 +182,6 @@ ACTIONS: tuple[Action, ...] = (
         "z",
         "depth",
         "colour the picture by its depth: matched, or guessed from which side; dense: in front",
-        _always,
-        "",
         lambda _: ToggleDepth(),
         slot="depth",
         needs_width=True,
@@ -257,8 +191,6 @@ ACTIONS: tuple[Action, ...] = (
         "y",
         "eye",
         "with run --mirror: see what an eye sees in the simulated mirror",
-        lambda snapshot: snapshot.is_simulated,
-        "the simulated room",
         lambda _: ToggleEye(),
     ),
     Action(
@@ -266,8 +198,6 @@ ACTIONS: tuple[Action, ...] = (
         "l",
         "layers",
         "see the layers of the overlay, switch them on and off",
-        _always,
-        "",
         slot="layers",
         needs_width=True,
     ),
@@ -276,8 +206,6 @@ ACTIONS: tuple[Action, ...] = (
         "k",
         "cuts",
         "see the cuts of the stage, planned and measured; say that one has been made",
-        lambda snapshot: bool(snapshot.cuts),
-        "a stage whose bone has planned cuts",
         slot="cuts",
         needs_width=True,
     ),
@@ -286,8 +214,6 @@ ACTIONS: tuple[Action, ...] = (
         "m",
         "check",
         "check what is seen in the mirror, or give the check up",
-        lambda snapshot: snapshot.has_mirror,
-        "a display in the mirror",
         lambda _: CheckMirror(),
     ),
     *(_nudge_action(shift, arrow, step_px) for shift, step_px in _STEPS_PX for arrow in _ARROWS),
@@ -296,31 +222,23 @@ ACTIONS: tuple[Action, ...] = (
         "enter",
         "confirm",
         "check of the mirror: the cross lies on its point",
-        _is_checking,
-        "a check of the mirror under way",
         lambda _: ConfirmCross(),
     ),
-    Action("devices", "d", "devices", "see the devices in detail", _always, "", slot="devices"),
+    Action("devices", "d", "devices", "see the devices in detail", slot="devices"),
     Action(
         "events",
         "e",
         "events",
         "see all events",
-        _always,
-        "",
         slot="events",
         needs_width=True,
     ),
-    Action(
-        "help", "?", "help", "see all keys, and the legend of the overlay", _always, "", slot="help"
-    ),
+    Action("help", "?", "help", "see all keys, and the legend of the overlay", slot="help"),
     Action(
         "quit",
         "q",
         "quit",
         "end the session; asks first while navigating",
-        _always,
-        "",
         lambda _: Quit(),
         slot="quit",
     ),
@@ -335,14 +253,8 @@ def bindings() -> list[BindingType]:
     return [action.binding() for action in ACTIONS]
 
 
-def say_why_not(action: Action, is_silent: bool) -> str:
-    """Why an action that is not possible was not done, in one line."""
-    why = "a session that answers" if is_silent else action.needs
-    return f"{action.label} needs {why}"
-
-
 def is_possible(action: Action, snapshot: Snapshot, is_silent: bool) -> bool:
-    """Whether the action may be done; on a silent session only what needs no judgement is."""
-    if is_silent and action.is_enabled is not _always:
-        return False
-    return action.is_enabled(snapshot)
+    """Whether an action makes sense now; of a silent session only what needs no answer does."""
+    if action.command is None or action.name in _HEEDLESS:
+        return True
+    return not is_silent and not why_refused(action.command(snapshot), snapshot)

@@ -12,13 +12,18 @@ from textual.binding import BindingType
 from textual.screen import Screen
 
 from navapp.control.commands import (
+    ConfirmCondition,
     ConfirmCut,
+    EnterStage,
+    OverrideGate,
     Quit,
     ToggleLayer,
+    WithdrawCondition,
     WithdrawCut,
 )
 from navapp.control.states import (
     DeviceHealth,
+    Event,
     EventLevel,
     SessionState,
     Snapshot,
@@ -29,9 +34,9 @@ from navapp.ui.actions import (
     ACTION_OF_NAME,
     bindings,
     is_possible,
-    say_why_not,
 )
 from navapp.ui.cuts_page import CutsPage, cut_of_key
+from navapp.ui.gates_page import REASONS, GatesPage, condition_of_key
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
@@ -58,6 +63,7 @@ _PAGES = {
     "help": HelpPage,
     "layers": LayersPage,
     "cuts": CutsPage,
+    "gates": GatesPage,
     "devices": DevicesPage,
     "events": EventsPage,
 }
@@ -99,7 +105,7 @@ class NavigationApp(QuietApp):
         snapshot = session.snapshot()
         start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
         self._view = View(snapshot, symbols, start_ns, title=title)
-        self._known_alarms: frozenset[object] = frozenset()
+        self._known_events: frozenset[Event] = frozenset()
 
     def get_default_screen(self) -> Screen[None]:
         """The main screen."""
@@ -126,30 +132,50 @@ class NavigationApp(QuietApp):
             if isinstance(screen, ViewScreen):
                 screen.show(self._view, is_text_due=is_text_due)
         self._ring(snapshot)
+        if snapshot.refused_stage not in (None, old.snapshot.refused_stage):
+            self._open_gates()
         if snapshot.is_over and snapshot.state is not SessionState.FAULT:
             self.exit(0)
 
     def _ring(self, snapshot: Snapshot) -> None:
-        """Ring once for alarms that were not there before."""
-        alarms = frozenset(event for event in snapshot.events if event.level is EventLevel.ALARM)
-        if alarms - self._known_alarms:
+        """Ring once for what was not there before: alarms, and commands that were refused."""
+        events = frozenset(snapshot.events)
+        new, self._known_events = events - self._known_events, events
+        refused = [event.text for event in new if event.kind == "refused"]
+        if refused or any(event.level is EventLevel.ALARM for event in new):
             self.bell()
-        self._known_alarms = alarms
+        for text in refused:
+            self.notify(text, severity="warning")
 
     def action_act(self, name: str) -> None:
-        """Do an action of the table, when it is possible on the newest snapshot shown."""
+        """Do an action of the table; the session answers what it refuses with an event."""
         action, view = ACTION_OF_NAME[name], self._view
-        if not is_possible(action, view.snapshot, view.is_silent):
-            # No key is dropped in silence.
-            self.bell()
-            self.notify(say_why_not(action, view.is_silent), severity="warning")
-            return
         if name == "quit":
             self._ask_to_quit(view)
         elif name in _PAGES:
             self.push_screen(_PAGES[name](view))
+        elif view.is_silent and not is_possible(action, view.snapshot, is_silent=True):
+            # No key is dropped in silence.
+            self.bell()
+            self.notify(f"{action.label} needs a session that answers", severity="warning")
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
+
+    def action_condition(self, key: str) -> None:
+        """Confirm or withdraw a condition: from the page of the gates."""
+        line = condition_of_key(self._view.snapshot, key)
+        if line is not None:
+            change = WithdrawCondition if line.is_met else ConfirmCondition
+            self._session.submit(change(line.name))
+
+    def action_pass_gate(self) -> None:
+        """Enter the stage whose gate the page shows."""
+        self._session.submit(EnterStage(self._view.snapshot.gate_stage))
+
+    def action_override_gate(self, number: str) -> None:
+        """Enter it whatever is open, with one of the page's reasons."""
+        reason = REASONS[int(number) - 1]
+        self._session.submit(OverrideGate(self._view.snapshot.gate_stage, reason))
 
     def action_toggle_layer(self, name: str) -> None:
         """Draw a layer, or no longer: from the page that lists them."""
@@ -161,6 +187,11 @@ class NavigationApp(QuietApp):
         if cut is not None and not self._view.is_silent:
             change = WithdrawCut if cut.is_made else ConfirmCut
             self._session.submit(change(cut.name))
+
+    def _open_gates(self) -> None:
+        """A gate was told as not met: its page, unless it is open."""
+        if not isinstance(self.screen, GatesPage):
+            self.push_screen(GatesPage(self._view))
 
     def _ask_to_quit(self, view: View) -> None:
         def finish(is_sure: bool | None) -> None:

@@ -26,7 +26,9 @@ class CutTable(TextView):
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """A line a cut, and a second one where its face was measured or looked for."""
-        snapshot, lines = view.snapshot, []
+        snapshot, lines = view.snapshot, list[Content]()
+        if not snapshot.cuts:
+            return [Content(f" the plan has no cuts of the {snapshot.stage.bone}")]
         for key, cut in zip(CUT_KEYS, snapshot.cuts, strict=False):
             word = "made" if cut.is_made else "planned"
             lines.append(

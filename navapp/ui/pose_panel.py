@@ -4,9 +4,10 @@ import textwrap
 
 from textual.content import Content
 
+from navapp.control.commands import Accept
 from navapp.control.interlocks import is_current
+from navapp.control.rules import why_refused
 from navapp.control.states import OtherBone, Snapshot
-from navapp.ui.actions import is_acceptable
 from navapp.ui.gauges import Number, draw_bar
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
@@ -134,7 +135,11 @@ def _candidate(view: View, width: int) -> list[Content]:
     figures = [_figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"), *_fit(snapshot)]
     accept = ("a", "bold $foreground"), " accept   "
     asks = [
-        Content.assemble(*(accept if is_acceptable(snapshot) else ()), ("r", "bold"), " reject")
+        Content.assemble(
+            *(accept if not why_refused(Accept(snapshot.candidate_id), snapshot) else ()),
+            ("r", "bold"),
+            " reject",
+        )
     ]
     if verdict is not None and verdict.reasons:
         why = textwrap.wrap(verdict.reasons[0].value, width)[:2]

@@ -1,15 +1,15 @@
-"""The row of the five stages, with gates and measurements of the current one."""
+"""The row of the five stages, with the gate before the next one and what was measured."""
 
 from textual.content import Content
 
 from navapp.ui.gauges import cut
 from navapp.ui.text_view import TextView
-from navapp.ui.view import View
+from navapp.ui.view import Level, View
 from navapp.values import StageSpec
 
 
 class StageStepper(TextView):
-    """One line; with more room also the gates and measurements of the present stage."""
+    """One line; with more room also what the next stage asks for, and what was measured."""
 
     def __init__(self) -> None:
         super().__init__("stepper")
@@ -23,11 +23,31 @@ class StageStepper(TextView):
         row = Content.assemble(steps, (limits.rjust(room), "$text-muted"))
         if height < 2:
             return [row]
-        return [
-            row,
-            _format_row("before the next stage", stage.gates, view, width),
-            _format_row("measured here", stage.measurements, view, width),
-        ]
+        return [row, _gate_row(view, width), _measured_row(view, width)]
+
+
+def _gate_row(view: View, width: int) -> Content:
+    """What the next stage asks for, each thing met or open."""
+    items = [
+        f"{(Level.OK if line.is_met else Level.ATTENTION).mark(view.symbols)} {line.text}"
+        for line in view.snapshot.gate
+    ]
+    return _format_row("before the next stage", items, view, width)
+
+
+def _measured_row(view: View, width: int) -> Content:
+    """The cuts of the stage that are made, against their plan."""
+    items = [
+        f"{cut.name} "
+        + (
+            "not measurable"
+            if cut.face is None
+            else f"{cut.face.angle_deg:.2f} deg {cut.face.offset_mm:+.2f} mm"
+        )
+        for cut in view.snapshot.cuts
+        if cut.is_made
+    ]
+    return _format_row("measured here", items, view, width)
 
 
 def _steps(view: View) -> Content:
@@ -45,6 +65,6 @@ def _step(stage: StageSpec, *, is_present: bool) -> tuple[str, str]:
     return f"{stage.number} {name}", "bold $primary" if is_present else "$text-muted"
 
 
-def _format_row(name: str, items: tuple[str, ...], view: View, width: int) -> Content:
+def _format_row(name: str, items: list[str], view: View, width: int) -> Content:
     text = f" {view.symbols.dot} ".join(items) or "nothing"
     return Content.assemble((f" {name:<22} ", "$text-muted"), cut(text, width - 25, view.symbols))

@@ -10,6 +10,7 @@ from navapp.values.bones import (
     FollowedBone,
     Side,
 )
+from navapp.values.conditions import Condition, ConditionKind
 from navapp.values.contents import (
     ANKLE_CENTRE,
     HIP_CENTRE,
@@ -54,6 +55,8 @@ __all__ = [
     "AspectGraph",
     "BoneModel",
     "Box",
+    "Condition",
+    "ConditionKind",
     "Cylinder",
     "Defect",
     "DisparityMap",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.bones import AspectGraph, BoneModel
+from navapp.values.conditions import Condition
 from navapp.values.contents import ResectionPlane, SurgicalContent
 from navapp.values.digests import add_value
 
@@ -56,8 +57,8 @@ class StageSpec:
     tolerance_deg: float
     targets: tuple[str, ...]
     layers: tuple[str, ...]
-    gates: tuple[str, ...]
-    measurements: tuple[str, ...] = ()
+    entry: tuple[Condition, ...] = ()  # before it is entered from the stage before
+    exit: tuple[Condition, ...] = ()  # before the next stage is entered
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -101,7 +101,7 @@ CHANGED: dict[str, Any] = {
         "board": "board.json",
     },
     "overlay": {},
-    "stages": {"first": "3"},
+    "stages": {"first": "3", "check_minutes": 12.5},
     "recording": {"folder": "sessions/1", "pictures": False},
     "link": {},
     "ui": {},

@@ -3,6 +3,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from tests.control.cuts import Faces
 from tests.control.fakes import Bench
 
 
@@ -16,3 +17,8 @@ def undo() -> Iterator[ExitStack]:
     """What is entered here ends with the test."""
     with ExitStack() as stack:
         yield stack
+
+
+@pytest.fixture
+def faces(monkeypatch: pytest.MonkeyPatch) -> Faces:
+    return Faces(monkeypatch)

@@ -153,7 +153,7 @@ def test_a_proposed_pose_cannot_be_accepted_before_it_is_judged(bench: Bench) ->
     bench.frames(1)
     bench.do(Propose(a_pose()))
     assert bench.accept().state.value == "review"
-    assert "lost" in bench.refused()
+    assert "not on the screen yet" in bench.refused()
 
 
 def test_a_proposed_pose_that_is_lost_cannot_be_accepted(bench: Bench) -> None:
@@ -313,6 +313,6 @@ def test_a_candidate_judged_in_another_stage_cannot_be_accepted(bench: Bench) ->
     bench.frames(1)
     bench.do(EnterStage(2))
     assert bench.accept().state.value == "review"
-    assert "lost" in bench.refused()
+    assert "not on the screen yet" in bench.refused()
     bench.frames(1)
     assert bench.accept().state.value == "navigating"

@@ -1,7 +1,6 @@
 """Cuts are confirmed, measured and withdrawn in a session."""
 
 import threading
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,47 +16,14 @@ from navapp.control.commands import (
 from navapp.control.executors import ThreadExecutor
 from navapp.control.states import Snapshot
 from navapp.errors import UsageError
-from navapp.resection import FaceMeter
-from navapp.values import MeasuredFace, Plan, ResectionPlane, Status, SurgicalContent
-from tests.control.fakes import Bench, a_plan, answer, navigating, wait_for
-
-# Across the bowl of the plan's bones: beyond it lies its rim.
-TOP = ResectionPlane("femur", np.array([0.0, 0.0, 8.0]), np.array([0.0, 0.0, 1.0]), (100.0, 100.0))
-SIDE = ResectionPlane(
-    "femur", np.array([25.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]), (100.0, 100.0)
-)
-
-
-def cut_plan() -> Plan:
-    planes = {"top": TOP, "side": SIDE, "flat": replace(TOP, bone="tibia")}
-    return replace(a_plan(), content=SurgicalContent(planes=planes), digest="")
+from navapp.values import Status
+from tests.control.cuts import Faces, cut_plan
+from tests.control.fakes import Bench, answer, navigating, wait_for
 
 
 @pytest.fixture
 def bench() -> Bench:
     return navigating(Bench(plan=cut_plan()))
-
-
-class Faces:
-    """Stands for what is measured of faces: by name, None is not seen."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.shares: dict[str, float | None] = {}
-        self.expected: list[ResectionPlane | None] = []
-        monkeypatch.setattr(FaceMeter, "measure", self._measure)
-
-    def _measure(self, left, right, estimate, made, planned, expected=None) -> MeasuredFace | None:
-        self.expected.append(expected)
-        share = self.shares.get("top" if planned is TOP else "side")
-        if share is None:
-            return None
-        little = np.diag([1e-6, 1e-6, 1e-3])
-        return MeasuredFace(planned, np.array([0.01, 0.0, -0.4]), little, little, share)
-
-
-@pytest.fixture
-def faces(monkeypatch: pytest.MonkeyPatch) -> Faces:
-    return Faces(monkeypatch)
 
 
 def told(snapshot: Snapshot) -> dict[str, bool]:

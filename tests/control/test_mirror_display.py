@@ -352,7 +352,7 @@ def test_the_check_needs_a_pose_points_and_a_mirror() -> None:
     video = Bench()
     navigating(video)
     video.do(CheckMirror())
-    assert "no display in the mirror" in video.events[-1].text
+    assert "not seen in a mirror" in video.events[-1].text
 
 
 DIFFERENT = {

@@ -7,7 +7,6 @@ from navapp.control.commands import (
     Accept,
     Blank,
     EnterStage,
-    Propose,
     Register,
     Reject,
     Show,
@@ -17,17 +16,14 @@ from navapp.control.executors import RecordedExecutor, ThreadExecutor
 from navapp.control.operators import (
     RecordedOperator,
     ReplayOperator,
-    ScriptedOperator,
-    ScriptStep,
     read_events,
-    read_script,
 )
 from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
-from navapp.errors import ConfigurationError, DeviceLost, SequenceError, UsageError
-from navapp.geometry.transform import rotation_angle_deg
+from navapp.errors import DeviceLost, SequenceError
 from navapp.values import Reason, Status
 from tests.control.fakes import Bench, FakeCamera, a_pose, answer, navigating
+from tests.control.operated import commands_of, kinds
 
 LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
 GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
@@ -38,15 +34,6 @@ def bench() -> Bench:
     return Bench(camera=FakeCamera(None, n_frames=40))
 
 
-def commands_of(bench: Bench, operator) -> list:
-    """What the operator did during the whole sequence."""
-    given = []
-    submit = bench.controller.submit
-    bench.controller.submit = lambda command: (given.append(command), submit(command))
-    run_headless(bench.controller, operator)
-    return given
-
-
 class NoFrames:
     """A recorder's sink that keeps nothing."""
 
@@ -55,58 +42,6 @@ class NoFrames:
 
     def close(self) -> None:
         pass
-
-
-def kinds(commands) -> list[str]:
-    return [type(command).__name__ for command in commands]
-
-
-@pytest.mark.parametrize("wrong", [LOST, GONE, answer(Status.DEGRADED, Reason.OUTLIERS)])
-def test_the_script_offers_a_wrong_pose_first_and_rejects_it(bench: Bench, wrong) -> None:
-    bench.script.assessed = wrong
-    given = commands_of(bench, ScriptedOperator())
-    assert kinds(given) == ["Register", "Reject", "Propose", "Reject", "Register", "Accept"]
-    proposed = next(c for c in given if isinstance(c, Propose)).left_from_bone
-    assert rotation_angle_deg(proposed, a_pose()) == pytest.approx(15.0)
-    assert bench.state == "navigating"
-
-
-def test_a_judge_that_takes_the_wrong_pose_is_found_out(bench: Bench) -> None:
-    given = commands_of(bench, ScriptedOperator())
-    assert kinds(given)[:4] == ["Register", "Reject", "Propose", "Accept"]
-
-
-def test_the_script_accepts_only_what_is_ok_and_gives_up_some_time(bench: Bench) -> None:
-    bench.script.found = [answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)]
-    given = commands_of(bench, ScriptedOperator((ScriptStep(do="register"),)))
-    assert "Accept" not in kinds(given)
-    assert kinds(given).count("Register") == 8
-
-
-def test_a_candidate_that_vanishes_is_rejected_and_searched_again(bench: Bench) -> None:
-    operator = ScriptedOperator((ScriptStep(do="register"),))
-    bench.frames(1)
-    assert operator.commands(bench.snapshot) == [Register()]
-    bench.do(Register())
-    bench.script.tracked = GONE
-    bench.frames(2)
-    assert bench.snapshot.left_from_bone is None
-    assert operator.commands(bench.snapshot) == [Reject(1)]
-
-
-def test_steps_wait_for_their_frame() -> None:
-    steps = (
-        ScriptStep(do="register"),
-        ScriptStep(do="blank", at_frame=8),
-        ScriptStep(do="show", at_frame=12),
-        ScriptStep(do="stage", stage="drilling", at_frame=15),
-    )
-    dark = []
-    hooks = SessionHooks(on_frame=(lambda r: dark.append(bench.is_dark),))
-    bench = Bench(camera=FakeCamera(None, n_frames=40), hooks=hooks)
-    given = commands_of(bench, ScriptedOperator(steps))
-    assert given == [Register(), Accept(1), Blank(), Show(), EnterStage(2)]
-    assert [number for number, is_dark in enumerate(dark) if is_dark] == [9, 10, 11, 12]
 
 
 def test_a_replays_operator_accepts_what_is_not_lost(bench: Bench) -> None:
@@ -254,32 +189,3 @@ def test_damaged_events_name_their_line(tmp_path: Path, damage: str) -> None:
     path.write_text('{"type": "event", "sequence": 1}\n' + damage + "\n")
     with pytest.raises(SequenceError, match="line 2 of"):
         read_events(path)
-
-
-def test_a_script_file_is_read(tmp_path: Path) -> None:
-    content = {"step": [{"do": "propose", "turn_deg": 9.0}, {"do": "stage", "stage": "implant"}]}
-    assert read_script(content, "s") == (
-        ScriptStep(do="propose", turn_deg=9.0),
-        ScriptStep(do="stage", stage="implant"),
-    )
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        {},
-        {"step": []},
-        {"step": [{"do": "dance"}]},
-        {"step": [{"do": "show", "at": 3}]},
-        {"step": [{"do": "show"}], "more": 1},
-        {"step": [{}]},
-    ],
-)
-def test_a_script_that_cannot_be_meant_is_refused(content) -> None:
-    with pytest.raises(ConfigurationError):
-        read_script(content, "s")
-
-
-def test_a_script_with_an_unknown_stage_is_refused() -> None:
-    with pytest.raises(UsageError, match="no stage"):
-        read_script({"step": [{"do": "stage", "stage": "dessert"}]}, "s")

@@ -5,8 +5,8 @@ from navapp.control.commands import (
     Quit,
     Register,
 )
-from navapp.control.operators import ScriptedOperator
 from navapp.control.runner import SessionRunner, run_headless
+from navapp.control.scripted_operator import ScriptedOperator
 from navapp.errors import DeviceLost, DeviceNotFound
 from tests.control.fakes import Bench, wait_for
 

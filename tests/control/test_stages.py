@@ -35,17 +35,18 @@ def test_a_stage_follows_the_bone_that_the_plan_names_and_is_judged_there() -> N
     bench.frames(1)
     entered = bench.do(EnterStage(2)).stage
     assert (entered.name, entered.bone, entered.targets) == ("drilling", "tibia", ("tibia/mine",))
-    assert entered.gates == stage_by_number(2).gates
+    assert entered.exit == stage_by_number(2).exit
     assert bench.do(EnterStage(3)).stage is stage_by_number(3)
 
 
-def test_entering_the_stage_that_is_in_force_changes_nothing() -> None:
+def test_entering_the_stage_that_is_in_force_is_refused() -> None:
     bench = Bench(plan=planned(drilling=StageContent("tibia", ("tibia/mine",))))
     bench.frames(1)
     bench.do(EnterStage(2))
     n_events = len(bench.events)
-    bench.do(EnterStage(2))
-    assert len(bench.events) == n_events
+    assert bench.do(EnterStage(2)).stage.number == 2
+    assert len(bench.events) == n_events + 1
+    assert bench.refused() == "stage refused: stage 2 drilling is in force already"
 
 
 def test_the_goal_of_a_bone_is_that_of_the_first_planned_stage_that_follows_it() -> None:

@@ -95,6 +95,10 @@ do = "stage"
 stage = "spacer"
 at_frame = 4
 [[step]]
+do = "override"
+stage = "spacer"
+reason = "a test"
+[[step]]
 do = "register"
 [[step]]
 do = "stage"

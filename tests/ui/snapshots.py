@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from navapp.control.commands import Command
 from navapp.control.stages import STAGES
 from navapp.control.states import (
+    ConditionLine,
     DeviceHealth,
     DeviceLine,
     Event,
@@ -80,6 +81,24 @@ GOOD = Verdict(
 )
 
 
+def condition(name: str, text: str, minutes: int | None = None) -> ConditionLine:
+    """One that a person answers for, confirmed so many minutes ago or open."""
+    note = "" if minutes is None else f"confirmed {minutes} min ago"
+    return ConditionLine(name, text, minutes is not None, is_personal=True, note=note)
+
+
+TIME_OUT = (
+    condition("patient", "this is the plan's patient: knee phantom", 3),
+    condition("side", "this is the plan's side: RIGHT", 3),
+    ConditionLine("rig", "the rig is calibrated", is_met=True),
+)
+GATE = (
+    condition("entry_point", "the entry point was checked with the tip", 1),
+    condition("hole_drilled", "the hole is drilled to its depth"),
+    condition("checked_on_patient", "checked on the patient: known points lie where shown"),
+)
+
+
 def navigating(**changes: Any) -> Snapshot:
     """Stage 2, all well."""
     snapshot = Snapshot(
@@ -91,6 +110,8 @@ def navigating(**changes: Any) -> Snapshot:
         verdict=GOOD,
         pose_age_ms=18.0,
         preview=picture(),
+        time_out=TIME_OUT,
+        gate=GATE,
         rates=RATES,
         devices=DEVICES,
         events=EVENTS,

@@ -60,9 +60,10 @@ def test_cuts_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> No
     ]
 
 
-def test_without_cuts_there_is_no_page() -> None:
+def test_without_cuts_the_page_says_so() -> None:
     async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press("k")
-        assert not isinstance(app.screen, CutsPage)
+        assert isinstance(app.screen, CutsPage)
+        assert "the plan has no cuts of the femur" in str(app.screen.query_one(CutTable).render())
 
     play(snapshots.navigating(), script, (80, 24))

@@ -2,10 +2,12 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from navapp.control.stages import STAGES
 from navapp.control.states import (
+    CutLine,
     DeviceHealth,
     DeviceLine,
     Event,
@@ -23,7 +25,7 @@ from navapp.ui.symbols import ASCII, UNICODE, Symbols
 from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import Level, View
-from navapp.values import Reason, Status, Verdict
+from navapp.values import MeasuredFace, Reason, ResectionPlane, Status, Verdict
 from tests.ui import snapshots
 
 # Room of the panels at 80 x 24.
@@ -92,12 +94,11 @@ def test_a_candidate_shows_what_the_judge_has_against_it() -> None:
     assert "CANDIDATE, not accepted" in view.picture_title
 
 
-def test_a_candidate_without_verdict_counts_as_lost() -> None:
+def test_a_candidate_that_waits_to_be_judged_is_not_asked_about() -> None:
     view = view_of(snapshots.review(verdict=None))
     text = " ".join(lines_of(PosePanel(), view, WIDTH, POSE_LINES))
-    assert "judged LOST" in text
+    assert "judged" not in text
     assert "a accept" not in text
-    assert "r reject" in text
 
 
 NONE = UNICODE.absent
@@ -306,10 +307,21 @@ def test_cancel_takes_the_place_of_register_while_that_runs() -> None:
     assert "g register" not in line
 
 
-def test_wide_stepper_names_gates_and_measurements() -> None:
-    lines = lines_of(StageStepper(), view_of(snapshots.navigating()), 160, 3)
-    assert "entry point checked with the tip" in lines[1]
-    assert "drill angle" in lines[2]
+def test_wide_stepper_tells_the_next_gate_and_what_was_measured() -> None:
+    plane = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, -1.0]))
+    tilt = np.array([np.tan(np.radians(0.31)), 0.0, -0.42])
+    face = MeasuredFace(plane, tilt, np.eye(3), np.eye(3), 0.6)
+    cuts = (
+        CutLine("femur_distal", is_made=True, face=face),
+        CutLine("lateral", is_made=True),
+        CutLine("posterior", is_made=False),
+    )
+    lines = lines_of(StageStepper(), view_of(snapshots.navigating(cuts=cuts)), 160, 3)
+    assert "● the entry point was checked with the tip" in lines[1]
+    assert f"{Level.ATTENTION.mark(UNICODE)} the hole is drilled to its depth" in lines[1]
+    assert "femur_distal 0.31 deg -0.42 mm" in lines[2]
+    assert "lateral not measurable" in lines[2]
+    assert "posterior" not in lines[2]
 
 
 def test_an_event_is_one_line_without_control_codes() -> None:

@@ -1,0 +1,256 @@
+"""An operator that follows a script, for sessions without a screen."""
+
+from collections import deque
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from navapp.config import Section, validate
+from navapp.control.commands import (
+    Accept,
+    Blank,
+    Command,
+    ConfirmCondition,
+    ConfirmCut,
+    EnterStage,
+    OverrideGate,
+    Propose,
+    Quit,
+    Register,
+    Reject,
+    Show,
+    WithdrawCondition,
+    WithdrawCut,
+)
+from navapp.control.stages import TIME_OUT, stage_by_name
+from navapp.control.states import SessionState, Snapshot
+from navapp.errors import ConfigurationError
+from navapp.values import ConditionKind, Status
+
+_MAX_ATTEMPTS = 8
+# What a step waits for besides a state of the session.
+_GUIDES, _DARK, _MEASURED = "guides", "dark", "measured"
+
+
+class ScriptStep(Section):
+    """One line of an operator's script."""
+
+    do: Literal[
+        "register",
+        "propose",
+        "confirm",
+        "withdraw",
+        "stage",
+        "override",
+        "cut",
+        "uncut",
+        "blank",
+        "show",
+        "wait",
+        "expect",
+        "quit",
+    ]
+    """propose offers the found pose, turned, to see the judge refuse it; wait goes on when the
+    session is there, expect when a text is told; both fail when that takes too many frames."""
+    turn_deg: float = 15.0
+    """Of a proposed pose."""
+    stage: str = ""
+    """Of stage and override: name or number."""
+    name: str = ""
+    """Of confirm and withdraw: the condition; of cut and uncut: the plane."""
+    reason: str = ""
+    """Of override."""
+    until: str = ""
+    """Of wait: a state of the session, or guides, dark, measured (every cut that was made)."""
+    text: str = ""
+    """Of expect: part of a reason on the screen, or of an event since the step before."""
+    frames: Annotated[int, Field(ge=1)] = 60
+    """Of wait and expect: the most that it may take."""
+    at_frame: Annotated[int, Field(ge=0)] = 0
+    """Not before this frame."""
+
+    def __str__(self) -> str:
+        """For people."""
+        words = (self.do, self.stage, self.name, self.until, self.text)
+        return " ".join(word for word in words if word)
+
+
+class Script(Section):
+    """An operator's script as a TOML file holds it."""
+
+    step: Annotated[tuple[ScriptStep, ...], Field(min_length=1)]
+    """[[step]] tables, in order."""
+
+
+# Goes through the time-out, then offers a wrong pose, which the judge must refuse.
+DEFAULT_SCRIPT = (
+    *(
+        ScriptStep(do="confirm", name=one.name)
+        for one in TIME_OUT
+        if one.kind is ConditionKind.PERSON
+    ),
+    ScriptStep(do="propose"),
+    ScriptStep(do="register"),
+)
+
+
+class ScriptedOperator:
+    """Follows a script; accepts a candidate only when the judge says OK, rejects all others.
+
+    Attributes:
+        failure: why the script ended before its end; empty when it did not.
+    """
+
+    def __init__(self, steps: tuple[ScriptStep, ...] = DEFAULT_SCRIPT) -> None:
+        self.failure = ""
+        self._steps = deque(steps)
+        self._n_steps = len(steps)
+        self._n_attempts = 0
+        self._phase: Literal["idle", "registering", "proposed"] = "idle"
+        self._since_frame: int | None = None
+        self._told_ns = 0
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """The next action of the script, when its time has come."""
+        if snapshot.state is SessionState.REVIEW:
+            return self._decide(snapshot)
+        if not self._steps or snapshot.sequence < self._steps[0].at_frame:
+            return []
+        step = self._steps[0]
+        if step.do in ("register", "propose"):
+            return self._begin(snapshot)
+        if step.do in ("wait", "expect"):
+            self._look(step, snapshot)
+            return []
+        self._next_step()
+        self._told_ns = snapshot.time_ns
+        return [_command_of(step)]
+
+    def _begin(self, snapshot: Snapshot) -> list[Command]:
+        if snapshot.state not in (SessionState.READY, SessionState.SUSPENDED):
+            return []
+        self._n_attempts += 1
+        if self._n_attempts > _MAX_ATTEMPTS:
+            self._fail(f"no pose was OK in {_MAX_ATTEMPTS} registrations")
+            return []
+        self._phase = "registering"
+        return [Register()]
+
+    def _look(self, step: ScriptStep, snapshot: Snapshot) -> None:
+        """Go on when what is waited for is there."""
+        since = snapshot.sequence if self._since_frame is None else self._since_frame
+        self._since_frame = since
+        is_there = self._is_told(step.text, snapshot) if step.do == "expect" else False
+        if is_there or (step.do == "wait" and _is_there(step.until, snapshot)):
+            self._next_step()
+        elif snapshot.sequence - since > step.frames:
+            said = ", ".join(reason.value for reason in snapshot.reasons) or "guides are shown"
+            self._fail(f"not within {step.frames} frames; {snapshot.state.value}: {said}")
+
+    def _is_told(self, text: str, snapshot: Snapshot) -> bool:
+        reasons = [reason.value for reason in snapshot.reasons]
+        events = [event.text for event in snapshot.events if event.time_ns >= self._told_ns]
+        return any(text in said for said in (*reasons, *events))
+
+    def _decide(self, snapshot: Snapshot) -> list[Command]:
+        """On a candidate: turn it, accept it or reject it."""
+        if snapshot.verdict is None:
+            return []
+        step = self._steps[0] if self._steps else ScriptStep(do="register")
+        pose = snapshot.left_from_bone
+        if step.do == "propose" and self._phase == "registering" and pose is not None:
+            self._phase = "proposed"
+            turn = np.array([0.0, 0.0, 0.0, np.radians(step.turn_deg), 0.0, 0.0])
+            # About a point of the bone: where the model's origin is, in the camera.
+            return [Reject(snapshot.candidate_id), Propose(pose.move(turn, pose.translation_mm))]
+        if snapshot.verdict.status is not Status.OK:
+            if self._phase == "proposed":
+                self._next_step()
+            return [Reject(snapshot.candidate_id)]
+        if step.do in ("register", "propose"):
+            self._next_step()
+        return [Accept(snapshot.candidate_id)]
+
+    def _next_step(self) -> None:
+        self._phase = "idle"
+        self._n_attempts, self._since_frame = 0, None
+        if self._steps:
+            self._steps.popleft()
+
+    def _fail(self, why: str) -> None:
+        number = self._n_steps - len(self._steps) + 1
+        self.failure = f"step {number} of the operator's script ({self._steps[0]}): {why}"
+        self._steps.clear()
+
+
+def _command_of(step: ScriptStep) -> Command:
+    """What a step that waits for nothing asks for."""
+    match step.do:
+        case "stage":
+            return EnterStage(stage_by_name(step.stage).number)
+        case "override":
+            return OverrideGate(stage_by_name(step.stage).number, step.reason)
+        case "confirm":
+            return ConfirmCondition(step.name)
+        case "withdraw":
+            return WithdrawCondition(step.name)
+        case "cut":
+            return ConfirmCut(step.name)
+        case "uncut":
+            return WithdrawCut(step.name)
+        case "blank":
+            return Blank()
+        case "show":
+            return Show()
+    return Quit()
+
+
+def _is_there(until: str, snapshot: Snapshot) -> bool:
+    if until == _GUIDES:
+        return snapshot.is_navigable
+    if until == _DARK:
+        return not snapshot.is_navigable
+    if until == _MEASURED:
+        return all(cut.face is not None for cut in snapshot.cuts if cut.is_made)
+    return snapshot.state.value == until
+
+
+def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]:
+    """Steps of an operator's script: `[[step]]` tables with the keys of `ScriptStep`.
+
+    Raises:
+        ConfigurationError: an unknown key, action or stage, or a step that lacks what it needs.
+    """
+    steps = validate(Script, content, name).step
+    waited = {_GUIDES, _DARK, _MEASURED, *(state.value for state in SessionState)}
+    for number, step in enumerate(steps, start=1):
+        if step.do in ("stage", "override"):
+            stage_by_name(step.stage)
+        needed = _NEEDED.get(step.do, "")
+        if needed and not getattr(step, needed):
+            raise ConfigurationError(
+                f"step {number} of {name} has no '{needed}'",
+                subject=name,
+                remedy=f"'{step.do}' needs it",
+            )
+        if step.do == "wait" and step.until not in waited:
+            raise ConfigurationError(
+                f"step {number} of {name} waits for '{step.until}', which does not exist",
+                subject=name,
+                remedy=f"use one of {', '.join(sorted(waited))}",
+            )
+    return steps
+
+
+# What each action cannot do without.
+_NEEDED = {
+    "confirm": "name",
+    "withdraw": "name",
+    "cut": "name",
+    "uncut": "name",
+    "override": "reason",
+    "wait": "until",
+    "expect": "text",
+}

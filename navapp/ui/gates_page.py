@@ -1,0 +1,119 @@
+"""The page of the time-out and of the gate before the next stage."""
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.content import Content
+
+from navapp.control.states import ConditionLine, Snapshot
+from navapp.ui.screens import PageScreen
+from navapp.ui.text_view import TextView
+from navapp.ui.view import Level, View
+
+CONDITION_KEYS = "bcdfghijmnosuw"
+# Why a gate may be overridden; their numbers are the keys.
+REASONS = (
+    "decided by the surgeon",
+    "not measurable here",
+    "measured by other means",
+    "practice, or a test",
+)
+
+
+class GateTable(TextView):
+    """Conditions with their letters: met, open, and who said so."""
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """The time-out first."""
+        snapshot = view.snapshot
+        keys = {name: key for key, name in _keyed(snapshot)}
+        lines = [Content.styled(" time-out: guides wait for it", "$text-muted")]
+        lines += [_format(line, keys, view) for line in snapshot.time_out]
+        if not snapshot.time_out:
+            lines.append(Content("    nothing is asked for"))
+        elif snapshot.has_mirror:
+            lines.append(_format(_mirror_line(snapshot), keys, view))
+        lines.append(Content(""))
+        if snapshot.gate_stage > len(snapshot.stages):
+            return [*lines, Content.styled(" this is the last stage", "$text-muted")]
+        name = snapshot.stages[snapshot.gate_stage - 1].name
+        title = f" before stage {snapshot.gate_stage} {name}"
+        lines.append(Content.styled(title, "$text-muted"))
+        lines += [_format(line, keys, view) for line in snapshot.gate]
+        if not snapshot.gate:
+            lines.append(Content("    nothing is asked for"))
+        return [*lines, *_ways_on(snapshot)]
+
+
+def _ways_on(snapshot: Snapshot) -> list[Content]:
+    """How the stage is entered."""
+    lines = [Content(""), Content.assemble((" ENTER  ", "bold $primary"), "go on to it")]
+    if snapshot.refused_stage is None:
+        return lines
+    lines.append(
+        Content.styled(" not met; go on all the same, for the record because:", "$warning")
+    )
+    return lines + [
+        Content.assemble((f" {number}      ", "bold $primary"), reason)
+        for number, reason in enumerate(REASONS, start=1)
+    ]
+
+
+def _format(line: ConditionLine, keys: dict[str, str], view: View) -> Content:
+    level = Level.OK if line.is_met else Level.ATTENTION
+    key = keys.get(line.name, " ") if line.is_personal else " "
+    word = "met " if line.is_met else "open"
+    return Content.assemble(
+        (f" {key}  ", "bold $primary"),
+        (f"{level.mark(view.symbols)} {word} ", level.value),
+        line.text,
+        (f"  {line.note}" if line.note else "", "$text-muted"),
+    )
+
+
+def _mirror_line(snapshot: Snapshot) -> ConditionLine:
+    """The check of the mirror has keys of its own."""
+    reason = snapshot.mirror_reason
+    note = "" if reason is None else reason.value
+    return ConditionLine("mirror", "the mirror is checked (key m)", reason is None, note=note)
+
+
+def _keyed(snapshot: Snapshot) -> list[tuple[str, str]]:
+    """Letter and name of every condition that a person answers for."""
+    lines = [*snapshot.time_out, *snapshot.gate]
+    names = dict.fromkeys(line.name for line in lines if line.is_personal)
+    return list(zip(CONDITION_KEYS, names, strict=False))
+
+
+def condition_of_key(snapshot: Snapshot, key: str) -> ConditionLine | None:
+    """The condition that a letter of the page means."""
+    name = dict(_keyed(snapshot)).get(key)
+    lines = [*snapshot.time_out, *snapshot.gate]
+    return next((line for line in lines if line.name == name), None)
+
+
+class GatesPage(PageScreen):
+    """Conditions by their letters, the stage by ENTER, a reason by its number."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("t", "dismiss", "back", show=False),
+        Binding("enter", "app.pass_gate", "enter the stage", show=False),
+        *(
+            Binding(key, f"app.condition('{key}')", "condition", show=False)
+            for key in CONDITION_KEYS
+        ),
+        *(
+            Binding(str(number), f"app.override_gate('{number}')", reason, show=False)
+            for number, reason in enumerate(REASONS, start=1)
+        ),
+    ]
+
+    page_title, keys = (
+        "time-out and gates",
+        " back  a letter: confirmed, or not after all  ENTER enter the stage",
+    )
+
+    def compose_page(self) -> ComposeResult:
+        """Time-out and gate."""
+        yield GateTable("gates")

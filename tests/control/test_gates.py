@@ -1,0 +1,172 @@
+"""The time-out and the gates between stages, in a session on fakes."""
+
+import json
+
+import pytest
+
+from navapp.control.command_files import command_from_json, command_to_json
+from navapp.control.commands import (
+    Command,
+    ConfirmCondition,
+    ConfirmCut,
+    EnterStage,
+    OverrideGate,
+    WithdrawCondition,
+)
+from navapp.control.stages import STAGES, TIME_OUT
+from navapp.control.states import Snapshot
+from navapp.values import ConditionKind, Reason, Status
+from tests.control.cuts import Faces, cut_plan
+from tests.control.fakes import PERIOD_NS, Bench, answer, navigating
+
+PERSONAL = [one.name for one in TIME_OUT if one.kind is ConditionKind.PERSON]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return navigating(Bench(plan=cut_plan(), has_gates=True))
+
+
+def confirm(bench: Bench, *names: str) -> Snapshot:
+    for name in names:
+        bench.do(ConfirmCondition(name))
+    return bench.snapshot
+
+
+def is_met(snapshot: Snapshot) -> dict[str, bool]:
+    return {line.name: line.is_met for line in snapshot.gate}
+
+
+def test_names_are_those_of_one_condition() -> None:
+    texts: dict[str, set[str]] = {}
+    conditions = [one for stage in STAGES for one in (*stage.entry, *stage.exit)]
+    for one in (*TIME_OUT, *conditions):
+        texts.setdefault(one.name, set()).add(one.text)
+    assert all(len(said) == 1 for said in texts.values())
+
+
+def test_no_guides_before_the_time_out(bench: Bench) -> None:
+    assert bench.snapshot.reasons == (Reason.TIME_OUT_OPEN,)
+    assert not bench.shows_guides
+    confirm(bench, *PERSONAL[:-1])
+    assert not bench.frames(1).is_navigable
+    assert confirm(bench, PERSONAL[-1]).is_navigable
+    bench.frames(1)
+    assert bench.shows_guides
+    bench.do(WithdrawCondition("side"))
+    assert not bench.frames(1).is_navigable
+
+
+def test_the_time_out_names_patient_side_plan_and_rig(bench: Bench) -> None:
+    lines = {line.name: line for line in bench.snapshot.time_out}
+    assert lines["side"].text == "this is the plan's side: RIGHT"
+    assert lines["plan"].text.endswith(cut_plan().digest[:8])
+    assert lines["rig"].is_met
+    assert not lines["rig"].is_personal
+
+
+def test_a_gate_is_told_item_by_item_and_met_by_what_is_known_and_said(bench: Bench) -> None:
+    assert is_met(bench.snapshot) == {
+        "bone_exposed": False, "bone_ok": True, "checked_on_patient": False,
+    }  # fmt: skip
+    snapshot = bench.do(EnterStage(2))
+    assert snapshot.stage.number == 1
+    assert snapshot.refused_stage == 2
+    assert bench.refused() == "stage 2 drilling refused: 2 open"
+    told = [event.text for event in bench.events if event.kind == "gate"]
+    assert told == [
+        "open: the bone is exposed",
+        "open: checked on the patient: known points lie where shown",
+    ]
+    confirm(bench, "bone_exposed", "checked_on_patient")
+    assert bench.do(EnterStage(2)).stage.number == 2
+    assert bench.snapshot.refused_stage is None
+
+
+def test_a_bone_that_is_not_ok_does_not_pass(bench: Bench) -> None:
+    confirm(bench, "bone_exposed", "checked_on_patient")
+    bench.script.tracked = answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)
+    bench.frames(1)
+    assert bench.do(EnterStage(2)).stage.number == 1
+    bench.script.tracked = answer()
+    bench.frames(1)
+    assert bench.do(EnterStage(2)).stage.number == 2
+
+
+def test_a_check_on_the_patient_grows_old(bench: Bench) -> None:
+    confirm(bench, "bone_exposed", "checked_on_patient")
+    bench.clock.advance_ns(31 * 60 * 10**9)
+    bench.frames(1)
+    assert is_met(bench.snapshot) == {
+        "bone_exposed": True, "bone_ok": True, "checked_on_patient": False,
+    }  # fmt: skip
+    notes = {line.name: line.note for line in bench.snapshot.gate}
+    assert notes["checked_on_patient"] == "confirmed 31 min ago: too old"
+
+
+def test_a_gate_is_overridden_only_after_it_was_told_and_with_a_reason(bench: Bench) -> None:
+    assert bench.do(OverrideGate(2, "haste")).stage.number == 1
+    assert "enter stage 2 first" in bench.refused()
+    bench.do(EnterStage(2))
+    assert bench.do(OverrideGate(3, "haste")).stage.number == 1
+    assert bench.do(OverrideGate(2, "  ")).stage.number == 1
+    assert "with a reason only" in bench.refused()
+    assert bench.do(OverrideGate(2, "haste")).stage.number == 2
+    (told,) = [event.text for event in bench.events if event.kind == "override"]
+    assert told.startswith("gate of stage 2 overridden (haste); open: the bone is exposed;")
+
+
+def test_a_jump_asks_for_everything_on_the_way_and_going_back_for_nothing(bench: Bench) -> None:
+    bench.do(EnterStage(3))
+    asked = is_met(bench.snapshot)
+    assert {"bone_exposed", "entry_point", "hole_drilled", "checked_on_patient"} <= set(asked)
+    assert bench.do(OverrideGate(3, "practice")).stage.number == 3
+    assert bench.do(EnterStage(1)).stage.number == 1
+
+
+def test_cuts_must_be_made_and_measured_or_checked_by_hand(bench: Bench, faces: Faces) -> None:
+    bench.do(EnterStage(3))
+    bench.do(OverrideGate(3, "practice"))
+    confirm(bench, "component_size", "component_seated")
+    assert is_met(bench.snapshot)["top"] is False
+    bench.do(ConfirmCondition("top"))
+    assert "nobody is asked for 'top'" in bench.refused()
+    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmCut("side"))
+    faces.shares["top"] = 0.8
+    bench.frames(31)
+    lines = {line.name: line for line in bench.snapshot.gate}
+    assert lines["top"].is_met
+    assert lines["top"].note == "0.57 deg, -0.40 mm"
+    assert not lines["side"].is_met
+    assert "not measurable" in lines["side"].note
+    assert bench.do(EnterStage(4)).stage.number == 3
+    confirm(bench, "side")
+    assert bench.do(EnterStage(4)).stage.number == 4
+
+
+def test_without_gates_nothing_is_asked_for() -> None:
+    bench = navigating(Bench())
+    assert bench.snapshot.is_navigable
+    assert bench.snapshot.time_out == bench.snapshot.gate == ()
+    assert bench.do(EnterStage(5)).stage.number == 5
+    bench.do(ConfirmCondition("patient"))
+    assert "nobody is asked for 'patient'" in bench.refused()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [OverrideGate(3, "a reason"), ConfirmCondition("side"), WithdrawCondition("side")],
+)
+def test_commands_are_recorded(command: Command) -> None:
+    assert command_from_json(json.loads(json.dumps(command_to_json(command)))) == command
+
+
+def test_conditions_go_by_the_time_of_pictures_so_that_they_replay(bench: Bench) -> None:
+    confirm(bench, "checked_on_patient")
+    bench.frames(3)
+    before = bench.snapshot.gate
+    bench.clock.advance_ns(10**9)
+    bench.do(WithdrawCondition("nothing"))
+    assert bench.snapshot.gate == before
+    assert PERIOD_NS < 60 * 10**9
