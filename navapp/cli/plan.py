@@ -54,6 +54,11 @@ def add_parser(subparsers: Any) -> None:
     )
     add_arguments(parser)
     parser.add_argument("--side", choices=("left", "right"), help="of the knee")
+    parser.add_argument(
+        "--side-anyway",
+        action="store_true",
+        help="write --side, although the bones are certainly of the other one",
+    )
     parser.add_argument("--out", metavar="P", help="plan folder to write")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
@@ -130,7 +135,9 @@ def _make_plan(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[
         raise UsageError("--out is missing", remedy="name the plan folder to write")
     check_place(options.out)
     draft = with_cartilage(make_draft(options, diagnostics), options.cartilage)
-    bones, about_side = with_side(draft.bones, draft.side, draft.fibula)
+    bones, about_side = with_side(
+        draft.bones, draft.side, draft.fibula, is_sure=options.side_anyway
+    )
     name = str(options.out).rstrip("/").rsplit("/", 1)[-1]
     plan, about_content = complete_plan(Plan(bones, name=name), options)
     plan = replace(plan, aspects=aspects_of(bones, diagnostics))

@@ -16,11 +16,17 @@ from navapp.values import ANKLE_CENTRE, HIP_CENTRE, BoneModel, Plan, Side
 
 # A planned point of a bone lies on it or beside it, but for the centres of the other joints.
 _FAR_MM = 30.0
+# How sure an estimate is, in words.
+_SAID = {"certain": "certainly", "likely": "by their shapes", "unknown": "perhaps"}
 _TURNED = np.array([-1.0, -1.0, 1.0])
 
 
 def with_side(
-    bones: Mapping[str, BoneModel], given: Side | None, fibula: TriangleMesh | None = None
+    bones: Mapping[str, BoneModel],
+    given: Side | None,
+    fibula: TriangleMesh | None = None,
+    *,
+    is_sure: bool = False,
 ) -> tuple[dict[str, BoneModel], list[str]]:
     """The bones with the side that is given, else with the one that their shapes tell.
 
@@ -28,12 +34,21 @@ def with_side(
         bones: of the plan.
         given: by the user.
         fibula: beside the tibia, where it is known: it makes the estimate certain.
+        is_sure: the given side holds, whatever the bones look like.
 
     Returns:
         Bones, and what has to be said: that the side is an estimate or unknown, or that the given
-        one contradicts a certain estimate.
+        one contradicts an estimate.
+
+    Raises:
+        PlanError: the given side contradicts a certain estimate, and nobody is sure of it.
     """
     estimate = estimate_side(bones, fibula)
+    if not is_sure and estimate.certainty == "certain" and given not in (None, estimate.side):
+        raise PlanError(
+            _contradiction(estimate, given),
+            remedy="check the patient and the pictures; add --side-anyway if it is right",
+        )
     side = given or estimate.side
     return {name: replace(bone, side=side) for name, bone in bones.items()}, _make_side_warnings(
         estimate, given
@@ -76,17 +91,21 @@ def complete(plan: Plan, planned: PlannedContent) -> tuple[Plan, list[str]]:
 def _make_side_warnings(estimate: SideEstimate, given: Side | None) -> list[str]:
     why = ", ".join(estimate.reasons)
     if given is not None:
-        if estimate.certainty == "certain" and estimate.side != given:
-            return [
-                f"--side says {given}, but the bones are certainly of a {estimate.side} knee: {why}"
-            ]
-        return []
+        is_other = estimate.side is not None and estimate.side != given
+        return [_contradiction(estimate, given)] if is_other else []
     if estimate.side is None:
         return [f"the side is unknown: {why} (give --side)"]
     return [
         f"the side is not given; it is taken to be {estimate.side}, which is "
         f"{estimate.certainty}: {why} (give --side)"
     ]
+
+
+def _contradiction(estimate: SideEstimate, given: Side | None) -> str:
+    return (
+        f"--side says {given}, but the bones are {_SAID[estimate.certainty]} of a "
+        f"{estimate.side} knee: {', '.join(estimate.reasons)}"
+    )
 
 
 def _far_from_bones(planned: PlannedContent, bones: Mapping[str, BoneModel]) -> list[str]:

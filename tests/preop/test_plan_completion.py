@@ -103,14 +103,21 @@ def test_a_side_that_cannot_be_told_stays_unknown() -> None:
     assert "the side is unknown" in said[0]
 
 
-def test_a_given_side_that_contradicts_a_certain_estimate_is_warned_of(sideless) -> None:
-    bones, said = with_side(sideless, "left", fibula_of(KNEE))
+def test_a_given_side_that_contradicts_a_certain_estimate_is_refused(sideless) -> None:
+    with pytest.raises(PlanError, match="certainly of a right knee: fibula") as refused:
+        with_side(sideless, "left", fibula_of(KNEE))
+    assert "--side-anyway" in refused.value.remedy
+    bones, said = with_side(sideless, "left", fibula_of(KNEE), is_sure=True)
     assert bones["femur"].side == "left"
-    assert "left" in said[0]
-    assert "right knee" in said[0]
+    assert "certainly of a right knee" in said[0]
     assert with_side(sideless, "right", fibula_of(KNEE))[1] == []
-    # Without the fibula it is likely only: no reason to doubt who says so.
-    assert with_side(sideless, "left")[1] == []
+
+
+def test_a_given_side_that_contradicts_the_shapes_is_warned_of(sideless) -> None:
+    bones, said = with_side(sideless, "left")
+    assert bones["femur"].side == "left"
+    assert said[0].startswith("--side says left, but the bones are by their shapes of a right knee:")
+    assert with_side(sideless, "right")[1] == []
 
 
 BALL = sphere(60.0, 30)
