@@ -121,6 +121,7 @@ class CommandHandler:
             case ConfirmCut() | WithdrawCut() | ConfirmCondition() | WithdrawCondition():
                 self._on_word(command)
             case Reconnect():
+                session.add_event("reopen", "lost devices are opened again")
                 self._camera.retry_now()
                 self._monitored.restore()
             case Interrupt():
@@ -178,11 +179,12 @@ class CommandHandler:
 
     def _on_enter_stage(self, command: EnterStage) -> None:
         stage = self._plan.stage(stage_by_number(command.number))
-        open_lines = [line for line in self._session.gate(stage.number) if not line.is_met]
+        gate = self._session.gate(stage.number)
+        open_lines = [line for line in gate if not line.is_met]
         if open_lines:
             self._session.refuse_stage(stage, open_lines)
         else:
-            self._session.enter_stage(stage)
+            self._session.enter_stage(stage, "gate met" if gate else "")
 
     def _on_override(self, command: OverrideGate) -> None:
         stage = self._plan.stage(stage_by_number(command.number))
@@ -191,7 +193,7 @@ class CommandHandler:
         self._session.add_event(
             "override", f"{text}; open: {'; '.join(open_texts)}", EventLevel.WARNING
         )
-        self._session.enter_stage(stage)
+        self._session.enter_stage(stage, "gate overridden")
 
     def _on_word(
         self, command: ConfirmCut | WithdrawCut | ConfirmCondition | WithdrawCondition

@@ -351,10 +351,15 @@ class Session:
         self.change_state(SessionState.REVIEW, text)
         return best.tracked
 
-    def enter_stage(self, stage: StageSpec) -> None:
-        """Put a stage in force; one of another bone ends the search and the review."""
+    def enter_stage(self, stage: StageSpec, how: str = "") -> None:
+        """Put a stage in force; one of another bone ends the search and the review.
+
+        Args:
+            stage: to enter.
+            how: it may be entered, for the event.
+        """
         is_other_bone = stage.bone != self._stage.bone
-        self._put_in_force(stage)
+        self._put_in_force(stage, how)
         if is_other_bone and self._state not in (SessionState.STARTING, SessionState.FAULT):
             self._stop_search()
             self.fall_back(f"the {stage.bone} is now the bone to follow")
@@ -454,14 +459,15 @@ class Session:
         """A command is about to be handled."""
         self._log.tell_command(command)
 
-    def _put_in_force(self, stage: StageSpec) -> None:
+    def _put_in_force(self, stage: StageSpec, how: str = "") -> None:
         self._stage = stage
         self._refused_stage = None
         self._layers.reset()
         # What was judged by the old stage's targets and tolerance says nothing in the new one.
         self._tracked = None
         self._tracks.forget_verdicts()
-        self.add_event("stage", f"stage {stage.number} {stage.name} entered")
+        text = f"stage {stage.number} {stage.name} entered"
+        self.add_event("stage", f"{text}, {how}" if how else text)
         self._log.tell_stage(stage.name)
 
     def _look_for_bone(self, frame: StereoFrame) -> TrackedFrame | None:

@@ -116,7 +116,9 @@ def test_a_given_side_that_contradicts_a_certain_estimate_is_refused(sideless) -
 def test_a_given_side_that_contradicts_the_shapes_is_warned_of(sideless) -> None:
     bones, said = with_side(sideless, "left")
     assert bones["femur"].side == "left"
-    assert said[0].startswith("--side says left, but the bones are by their shapes of a right knee:")
+    assert said[0].startswith(
+        "--side says left, but the bones are by their shapes of a right knee:"
+    )
     assert with_side(sideless, "right")[1] == []
 
 
