@@ -3,7 +3,13 @@
 import argparse
 
 from navapp.cli.session_folder import RecordedSession
-from navapp.control.commands import CheckMirror, DistrustRig
+from navapp.control.commands import (
+    CheckMirror,
+    Command,
+    ConfirmCut,
+    DistrustRig,
+    WithdrawCut,
+)
 from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
 from navapp.control.operators import CombinedOperator, Operator, RecordedOperator, ReplayOperator
 
@@ -24,7 +30,7 @@ def choose_operator(
 ) -> tuple[Operator, Executor]:
     """The recorded operator, so that the same poses come out, or one that only follows.
 
-    Whatever is changed, the recorded rig is believed no longer than it was.
+    Whatever is changed, the recorded rig is believed no longer than it was, and what was cut is cut.
     """
     is_changed = bool(
         options.prior or options.bone or options.also or options.method or options.start
@@ -32,12 +38,7 @@ def choose_operator(
     )  # fmt: skip
     if session is None or is_changed or options.order != "forward":
         plain = ReplayOperator(each_frame=options.order == "each", follows_refused=follows_refused)
-        moved = find_moved_rig(session, options)
-        if moved is None or options.order == "pingpong":
-            return plain, InlineExecutor()
-        after, command = moved
-        # A replay that starts later has not a single frame before.
-        recorded = RecordedOperator([(-1 if options.start > after else after, command)])
+        recorded = RecordedOperator(_find_facts(session, options))
         return CombinedOperator(recorded, plain), InlineExecutor()
     events = session.events
     commands = [
@@ -46,6 +47,27 @@ def choose_operator(
         if not (options.rig and isinstance(command, DistrustRig))
     ]
     return RecordedOperator(commands), RecordedExecutor(events.take_overs)
+
+
+def _find_facts(
+    session: RecordedSession | None, options: argparse.Namespace
+) -> list[tuple[int, Command]]:
+    """What has happened to rig and bones, whoever operates: after which frame, and what.
+
+    To and fro a rig that has moved is warned of instead. A replay that starts later has not a
+    single frame before.
+    """
+    if session is None:
+        return []
+    moved = None if options.order == "pingpong" else find_moved_rig(session, options)
+    facts: list[tuple[int, Command]] = [] if moved is None else [moved]
+    facts += [
+        one for one in session.events.commands if isinstance(one[1], ConfirmCut | WithdrawCut)
+    ]
+    return sorted(
+        ((-1 if options.start > after else after, command) for after, command in facts),
+        key=lambda fact: fact[0],
+    )
 
 
 def list_warnings(session: RecordedSession | None, options: argparse.Namespace) -> tuple[str, ...]:

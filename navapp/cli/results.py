@@ -7,6 +7,7 @@ import numpy as np
 
 from navapp.control.commands import DistrustRig
 from navapp.control.frame_result import FrameResult
+from navapp.control.recorder import face_to_json
 from navapp.control.session import describe_moved_rig
 from navapp.control.states import SessionState, Snapshot
 from navapp.values import FrameTimings, MeasuredFace, Reason, Status, TrackedFrame, join_faces
@@ -32,20 +33,8 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
             name: _answer_to_json(tracked, tracked.timings, tre_mm.get(name))
             for name, tracked in result.others.items()
         },
+        "bone_version": result.bone_version,
         "measured": {name: face_to_json(face) for name, face in result.faces.items()},
-    }
-
-
-def face_to_json(face: MeasuredFace) -> dict[str, Any]:
-    """The face of a cut, in plan coordinates and against its plan."""
-    return {
-        "point_mm": face.point_mm.tolist(),
-        "normal": face.normal.tolist(),
-        "angle_deg": face.angle_deg,
-        "offset_mm": face.offset_mm,
-        "bound_deg": face.bound_deg,
-        "bound_mm": face.bound_mm,
-        "seen_share": face.seen_share,
     }
 
 

@@ -216,6 +216,7 @@ class SessionController:
         self._rig_watch.check_frame(frame)
         snapshot = self._make_snapshot()
         picture, overlay_ms = self._presenter.show(frame, snapshot)
+        version = session.bone_version
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
         faces = session.measure_faces(frame)
@@ -230,6 +231,7 @@ class SessionController:
             snapshot.is_navigable,
             others,
             faces,
+            version,
         )
         # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped

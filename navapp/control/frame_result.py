@@ -24,6 +24,7 @@ class FrameResult:
     others: Mapping[str, TrackedFrame] = field(default_factory=dict)
     # faces of cuts that were measured in this very frame, by the plane's name.
     faces: Mapping[str, MeasuredFace] = field(default_factory=dict)
+    bone_version: int = 0  # of the stage's bone, that the pose was judged by
 
 
 FrameListener = Callable[[FrameResult], None]

@@ -3,7 +3,7 @@
 session.json   version, plan, options       rig.yml, prior.json, plan/
 frames.csv     one line a frame              left_*.png, right_*.png
 events.jsonl   commands, events and when a registration was taken over
-poses.jsonl    poses and verdicts of every frame
+poses.jsonl    poses and verdicts of every frame, version of the bone, faces that were measured
 """
 
 import json
@@ -20,7 +20,7 @@ from navapp.control.commands import Command
 from navapp.control.frame_result import FrameResult
 from navapp.control.states import Event
 from navapp.errors import InputError, NavappError
-from navapp.values import TrackedFrame
+from navapp.values import MeasuredFace, TrackedFrame
 
 
 class FrameSink(Protocol):
@@ -106,10 +106,12 @@ class SessionRecorder:
                 "sequence": result.frame.sequence,
                 "bone": result.stage.bone,
                 "state": result.state.value,
+                "bone_version": result.bone_version,
                 **_answer_to_json(result.tracked),
                 "bodies": {
                     name: _answer_to_json(tracked) for name, tracked in result.others.items()
                 },
+                "measured": {name: face_to_json(face) for name, face in result.faces.items()},
             },
         )
 
@@ -158,6 +160,19 @@ class SessionRecorder:
     def _write(self, stream: TextIO, value: dict[str, Any]) -> None:
         line = json.dumps(value) + "\n"
         self._attempt(lambda: (stream.write(line), stream.flush()))
+
+
+def face_to_json(face: MeasuredFace) -> dict[str, Any]:
+    """The face of a cut, in plan coordinates and against its plan."""
+    return {
+        "point_mm": face.point_mm.tolist(),
+        "normal": face.normal.tolist(),
+        "angle_deg": face.angle_deg,
+        "offset_mm": face.offset_mm,
+        "bound_deg": face.bound_deg,
+        "bound_mm": face.bound_mm,
+        "seen_share": face.seen_share,
+    }
 
 
 def _answer_to_json(tracked: TrackedFrame | None) -> dict[str, Any]:

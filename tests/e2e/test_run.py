@@ -148,6 +148,44 @@ def test_the_operators_script_has_two_bones_followed_at_once_and_they_replay_to_
                 assert body[key] == b["bodies"][name][key]
 
 
+CUTS = """
+[[step]]
+do = "register"
+[[step]]
+do = "cut"
+name = "femur_distal"
+[[step]]
+do = "uncut"
+name = "femur_distal"
+at_frame = 7
+[[step]]
+do = "cut"
+name = "femur_distal"
+"""
+
+
+def test_a_session_with_cuts_replays_and_keeps_them_whatever_is_changed(tmp_path: Path) -> None:
+    script, session, out = (tmp_path / name for name in ("script.toml", "session", "b.json"))
+    script.write_text(CUTS, encoding="utf-8")
+    first = tmp_path / "a.json"
+    options = ["--quiet", "run", "--headless", "--frames", "11", "--operator", str(script)]
+    assert run([*options, "--record", str(session), "--json", str(first)]) == 0
+    frames = result(first)["frames"]
+    versions = [frame["bone_version"] for frame in frames]
+    assert list(dict.fromkeys(versions)) == [0, 1, 2, 3]
+    lines = (session / "poses.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["bone_version"] for line in lines] == versions
+    assert run(["--quiet", "replay", str(session), "--json", str(out)]) == 0
+    for a, b in zip(frames, result(out)["frames"], strict=True):
+        for key in ("camera_from_model", "covariance", "bone_version", "measured"):
+            assert a[key] == b[key]
+    # Another operator registers, but the bone is cut where it was.
+    given = ["--quiet", "replay", str(session), "--start", "5", "--json", str(out)]
+    run(given)
+    changed = [frame["bone_version"] for frame in result(out)["frames"]]
+    assert changed == versions[5:]
+
+
 def test_a_session_is_never_recorded_over_another(
     session: Path, moving: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
