@@ -30,7 +30,8 @@ def choose_operator(
 ) -> tuple[Operator, Executor]:
     """The recorded operator, so that the same poses come out, or one that only follows.
 
-    Whatever is changed, the recorded rig is believed no longer than it was, and what was cut is cut.
+    Whatever is changed, the recorded rig is believed no longer than it was, and what was cut is
+    cut.
     """
     is_changed = bool(
         options.prior or options.bone or options.also or options.method or options.start
