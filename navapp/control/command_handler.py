@@ -55,6 +55,7 @@ _NAMES: dict[type[Command], str] = {
     EnterStage: "stage",
     OverrideGate: "override",
     Reconnect: "reopen",
+    DistrustRig: "rig",
 }
 
 

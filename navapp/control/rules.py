@@ -10,6 +10,7 @@ from navapp.control.commands import (
     CheckMirror,
     Command,
     ConfirmCross,
+    DistrustRig,
     EnterStage,
     NudgeCross,
     OverrideGate,
@@ -47,6 +48,8 @@ def why_refused(command: Command, snapshot: Snapshot) -> str:
             return "no check of the mirror is under way"
         case EnterStage() | OverrideGate():
             return _why_not_enter(command, snapshot)
+        case DistrustRig() if snapshot.rig_alarm:
+            return "the rig is known to have moved"
         case Reconnect() if not _has_failed_device(snapshot):
             return "no device is lost or in trouble"
     return ""
