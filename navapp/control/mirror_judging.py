@@ -7,6 +7,7 @@ from scipy.special import chdtri
 
 from navapp.control.calibrated_display import CalibratedDisplay, Eyes
 from navapp.control.mirror_error import OTHER_EYE_MM, MirrorError
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 from navapp.overlay import MirrorView, Scene, sample_guides
 from navapp.values import Plan, PoseEstimate, StageSpec, TrackedFrame
@@ -31,33 +32,55 @@ class MirrorJudge:
 
     def __init__(self, display: CalibratedDisplay, view: MirrorView, plan: Plan) -> None:
         self._display, self._view, self._plan = display, view, plan
-        self._judged: tuple[str, tuple[str, ...], int, FloatArray] | None = None
+        # What was judged (stage, layers, made cuts), when, and by which variances.
+        self._judged: tuple[object, int, FloatArray] | None = None
         self._error: MirrorError | None = None
 
     def judge(
-        self, stage: StageSpec, layers: tuple[str, ...], tracked: TrackedFrame | None, now_ns: int
+        self,
+        stage: StageSpec,
+        layers: tuple[str, ...],
+        tracked: TrackedFrame | None,
+        now_ns: int,
+        surface: TriangleMesh | None = None,
+        made_cuts: frozenset[str] = frozenset(),
     ) -> MirrorError | None:
-        """Of a stage's layers; None without a pose, or when nothing lies at the bone."""
+        """Of a stage's layers; None without a pose, or when nothing lies at the bone.
+
+        Args:
+            stage: in force.
+            layers: that are drawn.
+            tracked: what is said of the stage's bone.
+            now_ns: on the session's clock.
+            surface: what is left of the bone; None: all of it.
+            made_cuts: names of planes that need no guides any more.
+        """
         estimate = None if tracked is None else tracked.estimate
         if estimate is None or stage.bone not in self._plan.bones:
             self._judged = self._error = None
             return None
         variances = np.diag(estimate.covariance)
         last = self._judged
-        is_valid = last is not None and last[:2] == (stage.name, layers)
-        if last is None or not is_valid or not 0 <= now_ns - last[2] < _VALID_NS:
+        what = (stage.name, layers, made_cuts)
+        is_valid = last is not None and last[0] == what
+        if last is None or not is_valid or not 0 <= now_ns - last[1] < _VALID_NS:
             is_valid = False
         # The pose's covariance may grow from one frame to the next.
-        if last is None or not is_valid or not (variances <= _MOST_GROWN * last[3]).all():
-            self._judged = stage.name, layers, now_ns, variances
-            self._error = self._predict(stage, layers, estimate)
+        if last is None or not is_valid or not (variances <= _MOST_GROWN * last[2]).all():
+            self._judged = what, now_ns, variances
+            self._error = self._predict(stage, layers, estimate, surface, made_cuts)
         return self._error
 
     def _predict(
-        self, stage: StageSpec, layers: tuple[str, ...], estimate: PoseEstimate
+        self,
+        stage: StageSpec,
+        layers: tuple[str, ...],
+        estimate: PoseEstimate,
+        surface: TriangleMesh | None,
+        made_cuts: frozenset[str],
     ) -> MirrorError | None:
         pose = estimate.camera_from_bone
-        scene = Scene(self._plan, stage, pose, self._view, False, None, layers)
+        scene = Scene(self._plan, stage, pose, self._view, False, None, layers, surface, made_cuts)
         points = {name: sample_guides(scene, name) for name in layers}
         points = {name: some for name, some in points.items() if len(some)}
         if not points:

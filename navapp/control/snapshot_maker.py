@@ -120,7 +120,10 @@ class SnapshotMaker:
         if self.mirror_judge is None:
             return None
         session = self.session
-        return self.mirror_judge.judge(session.stage, session.layers, tracked, now_ns)
+        made = frozenset(cut.name for cut in session.cuts_of(session.stage) if cut.is_made)
+        return self.mirror_judge.judge(
+            session.stage, session.layers, tracked, now_ns, session.bone_surface, made
+        )
 
     @property
     def _is_simulated(self) -> bool:

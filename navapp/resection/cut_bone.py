@@ -23,7 +23,8 @@ class CutBone:
     planned: BoneModel
     made: Mapping[str, ResectionPlane] = field(default_factory=dict)  # by name, as planned
     faces: Mapping[str, MeasuredFace] = field(default_factory=dict)  # of those that are measured
-    version: int = 0  # counts the changes
+    version: int = 0  # a number for each state; one that comes back has its number again
+    earlier: tuple["CutBone", ...] = ()  # the states before, each once
 
     @cached_property
     def model(self) -> BoneModel:
@@ -46,22 +47,35 @@ class CutBone:
 
     def cut(self, name: str, plane: ResectionPlane) -> "CutBone":
         """With one more cut; its face is not measured."""
-        faces = {other: face for other, face in self.faces.items() if other != name}
-        return CutBone(self.planned, {**self.made, name: plane}, faces, self.version + 1)
+        return self._become({**self.made, name: plane}, self._faces_but(name))
 
     def restore(self, name: str) -> "CutBone":
         """Without a cut."""
         made = {other: plane for other, plane in self.made.items() if other != name}
-        faces = {other: face for other, face in self.faces.items() if other != name}
-        return CutBone(self.planned, made, faces, self.version + 1)
+        return self._become(made, self._faces_but(name))
 
     def without_faces(self) -> "CutBone":
         """With its cuts, and nothing known of their faces."""
-        return CutBone(self.planned, self.made, {}, self.version + 1)
+        return self._become(self.made, {})
 
     def with_faces(self, faces: Mapping[str, MeasuredFace]) -> "CutBone":
         """With the faces of some of its cuts as measured."""
-        return CutBone(self.planned, self.made, {**self.faces, **faces}, self.version + 1)
+        return self._become(self.made, {**self.faces, **faces})
+
+    def _faces_but(self, name: str) -> dict[str, MeasuredFace]:
+        return {other: face for other, face in self.faces.items() if other != name}
+
+    def _become(
+        self, made: Mapping[str, ResectionPlane], faces: Mapping[str, MeasuredFace]
+    ) -> "CutBone":
+        """Another state: an earlier one if it is the same, else a new version."""
+        known = {state.version: state for state in (*self.earlier, self)}
+        version = max(known) + 1
+        for state in known.values():
+            is_same = set(state.made) == set(made) and dict(state.faces) == dict(faces)
+            version = state.version if is_same else version
+        earlier = tuple(replace(state, earlier=()) for state in known.values())
+        return CutBone(self.planned, made, faces, version, earlier)
 
     def _cut(self, name: str) -> Cut:
         face = self.faces.get(name)

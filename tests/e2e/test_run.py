@@ -172,7 +172,7 @@ def test_a_session_with_cuts_replays_and_keeps_them_whatever_is_changed(tmp_path
     assert run([*options, "--record", str(session), "--json", str(first)]) == 0
     frames = result(first)["frames"]
     versions = [frame["bone_version"] for frame in frames]
-    assert list(dict.fromkeys(versions)) == [0, 1, 2, 3]
+    assert [version for version, _ in itertools.groupby(versions)] == [0, 1, 0, 1]
     lines = (session / "poses.jsonl").read_text(encoding="utf-8").splitlines()
     assert [json.loads(line)["bone_version"] for line in lines] == versions
     assert run(["--quiet", "replay", str(session), "--json", str(out)]) == 0
