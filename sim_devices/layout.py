@@ -16,6 +16,7 @@ _JOINT_GAP_MM = 3.5
 # The patella as it lies turned over: its back to the cameras, its upper end up in the picture.
 _EVERTED = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
 _PATELLA_Y_MM, _PATELLA_GAP_MM, _PATELLA_BELOW_MM = -24.0, 3.0, 1.0
+_MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 _PLACEMENT_DEG = (6.0, 9.0)
 _PLACEMENT_MM = (6.0, 10.0)
 
@@ -32,6 +33,11 @@ def left_from_table(rig: StereoRig) -> RigidTransform:
     half_turn = rotation_from_vector(0.5 * vector_from_rotation(left_from_right.rotation))
     origin = 0.5 * left_from_right.translation_mm + half_turn @ (0.0, 0.0, WORKING_DISTANCE_MM)
     return RigidTransform.from_parts("left", "table", half_turn, origin)
+
+
+def mirror_pose(pose: RigidTransform) -> RigidTransform:
+    """The same pose of the other side of the body."""
+    return RigidTransform(pose.target, pose.source, _MIRROR @ pose.matrix @ _MIRROR)
 
 
 def nominal_table_from_femur() -> RigidTransform:

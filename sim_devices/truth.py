@@ -1,9 +1,10 @@
 """The truth of the simulated world, for judging results only."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Protocol
 
 from navapp.geometry.transform import FloatArray, RigidTransform
+from sim_devices.operation_record import OperationRecord
 
 
 class KnowsTruth(Protocol):
@@ -19,23 +20,8 @@ class KnowsTruth(Protocol):
         ...
 
     @property
-    def made_planes(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
-        """Point and normal of each face of the saw."""
-        ...
-
-    @property
-    def made_hole(self) -> tuple[FloatArray, FloatArray]:
-        """Entry and direction of the drilled hole."""
-        ...
-
-    @property
-    def made_parts(self) -> Mapping[str, RigidTransform]:
-        """Motion of each component away from its plan."""
-        ...
-
-    @property
-    def made_insert_mm(self) -> float:
-        """Thickness of the insert with its tray."""
+    def record(self) -> OperationRecord:
+        """What was really made."""
         ...
 
 
@@ -64,21 +50,21 @@ class TruthOracle:
         """True pose of a body in the left camera (not rectified, mm) when a frame was captured."""
         return self._world.left_from_body(body, self._world_time_of(captured_ns))
 
-    def made_planes(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+    def made_planes(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Faces that the saw leaves, made already or not, by the name of their planned cut.
 
         Point (3,) mm and unit normal (3,) out of the bone, in the coordinates of its model.
         """
-        return self._world.made_planes
+        return self._world.record.made_planes
 
     def made_hole(self) -> tuple[FloatArray, FloatArray]:
         """Where the drilled hole enters the femur (3,) mm, and its unit direction (3,)."""
-        return self._world.made_hole
+        return self._world.record.made_hole
 
-    def made_parts(self) -> Mapping[str, RigidTransform]:
+    def made_parts(self) -> dict[str, RigidTransform]:
         """By which motion, in the coordinates of its bone, each component is off its plan."""
-        return self._world.made_parts
+        return self._world.record.made_parts
 
     def made_insert(self) -> float:
         """Thickness (mm) of the insert with its tray: it sets the gap of the finished knee."""
-        return self._world.made_insert_mm
+        return self._world.record.made_insert_mm

@@ -19,11 +19,12 @@ from sim_devices.cartilage import (
     wear_patch,
     with_cartilage,
 )
-from sim_devices.fitted_parts import SEATS, FittedParts
-from sim_devices.layout import left_from_table, misplace, nominal_table_from_femur
+from sim_devices.fitted_parts import FittedParts
+from sim_devices.layout import left_from_table, mirror_pose, misplace, nominal_table_from_femur
 from sim_devices.materials import make_material_table
 from sim_devices.motion import LegMotion, compute_drill_motion, compute_sweep_offset_mm
 from sim_devices.operation import State, enter
+from sim_devices.operation_record import OperationRecord
 from sim_devices.planned_cuts import Cut
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
 from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
@@ -31,12 +32,12 @@ from sim_devices.scenario import Scenario
 from sim_devices.scenes import Scene, make_scene
 from sim_devices.sensor import Eye
 from sim_devices.site import Site, make_site
+from sim_devices.state_history import StateHistory
 from sim_devices.textures import make_noise_tile
 
 _TISSUE_FOLLOWS = 0.9
 _DEFECT_RADIUS_MM = 9.0
 _HAND_ABOVE_MM = 32.0
-_MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 # Direction in the table's frame (z away from the cameras), strength.
 _LAMPS = np.array(
     [
@@ -78,6 +79,7 @@ class World:
         self._motion = LegMotion(scenario.motion, scenario.seed)
         self._site = self._make_site(right)
         self._fitted = FittedParts(self._site)
+        self.record = OperationRecord(self._site, self._fitted, is_left=self._is_left)
         self._surfaces = Surfaces(
             make_material_table(scenario.contrast, scenario.blood),
             make_noise_tile(scenario.seed),
@@ -87,11 +89,7 @@ class World:
         self._renderers: dict[tuple[State, Eye, float, Turn], Renderer] = {}
         self._others: dict[tuple[State, Camera], Renderer] = {}
         self._scenes: dict[State, Scene] = {}
-        # States with the time of the last picture before each: a pose of the past is asked for,
-        # too, when the room is in another state already.
-        self._history: list[tuple[int, State]] = []
-        self._newest_ns = -1
-        self.set_stage(scenario.stage)
+        self._history = StateHistory(enter(scenario.stage))
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -116,7 +114,12 @@ class World:
     @property
     def planned_cuts(self) -> dict[str, Cut]:
         """All cuts of the operation as they are planned, by name."""
-        return {name: self._mirror_cut(cut) for name, cut in self._site.planned.items()}
+        return self.record.planned_cuts
+
+    @property
+    def drill_line(self) -> tuple[FloatArray, FloatArray]:
+        """Where the drill is planned to enter the femur, and its unit direction, (3,) each."""
+        return self.record.planned_hole
 
     @property
     def nominal_left_from_femur(self) -> RigidTransform:
@@ -151,7 +154,7 @@ class World:
         Raises:
             UsageError: there is no such stage.
         """
-        self._show(enter(name))
+        self._history.show(enter(name))
         return self.made_cuts
 
     def set_made(self, made: Iterable[str]) -> None:
@@ -160,7 +163,7 @@ class World:
         Raises:
             UsageError: the operation has no such step.
         """
-        self._show(State(self.stage, frozenset(made)))
+        self._history.show(State(self.stage, frozenset(made)))
 
     def advance(self) -> None:
         """Make the next step of the stage in force: the next cut, then the component.
@@ -168,20 +171,11 @@ class World:
         Raises:
             UsageError: all of its steps are made.
         """
-        self._show(self._state.advance())
-
-    def _show(self, state: State) -> None:
-        with self._lock:
-            self._history.append((self._newest_ns, state))
+        self._history.show(self._state.advance())
 
     @property
     def _state(self) -> State:
-        return self._history[-1][1]
-
-    def _state_at(self, time_ns: int) -> State:
-        """The state in which a picture of that time was taken, or would be."""
-        before = (state for since_ns, state in reversed(self._history) if since_ns < time_ns)
-        return next(before, self._history[0][1])
+        return self._history.now
 
     def left_from_body(self, body: str, time_ns: int) -> RigidTransform:
         """True pose of a body in the left camera.
@@ -193,7 +187,7 @@ class World:
         Raises:
             UsageError: there is no such body.
         """
-        return self._left_from_body(body, time_ns, self._state_at(time_ns))
+        return self._left_from_body(body, time_ns, self._history.at(time_ns))
 
     def _left_from_body(self, body: str, time_ns: int, state: State) -> RigidTransform:
         return self._place_in_view(self._table_from_body(body, time_ns / 1e9, state))
@@ -224,17 +218,16 @@ class World:
             scale: of the picture against the rig's.
             turn_rad: of the right eye, about its own axes.
         """
+        state = self._history.take_picture(time_ns)
         with self._lock:
-            self._newest_ns = max(self._newest_ns, time_ns)
-            state = self._state
             renderer = self._renderer(state, eye, scale, turn_rad)
         seen_from = camera_from_left(self.rig, eye, turn_rad)
         return renderer.render(*self._poses(seen_from, state, time_ns))
 
     def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
         """True depth and body of every pixel of the picture that `render` gives."""
+        state = self._state
         with self._lock:
-            state = self._state
             renderer = self._renderer(state, eye, scale)
         return renderer.depth(*self._poses(camera_from_left(self.rig, eye), state, time_ns))
 
@@ -248,8 +241,8 @@ class World:
             seen_from: camera_from_left, of where it stands; it never moves.
             time_ns: world time.
         """
+        state = self._state
         with self._lock:
-            state = self._state
             renderer = self._renderer_for(state, camera)
         return renderer.render(*self._poses(seen_from, state, time_ns))
 
@@ -337,48 +330,13 @@ class World:
 
     def _place_in_view(self, table_from_body: RigidTransform) -> RigidTransform:
         """left_from_body of a pose that was made as for a right knee."""
-        return self._left_from_table @ self._mirror_pose(table_from_body)
-
-    def _mirror_pose(self, pose: RigidTransform) -> RigidTransform:
-        """Of the knee's own side, of a pose that was made as for a right one."""
-        if not self._is_left:
-            return pose
-        return RigidTransform(pose.target, pose.source, _MIRROR @ pose.matrix @ _MIRROR)
-
-    def _mirror_cut(self, cut: Cut) -> Cut:
-        return replace(cut, point_mm=cut.point_mm * self._sides, normal=cut.normal * self._sides)
+        if self._is_left:
+            table_from_body = mirror_pose(table_from_body)
+        return self._left_from_table @ table_from_body
 
     def _femur_from_tibia(self, state: State) -> RigidTransform:
         """At rest."""
         return (self._fitted if state.is_made("insert") else self._site).femur_from_tibia
-
-    @property
-    def drill_line(self) -> tuple[FloatArray, FloatArray]:
-        """Where the drill is planned to enter the femur, and its unit direction, (3,) each."""
-        entry_mm, axis = self._site.planned_hole
-        return entry_mm * self._sides, axis * self._sides
-
-    @property
-    def made_hole(self) -> tuple[FloatArray, FloatArray]:
-        """Where the drill really enters the femur, and its unit direction, (3,) each; truth."""
-        entry_mm, axis = self._site.made_hole
-        return entry_mm * self._sides, axis * self._sides
-
-    @property
-    def made_planes(self) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Point and unit normal, (3,) each, of the faces that the saw leaves, by name; truth."""
-        cuts = {name: self._mirror_cut(cut) for name, cut in self._site.made.items()}
-        return {name: (cut.point_mm, cut.normal) for name, cut in cuts.items()}
-
-    @property
-    def made_parts(self) -> dict[str, RigidTransform]:
-        """By which motion, in its bone's coordinates, each component is off its plan; truth."""
-        return {name: self._mirror_pose(self._fitted.motion_from_plan(name)) for name in SEATS}
-
-    @property
-    def made_insert_mm(self) -> float:
-        """Thickness of the tray and the insert together that was chosen; truth."""
-        return self._fitted.insert_mm
 
     @property
     def worn_vertices(self) -> NDArray[np.int64]:

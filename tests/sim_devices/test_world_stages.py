@@ -71,7 +71,7 @@ def test_both_cameras_see_the_cut_faces_of_the_stage(scenario, stage) -> None:
     site.set_stage(stage)
     if stage == "patella":
         site.advance()
-    planes = site.made_planes
+    planes = site.record.made_planes
     faces = [
         part
         for part in site._scene(site._state).parts
@@ -159,12 +159,12 @@ def test_the_pose_of_an_earlier_picture_is_still_known_after_the_knee_has_change
 
 def test_the_oracle_knows_what_was_made_and_it_is_not_what_was_planned() -> None:
     site = world()
-    assert set(site.made_planes) == set(site.planned_cuts)
-    for name, (point_mm, normal) in site.made_planes.items():
+    assert set(site.record.made_planes) == set(site.planned_cuts)
+    for name, (point_mm, normal) in site.record.made_planes.items():
         planned = site.planned_cuts[name]
         assert 0.0 < abs(planned.heights_mm(point_mm[None])[0]) < 4.0
         assert 0.0 < np.degrees(np.arccos(min(1.0, normal @ planned.normal))) < 6.0
-    (entry_mm, axis), (planned_mm, planned_axis) = site.made_hole, site.drill_line
+    (entry_mm, axis), (planned_mm, planned_axis) = site.record.made_hole, site.drill_line
     assert 0.0 < np.linalg.norm(np.cross(entry_mm - planned_mm, planned_axis)) < 4.0
     assert axis @ planned_axis > np.cos(np.radians(6.0))
 
@@ -172,15 +172,15 @@ def test_the_oracle_knows_what_was_made_and_it_is_not_what_was_planned() -> None
 def test_everything_that_is_made_on_a_left_knee_is_the_mirror_image() -> None:
     right, left = world(), world(replace(PLAIN, side="left"))
     flip = np.array([-1.0, 1.0, 1.0])
-    for name, (point_mm, normal) in right.made_planes.items():
-        np.testing.assert_allclose(left.made_planes[name][0], point_mm * flip, atol=1e-9)
-        np.testing.assert_allclose(left.made_planes[name][1], normal * flip, atol=1e-9)
-    assert left.made_insert_mm == right.made_insert_mm
-    for name, motion in right.made_parts.items():
-        assert rotation_angle_deg(motion, left.made_parts[name]) < 12.0
+    for name, (point_mm, normal) in right.record.made_planes.items():
+        np.testing.assert_allclose(left.record.made_planes[name][0], point_mm * flip, atol=1e-9)
+        np.testing.assert_allclose(left.record.made_planes[name][1], normal * flip, atol=1e-9)
+    assert left.record.made_insert_mm == right.record.made_insert_mm
+    for name, motion in right.record.made_parts.items():
+        assert rotation_angle_deg(motion, left.record.made_parts[name]) < 12.0
         mirrored = np.diag([*flip, 1.0])
         np.testing.assert_allclose(
-            left.made_parts[name].matrix, mirrored @ motion.matrix @ mirrored, atol=1e-9
+            left.record.made_parts[name].matrix, mirrored @ motion.matrix @ mirrored, atol=1e-9
         )
 
 
