@@ -229,7 +229,7 @@ def make_patella(d: ShapeDraws, ridge_y_mm: float) -> Field:
     def front(p: FloatArray) -> FloatArray:
         u, v = p[:, 0] - x, p[:, 2] - z
         dome = 0.009 * u * u + 0.007 * v * v + 0.00001 * (u * u + v * v) ** 2
-        limit: FloatArray = ridge_y_mm - 21.5 + dome
+        limit: FloatArray = ridge_y_mm - 24.0 + dome
         return limit
 
     def outline(p: FloatArray) -> FloatArray:
@@ -238,7 +238,7 @@ def make_patella(d: ShapeDraws, ridge_y_mm: float) -> Field:
         return seen_from_front(np.stack([across, up, 0.0 * up], axis=1))
 
     seen_from_front = make_loft(
-        [[-1.0, 0.0, 0.0, 22.0, 21.5, 24.5, 19.5], [1.0, 0.0, 0.0, 22.0, 21.5, 24.5, 19.5]],
+        [[-1.0, 0.0, 0.0, 20.4, 20.0, 22.0, 17.6], [1.0, 0.0, 0.0, 20.4, 20.0, 22.0, 17.6]],
         exponent=2.0,
     )
     back = Below(lambda p: ridge_y_mm + compute_patella_back(d, p), axis=1)

@@ -8,6 +8,7 @@ from navapp.geometry.transform import FloatArray
 from sim_devices.anatomy import KneeAnatomy
 from sim_devices.bone_shapes import PATELLA_Z_MM
 from sim_devices.relief import make_waves
+from sim_devices.textures import make_smooth_noise
 
 MAXIMUM_MM = 3.2
 MAXIMUM_MEAN_MM = 2.6
@@ -89,6 +90,15 @@ def wear_patch(
     distance = np.linalg.norm(mesh.vertices_mm - centre_mm, axis=1)
     result: FloatArray = thickness_mm * smoothstep(0.8 * radius_mm, 1.2 * radius_mm, distance)
     return result
+
+
+def make_worn_patch(femur: TriangleMesh, centre_mm: FloatArray, radius_mm: float) -> FloatArray:
+    """(V,) 0 to 1: an irregular worn patch round a point of the surface."""
+    offset = femur.vertices_mm - centre_mm
+    ragged = 1.0 + 0.25 * make_smooth_noise(femur.vertices_mm, 13.0, 5)
+    distance = np.linalg.norm(offset * (1.0, 0.7, 0.7), axis=1) / (radius_mm * ragged)
+    worn: FloatArray = np.clip((1.25 - distance) / 0.5, 0.0, 1.0)
+    return worn
 
 
 def with_cartilage(mesh: TriangleMesh, thickness_mm: FloatArray) -> TriangleMesh:

@@ -13,6 +13,10 @@ _VIEW_TILT_DEG = 30.0
 _FLEXION_DEG = 84.0
 _FEMUR_ON_TABLE_MM = (0.0, -20.0, 22.0)
 _JOINT_GAP_MM = 3.5
+# The patella as it lies turned over: its back to the cameras, its upper end up in the picture.
+_EVERTED = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]])
+_PATELLA_Y_MM, _PATELLA_GAP_MM, _PATELLA_BELOW_MM = -24.0, 3.0, 1.0
+_MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 _PLACEMENT_DEG = (6.0, 9.0)
 _PLACEMENT_MM = (6.0, 10.0)
 
@@ -29,6 +33,11 @@ def left_from_table(rig: StereoRig) -> RigidTransform:
     half_turn = rotation_from_vector(0.5 * vector_from_rotation(left_from_right.rotation))
     origin = 0.5 * left_from_right.translation_mm + half_turn @ (0.0, 0.0, WORKING_DISTANCE_MM)
     return RigidTransform.from_parts("left", "table", half_turn, origin)
+
+
+def mirror_pose(pose: RigidTransform) -> RigidTransform:
+    """The same pose of the other side of the body."""
+    return RigidTransform(pose.target, pose.source, _MIRROR @ pose.matrix @ _MIRROR)
 
 
 def nominal_table_from_femur() -> RigidTransform:
@@ -56,9 +65,50 @@ def flex_knee(femur: TriangleMesh, tibia: TriangleMesh) -> RigidTransform:
     centre = np.array([0.0, condyles[:, 1].max() - 21.0, bottom + 22.0])
     rotation = rotation_from_vector((np.radians(_FLEXION_DEG), 0.0, 0.0))
     turned = RigidTransform.from_parts("femur", "tibia", rotation, centre - rotation @ centre)
-    gap = _gap_mm(femur.transform(turned.inverse().rename("tibia", "femur")), tibia)
-    along = rotation @ (0.0, 0.0, gap - _JOINT_GAP_MM)
-    return RigidTransform.from_parts("femur", "tibia", rotation, turned.translation_mm + along)
+    return slide_tibia(femur, tibia, turned, _JOINT_GAP_MM)
+
+
+def slide_tibia(
+    femur: TriangleMesh, tibia: TriangleMesh, femur_from_tibia: RigidTransform, gap_mm: float
+) -> RigidTransform:
+    """A pose moved along the shin until a gap is left between the bones.
+
+    Args:
+        femur: what of it may touch the tibia.
+        tibia: likewise.
+        femur_from_tibia: the pose.
+        gap_mm: smallest distance along the shin.
+    """
+    rotation = femur_from_tibia.rotation
+    found_mm = _gap_mm(femur.transform(femur_from_tibia.inverse().rename("tibia", "femur")), tibia)
+    along = rotation @ (0.0, 0.0, found_mm - gap_mm)
+    origin = femur_from_tibia.translation_mm + along
+    return RigidTransform.from_parts("femur", "tibia", rotation, origin)
+
+
+def evert_patella(femur: TriangleMesh, patella: TriangleMesh) -> RigidTransform:
+    """femur_from_patella of the patella turned over beside the femur, its joint side up.
+
+    Args:
+        femur: of a right knee, like the patella.
+        patella: likewise.
+    """
+    table_from_femur = nominal_table_from_femur()
+    beside = femur.transform(table_from_femur).vertices_mm
+    turned = RigidTransform.from_parts("table", "patella", _EVERTED, np.zeros(3))
+    points = turned.apply(patella.vertices_mm)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    level = np.abs(beside[:, 1] - _PATELLA_Y_MM) < 0.5 * np.ptp(points[:, 1])
+    lateral = beside[level & (beside[:, 2] < beside[:, 2].min() + 40.0), 0].min()
+    place = np.array(
+        [
+            lateral - _PATELLA_GAP_MM - points[:, 0].max(),
+            _PATELLA_Y_MM - centre[1],
+            beside[:, 2].min() + _PATELLA_BELOW_MM - points[:, 2].min(),
+        ]
+    )
+    table_from_patella = RigidTransform.from_parts("table", "patella", _EVERTED, place)
+    return table_from_femur.inverse() @ table_from_patella
 
 
 def _gap_mm(above: TriangleMesh, below: TriangleMesh) -> float:

@@ -24,6 +24,9 @@ class MaterialId(IntEnum):
     STEEL = 5
     GLOVE = 6
     HANDLE = 7
+    SAWN_BONE = 8
+    METAL = 9
+    PLASTIC = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +54,9 @@ class Material:
     marked_specular: float = 1.0  # the highlight's factor where the mark is 1
     blood_at: float = _NO_BLOOD  # noise level above which blood lies
     wrap: float = 0.15  # how far light creeps round an edge (0 hard, 0.5 soft)
+    # mirror: share of the light of lamps and room that is reflected as by a mirror.
+    mirror: float = 0.0
+    roughness: float = 0.2  # of a mirror: over so much (rad) the edge of a mirrored lamp fades
 
     def row(self) -> list[float]:
         """In the order that the kernel reads."""
@@ -70,6 +76,8 @@ class Material:
             self.marked_specular,
             self.blood_at,
             self.wrap,
+            self.mirror,
+            self.roughness,
         ]
 
 
@@ -168,6 +176,41 @@ _TABLE: dict[MaterialId, Material] = {
         specular=0.3,
         shininess=30.0,
     ),
+    # A sawn face: spongy, and marked where the rim of hard bone is.
+    MaterialId.SAWN_BONE: Material(
+        colour=(0.30, 0.45, 0.62),
+        second=(0.17, 0.24, 0.50),
+        marked=(0.56, 0.70, 0.77),
+        mix_at=0.3,
+        mix_width=1.2,
+        contrast_fine=0.16,
+        contrast_coarse=0.08,
+        pores=0.45,
+        bump=0.12,
+        mark_noise=0.25,
+        specular=0.8,
+        shininess=70.0,
+    ),
+    MaterialId.METAL: Material(
+        colour=(0.10, 0.10, 0.10),
+        second=(0.09, 0.09, 0.09),
+        marked=(0.04, 0.03, 0.16),
+        contrast_fine=0.03,
+        contrast_coarse=0.03,
+        mirror=0.6,
+        roughness=0.1,
+    ),
+    MaterialId.PLASTIC: Material(
+        colour=(0.70, 0.74, 0.75),
+        second=(0.67, 0.71, 0.72),
+        marked=(0.10, 0.09, 0.38),
+        mix_width=2.0,
+        contrast_fine=0.012,
+        contrast_coarse=0.015,
+        specular=0.6,
+        shininess=90.0,
+        wrap=0.35,
+    ),
 }
 
 # Which surfaces blood runs on, and how much more readily than on bone.
@@ -178,6 +221,9 @@ _BLOODY = {
     MaterialId.TISSUE: 0.55,
     MaterialId.STEEL: 0.2,
     MaterialId.GLOVE: 0.4,
+    MaterialId.SAWN_BONE: 0.4,
+    MaterialId.METAL: 0.12,
+    MaterialId.PLASTIC: 0.15,
 }
 
 

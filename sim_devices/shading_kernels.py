@@ -13,6 +13,10 @@ Floats = NDArray[np.float32]
 _COLOUR, _SECOND, _MARKED = 0, 3, 6
 _MIX_AT, _MIX_SLOPE, _FINE, _COARSE, _PORES, _BUMP = 9, 10, 11, 12, 13, 14
 _MARK_NOISE, _SPECULAR, _SHININESS, _MARKED_SPECULAR, _BLOOD_AT, _WRAP = 15, 16, 17, 18, 19, 20
+_MIRROR, _ROUGHNESS = 21, 22
+
+# Of a lamp as a mirror shows it: its radius (rad), and its light over that of the lit site.
+_LAMP_RADIUS, _LAMP_LIGHT = 0.13, 1.0 / 0.13**2
 
 # The swizzle and shift of the second lookup keep it unrelated to the first.
 _SHIFT_X, _SHIFT_Y, _SHIFT_Z = 41.3, 17.9, 73.1
@@ -93,7 +97,7 @@ def compute_albedo(
     """Reflectance of a point from its noise, and how wet it is.
 
     Args:
-        materials: (M, 21) float32 table.
+        materials: (M, 23) float32 table.
         row: of the table.
         fine: (5,) float32 of `sample_tile`.
         coarse: likewise, of the coarse lookup.
@@ -264,6 +268,37 @@ def compute_light(
 
 
 @njit(cache=True, nogil=True)
+def compute_mirrored(
+    lamps: Floats, part: int, normal: Floats, point: Floats, eye: Floats, rough: float
+) -> Any:
+    """Light that a mirror at one point throws into the eye: the lamps' discs, and a dim room.
+
+    Args:
+        lamps: (P, L, 4) float32 unit direction towards the lamp, strength.
+        part: whose frame.
+        normal: (3,) float32 unit, in the body's frame.
+        point: (3,) float32 mm, likewise.
+        eye: (3,) float32 mm, likewise.
+        rough: over so much (rad) the edge of a disc fades.
+    """
+    one, two = float32(1.0), float32(2.0)
+    vx, vy, vz = eye[0] - point[0], eye[1] - point[1], eye[2] - point[2]
+    length = one / math.sqrt(vx * vx + vy * vy + vz * vz)
+    vx, vy, vz = vx * length, vy * length, vz * length
+    cosine = two * (normal[0] * vx + normal[1] * vy + normal[2] * vz)
+    rx, ry, rz = cosine * normal[0] - vx, cosine * normal[1] - vy, cosine * normal[2] - vz
+    # The room is brighter where the lamps light it, the cloths all round are dark.
+    total, overhead = float32(0.0), float32(0.0)
+    for k in range(lamps.shape[1]):
+        along = rx * lamps[part, k, 0] + ry * lamps[part, k, 1] + rz * lamps[part, k, 2]
+        apart = math.sqrt(max(float32(0.0), two - two * along))
+        disc = _step((float32(_LAMP_RADIUS) - apart) / rough + float32(0.5))
+        total += lamps[part, k, 3] * disc * float32(_LAMP_LIGHT)
+        overhead += lamps[part, k, 3] * max(float32(0.0), along)
+    return total + float32(0.08) + float32(0.9) * overhead * overhead
+
+
+@njit(cache=True, nogil=True)
 def shade(
     frame: tuple[Any, ...],
     geometry: tuple[Any, ...],
@@ -282,7 +317,7 @@ def shade(
         parts: (body_from_camera (P, 3, 4) float32, lamps (P, L, 4) float32 directions
             in body frames and strengths,
             texture (P, 4) float32: sign of x and shift of the texture).
-        surface: (materials (M, 21) float32, tile (n, n, n) uint16, ambient, constants (3,)
+        surface: (materials (M, 23) float32, tile (n, n, n) uint16, ambient, constants (3,)
             float32: fine and coarse voxels per mm, vignetting per px^2).
         image: (H, W, 3) float32 out, BGR.
     """
@@ -333,5 +368,10 @@ def shade(
             exposure *= one - constants[2] * (dx * dx + dy * dy)
             diffuse = (sums[0] + ambient) * exposure
             highlight = sums[1] * colour[3] * exposure
+            if materials[row, _MIRROR] > float32(0.0):
+                rough = materials[row, _ROUGHNESS]
+                mirrored = compute_mirrored(lamps, part, normal, point, eye, rough)
+                # Blood hides the mirror below it.
+                highlight += materials[row, _MIRROR] * (one - colour[4]) * mirrored * exposure
             for k in range(3):
                 image[y, x, k] = colour[k] * diffuse + highlight

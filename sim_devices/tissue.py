@@ -26,6 +26,8 @@ DRAPE_HOLE_MM = 75.0
 DRAPE_GAP_MM = 5.0
 # Distance over which the wound's wall reaches the skin.
 WALL_MM = 24.0
+# Tissue stays so far away from what the surgeon has freed.
+FREED_MM = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +40,10 @@ class Sheet:
 
 
 def make_tissue(
-    exposed_bones: Sequence[TriangleMesh], bones: Sequence[TriangleMesh], seed: int
+    exposed_bones: Sequence[TriangleMesh],
+    bones: Sequence[TriangleMesh],
+    seed: int,
+    freed: Sequence[TriangleMesh] = (),
 ) -> Sheet:
     """The sheet of skin, fat and muscle with its opening, far beyond the drape's hem.
 
@@ -49,6 +54,7 @@ def make_tissue(
         exposed_bones: the parts that the surgeon laid bare, in the table's frame at the start.
         bones: all of them; what is not laid bare stays covered.
         seed: of the border.
+        freed: what no tissue reaches over, up to its rim: sawn faces, an everted patella.
     """
     grid = _Grid(GROUND_HALF_MM, CELL_MM)
     bare = _heights(exposed_bones, grid)
@@ -56,6 +62,8 @@ def make_tissue(
     top = float(np.nanmax(bare))
     exposed = bare > top - EXPOSED_DEPTH_MM
     border = _border_distance(exposed, grid, seed)
+    if freed:
+        border = np.minimum(border, _outside_mm(~np.isnan(_heights(freed, grid)), grid) - FREED_MM)
     ground = _ground(np.where(exposed, bare, np.nan), top)
     points = grid.points
     relief = _field(points, 9.0, seed + 1, grid) * 0.9 + _field(points, 4.0, seed + 2, grid) * 0.45
@@ -190,13 +198,23 @@ def _border_distance(exposed: NDArray[np.bool_], grid: _Grid, seed: int) -> Floa
 
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (25, 25))
     closed = cv2.morphologyEx(exposed.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
-    outside = cv2.distanceTransform(1 - closed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    inside = cv2.distanceTransform(closed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    distance = (outside.astype(np.float64) - inside) * grid.cell_mm
+    distance = _outside_mm(closed > 0, grid)
     points = grid.points
     wander = 4.6 * _field(points, 32.0, seed, grid) + 1.9 * _field(points, 10.0, seed + 9, grid)
     result: FloatArray = distance + 4.0 + wander
     return result
+
+
+def _outside_mm(mask: NDArray[np.bool_], grid: _Grid) -> FloatArray:
+    """(n, n) signed distance to the border of a mask, positive outside."""
+    import cv2
+
+    outside, inside = (
+        cv2.distanceTransform(side.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        for side in (~mask, mask)
+    )
+    distance: FloatArray = (outside.astype(np.float64) - inside) * grid.cell_mm
+    return distance
 
 
 def _ground(bone: FloatArray, top: float) -> FloatArray:

@@ -1,13 +1,14 @@
-"""True poses of the simulated world, for judging results only."""
+"""The truth of the simulated world, for judging results only."""
 
 from collections.abc import Callable
 from typing import Protocol
 
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform
+from sim_devices.operation_record import OperationRecord
 
 
-class KnowsPoses(Protocol):
-    """The part of a world that knows where its bodies are."""
+class KnowsTruth(Protocol):
+    """The part of a world that knows where its bodies are, and what was made of them."""
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -18,14 +19,19 @@ class KnowsPoses(Protocol):
         """Pose in the left camera at a world time (0 = start)."""
         ...
 
+    @property
+    def record(self) -> OperationRecord:
+        """What was really made."""
+        ...
+
 
 class TruthOracle:
-    """True poses at the capture times of frames.
+    """True poses at the capture times of frames, and what saw and drill really made.
 
     Kept apart from every device: no stage of the line may ever be handed one.
     """
 
-    def __init__(self, world: KnowsPoses, world_time_of: Callable[[int], int]) -> None:
+    def __init__(self, world: KnowsTruth, world_time_of: Callable[[int], int]) -> None:
         """Join a world and the clock of its camera.
 
         Args:
@@ -43,3 +49,22 @@ class TruthOracle:
     def left_from_body(self, body: str, captured_ns: int) -> RigidTransform:
         """True pose of a body in the left camera (not rectified, mm) when a frame was captured."""
         return self._world.left_from_body(body, self._world_time_of(captured_ns))
+
+    def made_planes(self) -> dict[str, tuple[FloatArray, FloatArray]]:
+        """Faces that the saw leaves, made already or not, by the name of their planned cut.
+
+        Point (3,) mm and unit normal (3,) out of the bone, in the coordinates of its model.
+        """
+        return self._world.record.made_planes
+
+    def made_hole(self) -> tuple[FloatArray, FloatArray]:
+        """Where the drilled hole enters the femur (3,) mm, and its unit direction (3,)."""
+        return self._world.record.made_hole
+
+    def made_parts(self) -> dict[str, RigidTransform]:
+        """By which motion, in the coordinates of its bone, each component is off its plan."""
+        return self._world.record.made_parts
+
+    def made_insert(self) -> float:
+        """Thickness (mm) of the insert with its tray: it sets the gap of the finished knee."""
+        return self._world.record.made_insert_mm

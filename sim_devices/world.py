@@ -1,7 +1,8 @@
 """The simulated operating site: an opened knee on the table, seen by two cameras."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,32 +12,32 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
-from sim_devices.anatomy import KneeAnatomy, make_knee, mirror_mesh
-from sim_devices.cartilage import make_cartilage_thickness_mm, wear_patch, with_cartilage
-from sim_devices.layout import (
-    flex_knee,
-    left_from_table,
-    misplace,
-    nominal_table_from_femur,
-    select_side,
+from sim_devices.anatomy import MIRROR, KneeAnatomy, make_knee, mirror_mesh
+from sim_devices.cartilage import (
+    make_cartilage_thickness_mm,
+    make_worn_patch,
+    wear_patch,
+    with_cartilage,
 )
+from sim_devices.fitted_parts import FittedParts
+from sim_devices.layout import left_from_table, mirror_pose, misplace, nominal_table_from_femur
 from sim_devices.materials import make_material_table
 from sim_devices.motion import LegMotion, compute_drill_motion, compute_sweep_offset_mm
+from sim_devices.operation import State, enter
+from sim_devices.operation_record import OperationRecord
+from sim_devices.planned_cuts import Cut
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
 from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
 from sim_devices.scenario import Scenario
+from sim_devices.scenes import Scene, make_scene
 from sim_devices.sensor import Eye
-from sim_devices.stages import STAGES, Site, find_entry_point, make_worn_patch
+from sim_devices.site import Site, make_site
+from sim_devices.state_history import StateHistory
 from sim_devices.textures import make_noise_tile
-from sim_devices.tissue import SKIN_BELOW_TOP_MM, make_drape, make_tissue, trim
 
 _TISSUE_FOLLOWS = 0.9
-# How far from the joint line the surgeon laid the bones bare.
-_BARE_FEMUR_MM = 62.0
-_BARE_TIBIA_MM = 27.0
 _DEFECT_RADIUS_MM = 9.0
 _HAND_ABOVE_MM = 32.0
-_MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 # Direction in the table's frame (z away from the cameras), strength.
 _LAMPS = np.array(
     [
@@ -67,36 +68,58 @@ class World:
         self.rig: StereoRig = rig or make_default_rig()
         self.anatomy: KneeAnatomy = make_knee(scenario.knee)
         self._is_left = scenario.side == "left"
+        # What mirrors a point of a right knee when this is a left one.
+        self._sides = MIRROR if self._is_left else np.ones(3)
         right = {
             name: mirror_mesh(mesh) if self._is_left else mesh for name, mesh in self._surfaces_mm()
         }
         self._left_from_table = left_from_table(self.rig)
         self._nominal = nominal_table_from_femur()
         self._start = misplace(self._nominal, scenario.seed)
-        self._femur_from_tibia = flex_knee(right["femur"], right["tibia"])
         self._motion = LegMotion(scenario.motion, scenario.seed)
         self._site = self._make_site(right)
+        self._fitted = FittedParts(self._site)
+        self.record = OperationRecord(self._site, self._fitted, is_left=self._is_left)
         self._surfaces = Surfaces(
             make_material_table(scenario.contrast, scenario.blood),
             make_noise_tile(scenario.seed),
             _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
         )
         self._lock = threading.Lock()
-        self._renderers: dict[tuple[str, Eye, float, Turn], Renderer] = {}
-        self._others: dict[tuple[str, Camera], Renderer] = {}
-        self._parts: dict[str, tuple[Part, ...]] = {}
-        self._stage = ""
-        self.set_stage(scenario.stage)
+        self._renderers: dict[tuple[State, Eye, float, Turn], Renderer] = {}
+        self._others: dict[tuple[State, Camera], Renderer] = {}
+        self._scenes: dict[State, Scene] = {}
+        self._history = StateHistory(enter(scenario.stage))
 
     @property
     def bodies(self) -> tuple[str, ...]:
         """The bodies that can be tracked."""
-        return ("femur", "tibia")
+        return ("femur", "tibia", "patella")
 
     @property
     def stage(self) -> str:
         """The surgical stage in force."""
-        return self._stage
+        return self._state.stage
+
+    @property
+    def made(self) -> frozenset[str]:
+        """Names of the steps of the operation that have been made (`operation.STEPS`)."""
+        return self._state.made
+
+    @property
+    def made_cuts(self) -> tuple[str, ...]:
+        """Names of the cuts among them, in their order."""
+        return self._state.cuts
+
+    @property
+    def planned_cuts(self) -> dict[str, Cut]:
+        """All cuts of the operation as they are planned, by name."""
+        return self.record.planned_cuts
+
+    @property
+    def drill_line(self) -> tuple[FloatArray, FloatArray]:
+        """Where the drill is planned to enter the femur, and its unit direction, (3,) each."""
+        return self.record.planned_hole
 
     @property
     def nominal_left_from_femur(self) -> RigidTransform:
@@ -106,7 +129,12 @@ class World:
     @property
     def nominal_left_from_tibia(self) -> RigidTransform:
         """Where the tibia lies according to the book: the knee bent as it is at rest."""
-        return self._place_in_view(self._nominal @ self._femur_from_tibia)
+        return self._place_in_view(self._nominal @ self._site.femur_from_tibia)
+
+    @property
+    def nominal_left_from_patella(self) -> RigidTransform:
+        """Where the patella lies according to the book: turned over, beside the femur."""
+        return self._place_in_view(self._nominal @ self._site.femur_from_patella)
 
     @property
     def approach_axis(self) -> FloatArray:
@@ -117,20 +145,37 @@ class World:
         unit: FloatArray = direction / np.linalg.norm(direction)
         return unit
 
-    def set_stage(self, name: str) -> None:
-        """Show another surgical stage from the next picture on.
+    def set_stage(self, name: str) -> tuple[str, ...]:
+        """Show another surgical stage from the next picture on, as it is usually entered.
+
+        Returns:
+            Names of the cuts that are made then.
 
         Raises:
             UsageError: there is no such stage.
         """
-        if name not in STAGES:
-            raise UsageError(
-                f"the simulator shows no stage {name!r}",
-                subject=name,
-                remedy=f"choose one of {', '.join(STAGES)}",
-            )
-        with self._lock:
-            self._stage = name
+        self._history.show(enter(name))
+        return self.made_cuts
+
+    def set_made(self, made: Iterable[str]) -> None:
+        """Show the stage in force with these steps of the operation made, and no others.
+
+        Raises:
+            UsageError: the operation has no such step.
+        """
+        self._history.show(State(self.stage, frozenset(made)))
+
+    def advance(self) -> None:
+        """Make the next step of the stage in force: the next cut, then the component.
+
+        Raises:
+            UsageError: all of its steps are made.
+        """
+        self._history.show(self._state.advance())
+
+    @property
+    def _state(self) -> State:
+        return self._history.now
 
     def left_from_body(self, body: str, time_ns: int) -> RigidTransform:
         """True pose of a body in the left camera.
@@ -142,7 +187,10 @@ class World:
         Raises:
             UsageError: there is no such body.
         """
-        return self._place_in_view(self._table_from_body(body, time_ns / 1e9))
+        return self._left_from_body(body, time_ns, self._history.at(time_ns))
+
+    def _left_from_body(self, body: str, time_ns: int, state: State) -> RigidTransform:
+        return self._place_in_view(self._table_from_body(body, time_ns / 1e9, state))
 
     def cartilage_mm(self, bone: str) -> FloatArray:
         """(V,) true thickness over the vertices of a bone of the anatomy, worn at the defect.
@@ -170,14 +218,18 @@ class World:
             scale: of the picture against the rig's.
             turn_rad: of the right eye, about its own axes.
         """
-        renderer, parts = self._renderer(eye, scale, turn_rad)
+        state = self._history.take_picture(time_ns)
+        with self._lock:
+            renderer = self._renderer(state, eye, scale, turn_rad)
         seen_from = camera_from_left(self.rig, eye, turn_rad)
-        return renderer.render(*self._poses(seen_from, parts, time_ns))
+        return renderer.render(*self._poses(seen_from, state, time_ns))
 
     def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
         """True depth and body of every pixel of the picture that `render` gives."""
-        renderer, parts = self._renderer(eye, scale)
-        return renderer.depth(*self._poses(camera_from_left(self.rig, eye), parts, time_ns))
+        state = self._state
+        with self._lock:
+            renderer = self._renderer(state, eye, scale)
+        return renderer.depth(*self._poses(camera_from_left(self.rig, eye), state, time_ns))
 
     def render_for(
         self, camera: Camera, seen_from: RigidTransform, time_ns: int
@@ -189,42 +241,39 @@ class World:
             seen_from: camera_from_left, of where it stands; it never moves.
             time_ns: world time.
         """
-        renderer, parts = self._renderer_for(camera)
-        return renderer.render(*self._poses(seen_from, parts, time_ns))
+        state = self._state
+        with self._lock:
+            renderer = self._renderer_for(state, camera)
+        return renderer.render(*self._poses(seen_from, state, time_ns))
 
-    def _renderer(
-        self, eye: Eye, scale: float, turn_rad: Turn = NO_TURN
-    ) -> tuple[Renderer, tuple[Part, ...]]:
+    def _renderer(self, state: State, eye: Eye, scale: float, turn_rad: Turn = NO_TURN) -> Renderer:
         """That of an eye as it stands: what lies still is drawn once and kept."""
-        with self._lock:
-            parts = self._parts_now()
-            key = (self._stage, eye, scale, turn_rad)
-            if key not in self._renderers:
-                rig = self.rig if scale == 1.0 else self.rig.scale(scale)
-                camera = rig.left if eye == "left" else rig.right
-                self._renderers[key] = self._make_renderer(camera, parts, scale)
-            return self._renderers[key], parts
+        key = (state, eye, scale, turn_rad)
+        if key not in self._renderers:
+            rig = self.rig if scale == 1.0 else self.rig.scale(scale)
+            camera = rig.left if eye == "left" else rig.right
+            self._renderers[key] = self._make_renderer(camera, self._scene(state).parts, scale)
+        return self._renderers[key]
 
-    def _renderer_for(self, camera: Camera) -> tuple[Renderer, tuple[Part, ...]]:
+    def _renderer_for(self, state: State, camera: Camera) -> Renderer:
         """That of another camera, kept likewise."""
-        with self._lock:
-            parts = self._parts_now()
-            key = (self._stage, camera)
-            if key not in self._others:
-                self._others[key] = self._make_renderer(camera, parts)
-            return self._others[key], parts
+        key = (state, camera)
+        if key not in self._others:
+            self._others[key] = self._make_renderer(camera, self._scene(state).parts)
+        return self._others[key]
 
     def _make_renderer(
         self, camera: Camera, parts: tuple[Part, ...], scale: float = 1.0
     ) -> Renderer:
         return Renderer(camera, parts, self._surfaces_at(scale), frozenset({"drape"}))
 
-    def _parts_now(self) -> tuple[Part, ...]:
-        """Of the stage in force; called with the lock held."""
-        if self._stage not in self._parts:
-            made = STAGES[self._stage](self._site)
-            self._parts[self._stage] = tuple(self._mirror_if_left(part) for part in made)
-        return self._parts[self._stage]
+    def _scene(self, state: State) -> Scene:
+        """Made at the first call, and kept."""
+        if state not in self._scenes:
+            made = make_scene(self._site, self._fitted, state)
+            parts = tuple(self._mirror_if_left(part) for part in made.parts)
+            self._scenes[state] = replace(made, parts=parts)
+        return self._scenes[state]
 
     def _surfaces_at(self, scale: float) -> Surfaces:
         """Smaller pictures need a blurred texture, or its finest octave would flicker."""
@@ -235,16 +284,16 @@ class World:
         return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
 
     def _poses(
-        self, seen_from: RigidTransform, parts: tuple[Part, ...], time_ns: int
+        self, seen_from: RigidTransform, state: State, time_ns: int
     ) -> tuple[dict[str, RigidTransform], RigidTransform]:
         """camera_from_body of everything in the scene, and camera_from_table."""
         poses = {
-            body: seen_from @ self.left_from_body(body, time_ns)
-            for body in dict.fromkeys(part.body for part in parts)
+            body: seen_from @ self._left_from_body(body, time_ns, state)
+            for body in dict.fromkeys(part.body for part in self._scene(state).parts)
         }
         return poses, seen_from @ self._left_from_table
 
-    def _table_from_body(self, body: str, time_s: float) -> RigidTransform:
+    def _table_from_body(self, body: str, time_s: float, state: State) -> RigidTransform:
         """As for a right knee."""
         twist = self._motion.twist(time_s)
         centre = self._start.translation_mm
@@ -254,23 +303,24 @@ class World:
         if body == "tibia":
             bend = rotation_from_vector((self._motion.bend_rad(time_s), 0.0, 0.0))
             turned = RigidTransform.from_parts("femur", "femur", bend, np.zeros(3))
-            return femur @ turned @ self._femur_from_tibia
-        if body == "tissue":
+            return femur @ turned @ self._femur_from_tibia(state)
+        if body in ("tissue", "patella"):
+            # The patella that is turned over lies on tissue, and moves with it.
             rest = RigidTransform.identity("table", "tissue")
+            if body == "patella":
+                rest = self._start @ self._site.femur_from_patella
             return rest.move(_TISSUE_FOLLOWS * twist, centre)
         if body == "drape":
             return RigidTransform.identity("table", "drape")
         if body == "hand":
             offset = compute_sweep_offset_mm(self.scenario.instrument, time_s)
-            height = float(self._site.tissue.mesh.vertices_mm[:, 2].min()) - _HAND_ABOVE_MM
+            height = self._scene(state).tissue_top_mm - _HAND_ABOVE_MM
             return RigidTransform.from_parts(
                 "table", "hand", np.eye(3), offset + np.array([0.0, 0.0, height])
             )
         if body in ("drill", "chuck"):
-            site = self._site
-            tool = compute_drill_motion(
-                site.entry_mm, site.entry_axis, time_s, turns=body == "drill"
-            )
+            entry_mm, axis = self._site.made_hole
+            tool = compute_drill_motion(entry_mm, axis, time_s, turns=body == "drill")
             return femur @ RigidTransform("femur", body, tool)
         raise UsageError(
             f"there is no body {body!r} in the simulated world",
@@ -281,16 +331,12 @@ class World:
     def _place_in_view(self, table_from_body: RigidTransform) -> RigidTransform:
         """left_from_body of a pose that was made as for a right knee."""
         if self._is_left:
-            table_from_body = RigidTransform(
-                "table", table_from_body.source, _MIRROR @ table_from_body.matrix @ _MIRROR
-            )
+            table_from_body = mirror_pose(table_from_body)
         return self._left_from_table @ table_from_body
 
-    @property
-    def drill_line(self) -> tuple[FloatArray, FloatArray]:
-        """Where the drill enters the femur and its unit direction into it, (3,) each."""
-        mirror = np.array([-1.0 if self._is_left else 1.0, 1.0, 1.0])
-        return self._site.entry_mm * mirror, self._site.entry_axis * mirror
+    def _femur_from_tibia(self, state: State) -> RigidTransform:
+        """At rest."""
+        return (self._fitted if state.is_made("insert") else self._site).femur_from_tibia
 
     @property
     def worn_vertices(self) -> NDArray[np.int64]:
@@ -316,29 +362,12 @@ class World:
             yield name, with_cartilage(bone, self.cartilage_mm(name))
 
     def _make_site(self, right: dict[str, TriangleMesh]) -> Site:
-        femur = self._start
-        laid = {"femur": femur, "tibia": femur @ self._femur_from_tibia}
-        on_table = [right[name].transform(pose) for name, pose in laid.items()]
-        bare = [
-            select_side(
-                right["femur"], float(right["femur"].vertices_mm[:, 2].min()) + _BARE_FEMUR_MM, -1.0
-            ),
-            select_side(
-                right["tibia"], float(right["tibia"].vertices_mm[:, 2].max()) - _BARE_TIBIA_MM, 1.0
-            ),
-        ]
-        exposed = [mesh.transform(pose) for mesh, pose in zip(bare, laid.values(), strict=True)]
-        tissue = make_tissue(exposed, on_table, self.scenario.seed)
-        top = -min(float(bone.vertices_mm[:, 2].min()) for bone in on_table)
-        mirror = np.array([-1.0, 1.0, 1.0]) if self._is_left else np.ones(3)
-        notch = self.anatomy.landmarks["femur/notch"] * mirror
-        axis = rotation_from_vector((np.radians(-6.0), 0.0, 0.0)) @ (0.0, 0.0, 1.0)
-        return Site(
-            bones=right,
-            worn=make_worn_patch(right["femur"], self._defect_mm() * mirror, _DEFECT_RADIUS_MM),
+        centre_mm = self._defect_mm() * self._sides
+        return make_site(
+            make_knee(replace(self.scenario.knee, side="right")),
+            right,
+            make_worn_patch(right["femur"], centre_mm, _DEFECT_RADIUS_MM),
+            self._start,
+            self.scenario.seed,
             is_covered=self.scenario.cartilage_mm > 0.0,
-            tissue=trim(tissue),
-            drape=make_drape(tissue, top - SKIN_BELOW_TOP_MM - 11.0, self.scenario.seed),
-            entry_mm=find_entry_point(right["femur"], notch + np.array([0.0, -10.0, 0.0]), axis),
-            entry_axis=axis,
         )

@@ -12,6 +12,7 @@ from navapp.errors import ConfigurationError, UsageError
 
 if TYPE_CHECKING:
     from calibration.targets.boards import Board
+    from navapp.cli.practice_cuts import PracticeCuts
     from navapp.config import Configuration
     from navapp.control.board_watch import BoardWatch
     from navapp.control.calibrated_display import CalibratedDisplay
@@ -150,15 +151,31 @@ def make_controller(
     from navapp.control.controller import SessionController
     from navapp.control.executors import InlineExecutor, ThreadExecutor
 
-    return SessionController(
+    hooks, cuts = _make_hooks(session, on_frame, undo), _make_practice_cuts(session)
+    if cuts is not None:
+        hooks = replace(hooks, on_stage=(cuts.enter_stage,))
+    controller = SessionController(
         session.opened.devices,
         session.specification,
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
-        hooks=_make_hooks(session, on_frame, undo),
+        hooks=hooks,
         board_watch=_make_board_watch(session, is_inline=is_inline),
         locate_corners=_make_locator(session),
         eye=_make_eye(session, is_inline=is_inline),
     )
+    if cuts is not None:
+        cuts.connect(controller.submit)
+    return controller
+
+
+def _make_practice_cuts(session: LiveSession) -> "PracticeCuts | None":
+    """What tells the session which cuts the simulated room shows; None without such a room."""
+    from navapp.cli.practice_cuts import PracticeCuts
+
+    simulation = session.opened.simulation
+    if simulation is None:
+        return None
+    return PracticeCuts(simulation.set_stage, frozenset(session.specification.plan.content.planes))
 
 
 def _make_locator(session: LiveSession) -> "LocateCorners | None":
@@ -200,14 +217,13 @@ def _make_board_watch(session: LiveSession, *, is_inline: bool) -> "BoardWatch |
 def _make_hooks(
     session: LiveSession, on_frame: "Sequence[FrameListener]", undo: ExitStack
 ) -> "SessionHooks":
-    """Who is told: the caller, the simulated room, and the recorder when there is one."""
+    """Who is told: the caller, and the recorder when there is one."""
     from navapp.cli.session_folder import discard_if_empty, start_recording
     from navapp.control.event_log import SessionHooks
 
     configuration, opened = session.configuration, session.opened
     hooks = SessionHooks(
         on_frame=tuple(on_frame),
-        on_stage=() if opened.simulation is None else (opened.simulation.set_stage,),
         reopen_camera=opened.reopen_camera,
     )
     folder = configuration.recording.folder

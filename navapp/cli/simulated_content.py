@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from navapp.devices import Simulation
-from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import (
     ANKLE_CENTRE,
     HIP_CENTRE,
@@ -21,20 +21,23 @@ from navapp.values import (
     SurgicalContent,
 )
 
-# By the book: as much bone as the component is thick, the tibia's cut falling to the back.
-_RESECTION_MM, _SLOPE_DEG = 9.0, 3.0
+# Thickness of all components: what the planned cuts remove.
+_COMPONENT_MM = 9.0
 _DRILL_DIAMETER_MM, _DRILL_DEPTH_MM = 9.0, 25.0
 _SAFETY_MM = 5.0
 # Lengths of a thigh and a shank, by way of the knee's own size.
 _HIP_ABOVE, _ANKLE_BELOW = 5.4, 4.6
 
-_UP, _BACK = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 def make_built_in_content(simulation: Simulation) -> SurgicalContent:
     """All that a plan can hold, of the simulated patient."""
     points = {name: np.asarray(point) for name, point in simulation.targets.items()}
-    planes = _planes(points)
+    planes = {
+        name: ResectionPlane(cut.bone, cut.point_mm, cut.normal, cut.extent_mm)
+        for name, cut in simulation.planned_cuts.items()
+    }
     entry = DrillAxis(
         "femur",
         simulation.drill_entry_mm,
@@ -54,35 +57,24 @@ def make_built_in_content(simulation: Simulation) -> SurgicalContent:
             "drilling": StageContent(
                 "femur", drills=("femoral_guide",), risks=tuple(simulation.curves)
             ),
-            "implant": StageContent("femur", planes=("femur_distal",), parts=("femoral_implant",)),
-            "patella": StageContent("patella", planes=("patella",), parts=("patellar_implant",)),
-            "spacer": StageContent("tibia", planes=("tibia_proximal",), parts=("spacer",)),
+            "implant": _stage(planes, "femur", "femoral_implant"),
+            "patella": _stage(planes, "patella", "patellar_implant"),
+            "spacer": _stage(planes, "tibia", "spacer"),
         },
     )
 
 
-def _planes(points: Mapping[str, FloatArray]) -> dict[str, ResectionPlane]:
-    lowest = min(
-        (points["femur/medial_condyle"], points["femur/lateral_condyle"]), key=lambda p: p[2]
-    )
-    distal = np.array([*points["femur/notch"][:2], lowest[2] + _RESECTION_MM])
-    plateaus = np.stack([points["tibia/medial_plateau"], points["tibia/lateral_plateau"]])
-    proximal = np.append(plateaus[:, :2].mean(axis=0), plateaus[:, 2].max() - _RESECTION_MM)
-    slope = rotation_from_vector((-np.radians(_SLOPE_DEG), 0.0, 0.0)) @ _UP
-    return {
-        "femur_distal": ResectionPlane("femur", distal, -_UP, (80.0, 60.0)),
-        "tibia_proximal": ResectionPlane("tibia", proximal, slope, (80.0, 55.0)),
-        "patella": ResectionPlane(
-            "patella", points["patella/ridge"] - _RESECTION_MM * _BACK, _BACK, (45.0, 40.0)
-        ),
-    }
+def _stage(planes: Mapping[str, ResectionPlane], bone: str, part: str) -> StageContent:
+    """All cuts of a bone, and the component that covers them."""
+    names = tuple(name for name, plane in planes.items() if plane.bone == bone)
+    return StageContent(bone, planes=names, parts=(part,))
 
 
 def _parts(planes: Mapping[str, ResectionPlane]) -> dict[str, Part]:
     """Components on their cuts, as thick as what was removed."""
-    plate = Box((66.0, 52.0, _RESECTION_MM))
-    button = Cylinder(30.0, _RESECTION_MM)
-    liner = Box((68.0, 44.0, _RESECTION_MM))
+    plate = Box((66.0, 52.0, _COMPONENT_MM))
+    button = Cylinder(30.0, _COMPONENT_MM)
+    liner = Box((68.0, 44.0, _COMPONENT_MM))
     return {
         "femoral_implant": Part("implant", plate, _on(planes["femur_distal"], "femoral_implant")),
         "patellar_implant": Part("implant", button, _on(planes["patella"], "patellar_implant")),
@@ -96,7 +88,7 @@ def _on(plane: ResectionPlane, name: str) -> RigidTransform:
     across = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
     rotation = np.column_stack([across, np.cross(plane.normal, across), plane.normal])
     return RigidTransform.from_parts(
-        plane.bone, name, rotation, plane.point_mm + 0.5 * _RESECTION_MM * plane.normal
+        plane.bone, name, rotation, plane.point_mm + 0.5 * _COMPONENT_MM * plane.normal
     )
 
 

@@ -15,6 +15,7 @@ from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import Scene, SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
+from sim_devices.planned_cuts import Cut
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.sheet import SheetInView
@@ -33,6 +34,7 @@ class Simulation:
     # drill_entry_mm, drill_direction: where the room's drill enters the femur, and whereto.
     drill_entry_mm: FloatArray
     drill_direction: FloatArray
+    planned_cuts: Mapping[str, Cut]  # what the room's saw is to make, by name
     worn_vertices: NDArray[np.int64]  # of the femur, where its cartilage is worn
     # how the knee was laid on the table; rough starts.
     nominal_left_from_bone: Mapping[str, RigidTransform]
@@ -40,7 +42,8 @@ class Simulation:
     approach_axis: FloatArray
     approach_half_angle_deg: float
     oracle: TruthOracle  # the truth, for evaluation after the run only
-    set_stage: Callable[[str], None]  # tells the room which stage is in force
+    # tells the room which stage is in force; it answers with the planned cuts that are made there.
+    set_stage: Callable[[str], tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +121,12 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         },
         drill_entry_mm=entry_mm,
         drill_direction=direction,
+        planned_cuts=world.planned_cuts,
         worn_vertices=world.worn_vertices,
         nominal_left_from_bone={
             "femur": world.nominal_left_from_femur,
             "tibia": world.nominal_left_from_tibia,
+            "patella": world.nominal_left_from_patella,
         },
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,

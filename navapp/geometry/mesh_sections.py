@@ -96,10 +96,17 @@ def _turn(faces: NDArray[np.int32], is_first: NDArray[np.bool_]) -> NDArray[np.i
     return np.take_along_axis(faces, columns, axis=1)
 
 
-def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | None:
+def fill_section(
+    lines: list[FloatArray], normal: FloatArray, step_mm: float | None = None
+) -> TriangleMesh | None:
     """The area that closed lines (N, 3) of a plane enclose, as triangles that face along a normal.
 
     A point is inside when the lines go round it an odd number of times. None without any area.
+
+    Args:
+        lines: of one plane.
+        normal: (3,) unit, of the plane.
+        step_mm: further vertices so far apart fill the area; None: it has those of the lines alone.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -108,16 +115,16 @@ def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | 
         return None
     points = np.concatenate([line[:-1] for line in closed])
     axes = perpendicular_axes(normal[None])[0]
-    flat = points @ axes.T
+    flat, outlines = points @ axes.T, [line @ axes.T for line in closed]
+    if step_mm is not None:
+        inner = _grid_inside(flat, outlines, step_mm)
+        points = np.concatenate([points, inner @ axes + (points[0] @ normal) * normal])
+        flat = np.concatenate([flat, inner])
     try:
         faces = Delaunay(flat).simplices
     except QhullError:  # all on one line
         return None
-    middles = flat[faces].mean(axis=1)
-    is_inside = np.zeros(len(faces), dtype=np.bool_)
-    for line in closed:
-        is_inside ^= _is_enclosed(middles, line @ axes.T)
-    faces = faces[is_inside]
+    faces = faces[_is_inside(flat[faces].mean(axis=1), outlines)]
     if len(faces) == 0:
         return None
     a, b, c = (flat[faces[:, k]] for k in range(3))
@@ -125,6 +132,28 @@ def fill_section(lines: list[FloatArray], normal: FloatArray) -> TriangleMesh | 
     is_turned = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0.0
     faces[is_turned] = faces[is_turned][:, ::-1]
     return TriangleMesh(points, faces.astype(np.int32), np.tile(normal, (len(points), 1)))
+
+
+def _grid_inside(flat: FloatArray, outlines: list[FloatArray], step_mm: float) -> FloatArray:
+    """(N, 2) points of a square grid within outlines, none near the vertices of these."""
+    from scipy.spatial import cKDTree
+
+    x, y = (
+        np.arange(low + step_mm, high, step_mm)
+        for low, high in zip(flat.min(axis=0), flat.max(axis=0), strict=True)
+    )
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    grid = grid[cKDTree(flat).query(grid)[0] > 0.7 * step_mm]
+    inside: FloatArray = grid[_is_inside(grid, outlines)]
+    return inside
+
+
+def _is_inside(points: FloatArray, outlines: list[FloatArray]) -> NDArray[np.bool_]:
+    """(N,) whether closed lines (M, 2) go round points (N, 2) an odd number of times together."""
+    is_inside = np.zeros(len(points), dtype=np.bool_)
+    for line in outlines:
+        is_inside ^= _is_enclosed(points, line)
+    return is_inside
 
 
 def _is_enclosed(points: FloatArray, line: FloatArray) -> NDArray[np.bool_]:

@@ -3,15 +3,20 @@
 import itertools
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from navapp.cli.main import run
+from navapp.cli.simulated_patient import make_built_in_plan
+from navapp.config import SimulationSection
+from navapp.devices.simulated_room import Pace, make_simulated_camera, scenario_of, simulation_of
 from navapp.preop import write_plan
-from navapp.values import Plan
+from navapp.values import Plan, StageContent
 from sim_devices.anatomy import KneeSpec
+from sim_devices.world import World
 from tests.bones import femur_model
 from tests.many import few_of
 
@@ -92,7 +97,7 @@ TWO_BONES = """
 do = "register"
 [[step]]
 do = "stage"
-stage = "spacer"
+stage = "opening"
 at_frame = 4
 [[step]]
 do = "override"
@@ -102,12 +107,24 @@ reason = "a test"
 do = "register"
 [[step]]
 do = "stage"
-stage = "opening"
+stage = "drilling"
 at_frame = 9
 [[step]]
 do = "blank"
 at_frame = 12
 """
+
+
+def plan_with_tibia_at_the_opening(seed: int) -> Plan:
+    """A plan by which a stage that shows both bones unsawn follows the tibia."""
+    settings = SimulationSection(seed=seed, motion="patient")
+    world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=True)
+    plan = make_built_in_plan(
+        simulation_of(world, make_simulated_camera(world, settings, pace, 15.0))
+    )
+    targets = ("tibia/medial_plateau", "tibia/lateral_plateau")
+    stages = {**plan.content.stages, "opening": StageContent("tibia", targets)}
+    return replace(plan, content=replace(plan.content, stages=stages), digest="")
 
 
 @pytest.mark.slow
@@ -118,24 +135,29 @@ def test_the_operators_script_has_two_bones_followed_at_once_and_they_replay_to_
 ) -> None:
     script, session, knee = (tmp_path / name for name in ("script.toml", "session", "knee.toml"))
     knee.write_text(KNEE.format(seed=seed), encoding="utf-8")
+    write_plan(tmp_path / "plan", plan_with_tibia_at_the_opening(seed))
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     script.write_text(TWO_BONES, encoding="utf-8")
     options = ["--quiet", "--config", str(knee), "run", "--headless", "--frames", "14"]
+    options += ["--plan", str(tmp_path / "plan"), "--stage", "drilling"]
     options += ["--operator", str(script), "--record", str(session)]
     assert run([*options, "--json", str(first)]) == 0
     frames = result(first)["frames"]
     blanks = [e for e in events_of(session) if e.get("command") == "blank"]
     assert [entry["sequence"] for entry in blanks] == [12]
     stages = [frame["stage"] for frame in frames]
-    assert list(dict.fromkeys(stages)) == ["opening", "spacer"]
-    assert stages[-1] == "opening"
+    assert list(dict.fromkeys(stages)) == ["drilling", "opening"]
+    assert stages[-1] == "drilling"
     for bone, other in (("tibia", "femur"), ("femur", "tibia")):
         its_turns = [f for f in frames if f["bone"] == bone and f["bodies"]]
         assert len(its_turns) >= 2
         assert all(set(frame["bodies"]) == {other} for frame in its_turns)
         assert all(b["index"] - a["index"] == 2 for a, b in itertools.pairwise(its_turns))
         said = [frame["bodies"][other] for frame in its_turns]
-        assert all(one["status"] == "OK" and one["tre_mm"] < 0.4 for one in said)
+        # The drill hides the tibia.
+        expected = "OK" if other == "femur" else "LOST"
+        assert all(one["status"] == expected for one in said)
+        assert all(one["tre_mm"] < 0.4 for one in said if expected == "OK")
     # The femur's stage goes on from where the femur is by then, without being looked for.
     back = frames[[f["bone"] for f in frames].index("tibia") :]
     assert next(f for f in back if f["bone"] == "femur")["state"] == "navigating"

@@ -49,6 +49,17 @@ def test_a_hole_and_an_island_are_told_from_the_area() -> None:
     assert lid.face_areas_mm2().sum() == pytest.approx(expected, rel=0.01)
 
 
+def test_an_area_is_filled_with_small_triangles_when_asked() -> None:
+    wall, hole = sphere(20.0, 120), sphere(10.0, 120).flip()
+    body = join_meshes(wall, hole)
+    lid = fill_section(section_lines(body, height(body, 0.5)), UP, step_mm=1.0)
+    assert lid is not None
+    assert lid.face_areas_mm2().sum() == pytest.approx(np.pi * (20.0**2 - 10.0**2), rel=0.01)
+    np.testing.assert_allclose(lid.vertices_mm[:, 2], 0.5, atol=1e-9)
+    corners = lid.vertices_mm[lid.faces]
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() < 2.5
+
+
 def test_where_nothing_is_cut_there_is_no_area() -> None:
     block = cube(10.0)
     assert section_lines(block, height(block, 20.0)) == []

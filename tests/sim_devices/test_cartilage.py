@@ -6,6 +6,7 @@ from sim_devices.anatomy import KneeSpec, make_knee
 from sim_devices.cartilage import (
     compute_articular_weight,
     make_cartilage_thickness_mm,
+    make_worn_patch,
     smoothstep,
     wear_patch,
     with_cartilage,
@@ -106,3 +107,11 @@ def test_what_cannot_be_is_refused(knee, bone, mean_mm):
 def test_smoothstep_rises_or_falls():
     np.testing.assert_allclose(smoothstep(1.0, 3.0, np.array([0.0, 2.0, 4.0])), [0.0, 0.5, 1.0])
     np.testing.assert_allclose(smoothstep(3.0, 1.0, np.array([0.0, 2.0, 4.0])), [1.0, 0.5, 0.0])
+
+
+def test_the_worn_patch_is_round_its_centre_and_nowhere_else(knee):
+    femur, centre = knee.bones["femur"], knee.landmarks["femur/medial_condyle"]
+    worn = make_worn_patch(femur, centre, 9.0)
+    distance = np.linalg.norm(femur.vertices_mm - centre, axis=1)
+    assert worn[distance < 3.0].min() == 1.0
+    assert worn[distance > 30.0].max() == 0.0

@@ -121,8 +121,9 @@ def test_guides_of_the_product_lie_on_the_bone_that_the_eye_sees() -> None:
 def bone_masks(eye: SimulatedEye, time_ns: int) -> tuple[np.ndarray, np.ndarray]:
     """(h, w) of the femur from the eye: all of it, and what nothing hides."""
     world, camera = knee().world, eye.view.camera
-    renderer, parts = world._renderer_for(camera)
-    poses = world._poses(eye._seen_from, parts, time_ns)
+    state = world._state
+    renderer, parts = world._renderer_for(state, camera), world._scene(state).parts
+    poses = world._poses(eye._seen_from, state, time_ns)
     alone = Renderer(camera, [part for part in parts if part.body == "femur"], world._surfaces)
     seen = renderer.depth(*poses)
     return alone.depth(*poses).body >= 0, seen.body == seen.bodies.index("femur")

@@ -5,7 +5,9 @@ import numpy as np
 
 from drivers.clock import ManualClock
 from sim_devices.camera import SimulatedCamera
+from sim_devices.scenario import Scenario
 from sim_devices.truth import TruthOracle
+from sim_devices.world import World
 from tests.sim_devices.plain_world import PlainWorld
 
 
@@ -33,3 +35,12 @@ def test_no_stage_of_the_line_knows_the_truth():
             if isinstance(node, ast.ImportFrom):
                 names = [node.module or ""]
             assert not any(name.startswith("sim_devices") for name in names), path
+
+
+def test_what_was_made_is_that_of_the_world():
+    world = World(Scenario(motion="still"))
+    oracle = TruthOracle(world, lambda captured_ns: captured_ns)
+    assert oracle.made_planes().keys() == world.planned_cuts.keys()
+    assert oracle.made_parts().keys() == {"femoral_component", "patellar_component", "insert"}
+    np.testing.assert_array_equal(oracle.made_hole()[0], world.record.made_hole[0])
+    assert oracle.made_insert() == world.record.made_insert_mm

@@ -117,13 +117,17 @@ def test_the_nominal_start_is_the_book_and_the_truth_is_off_by_the_placement_err
 def test_by_the_book_the_knee_is_bent_as_it_is_at_rest(side):
     simulated = world(replace(PLAIN, side=side))
     true_femur, true_tibia = (simulated.left_from_body(name, 0) for name in ("femur", "tibia"))
-    nominal_tibia = simulated.nominal_left_from_tibia
-    np.testing.assert_allclose(
-        (simulated.nominal_left_from_femur.inverse() @ nominal_tibia).matrix,
-        (true_femur.inverse() @ true_tibia).matrix,
-        atol=1e-9,
-    )
-    assert rotation_angle_deg(true_tibia, nominal_tibia) >= 6.0
+    true_patella = simulated.left_from_body("patella", 0)
+    for true, nominal in (
+        (true_tibia, simulated.nominal_left_from_tibia),
+        (true_patella, simulated.nominal_left_from_patella),
+    ):
+        np.testing.assert_allclose(
+            (simulated.nominal_left_from_femur.inverse() @ nominal).matrix,
+            (true_femur.inverse() @ true).matrix,
+            atol=1e-9,
+        )
+        assert rotation_angle_deg(true, nominal) >= 6.0
 
 
 def test_the_approach_axis_points_from_the_bone_to_the_cameras():
@@ -173,7 +177,7 @@ def test_an_unknown_stage_names_the_known_ones():
 
 
 def test_an_unknown_body_is_refused():
-    with pytest.raises(UsageError, match="femur, tibia"):
+    with pytest.raises(UsageError, match="femur, tibia, patella"):
         world().left_from_body("nose", 0)
 
 
@@ -189,7 +193,7 @@ def test_a_left_knee_is_the_mirror_image_of_a_right_one():
     camera_from_table = RigidTransform.from_parts("camera", "table", np.eye(3), (0.0, 0.0, 450.0))
     pictures = []
     for site in (right, left):
-        _, parts = site._renderer("left", 1.0)
+        parts = site._scene(site._state).parts
         poses = {
             part.body: camera_from_table @ table @ site.left_from_body(part.body, 0)
             for part in parts
@@ -293,7 +297,7 @@ def test_a_bare_bone_has_no_thickness_anywhere():
 
 def test_edges_of_large_triangles_follow_the_lens():
     site = world()
-    _, parts = site._renderer("left", 1.0)
+    parts = site._scene(site._state).parts
     camera = site.rig.left
     for part in parts:
         pose = site.left_from_body(part.body, 0)

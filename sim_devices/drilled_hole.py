@@ -1,100 +1,16 @@
-"""Bodies of the simulated surgical stages, and how they are made.
+"""The hole that is drilled into a bone for a guide."""
 
-Everything is built as for a right knee; a left one is the mirror image of the whole site.
-"""
-
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from sim_devices.materials import MaterialId
-from sim_devices.renderer import Part
-from sim_devices.textures import make_smooth_noise
-from sim_devices.tissue import Sheet
-from sim_devices.tools import (
-    across,
-    hand_meshes,
-    make_bloody_fingers,
-    make_chuck_mesh,
-    make_drill_mesh,
-)
+from sim_devices.tools import across
 
 HOLE_RADIUS_MM = 4.5
 HOLE_DEPTH_MM = 25.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Site:
-    """The operating site before any stage has changed it, as for a right knee."""
-
-    bones: Mapping[str, TriangleMesh]  # in their own frames, cartilage included
-    worn: FloatArray  # (V,) of the femur: 1 where its cartilage is worn, 0 elsewhere
-    is_covered: bool  # whether the bones carry cartilage
-    # tissue, drape: in the table's frame.
-    tissue: Sheet
-    drape: Sheet
-    # entry_mm, entry_axis: where a drill enters the femur, and the unit direction into it.
-    entry_mm: FloatArray
-    entry_axis: FloatArray
-
-
-def _opening(site: Site) -> tuple[Part, ...]:
-    """The intact femur with its worn patch."""
-    return (_femur(site, site.bones["femur"], site.worn), *_surroundings(site))
-
-
-def _drilling(site: Site) -> tuple[Part, ...]:
-    """The femur opened for the guide, and the drill."""
-    femur, wall, depth = drill_hole(site.bones["femur"], site.entry_mm, site.entry_axis)
-    # Faces are cut, vertices only added: the first ones are those of the intact bone.
-    worn = np.zeros(len(femur.vertices_mm))
-    worn[: len(site.worn)] = site.worn
-    hole = Part(
-        "femur",
-        wall,
-        MaterialId.SPONGY_BONE,
-        mark=np.clip(depth / HOLE_DEPTH_MM, 0.0, 1.0),
-        exposure=1.0 / (1.0 + (depth / 7.0) ** 2),
-    )
-    drill = Part("drill", make_drill_mesh(), MaterialId.STEEL)
-    chuck = Part("chuck", make_chuck_mesh(), MaterialId.HANDLE)
-    return (_femur(site, femur, worn), hole, drill, chuck, *_surroundings(site))
-
-
-STAGES: Mapping[str, Callable[[Site], tuple[Part, ...]]] = {
-    "opening": _opening,
-    "drilling": _drilling,
-}
-
-
-def _femur(site: Site, mesh: TriangleMesh, worn: FloatArray) -> Part:
-    material = MaterialId.CARTILAGE if site.is_covered else MaterialId.BONE
-    return Part("femur", mesh, material, mark=worn)
-
-
-def _surroundings(site: Site) -> tuple[Part, ...]:
-    material = MaterialId.CARTILAGE if site.is_covered else MaterialId.BONE
-    glove, tool = hand_meshes()
-    return (
-        Part("tibia", site.bones["tibia"], material),
-        Part("tissue", site.tissue.mesh, MaterialId.TISSUE, site.tissue.mark, site.tissue.exposure),
-        Part("drape", site.drape.mesh, MaterialId.DRAPE, site.drape.mark, site.drape.exposure),
-        Part("hand", glove, MaterialId.GLOVE, mark=make_bloody_fingers(glove)),
-        Part("hand", tool, MaterialId.STEEL),
-    )
-
-
-def make_worn_patch(femur: TriangleMesh, centre_mm: FloatArray, radius_mm: float) -> FloatArray:
-    """(V,) 0 to 1: an irregular worn patch round a point of the surface."""
-    offset = femur.vertices_mm - centre_mm
-    ragged = 1.0 + 0.25 * make_smooth_noise(femur.vertices_mm, 13.0, 5)
-    distance = np.linalg.norm(offset * (1.0, 0.7, 0.7), axis=1) / (radius_mm * ragged)
-    worn: FloatArray = np.clip((1.25 - distance) / 0.5, 0.0, 1.0)
-    return worn
 
 
 def find_entry_point(femur: TriangleMesh, beside_mm: FloatArray, axis: FloatArray) -> FloatArray:

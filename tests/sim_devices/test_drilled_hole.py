@@ -3,14 +3,13 @@ import pytest
 
 from navapp.geometry.mesh import TriangleMesh
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.stages import (
+from sim_devices.drilled_hole import (
     HOLE_DEPTH_MM,
     HOLE_RADIUS_MM,
     drill_hole,
     find_entry_point,
-    make_worn_patch,
 )
-from sim_devices.tools import across, hand_meshes, make_chuck_mesh, make_drill_mesh
+from sim_devices.tools import across
 
 AXIS = np.array([0.0, np.sin(0.1), np.cos(0.1)])
 
@@ -81,20 +80,3 @@ def test_the_wall_faces_the_axis(femur, entry):
 def test_a_line_beside_the_bone_has_no_entry_point(femur):
     with pytest.raises(ValueError, match="misses"):
         find_entry_point(femur, np.array([500.0, 0.0, 0.0]), AXIS)
-
-
-def test_the_worn_patch_is_round_its_centre_and_nowhere_else(femur):
-    centre = make_knee(KneeSpec(1)).landmarks["femur/medial_condyle"]
-    worn = make_worn_patch(femur, centre, 9.0)
-    distance = np.linalg.norm(femur.vertices_mm - centre, axis=1)
-    assert worn[distance < 3.0].min() == 1.0
-    assert worn[distance > 30.0].max() == 0.0
-
-
-@pytest.mark.parametrize("mesh", [make_drill_mesh(), make_chuck_mesh(), *hand_meshes()])
-def test_instruments_are_closed_and_their_triangles_are_small(mesh):
-    assert mesh.volume_mm3() > 100.0
-    corners = mesh.vertices_mm[mesh.faces]
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    # Longer edges would cut across the lens distortion.
-    assert edges.max() < 21.0

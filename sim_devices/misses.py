@@ -1,0 +1,56 @@
+"""By how much saw and drill miss their plan."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from navapp.geometry.directions import perpendicular_axes
+from navapp.geometry.transform import FloatArray, rotation_from_vector
+from sim_devices.planned_cuts import Cut
+
+OFFSET_SD_MM = 1.0
+TILT_SD_DEG = 1.5
+# Share of the cuts that are made twice.
+REPEATED = 0.1
+
+
+def miss_cut(planned: Cut, rng: np.random.Generator) -> Cut:
+    """The cut as the saw makes it.
+
+    One cut in ten is made a second time, and only that attempt's miss counts.
+    """
+    is_repeated = rng.uniform() < REPEATED
+    attempts = [miss_plane(planned.point_mm, planned.normal, rng) for _ in range(2)]
+    point_mm, normal = attempts[1 if is_repeated else 0]
+    return replace(planned, point_mm=point_mm, normal=normal)
+
+
+def miss_plane(
+    point_mm: FloatArray, normal: FloatArray, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Point and normal of a plane, set off along the normal and tilted about the point."""
+    offset_mm = OFFSET_SD_MM * float(rng.standard_normal())
+    return point_mm + offset_mm * normal, _tilt(normal, rng)
+
+
+def miss_line(
+    entry_mm: FloatArray, axis: FloatArray, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """A point and the direction of a line, set off across itself and tilted about the point."""
+    offset_mm = OFFSET_SD_MM * float(rng.standard_normal())
+    return entry_mm + offset_mm * _draw_across(axis, rng), _tilt(axis, rng)
+
+
+def _tilt(direction: FloatArray, rng: np.random.Generator) -> FloatArray:
+    angle_rad = np.radians(TILT_SD_DEG * float(rng.standard_normal()))
+    tilted: FloatArray = rotation_from_vector(angle_rad * _draw_across(direction, rng)) @ direction
+    return tilted
+
+
+def _draw_across(direction: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """A unit vector across a direction."""
+    angle_rad = float(rng.uniform(0.0, 2.0 * np.pi))
+    across: FloatArray = (np.cos(angle_rad), np.sin(angle_rad)) @ perpendicular_axes(
+        direction[None]
+    )[0]
+    return across

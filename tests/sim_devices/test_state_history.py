@@ -1,0 +1,29 @@
+from sim_devices.operation import State, enter
+from sim_devices.state_history import StateHistory
+
+OPENING, IMPLANT, SPACER = (enter(stage) for stage in ("opening", "implant", "spacer"))
+
+
+def test_before_any_picture_the_newest_state_counts_for_all_times() -> None:
+    history = StateHistory(OPENING)
+    history.show(IMPLANT)
+    assert history.now == IMPLANT
+    assert history.at(0) == IMPLANT
+
+
+def test_a_picture_keeps_the_state_that_it_showed() -> None:
+    history = StateHistory(OPENING)
+    assert history.take_picture(100) == OPENING
+    history.show(IMPLANT)
+    assert history.take_picture(200) == IMPLANT
+    history.show(SPACER)
+    shown = [history.at(time_ns) for time_ns in (0, 100, 101, 200, 201)]
+    assert shown == [OPENING, OPENING, IMPLANT, IMPLANT, SPACER]
+
+
+def test_an_older_picture_does_not_move_the_change_back() -> None:
+    history = StateHistory(OPENING)
+    history.take_picture(200)
+    history.take_picture(100)
+    history.show(State("opening", frozenset({"hole"})))
+    assert history.at(150) == OPENING
