@@ -59,7 +59,7 @@ def make_site(
     axis = rotation_from_vector((np.radians(_DRILL_TILT_DEG), 0.0, 0.0)) @ (0.0, 0.0, 1.0)
     notch = knee.landmarks["femur/notch"]
     made_hole = find_entry_point(femur, notch + np.array([0.0, -10.0, 0.0]), axis), axis
-    # The hole is at the same place for every seed, and it is the plan that is set off from it.
+    # The hole is where the notch says, and it is the plan that is set off from it by the miss.
     near_mm, direction = miss_line(*made_hole, np.random.default_rng([seed, 61, number["hole"]]))
     return Site(
         knee=knee,
