@@ -36,6 +36,7 @@ class RecordedSession:
     follows_refused: bool
     first_stage: str
     events: RecordedEvents
+    others: tuple[str, ...] = ()  # bones that were looked for unasked
 
 
 def start_recording(
@@ -67,6 +68,7 @@ def start_recording(
         "method": specification.method,
         "follow_refused": specification.follows_refused,
         "first_stage": specification.stage.name,
+        "others": list(specification.others),
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
     return SessionRecorder(
@@ -123,6 +125,7 @@ def read_session(folder: str | Path) -> RecordedSession:
         content.get("follow_refused") is True,
         first_stage,
         read_events(events_path),
+        tuple(str(name) for name in content.get("others", ())),
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
 from navapp.control.states import SessionState
+from navapp.limb import LimbMeasurement
 from navapp.values import FrameTimings, MeasuredFace, OverlayPicture, StageSpec, TrackedFrame
 
 
@@ -24,6 +25,8 @@ class FrameResult:
     others: Mapping[str, TrackedFrame] = field(default_factory=dict)
     # faces of cuts that were measured in this very frame, by the plane's name.
     faces: Mapping[str, MeasuredFace] = field(default_factory=dict)
+    # what femur and tibia say together; None unless both are OK in this very frame.
+    limb: LimbMeasurement | None = None
 
 
 FrameListener = Callable[[FrameResult], None]

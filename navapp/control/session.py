@@ -22,6 +22,7 @@ from navapp.control.states import (
 from navapp.errors import RigError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
+from navapp.limb import LimbMeasurement
 from navapp.overlay import LAYERS
 from navapp.resection import CutBone
 from navapp.values import MeasuredFace, Reason, StageSpec, Status, TrackedFrame, Verdict
@@ -176,7 +177,12 @@ class Session:
         """Follow another bone into a frame; in a fault none: nothing that is measured counts."""
         if self._state is SessionState.FAULT:
             return {}
-        return self._others.follow(self._stage, frame, self._tracked)
+        is_accepted = self._state is SessionState.NAVIGATING
+        return self._others.follow(self._stage, frame, self._tracked, is_accepted=is_accepted)
+
+    def measure_limb(self, others: dict[str, TrackedFrame]) -> LimbMeasurement | None:
+        """What femur and tibia say together in the newest frame; None unless both are OK in it."""
+        return self._others.measure_limb(self._stage, self._tracked, others)
 
     def confirm_cut(self, name: str) -> None:
         """A planned cut has been made.
@@ -358,6 +364,7 @@ class Session:
         """End without a word and stop the search."""
         self._is_over = True
         self._stop_search()
+        self._others.close()
 
     def go_offline(self) -> None:
         """The devices are closed."""
