@@ -91,16 +91,19 @@ class BesideFemur:
         left_from_femur: RigidTransform,
         track_number: int,
     ) -> None:
-        """Search for a stage's bone, the tibia, in a frame in which the femur's pose is known."""
+        """Search for a stage's bone, the tibia, in a frame in which the femur's pose is known.
+
+        Raises:
+            ValueError: it `can_find` no such bone.
+        """
         tracker, search = self._trackers.tracker(stage.bone), self._search
-        assert isinstance(tracker, BimccTracker) and search is not None, "asked `can_find`"
         goal = self._trackers.goal(stage)
+        if search is None or not isinstance(tracker, BimccTracker):
+            raise ValueError(f"the {stage.bone} is not found from the femur")
 
         def look(on_progress: Callable[[float], None]) -> FoundBone:
             hidden = self._hide(tracker, left_from_femur)
-            found = search.find(
-                hidden, frame.left, frame.right, left_from_femur, goal, on_progress
-            )
+            found = search.find(hidden, frame.left, frame.right, left_from_femur, goal, on_progress)
             return FoundBone(
                 found.tracked, frame.captured_ns, left_from_femur, track_number, found.spread
             )

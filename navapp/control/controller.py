@@ -234,7 +234,7 @@ class SessionController:
             snapshot.is_navigable,
             others,
             faces,
-            session.measure_limb(others),
+            session.measure_limb(frame, others),
         )
         # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped

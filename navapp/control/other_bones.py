@@ -12,7 +12,7 @@ from drivers.frames import StereoFrame
 from navapp.control.beside_femur import BesideFemur, FoundBone
 from navapp.control.bone_tracks import BoneTracks
 from navapp.control.stages import stage_of
-from navapp.control.states import OtherBone
+from navapp.control.states import LimbLine, OtherBone
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import FEMUR, TIBIA, LimbMeasurement
 from navapp.values import Plan, StageSpec, Status, TrackedFrame, Verdict
@@ -69,6 +69,8 @@ class OtherBones:
         self._n_frames = 0
         self._turns_to_search = 0
         self._sights: dict[str, _Sight] = {}
+        # The newest measurement, and when its picture was captured.
+        self._limb: tuple[LimbMeasurement, int] | None = None
 
     def follow(
         self,
@@ -161,9 +163,9 @@ class OtherBones:
         found: FoundBone,
     ) -> TrackedFrame | None:
         """Follow what a search has found, into this frame if it was found in an earlier one."""
-        if self._asked.is_live and found.tracked.verdict.status is not Status.OK:
-            return None
         is_now = found.captured_ns == frame.captured_ns
+        if self._asked.is_live and found.tracked.verdict.status is not Status.OK:
+            return found.tracked if is_now else None
         if not is_now and found.track_number != self._tracks.track_number:
             return None
         self._tracks.take(own, found.tracked, found.captured_ns)
@@ -174,7 +176,11 @@ class OtherBones:
         return self._tracks.glance(own, frame, moved, tracker)
 
     def measure_limb(
-        self, stage: StageSpec, active: TrackedFrame | None, others: dict[str, TrackedFrame]
+        self,
+        stage: StageSpec,
+        frame: StereoFrame,
+        active: TrackedFrame | None,
+        others: dict[str, TrackedFrame],
     ) -> LimbMeasurement | None:
         """What femur and tibia say together, when both are OK in this very frame."""
         if active is None:
@@ -187,12 +193,23 @@ class OtherBones:
             return None
         if femur.estimate is None or tibia.estimate is None:
             return None
-        return self._beside.measure_limb(femur.estimate, tibia.estimate)
+        measured = self._beside.measure_limb(femur.estimate, tibia.estimate)
+        self._limb = measured, frame.captured_ns
+        return measured
+
+    def describe_limb(self, stage: StageSpec, now_ns: int) -> LimbLine | None:
+        """What they said together last; None while they are not both followed."""
+        if not {FEMUR, TIBIA} <= {stage.bone, *self._names(stage)}:
+            return None
+        if self._limb is None:
+            return LimbLine()
+        measured, captured_ns = self._limb
+        return LimbLine(measured, (now_ns - captured_ns) / 1e6)
 
     def forget(self) -> None:
         """Forget the verdicts; the tracks stay."""
         self._beside.cancel()
-        self._sights = {}
+        self._sights, self._limb = {}, None
 
     def close(self) -> None:
         """End what runs."""

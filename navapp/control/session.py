@@ -15,6 +15,7 @@ from navapp.control.states import (
     CutLine,
     Event,
     EventLevel,
+    LimbLine,
     OtherBone,
     Rates,
     SessionState,
@@ -180,9 +181,15 @@ class Session:
         is_accepted = self._state is SessionState.NAVIGATING
         return self._others.follow(self._stage, frame, self._tracked, is_accepted=is_accepted)
 
-    def measure_limb(self, others: dict[str, TrackedFrame]) -> LimbMeasurement | None:
-        """What femur and tibia say together in the newest frame; None unless both are OK in it."""
-        return self._others.measure_limb(self._stage, self._tracked, others)
+    def measure_limb(
+        self, frame: StereoFrame, others: dict[str, TrackedFrame]
+    ) -> LimbMeasurement | None:
+        """What femur and tibia say together in a frame; None unless both are OK in it."""
+        return self._others.measure_limb(self._stage, frame, self._tracked, others)
+
+    def limb(self, now_ns: int) -> LimbLine | None:
+        """What they said together last, as of now; None while they are not both followed."""
+        return self._others.describe_limb(self._stage, now_ns)
 
     def confirm_cut(self, name: str) -> None:
         """A planned cut has been made.

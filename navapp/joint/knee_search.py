@@ -1,4 +1,4 @@
-"""A tibia is found from its femur: swept over the knee's flexion, stepped onto the pictures, judged.
+"""A tibia is found from its femur: swept over the knee's flexion, fitted to the pictures, judged.
 
 Where the knee may bend to says where to look. What is found is fitted to the pictures alone and
 judged like any other pose.

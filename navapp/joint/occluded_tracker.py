@@ -1,14 +1,14 @@
 """A bone that another bone, whose pose is known, stands in front of."""
 
+from copy import copy
 from dataclasses import replace
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration import RegistrationModel
@@ -17,7 +17,6 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairCheck
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.surface_meter import Margins, Measurement, SurfaceMeter
 from navapp.values import DisparityMap
 
 # Both chosen. Windows that reach over the occluder's outline see both bones.
@@ -87,34 +86,7 @@ class _OccludedModel(RegistrationModel):
         has_lid: bool = False,
     ) -> RenderedView:
         """As of the model, without what lies behind the occluder."""
-        return self._occluder.hide(
-            super().render(camera_from_bone, geometry, box, has_lid=has_lid)
-        )
-
-
-class _OccludedMeter(SurfaceMeter):
-    """Measures the surface of a bone beside its occluder."""
-
-    _occluder: Occluder
-
-    @classmethod
-    def of(cls, meter: SurfaceMeter, occluder: Occluder) -> Self:
-        """As another meter, which knows no occluder."""
-        made = cls.__new__(cls)
-        made.__dict__.update(meter.__dict__)
-        made.model, made._occluder = _OccludedModel(meter.model, occluder), occluder
-        return made
-
-    def measure_freely(
-        self, pair: RectifiedPair, pose: RigidTransform, margins: Margins
-    ) -> Measurement | None:
-        """Whatever surface is around a pose, but for the occluder's."""
-        measured = super().measure_freely(pair, pose, margins)
-        if measured is None:
-            return None
-        found = self._occluder.remove(measured.disparity)
-        fraction = found.matched_fraction
-        return replace(measured, disparity=found, cloud=self._cloud(found), matched_fraction=fraction)
+        return self._occluder.hide(super().render(camera_from_bone, geometry, box, has_lid=has_lid))
 
 
 class _SpreadJudge(PoseJudge):
@@ -140,8 +112,9 @@ class _SpreadJudge(PoseJudge):
 class OccludedTracker(BimccTracker):
     """A tracker of a bone for one pair of pictures, in which a known surface stands before it.
 
-    What is measured on the occluder is not matched with the bone, and what it hides of the bone is
-    neither expected nor held against a pose.
+    Where the occluder is, the bone is not matched, and what it hides of the bone is neither
+    expected nor held against a pose. For glances, and for searches that take the occluder out of
+    what they measure freely (`Occluder.remove`).
 
     Args:
         tracker: of the bone, for any pair.
@@ -162,7 +135,8 @@ class OccludedTracker(BimccTracker):
     ) -> None:
         geometry = tracker.meter.geometry
         self.occluder = Occluder(mesh, tracker.rectify_pose(left_from_mesh), geometry)
-        meter = _OccludedMeter.of(tracker.meter, self.occluder)
+        meter = copy(tracker.meter)
+        meter.model = _OccludedModel(tracker.meter.model, self.occluder)
         super().__init__(meter.rectifier.rig, tracker.model.bone, tracker.settings, meter=meter)
         if spread is not None:
             self.judge = self.judge_with(spread)

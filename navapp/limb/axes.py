@@ -33,7 +33,9 @@ def find_missing(landmarks: Mapping[str, Landmark]) -> str | None:
         return "no knee centre in the plan"
     asked = (HIP_CENTRE, ANKLE_CENTRE, *_EPICONDYLES, *_PLATEAUS)
     missing = next((name for name in asked if name not in landmarks), None)
-    return None if missing is None else f"no {missing.partition('/')[2].replace('_', ' ')} in the plan"
+    if missing is None:
+        return None
+    return f"no {missing.partition('/')[2].replace('_', ' ')} in the plan"
 
 
 def find_limb_axes(landmarks: Mapping[str, Landmark]) -> LimbAxes | None:

@@ -70,9 +70,8 @@ class GapMeter:
         centres_mm: tuple[FloatArray, FloatArray],
     ) -> Gap | None:
         tibia_from_femur = tibia.camera_from_bone.inverse() @ femur.camera_from_bone
-        distances_mm, nearest = self._tree.query(
-            tibia_from_femur.apply(points_mm), distance_upper_bound=_WIDEST_MM
-        )
+        found = self._tree.query(tibia_from_femur.apply(points_mm), distance_upper_bound=_WIDEST_MM)
+        distances_mm, nearest = (np.asarray(one) for one in found)
         if len(distances_mm) == 0 or not np.isfinite(distances_mm.min()):
             return None
         k = int(np.argmin(distances_mm))

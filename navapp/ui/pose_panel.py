@@ -8,6 +8,7 @@ from navapp.control.interlocks import is_current
 from navapp.control.states import OtherBone, Snapshot
 from navapp.ui.actions import is_acceptable
 from navapp.ui.gauges import Number, draw_bar
+from navapp.ui.limb_lines import format_limb_lines
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 from navapp.values import Status
@@ -50,7 +51,7 @@ class PosePanel(TextView):
         needed = needed[:room]
         others = [_other(view, other, width) for other in view.snapshot.others]
         others = others[: room - len(needed)]
-        more = more[: room - len(needed) - len(others)]
+        more = [*format_limb_lines(view, width), *more][: room - len(needed) - len(others)]
         free = [Content("")] * (room - len(needed) - len(more) - len(others))
         above = [format_navigable_line(view, width), *needed, *more, *free]
         return [*above, *others, *_error(view, width)]

@@ -4,12 +4,13 @@ usage: python -m tests.bench.two_bones [FOLDER] [--only NAME] [--order ORDER ...
                                        [--knees N] [--first SEED]
 
 FOLDER (default: NAVAPP_DATA) holds `phantom_*` folders as of `tests.bench.recorded_accuracy`. Each
-sequence is replayed with `--also tibia`, from a prior that says nothing of the tibia: every frame on
-its own (`each`), or as it is (`forward`). A frame is exempt when the bound at the true pose exceeds
-0.5 mm: where the tibia rests next to that pose, behind the femur at its true pose, as judged there;
-`--frames` lists them. Hip and ankle centre of the phantoms' plans are made up: they say where the
-axes are, for estimate and truth alike. With --knees, simulated sessions with seeds from SEED on are
-run instead: the tibia is found in the first frame and followed in its turns of 16.
+sequence is replayed with `--also tibia`, from a prior that says nothing of the tibia: every frame
+on its own (`each`), or as it is (`forward`). A frame is exempt when the bound at the true pose
+exceeds 0.5 mm: where the tibia rests next to that pose, behind the femur at its true pose, as
+judged there; `--frames` lists them. Hip and ankle centre of the phantoms' plans are made up: they
+say where the axes are, for estimate and truth alike. With --knees, simulated sessions with seeds
+from SEED on are run instead: the tibia is looked for once the femur is accepted, and followed in
+its turns of 16 frames.
 """
 
 import argparse
@@ -34,6 +35,7 @@ from navapp.cli.results import limb_to_json
 from navapp.config import parse
 from navapp.control.operators import ScriptedOperator, ScriptStep
 from navapp.evaluation import compute_mean_tre_mm
+from navapp.geometry.ply import read_ply
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform
 from navapp.joint import OccludedTracker
@@ -60,38 +62,40 @@ _N_FRAMES = 16
 
 @dataclass
 class Errors:
-    """Of angles (deg) and gaps (mm), each with its bound."""
+    """Of each angle (deg) and of the gaps (mm), each with its bound."""
 
-    angles: list[tuple[float, float]] = field(default_factory=list)
-    gaps: list[tuple[float, float]] = field(default_factory=list)
+    of: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
     def add(self, limb: Mapping[str, Any], truth: Mapping[str, Any]) -> None:
         """One measurement beside its truth, as JSON."""
         for name in _ANGLES:
-            self._add(self.angles, limb, truth, f"{name}_deg", limb["bound_deg"][name])
+            self._add(name, limb, truth, f"{name}_deg", limb["bound_deg"][name])
         for name in _SIDES:
-            self._add(self.gaps, limb, truth, f"gap_{name}_mm", limb["bound_mm"][name])
+            self._add("gaps", limb, truth, f"gap_{name}_mm", limb["bound_mm"][name])
 
     def _add(
         self,
-        errors: list[tuple[float, float]],
+        name: str,
         limb: Mapping[str, Any],
         truth: Mapping[str, Any],
         key: str,
         bound: float | None,
     ) -> None:
         if limb[key] is not None and truth[key] is not None and bound is not None:
-            errors.append((abs(limb[key] - truth[key]), bound))
+            self.of.setdefault(name, []).append((abs(limb[key] - truth[key]), bound))
 
     def rows(self, name: str) -> Iterator[str]:
         """Of the table."""
-        for what, unit, errors in (("angles", "deg", self.angles), ("gaps", "mm", self.gaps)):
+        angles = [one for angle in _ANGLES for one in self.of.get(angle, [])]
+        for what, errors in (*self.of.items(), ("all angles", angles)):
             if errors:
+                unit = "mm" if what == "gaps" else "deg"
                 error, bound = np.array(errors).T
                 yield (
-                    f"| {name} | {what} | {len(error)} | {np.median(error):.2f} {unit} | "
-                    f"{np.percentile(error, 95):.2f} {unit} | {error.max():.2f} {unit} | "
-                    f"{np.median(bound):.2f} {unit} | {100.0 * np.mean(error <= bound):.0f} % |"
+                    f"| {name} | {what.replace('_', ' ')} | {len(error)} | "
+                    f"{np.median(error):.2f} {unit} | {np.percentile(error, 95):.2f} {unit} | "
+                    f"{error.max():.2f} {unit} | {np.median(bound):.2f} {unit} | "
+                    f"{100.0 * np.mean(error <= bound):.0f} % |"
                 )
 
 
@@ -155,7 +159,8 @@ def _replay_phantoms(options: argparse.Namespace, errors: dict[str, Errors]) -> 
                     frames = _replay(phantom, sequence, plan, order)
                     name = f"{phantom.name}/{sequence.name}"
                     turns = list(bench.score(frames, sequence))
-                    bench.score_limbs(frames, sequence, errors.setdefault(phantom.name, Errors()))
+                    for one in (phantom.name, "all phantoms"):
+                        bench.score_limbs(frames, sequence, errors.setdefault(one, Errors()))
                     print(_row(name, order, turns, frames), flush=True)
                     if options.frames:
                         _print_turns(turns)
@@ -163,8 +168,6 @@ def _replay_phantoms(options: argparse.Namespace, errors: dict[str, Errors]) -> 
 
 def _make_plan(phantom: Path, folder: Path) -> Path:
     tibia = phantom / "tibia.ply"
-    from navapp.geometry.ply import read_ply
-
     (folder / "contents.toml").write_text(
         _FAR_JOINTS.format(x=round(float(read_ply(tibia)[0].vertices_mm[:, 0].mean()), 1))
     )
@@ -237,9 +240,7 @@ class PhantomBench:
         bound_mm = judged.verdict.predicted_tre_mm
         return float("inf") if bound_mm is None else bound_mm
 
-    def score_limbs(
-        self, frames: list[dict[str, Any]], sequence: Path, errors: Errors
-    ) -> None:
+    def score_limbs(self, frames: list[dict[str, Any]], sequence: Path, errors: Errors) -> None:
         """What the frames say of the limb."""
         truth = _read_truth(sequence)
         for frame in frames:

@@ -1,0 +1,57 @@
+"""Angles and gaps of the limb for the pose panel, with bounds, or why they are not known."""
+
+import textwrap
+
+from textual.content import Content
+
+from navapp.control.interlocks import is_limb_current
+from navapp.limb import LimbMeasurement
+from navapp.ui.view import View
+
+_NOT_BOTH = "femur and tibia are not OK in one picture"
+
+
+def format_limb_lines(view: View, width: int) -> list[Content]:
+    """A line each; none while femur and tibia are not both followed."""
+    limb = view.snapshot.limb
+    if limb is None:
+        return []
+    if view.is_silent or limb.measurement is None or not is_limb_current(limb):
+        return _say(f"limb not known: {_NOT_BOTH}", width)
+    return [*_angles(view, limb.measurement, width), *_gaps(view, limb.measurement)]
+
+
+def _angles(view: View, measured: LimbMeasurement, width: int) -> list[Content]:
+    angles = measured.angles
+    if angles is None:
+        return _say(f"angles not known: {measured.missing}", width)
+    # The word says to which side, never a sign.
+    varus = "varus" if angles.varus_deg >= 0.0 else "valgus"
+    rotation = "int. rot." if angles.internal_rotation_deg >= 0.0 else "ext. rot."
+    flexion = "flexion" if angles.flexion_deg >= 0.0 else "hyperext."
+    return [
+        _figure(view, flexion, angles.flexion_deg, angles.flexion_bound_deg, "deg"),
+        _figure(view, varus, angles.varus_deg, angles.varus_bound_deg, "deg"),
+        _figure(
+            view, rotation, angles.internal_rotation_deg, angles.internal_rotation_bound_deg, "deg"
+        ),
+    ]
+
+
+def _gaps(view: View, measured: LimbMeasurement) -> list[Content]:
+    return [
+        _figure(view, f"gap {name[:3]}.", gap.mm, gap.bound_mm, "mm")
+        for name, gap in measured.gaps.items()
+    ]
+
+
+def _figure(view: View, name: str, value: float, bound: float, unit: str) -> Content:
+    return Content.assemble(
+        (f"{name:<10}", "$text-muted"),
+        f"{abs(value):6.1f}",
+        (f" {unit} {view.symbols.at_most} {bound:.1f}", "$text-muted"),
+    )
+
+
+def _say(text: str, width: int) -> list[Content]:
+    return [Content.styled(line, "$text-muted") for line in textwrap.wrap(text, max(width - 1, 1))]
