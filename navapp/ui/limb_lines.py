@@ -8,6 +8,7 @@ from navapp.control.interlocks import is_limb_current
 from navapp.limb import LimbMeasurement
 from navapp.ui.view import View
 
+_SIDES = ("medial", "lateral")
 _NOT_BOTH = "femur and tibia are not OK in one picture"
 
 
@@ -30,26 +31,33 @@ def _angles(view: View, measured: LimbMeasurement, width: int) -> list[Content]:
     rotation = "int. rot." if angles.internal_rotation_deg >= 0.0 else "ext. rot."
     flexion = "flexion" if angles.flexion_deg >= 0.0 else "hyperext."
     return [
-        _figure(view, flexion, angles.flexion_deg, angles.flexion_bound_deg, "deg"),
-        _figure(view, varus, angles.varus_deg, angles.varus_bound_deg, "deg"),
-        _figure(
-            view, rotation, angles.internal_rotation_deg, angles.internal_rotation_bound_deg, "deg"
-        ),
+        _figure(view, flexion, angles.flexion_deg, angles.flexion_bound_deg),
+        _figure(view, varus, angles.varus_deg, angles.varus_bound_deg),
+        _figure(view, rotation, angles.internal_rotation_deg, angles.internal_rotation_bound_deg),
     ]
 
 
 def _gaps(view: View, measured: LimbMeasurement) -> list[Content]:
+    """Both in one line, with the larger bound."""
+    gaps = measured.gaps
+    if not gaps:
+        return []
+    both = "/".join(f"{gaps[name].mm:.1f}" if name in gaps else "-" for name in _SIDES)
+    bound_mm = max(gap.bound_mm for gap in gaps.values())
     return [
-        _figure(view, f"gap {name[:3]}.", gap.mm, gap.bound_mm, "mm")
-        for name, gap in measured.gaps.items()
+        Content.assemble(
+            ("gap m/l ", "$text-muted"),
+            both.rjust(8),
+            (f" mm {view.symbols.at_most}{bound_mm:.1f}", "$text-muted"),
+        )
     ]
 
 
-def _figure(view: View, name: str, value: float, bound: float, unit: str) -> Content:
+def _figure(view: View, name: str, value: float, bound: float) -> Content:
     return Content.assemble(
         (f"{name:<10}", "$text-muted"),
-        f"{abs(value):6.1f}",
-        (f" {unit} {view.symbols.at_most} {bound:.1f}", "$text-muted"),
+        f"{abs(value):5.1f}",
+        (f" deg {view.symbols.at_most}{bound:.1f}", "$text-muted"),
     )
 
 
