@@ -135,7 +135,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
     faces = [result.faces for result in log.results]
-    return report_result(frames, seconds, failure, options, diagnostics, told, faces)
+    limbs = [result.limb for result in log.results]
+    return report_result(frames, seconds, failure, options, diagnostics, told, faces, limbs)
 
 
 def _run_session(

@@ -139,7 +139,10 @@ def _run_headless(
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
     faces = [result.faces for result in log.results]
-    return report_result(frames, seconds, controller.failure, options, diagnostics, rig, faces)
+    limbs = [result.limb for result in log.results]
+    return report_result(
+        frames, seconds, controller.failure, options, diagnostics, rig, faces, limbs
+    )
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

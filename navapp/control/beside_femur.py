@@ -7,6 +7,7 @@ from functools import cached_property
 from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job
 from navapp.control.trackers import Trackers
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.joint import KneeSearch, OccludedTracker
 from navapp.limb import FEMUR, TIBIA, Hinge, LimbMeasurement, LimbMeter
@@ -139,7 +140,10 @@ class BesideFemur:
 
     def measure_limb(self, femur: PoseEstimate, tibia: PoseEstimate) -> LimbMeasurement:
         """Of two poses of one pair of pictures."""
-        surfaces = tuple(
-            self._trackers.tracker(name).model.rendered_mesh for name in (FEMUR, TIBIA)
-        )
-        return self._limb_meter.measure(femur, tibia, (surfaces[0], surfaces[1]))
+        surfaces = self._surface(FEMUR), self._surface(TIBIA)
+        return self._limb_meter.measure(femur, tibia, surfaces)
+
+    def _surface(self, name: str) -> TriangleMesh:
+        """What is left of a bone."""
+        bone = self._trackers.bone(name)
+        return bone.planned.mesh if bone.surface is None else bone.surface

@@ -203,7 +203,10 @@ class BoneTracks:
         """
         answers = self._trackers.register(stage, frame)
         best = answers[0] if answers else _make_unjudged(stage.bone)
-        self.take(stage, best, frame.captured_ns)
+        pose, verdict = best.left_from_bone, best.verdict
+        if pose is not None and verdict.status is not Status.LOST:
+            track = TrackState.at_rest(pose, frame.captured_ns, verdict.cause)
+            self._tracks[stage.bone] = track
         return best
 
 

@@ -46,8 +46,8 @@ def _gaps(view: View, measured: LimbMeasurement) -> list[Content]:
     bound_mm = max(gap.bound_mm for gap in gaps.values())
     return [
         Content.assemble(
-            ("gap m/l ", "$text-muted"),
-            both.rjust(8),
+            ("gap m/l", "$text-muted"),
+            both.rjust(9),
             (f" mm {view.symbols.at_most}{bound_mm:.1f}", "$text-muted"),
         )
     ]
@@ -55,7 +55,7 @@ def _gaps(view: View, measured: LimbMeasurement) -> list[Content]:
 
 def _figure(view: View, name: str, value: float, bound: float) -> Content:
     return Content.assemble(
-        (f"{name:<10}", "$text-muted"),
+        (f"{name:<9}", "$text-muted"),
         f"{abs(value):5.1f}",
         (f" deg {view.symbols.at_most}{bound:.1f}", "$text-muted"),
     )

@@ -245,7 +245,7 @@ class PhantomBench:
         truth = _read_truth(sequence)
         for frame in frames:
             if "limb" in frame:
-                meshes = tuple(self._trackers[name].model.rendered_mesh for name in _BONES)
+                meshes = tuple(self._plan.bones[name].mesh for name in _BONES)
                 errors.add(
                     frame["limb"], measure_true_limb(self._plan, truth[frame["index"]], meshes)
                 )
