@@ -98,10 +98,11 @@ class OtherBones:
         known = _ok_pose(active)
         if not self._asked.is_each:
             names = [] if is_odd or not names else [names[turn % len(names)]]
-        is_trusted = is_accepted or not self._asked.is_live
         answers = {}
         for name in names:
-            tracked = self._follow(name, stage.bone, frame, known, is_trusted=is_trusted)
+            tracked = self._follow(
+                name, stage.bone, frame, known, is_trusted=self._trusts(is_accepted)
+            )
             if tracked is not None:
                 self._remember(name, tracked.verdict, frame.captured_ns, known)
                 answers[name] = tracked
@@ -131,6 +132,10 @@ class OtherBones:
         if tracked is None and is_asked and not self._asked.is_live:
             return self._tracks.register_now(own, frame)
         return tracked
+
+    def _trusts(self, is_accepted: bool) -> bool:
+        """Whether the active bone's pose counts for others: in a replay nobody is asked."""
+        return is_accepted or not self._asked.is_live
 
     def _search(
         self,
@@ -181,9 +186,14 @@ class OtherBones:
         frame: StereoFrame,
         active: TrackedFrame | None,
         others: dict[str, TrackedFrame],
+        *,
+        is_accepted: bool = True,
     ) -> LimbMeasurement | None:
-        """What femur and tibia say together, when both are OK in this very frame."""
-        if active is None:
+        """What femur and tibia say together, when both are OK in this very frame.
+
+        Nothing while the active bone's pose is not accepted.
+        """
+        if active is None or not self._trusts(is_accepted):
             return None
         answers = {**others, stage.bone: active}
         if not {FEMUR, TIBIA} <= set(answers):

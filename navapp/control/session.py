@@ -178,14 +178,20 @@ class Session:
         """Follow another bone into a frame; in a fault none: nothing that is measured counts."""
         if self._state is SessionState.FAULT:
             return {}
-        is_accepted = self._state is SessionState.NAVIGATING
-        return self._others.follow(self._stage, frame, self._tracked, is_accepted=is_accepted)
+        return self._others.follow(self._stage, frame, self._tracked, is_accepted=self._is_accepted)
 
     def measure_limb(
         self, frame: StereoFrame, others: dict[str, TrackedFrame]
     ) -> LimbMeasurement | None:
         """What femur and tibia say together in a frame; None unless both are OK in it."""
-        return self._others.measure_limb(self._stage, frame, self._tracked, others)
+        return self._others.measure_limb(
+            self._stage, frame, self._tracked, others, is_accepted=self._is_accepted
+        )
+
+    @property
+    def _is_accepted(self) -> bool:
+        """The pose of the stage's bone was accepted, and is followed."""
+        return self._state is SessionState.NAVIGATING
 
     def limb(self, now_ns: int) -> LimbLine | None:
         """What they said together last, as of now; None while they are not both followed."""
@@ -238,8 +244,7 @@ class Session:
         if self._state is SessionState.FAULT:
             return {}
         before = self.bone_version
-        is_accepted = self._state is SessionState.NAVIGATING
-        faces = self._cuts.measure(frame, self._tracked, is_accepted=is_accepted)
+        faces = self._cuts.measure(frame, self._tracked, is_accepted=self._is_accepted)
         if self.bone_version != before:
             text = f"faces measured: version {self.bone_version} of the {self._stage.bone}"
             self.add_event("cut", f"{text} is in force")

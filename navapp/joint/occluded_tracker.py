@@ -15,7 +15,7 @@ from navapp.registration import RegistrationModel
 from navapp.registration.verdict import Agreement
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairCheck
-from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.judging import PoseJudge
 from navapp.values import DisparityMap
 
@@ -89,24 +89,33 @@ class _OccludedModel(RegistrationModel):
         return self._occluder.hide(super().render(camera_from_bone, geometry, box, has_lid=has_lid))
 
 
-class _SpreadJudge(PoseJudge):
-    """Judges poses that may rest elsewhere: their covariance grows by how far such places spread.
+class _HiddenBoneJudge(PoseJudge):
+    """Judges poses of a bone behind an occluder, never less strictly than poses of the whole bone.
 
-    Tissue that lies flush with a bone holds it at several places, and no residual of one tells.
+    Their covariance grows by how far the places spread where the bone may rest as well: tissue that
+    lies flush with a bone holds it at several, and no residual of one tells. What the occluder
+    hides counts as hidden when it is asked whether the bone lies in the open.
     """
 
-    def __init__(self, tracker: BimccTracker, spread: FloatArray) -> None:
+    def __init__(self, tracker: BimccTracker, whole: RegistrationModel, spread: FloatArray) -> None:
         quality, keeps = tracker.meter.rectifier.rig.quality, tracker.settings.follows_refused
         super().__init__(tracker.meter, quality, tells_refused=keeps)
-        self._spread = spread
+        self._whole, self._geometry, self._spread = whole, tracker.meter.geometry, spread
 
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """As of any judge, then grown."""
         fit, view, agreement = super()._settle(frame, fit, check)
-        covariance = fit.estimate.covariance + self._spread
-        return replace(fit, estimate=replace(fit.estimate, covariance=covariance)), view, agreement
+        covariance = fit.estimate.covariance
+        if view is not None and agreement is not None and agreement.lies_open:
+            whole = self._whole.render(fit.pose, self._geometry, view.box)
+            share = agreement.n_visible / max(int(np.count_nonzero(whole.mask)), 1)
+            if agreement.coverage * share <= 1.0 - share * (1.0 - agreement.hidden_fraction):
+                # The noise of a bone in the open was counted: it is as claimed.
+                covariance = covariance / NOISE_VARIANCE_RATIO
+        estimate = replace(fit.estimate, covariance=covariance + self._spread)
+        return replace(fit, estimate=estimate), view, agreement
 
 
 class OccludedTracker(BimccTracker):
@@ -138,9 +147,9 @@ class OccludedTracker(BimccTracker):
         meter = copy(tracker.meter)
         meter.model = _OccludedModel(tracker.meter.model, self.occluder)
         super().__init__(meter.rectifier.rig, tracker.model.bone, tracker.settings, meter=meter)
-        if spread is not None:
-            self.judge = self.judge_with(spread)
+        self._whole = tracker.model
+        self.judge = self.judge_with(np.zeros((6, 6)) if spread is None else spread)
 
     def judge_with(self, spread: FloatArray) -> PoseJudge:
         """The judge of poses that spread so."""
-        return _SpreadJudge(self, spread)
+        return _HiddenBoneJudge(self, self._whole, spread)

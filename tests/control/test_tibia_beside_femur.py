@@ -9,6 +9,7 @@ from navapp.control.beside_femur import FoundBone
 from navapp.control.bone_tracks import BoneTracks
 from navapp.control.other_bones import AskedBones, OtherBones
 from navapp.control.stages import STAGES, stage_of
+from navapp.limb import LimbMeasurement
 from navapp.tracking import Goal
 from navapp.values import Reason, Status, TrackedFrame
 from tests.control.fakes import (
@@ -61,6 +62,9 @@ class FakeBeside:
 
     def cancel(self) -> None:
         self._due = None
+
+    def measure_limb(self, femur, tibia) -> LimbMeasurement:
+        return LimbMeasurement(None, {}, f"{femur.camera_from_bone.source} and {tibia.n_points}")
 
 
 class Room:
@@ -191,3 +195,21 @@ def test_the_limb_is_described_while_both_are_followed() -> None:
     line = room.others.describe_limb(OPENING, 0)
     assert (line.measurement, line.age_ms) == (None, None)
     assert room.others.describe_limb(stage_of("patella", a_plan("patella", "femur")), 0) is None
+
+
+def test_the_limb_is_measured_in_one_frame_of_two_ok_poses_of_which_the_active_is_accepted() -> (
+    None
+):
+    room = Room(FOUND, is_live=True)
+    frame = a_frame(10**9)
+    pair = {"tibia": FOUND}
+    measured = room.others.measure_limb(OPENING, frame, answer(), pair)
+    assert measured.missing == "femur and 500"
+    line = room.others.describe_limb(OPENING, 10**9 + 40_000_000)
+    assert (line.measurement, line.age_ms) == (measured, 40.0)
+    assert room.others.measure_limb(OPENING, frame, answer(), pair, is_accepted=False) is None
+    assert room.others.measure_limb(OPENING, frame, answer(), {}) is None
+    assert room.others.measure_limb(OPENING, frame, answer(), {"tibia": DEGRADED}) is None
+    assert room.others.measure_limb(OPENING, frame, LOST, pair) is None
+    room.others.forget()
+    assert room.others.describe_limb(OPENING, 0).measurement is None

@@ -8,6 +8,8 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.joint.occluded_tracker import OccludedTracker, Occluder
 from navapp.tracking import TrackState
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO
+from navapp.tracking.judging import PoseJudge
 from navapp.values import DisparityMap, Status, Stopwatch
 from tests.geometry.shapes import sphere
 from tests.registration.shapes import GEOMETRY
@@ -86,3 +88,26 @@ def test_a_spread_makes_the_bound_larger_and_moves_nothing() -> None:
     grown = poses[1].estimate.covariance - poses[0].estimate.covariance
     assert np.trace(grown) == pytest.approx(0.03)
     assert poses[1].verdict.predicted_tre_mm > poses[0].verdict.predicted_tre_mm
+
+
+def test_a_bone_that_is_hidden_for_the_most_part_does_not_lie_in_the_open() -> None:
+    """Though most of what is left of it is seen: its noise counts as it is claimed."""
+    a = room()
+    frame = a.frames[0]
+    start = a.truth(frame)
+    near = start.apply(a.tracker.centre_mm) * 0.9
+    bounds = {}
+    for radius_mm in (1.0, 22.0):
+        ball = sphere(radius_mm, 48)
+        before = RigidTransform.from_parts("left", "ball", np.eye(3), near)
+        hidden = OccludedTracker(a.tracker, ball, before)
+        begun = hidden.begin(frame.left, frame.right, start, Stopwatch())
+        fit = next(hidden.near.find_on_model(begun))
+        plain = PoseJudge(hidden.meter, a.rig.quality)
+        bounds[radius_mm] = [
+            np.trace(judge.judge(begun, fit, GOAL).estimate.covariance)
+            for judge in (plain, hidden.judge)
+        ]
+    small, large = bounds.values()
+    assert small[0] == pytest.approx(small[1])
+    assert large[1] == pytest.approx(large[0] / NOISE_VARIANCE_RATIO)
