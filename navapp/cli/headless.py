@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, write_json
-from navapp.cli.results import frame_text, summarise, summarise_faces, summary_text
+from navapp.cli.results import frame_text, summarise, summarise_faces, summarise_gaps, summary_text
 from navapp.control.controller import SessionController
 from navapp.control.frame_result import FrameResult
 from navapp.control.operators import Operator
 from navapp.control.runner import run_headless
 from navapp.errors import NavappError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
+from navapp.limb import LimbMeasurement
 from navapp.values import MeasuredFace, Prior
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
@@ -123,6 +124,7 @@ def report_result(
     diagnostics: Diagnostics,
     rig: dict[str, Any] | None = None,
     faces: Sequence[Mapping[str, MeasuredFace]] = (),
+    limbs: Sequence[LimbMeasurement | None] = (),
 ) -> int:
     """Write the result, tell its summary, and answer with the exit code.
 
@@ -134,12 +136,15 @@ def report_result(
         diagnostics: takes the summary.
         rig: what a live session found out about its rig.
         faces: of cuts, as each frame has measured them.
+        limbs: what femur and tibia said together in each frame.
 
     Raises:
         NavappError: that fault.
         ResultError: no frame was OK.
     """
     summary = {**summarise(frames, seconds), "measured": summarise_faces(faces)}
+    if any(limb is not None for limb in limbs):
+        summary["limb"] = summarise_gaps(limbs)
     told = {} if rig is None else {"rig": rig}
     write_json(options.json, options.verb, {"frames": frames, "summary": summary, **told})
     if options.json != "-":

@@ -44,6 +44,7 @@ def prepare_session(
         NavappError: a file, a device or a combination that cannot be used.
     """
     from navapp.cli.headless import check_accepted, check_not_expired, check_start
+    from navapp.cli.other_bones import check_others
     from navapp.cli.prior_files import read_prior
     from navapp.cli.simulated_patient import make_built_in_plan, make_nominal_prior
     from navapp.control.specification import specify_session
@@ -82,6 +83,7 @@ def prepare_session(
         prior,
         stage,
         is_live=True,
+        others=check_others(options.also, plan, stage, is_live=True),
         calibrated_display=display,
         has_gates=True,
     )
@@ -158,6 +160,7 @@ def make_controller(
         session.opened.devices,
         session.specification,
         executor=InlineExecutor() if is_inline else ThreadExecutor(),
+        other_executor=InlineExecutor() if is_inline else ThreadExecutor("other bone"),
         hooks=hooks,
         board_watch=_make_board_watch(session, is_inline=is_inline),
         locate_corners=_make_locator(session),
@@ -238,4 +241,5 @@ def _make_hooks(
         on_event=(recorder.on_event,),
         on_command=(recorder.on_command,),
         on_take_over=(recorder.on_take_over,),
+        on_other_take_over=(recorder.on_other_take_over,),
     )

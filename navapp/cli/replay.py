@@ -56,7 +56,8 @@ def add_parser(subparsers: Any) -> None:
         metavar="NAME",
         action="append",
         default=[],
-        help="another bone, registered from the prior and followed in turns; repeatable",
+        help="another bone, followed in turns: the tibia is found from the femur, others from the "
+        "prior; repeatable",
     )
     parser.add_argument(
         "--cut",
@@ -96,6 +97,7 @@ class _Replay:
     specification: "SessionSpecification"  # of the session
     operator: "Operator"  # gives the commands
     executor: "Executor"  # runs first registrations
+    other_executor: "Executor"  # runs searches for other bones
     # commands and results of searches come when they came in the recording.
     is_as_recorded: bool = False
     warnings: tuple[str, ...] = ()  # for a person, before the replay begins
@@ -109,6 +111,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.cli.headless import FrameLog, check_accepted, check_start, report_result
     from navapp.cli.results import frame_to_json, rig_alarm_to_json
     from navapp.config import find_file, load
+    from navapp.control.beside_femur import may_start_from
     from navapp.devices import open_recording
 
     _check(options)
@@ -121,8 +124,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     rig = specification.rig
     check_accepted(rig, options.allow_unaccepted, diagnostics)
     if not replay.is_as_recorded:
-        for bone in (specification.stage.bone, *specification.others):
-            check_start(specification.prior, bone)
+        first = specification.stage.bone
+        for bone in (first, *specification.others):
+            if not may_start_from(bone, first):
+                check_start(specification.prior, bone)
     opened = open_recording(options.sequence, settings, rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
     seconds, failure = _run_session(replay, opened, log, options, settings.rate_hz)
@@ -130,7 +135,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
     faces = [result.faces for result in log.results]
-    return report_result(frames, seconds, failure, options, diagnostics, told, faces)
+    limbs = [result.limb for result in log.results]
+    return report_result(frames, seconds, failure, options, diagnostics, told, faces, limbs)
 
 
 def _run_session(
@@ -158,6 +164,7 @@ def _run_session(
             opened.devices,
             replay.specification,
             executor=replay.executor,
+            other_executor=replay.other_executor,
             hooks=SessionHooks(on_frame=tuple(listeners)),
         )
         undo.callback(controller.close)
@@ -169,10 +176,6 @@ def _check(options: argparse.Namespace) -> None:
     """Refuse what is known to be wrong before anything is read."""
     if options.order == "pingpong" and options.frames is None:
         raise UsageError("--order pingpong has no end", remedy="add --frames N")
-    if options.order == "each" and options.also:
-        raise UsageError(
-            "--order each follows no bone from frame to frame", remedy="leave --also out"
-        )
     if options.png and options.overlay is None:
         raise UsageError("--png is of the pictures of --overlay", remedy="add --overlay DIR")
     _layers(options.layers)
@@ -198,6 +201,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     from navapp.cli.prior_files import read_prior
     from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
     from navapp.cli.session_folder import is_session, read_session
+    from navapp.control.executors import InlineExecutor, RecordedExecutor
     from navapp.control.operators import RecordedOperator
     from navapp.control.specification import specify_session
     from navapp.geometry.rig_files import read_rig
@@ -227,22 +231,28 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         method=method,
         follows_refused=options.follow_refused or is_recorded_so or None,
         others=others,
+        is_each=options.order == "each",
         layers=_layers(options.layers),
         made_cuts=tuple(dict.fromkeys(options.cut)),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
-    is_recorded = isinstance(operator, RecordedOperator)
+    other_executor: Executor = InlineExecutor()
+    is_as_recorded = isinstance(operator, RecordedOperator)
+    if is_as_recorded and session is not None:
+        # Who only follows has nobody to answer for conditions.
+        specification = replace(
+            specification, others=session.others, is_live=True, has_gates=session.has_gates
+        )
+        other_executor = RecordedExecutor(session.events.other_take_overs)
     if session is None:
         # Nothing is late: every frame tells what it can.
         specification = replace(specification, frames_between_faces=1)
-    elif is_recorded:
-        # Who only follows has nobody to answer for conditions.
-        specification = replace(specification, has_gates=session.has_gates)
     return _Replay(
         specification,
         operator,
         executor,
-        is_recorded,
+        other_executor,
+        is_as_recorded,
         list_warnings(session, options),
         find_moved_rig(session, options),
     )
@@ -266,20 +276,9 @@ def _stages(
     options: argparse.Namespace, plan: "Plan", name: str
 ) -> "tuple[StageSpec, tuple[str, ...]]":
     """The stage to start in, that of `--bone` or else the named one; and the bones of `--also`."""
+    from navapp.cli.other_bones import check_others, find_stage_of
     from navapp.control.stages import stage_by_name
 
     is_named = options.bone is None
-    first = plan.stage(stage_by_name(name)) if is_named else _stage_of(options.bone, plan)
-    others = tuple(_stage_of(bone, plan).bone for bone in dict.fromkeys(options.also))
-    if first.bone in others:
-        raise UsageError(f"the {first.bone} is followed anyway", remedy="leave --also out")
-    return first, others
-
-
-def _stage_of(bone: str, plan: "Plan") -> "StageSpec":
-    """The first stage that follows a bone."""
-    from navapp.control.stages import stage_of
-
-    if bone not in plan.bones:
-        raise UsageError(f"the plan has no bone '{bone}'", remedy=f"it has {', '.join(plan.bones)}")
-    return stage_of(bone, plan)
+    first = plan.stage(stage_by_name(name)) if is_named else find_stage_of(options.bone, plan)
+    return first, check_others(options.also, plan, first)

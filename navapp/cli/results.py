@@ -1,5 +1,6 @@
 """What `run` and `replay` answer: frames, their summary, and both for people."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,12 @@ from navapp.control.frame_result import FrameResult
 from navapp.control.recorder import face_to_json
 from navapp.control.session import describe_moved_rig
 from navapp.control.states import SessionState, Snapshot
+from navapp.limb import LimbMeasurement
 from navapp.values import FrameTimings, MeasuredFace, Reason, Status, TrackedFrame, join_faces
+
+_ANGLES = ("flexion", "varus", "internal_rotation")
+# Gaps count as those of a flexion when the knee is bent by so much more or less; chosen.
+_NEAR_DEG = 10.0
 
 
 def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> dict[str, Any]:
@@ -35,7 +41,42 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
         },
         "bone_version": result.bone_version,
         "measured": {name: face_to_json(face) for name, face in result.faces.items()},
+        **({} if result.limb is None else {"limb": limb_to_json(result.limb)}),
     }
+
+
+def limb_to_json(limb: LimbMeasurement) -> dict[str, Any]:
+    """Angles and gaps of a pair of pictures; null where they are not known, and why."""
+    angles, gaps = limb.angles, limb.gaps
+    found: dict[str, Any] = {
+        f"{name}_deg": None if angles is None else getattr(angles, f"{name}_deg")
+        for name in _ANGLES
+    }
+    found["bound_deg"] = {
+        name: None if angles is None else getattr(angles, f"{name}_bound_deg") for name in _ANGLES
+    }
+    for name in ("medial", "lateral"):
+        found[f"gap_{name}_mm"] = gaps[name].mm if name in gaps else None
+    found["bound_mm"] = {
+        name: gaps[name].bound_mm if name in gaps else None for name in ("medial", "lateral")
+    }
+    return {**found, "not_known": limb.missing}
+
+
+def summarise_gaps(limbs: Sequence[LimbMeasurement | None]) -> dict[str, Any]:
+    """The gaps where the knee was nearest to 0 and to 90 degrees; null beyond 10 degrees of it."""
+    known = [limb for limb in limbs if limb is not None and limb.angles is not None]
+
+    def find(flexion_deg: float) -> dict[str, Any] | None:
+        def off_deg(limb: LimbMeasurement) -> float:
+            known_deg = math.inf if limb.angles is None else limb.angles.flexion_deg
+            return abs(known_deg - flexion_deg)
+
+        nearest = min(known, key=off_deg, default=None)
+        is_near = nearest is not None and off_deg(nearest) <= _NEAR_DEG
+        return limb_to_json(nearest) if nearest is not None and is_near else None
+
+    return {"at_0_deg": find(0.0), "at_90_deg": find(90.0)}
 
 
 def summarise_faces(faces: Sequence[Mapping[str, MeasuredFace]]) -> dict[str, Any]:

@@ -43,6 +43,13 @@ def add_parser(subparsers: Any) -> None:
         action="store_true",
         help="practise with a simulated display in a half-silvered mirror",
     )
+    parser.add_argument(
+        "--also",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="another bone, found from the accepted one and followed in turns: the tibia",
+    )
     parser.add_argument("--headless", action="store_true", help="no screen; a scripted operator")
     parser.add_argument("--frames", type=int, metavar="N", help="end after N frames")
     parser.add_argument("--stage", metavar="S", help="stage to start in, name or number")
@@ -135,7 +142,8 @@ def _run_headless(
     failure = controller.failure
     if failure is None and operator.failure:
         failure = ResultError(operator.failure, remedy="see the frames in --json")
-    return report_result(frames, seconds, failure, options, diagnostics, rig, faces)
+    limbs = [result.limb for result in log.results]
+    return report_result(frames, seconds, failure, options, diagnostics, rig, faces, limbs)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

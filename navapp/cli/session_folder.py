@@ -37,6 +37,7 @@ class RecordedSession:
     first_stage: str
     has_gates: bool
     events: RecordedEvents
+    others: tuple[str, ...] = ()  # bones that were looked for unasked
 
 
 def start_recording(
@@ -69,6 +70,7 @@ def start_recording(
         "follow_refused": specification.follows_refused,
         "first_stage": specification.stage.name,
         "gates": specification.has_gates,
+        "others": list(specification.others),
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
     return SessionRecorder(
@@ -126,6 +128,7 @@ def read_session(folder: str | Path) -> RecordedSession:
         first_stage,
         content.get("gates") is True,
         read_events(events_path),
+        tuple(str(name) for name in content.get("others", ())),
     )
 
 

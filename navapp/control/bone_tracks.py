@@ -8,7 +8,7 @@ from drivers.frames import StereoFrame
 from navapp.control.registration_job import Registration
 from navapp.control.trackers import Trackers
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import TrackState
+from navapp.tracking import Tracker, TrackState
 from navapp.values import FrameTimings, StageSpec, Status, TrackedFrame, Verdict
 
 # Further than that within one delay of the display a patient does not move: chosen.
@@ -40,6 +40,8 @@ class BoneTracks:
     def __init__(self, trackers: Trackers) -> None:
         self._trackers = trackers
         self._tracks: dict[str, TrackState] = {}
+        # Of bones that were found beside another one: nobody has accepted these.
+        self._found: dict[str, TrackState] = {}
         self._candidates: list[Candidate] = []
         self._n_reviewed = 0
         self.track_number = 0
@@ -65,6 +67,23 @@ class BoneTracks:
     def is_accepted(self, stage: StageSpec) -> bool:
         """A pose of the stage's bone was accepted before."""
         return stage.bone in self._tracks
+
+    def is_followed(self, stage: StageSpec) -> bool:
+        """The stage's bone was accepted, or found beside another one."""
+        return self.is_accepted(stage) or stage.bone in self._found
+
+    def take(self, stage: StageSpec, tracked: TrackedFrame, captured_ns: int) -> None:
+        """Follow a stage's bone, found beside another one, from now on; nothing if it is lost."""
+        pose, verdict = tracked.left_from_bone, tracked.verdict
+        if pose is None or verdict.status is Status.LOST:
+            return
+        tracks = self._tracks if self.is_accepted(stage) else self._found
+        tracks[stage.bone] = TrackState.at_rest(pose, captured_ns, verdict.cause)
+
+    def forget(self, bone: str) -> None:
+        """A bone is followed no longer."""
+        self._tracks.pop(bone, None)
+        self._found.pop(bone, None)
 
     def offer(self, registration: Registration) -> None:
         """Put the answers of a registration under review: all but the lost ones.
@@ -112,6 +131,7 @@ class BoneTracks:
     def accept(self, stage: StageSpec) -> None:
         """The candidate is the bone's pose from now on."""
         self._tracks[stage.bone] = self._candidates[0].track
+        self._found.pop(stage.bone, None)
         self._candidates = []
 
     def reject(self) -> Candidate:
@@ -157,21 +177,23 @@ class BoneTracks:
         return pose if np.linalg.norm(moved, axis=1).max() <= FARTHEST_PREDICTED_MM else None
 
     def glance(
-        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None
+        self, stage: StageSpec, frame: StereoFrame, moved: RigidTransform | None, tracker: Tracker
     ) -> TrackedFrame:
-        """Follow an accepted bone into a frame if it is near where it is expected.
+        """Follow an accepted or found bone into a frame if it is near where it is expected.
 
         Args:
             stage: whose bone, and by whose goal.
             frame: the next one.
             moved: in the left camera, how something that the bone goes with has moved meanwhile.
+            tracker: of the bone in that frame.
         """
-        tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
-        track = self._tracks[stage.bone]
+        goal = self._trackers.goal(stage)
+        tracks = self._tracks if self.is_accepted(stage) else self._found
+        track = tracks[stage.bone]
         if moved is not None:
             track = track.carry(moved)
         tracked, track = tracker.glance(frame.left, frame.right, frame.captured_ns, track, goal)
-        self._tracks[stage.bone] = track
+        tracks[stage.bone] = track
         return tracked
 
     def register_now(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:

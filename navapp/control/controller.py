@@ -14,6 +14,7 @@ from dataclasses import replace
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import DeviceSet
+from navapp.control.beside_femur import BesideFemur
 from navapp.control.board_watch import BoardWatch
 from navapp.control.bone_motion import BoneMotion
 from navapp.control.bone_tracks import BoneTracks
@@ -35,7 +36,7 @@ from navapp.control.layer_choice import LayerChoice
 from navapp.control.made_cuts import MadeCuts
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
-from navapp.control.other_bones import OtherBones
+from navapp.control.other_bones import AskedBones, OtherBones
 from navapp.control.pictures import Composer
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
@@ -65,6 +66,7 @@ class SessionController:
         specification: SessionSpecification,
         *,
         executor: Executor,
+        other_executor: Executor | None = None,
         hooks: SessionHooks | None = None,
         board_watch: BoardWatch | None = None,
         locate_corners: LocateCorners | None = None,
@@ -77,6 +79,7 @@ class SessionController:
             devices: opened; closed with the controller.
             specification: of the session.
             executor: runs first registrations.
+            other_executor: runs searches for the other bones; None: at once.
             hooks: who is told what.
             board_watch: looks for a known length; None: nobody does.
             locate_corners: of a board, for the check of the mirror; None: no board is known.
@@ -97,7 +100,10 @@ class SessionController:
         self.lost_device: DeviceError | None = None
         self._queue: deque[Command] = deque()
         self._lock = threading.Lock()
-        self._session = _make_session(devices.clock, specification, hooks, executor, make_tracker)
+        self._session = _make_session(
+            devices.clock, specification, hooks, executor, other_executor or InlineExecutor(),
+            make_tracker,
+        )  # fmt: skip
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._presenter = FramePresenter(
             self._session, self._display, composer, self._mirror_checking, self._eye,
@@ -232,6 +238,7 @@ class SessionController:
             others,
             faces,
             version,
+            session.measure_limb(frame, others),
         )
         # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped
@@ -252,6 +259,7 @@ def _make_session(
     specification: SessionSpecification,
     hooks: SessionHooks,
     executor: Executor,
+    other_executor: Executor,
     make_tracker: MakeTracker,
 ) -> Session:
     plan = specification.plan
@@ -262,13 +270,15 @@ def _make_session(
         specification.tracker_settings,
         make_tracker,
     )
-    tracks = BoneTracks(trackers)
+    tracks, log = BoneTracks(trackers), EventLog(clock, hooks)
+    asked = AskedBones(specification.others, specification.is_each, specification.is_live)
+    beside = BesideFemur(trackers, plan, other_executor)
     return Session(
         clock,
-        EventLog(clock, hooks),
+        log,
         tracks,
         RegistrationJob(trackers, executor),
-        OtherBones(tracks, plan, specification.others),
+        OtherBones(tracks, plan, beside, asked, log.tell_other_take_over),
         MadeCuts(plan, trackers, specification.made_cuts, specification.frames_between_faces),
         Gates(plan, are_asked=specification.has_gates, check_minutes=specification.check_minutes),
         specification.stage,

@@ -23,6 +23,7 @@ class SessionHooks:
     on_event: tuple[Callable[[Event], None], ...] = ()
     on_command: tuple[Callable[[Command, int], None], ...] = ()
     on_take_over: tuple[Callable[[int], None], ...] = ()
+    on_other_take_over: tuple[Callable[[int], None], ...] = ()
     on_stage: tuple[Callable[[str], None], ...] = ()
     reopen_camera: Reopen | None = None
 
@@ -72,6 +73,10 @@ class EventLog:
     def tell_take_over(self, next_sequence: int) -> None:
         """A registration's result is used from that frame on."""
         self._tell(self._hooks.on_take_over, next_sequence)
+
+    def tell_other_take_over(self, sequence: int) -> None:
+        """What a search for another bone has found is used in that frame."""
+        self._tell(self._hooks.on_other_take_over, sequence)
 
     def tell_stage(self, name: str) -> None:
         """Tell the simulated room, if any; a stage that it cannot show is an event."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
 from navapp.control.states import SessionState
+from navapp.limb import LimbMeasurement
 from navapp.values import FrameTimings, MeasuredFace, OverlayPicture, StageSpec, TrackedFrame
 
 
@@ -25,6 +26,8 @@ class FrameResult:
     # faces of cuts that were measured in this very frame, by the plane's name.
     faces: Mapping[str, MeasuredFace] = field(default_factory=dict)
     bone_version: int = 0  # of the stage's bone, that the pose was judged by
+    # what femur and tibia say together; None unless both are OK in this very frame.
+    limb: LimbMeasurement | None = None
 
 
 FrameListener = Callable[[FrameResult], None]

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from navapp.control.mirror_error import MirrorError
 from navapp.control.states import (
+    LimbLine,
     OtherBone,
     SessionState,
     Snapshot,
@@ -32,7 +33,10 @@ def grow_older(snapshot: Snapshot, now_ns: int) -> Snapshot:
         for other in snapshot.others
     )
     age_ms = None if snapshot.pose_age_ms is None else snapshot.pose_age_ms + passed_ms
-    return judge(replace(snapshot, pose_age_ms=age_ms, others=others))
+    limb = snapshot.limb
+    if limb is not None and limb.age_ms is not None:
+        limb = replace(limb, age_ms=limb.age_ms + passed_ms)
+    return judge(replace(snapshot, pose_age_ms=age_ms, others=others, limb=limb))
 
 
 def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
@@ -72,6 +76,11 @@ def _of_mirror(error: MirrorError) -> list[Reason]:
     if not error.is_dark:
         return []
     return [Reason.OTHER_EYE if error.off_layers else Reason.MIRROR_INEXACT]
+
+
+def is_limb_current(limb: LimbLine) -> bool:
+    """Whether angles and gaps may be shown as those of now."""
+    return limb.age_ms is not None and limb.age_ms <= MAX_POSE_AGE_MS
 
 
 def is_current(other: OtherBone) -> bool:

@@ -5,7 +5,7 @@ An operator sees snapshots, as a person does, and answers with commands.
 
 import json
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -88,6 +88,8 @@ class RecordedEvents:
     commands: list[tuple[int, Command]]
     take_overs: list[int]  # before which frames a registration's result was used
     is_complete: bool  # the recording ran to its end
+    # in which frames what a search for another bone had found was used.
+    other_take_overs: list[int] = field(default_factory=list)
 
     @property
     def rig_moved(self) -> tuple[int, DistrustRig] | None:
@@ -103,7 +105,7 @@ def read_events(path: str | Path) -> RecordedEvents:
         SequenceError: damaged or cut short.
     """
     commands: list[tuple[int, Command]] = []
-    take_overs: list[int] = []
+    take_overs: dict[str, list[int]] = {"take_over": [], "other_take_over": []}
     is_complete = False
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -125,12 +127,14 @@ def read_events(path: str | Path) -> RecordedEvents:
             ) from error
         if value.get("type") == "command":
             commands.append((sequence, command_from_json(value)))
-        elif value.get("type") == "take_over":
-            take_overs.append(sequence)
+        elif value.get("type") in take_overs:
+            take_overs[value["type"]].append(sequence)
         elif value.get("kind") == "refused" and commands and commands[-1][0] == sequence:
             # The refusal follows its command at once. What refused it may be missing in a replay,
             # a lost camera for example, and the command would be carried out. A gate refuses again,
             # and is overridden only then.
             commands[-1:] = [one for one in commands[-1:] if isinstance(one[1], EnterStage)]
         is_complete = value.get("type") == "end"
-    return RecordedEvents(commands, take_overs, is_complete)
+    return RecordedEvents(
+        commands, take_overs["take_over"], is_complete, take_overs["other_take_over"]
+    )

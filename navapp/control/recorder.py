@@ -126,6 +126,10 @@ class SessionRecorder:
         """A registration's result is used from that frame on."""
         self._write(self._events, {"type": "take_over", "sequence": before_sequence})
 
+    def on_other_take_over(self, sequence: int) -> None:
+        """What a search for another bone has found is used in that frame."""
+        self._write(self._events, {"type": "other_take_over", "sequence": sequence})
+
     def on_event(self, event: Event) -> None:
         """Something happened."""
         self._write(

@@ -21,6 +21,7 @@ from navapp.control.states import (
     CutLine,
     Event,
     EventLevel,
+    LimbLine,
     OtherBone,
     Rates,
     SessionState,
@@ -28,6 +29,7 @@ from navapp.control.states import (
 from navapp.errors import RigError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
+from navapp.limb import LimbMeasurement
 from navapp.resection import CutBone
 from navapp.values import MeasuredFace, Reason, StageSpec, Status, TrackedFrame, Verdict
 
@@ -185,7 +187,24 @@ class Session:
         """Follow another bone into a frame; in a fault none: nothing that is measured counts."""
         if self._state is SessionState.FAULT:
             return {}
-        return self._others.follow(self._stage, frame, self._tracked)
+        return self._others.follow(self._stage, frame, self._tracked, is_accepted=self._is_accepted)
+
+    def measure_limb(
+        self, frame: StereoFrame, others: dict[str, TrackedFrame]
+    ) -> LimbMeasurement | None:
+        """What femur and tibia say together in a frame; None unless both are OK in it."""
+        return self._others.measure_limb(
+            self._stage, frame, self._tracked, others, is_accepted=self._is_accepted
+        )
+
+    @property
+    def _is_accepted(self) -> bool:
+        """The pose of the stage's bone was accepted, and is followed."""
+        return self._state is SessionState.NAVIGATING
+
+    def limb(self, now_ns: int) -> LimbLine | None:
+        """What they said together last, as of now; None while they are not both followed."""
+        return self._others.describe_limb(self._stage, now_ns)
 
     def confirm_cut(self, name: str) -> None:
         """A planned cut has been made.
@@ -292,8 +311,7 @@ class Session:
         if self._state is SessionState.FAULT:
             return {}
         before = self.bone_version
-        is_accepted = self._state is SessionState.NAVIGATING
-        faces = self._cuts.measure(frame, self._tracked, is_accepted=is_accepted)
+        faces = self._cuts.measure(frame, self._tracked, is_accepted=self._is_accepted)
         if self.bone_version != before:
             text = f"faces measured: version {self.bone_version} of the {self._stage.bone}"
             self.add_event("cut", f"{text} is in force")
@@ -431,6 +449,7 @@ class Session:
         """End without a word and stop the search."""
         self._is_over = True
         self._stop_search()
+        self._others.close()
 
     def go_offline(self) -> None:
         """The devices are closed."""

@@ -62,6 +62,7 @@ class SnapshotMaker:
             candidate_id=session.candidate_id,
             pose_age_ms=session.pose_age_ms(now_ns),
             others=session.other_bones(now_ns),
+            limb=session.limb(now_ns),
             valid_ms=self.specification.overlay_valid_ms,
             pose_at_light=self._predict_pose(now_ns),
             preview=None if picture is None else picture.drawn,

@@ -24,8 +24,11 @@ class SessionSpecification:
     method: Method = "bimcc"  # of pose estimation
     follows_refused: bool = False  # poses that the judge refuses are carried on, to be measured
     depth_mm: tuple[float, float] = _DEPTH_MM  # nearest and farthest surface of the working volume
-    # bones that are registered from the prior and followed, too, unasked.
+    # bones that are looked for and followed, too, unasked: the tibia from the femur, others from
+    # the prior.
     others: tuple[str, ...] = ()
+    is_each: bool = False  # every frame stands for itself, and is the turn of each of them
+    is_live: bool = False  # an operator accepts what is found; in a replay nobody is asked
     # how long a picture may stay on the display without a newer one.
     overlay_valid_ms: float = 500.0
     # where the mirror stood when the display was calibrated, if the display's model does not say.
@@ -69,6 +72,7 @@ def specify_session(
     method: Method | None = None,
     follows_refused: bool | None = None,
     others: tuple[str, ...] = (),
+    is_each: bool = False,
     layers: tuple[str, ...] | None = None,
     calibrated_display: CalibratedDisplay | None = None,
     made_cuts: tuple[str, ...] = (),
@@ -86,7 +90,8 @@ def specify_session(
             recorded; neither is true of a replay.
         method: of pose estimation; None: the configured one.
         follows_refused: poses that the judge refuses are carried on; None: as configured.
-        others: bones that are registered and followed unasked.
+        others: bones that are looked for and followed unasked.
+        is_each: every frame stands for itself.
         layers: drawn in every stage; None: the stage's own.
         calibrated_display: in the mirror; None: the display shows the video.
         made_cuts: planes of the plan that are cut from the start.
@@ -102,6 +107,8 @@ def specify_session(
         configuration.tracking.follow_refused if follows_refused is None else follows_refused,
         configuration.camera.depth_mm,
         others,
+        is_each=is_each,
+        is_live=is_live,
         overlay_valid_ms=display.withdrawn_ms if is_live else display.valid_ms,
         mirror_deg=configuration.mirror.calibrated_deg,
         display_delay_ms=display.delay_ms if is_live else 0.0,

@@ -10,6 +10,7 @@ from navapp.control.length_check import LengthCheck
 from navapp.control.mirror_error import MirrorError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
+from navapp.limb import LimbMeasurement
 from navapp.values import MeasuredFace, Reason, StageSpec, Verdict
 
 
@@ -128,6 +129,14 @@ class OtherBone:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LimbLine:
+    """What femur and tibia said together last."""
+
+    measurement: LimbMeasurement | None = None  # None: they were never OK in one picture
+    age_ms: float | None = None  # since that picture, now
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CutLine:
     """A cut of the stage: planned, made, measured."""
 
@@ -169,6 +178,7 @@ class Snapshot:
     # too fast to know.
     pose_at_light: RigidTransform | None = None
     others: tuple[OtherBone, ...] = ()  # the other bones that are followed
+    limb: LimbLine | None = None  # None while femur and tibia are not both followed
     # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
     # frame. `plain_preview` is the same without guides, None when it has none.
     preview: NDArray[np.uint8] | None = None

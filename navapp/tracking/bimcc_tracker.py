@@ -19,7 +19,7 @@ from navapp.tracking.search.after_loss import SearchAfterLoss
 from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
-from navapp.tracking.surface_meter import NEAR_VIEW
+from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
 from navapp.tracking.tracker import Tracker, TrackerSettings
 from navapp.values import AspectGraph, BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame
 
@@ -41,13 +41,14 @@ class BimccTracker(Tracker):
         settings: TrackerSettings | None = None,
         aspects: AspectGraph | None = None,
         *,
+        meter: SurfaceMeter | None = None,
         judge: PoseJudge | None = None,
         near: NearSearch | None = None,
         buried: BuriedSearch | None = None,
         after_loss: SearchAfterLoss | None = None,
         diagnosis: Diagnosis | None = None,
     ) -> None:
-        super().__init__(rig, bone, settings, judge, diagnosis)
+        super().__init__(rig, bone, settings, judge, diagnosis, meter)
         meter, scorer = self.meter, self.scorer
         self.near = near or NearSearch(meter, scorer.score)
         self.buried = buried or BuriedSearch(meter)

@@ -1,7 +1,6 @@
 """The trackers by the names of their methods."""
 
 from navapp.geometry.rig import StereoRig
-from navapp.registration.register import Method as RegisterMethod
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.icp_tracker import IcpTracker
 from navapp.tracking.paper_tracker import PaperTracker
@@ -12,13 +11,6 @@ _TRACKERS: dict[Method, type[BimccTracker | IcpTracker]] = {
     "bimcc": BimccTracker,
     "paper": PaperTracker,
     "icp": IcpTracker,
-}
-
-# The registration that each of them makes in a frame, as `navapp register` calls it.
-REGISTER_METHODS: dict[Method, RegisterMethod] = {
-    "bimcc": "bimcc",
-    "paper": "bimcc-literal",
-    "icp": "icp",
 }
 
 

@@ -69,11 +69,12 @@ class Tracker(ABC):
         settings: TrackerSettings | None = None,
         judge: PoseJudge | None = None,
         diagnosis: Diagnosis | None = None,
+        meter: SurfaceMeter | None = None,
     ) -> None:
         self.settings = settings or TrackerSettings()
-        self.model = RegistrationModel(bone)
         depth_mm, max_points = self.settings.depth_mm, self.settings.max_points
-        self.meter = SurfaceMeter(rig, self.model, depth_mm, max_points)
+        self.meter = meter or SurfaceMeter(rig, RegistrationModel(bone), depth_mm, max_points)
+        self.model = self.meter.model
         keeps = self.settings.follows_refused
         self.judge = judge or PoseJudge(self.meter, rig.quality, tells_refused=keeps)
         self.boxes = BoxTracker(rig, self.model)

@@ -9,6 +9,7 @@ from navapp.control.interlocks import is_current
 from navapp.control.rules import why_refused
 from navapp.control.states import OtherBone, Snapshot
 from navapp.ui.gauges import Number, draw_bar
+from navapp.ui.limb_lines import format_limb_lines
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 from navapp.values import Status
@@ -27,7 +28,8 @@ class PosePanel(TextView):
     """Whether guides may be shown, figures or the reason, and the error against its limit.
 
     Above the error a line for each other bone that is followed: rms figures make room for them, a
-    reason or a question to the operator does not.
+    reason or a question to the operator does not. Angles and gaps of the limb, where femur and
+    tibia are both followed, come before how much is seen.
     """
 
     def __init__(self) -> None:
@@ -92,12 +94,15 @@ def _middle(view: View, width: int) -> tuple[list[Content], list[Content]]:
     if not view.is_navigable:
         return format_reason_lines(view, width), _other_reasons(view, width)
     snapshot = view.snapshot
-    needed = [
-        Content(""),
-        _figure("age", Number.WHOLE, snapshot.pose_age_ms, "ms"),
+    age = _figure("age", Number.WHOLE, snapshot.pose_age_ms, "ms")
+    seen = [
         _figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"),
         _figure("occluded", Number.WHOLE, _compute_occluded_percent(snapshot), "%"),
     ]
+    limb = format_limb_lines(view, width)
+    if limb:
+        return [age], [*limb, *seen, *_fit(snapshot)]
+    needed = [Content(""), age, *seen]
     if snapshot.mirror_error is not None:
         # Of what is seen: with the calibration of the mirror, and an eye beside its place.
         needed.append(_figure("in mirror", Number.MM, snapshot.mirror_error.bound_mm, "mm"))

@@ -8,13 +8,16 @@ import pytest
 from navapp.cli.results import (
     frame_text,
     frame_to_json,
+    limb_to_json,
     rig_alarm_to_json,
     summarise,
     summarise_faces,
+    summarise_gaps,
     summary_text,
 )
 from navapp.control.commands import DistrustRig
 from navapp.control.frame_result import FrameResult
+from navapp.limb import Gap, LimbAngles, LimbMeasurement
 from navapp.values import MeasuredFace, Reason, ResectionPlane, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
 
@@ -107,3 +110,34 @@ def test_faces_are_told_against_their_plan_and_joined_over_frames() -> None:
     assert (
         "cut top: 1.00 deg (+- 0.17) and -0.40 mm (+- 0.02) from its plan, 80 % of it seen" in lines
     )
+
+
+def a_limb(flexion_deg: float, gap_mm: float = 2.0) -> LimbMeasurement:
+    angles = LimbAngles(flexion_deg, -1.5, 4.0, 0.3, 0.2, 0.4)
+    return LimbMeasurement(angles, {"medial": Gap(gap_mm, 0.1), "lateral": Gap(3.0, 0.2)})
+
+
+def test_a_limb_has_angles_gaps_and_the_bounds_of_both() -> None:
+    frame = frame_to_json(replace(a_result(), limb=a_limb(84.0)), {})
+    assert frame["limb"] == {
+        "flexion_deg": 84.0, "varus_deg": -1.5, "internal_rotation_deg": 4.0,
+        "bound_deg": {"flexion": 0.3, "varus": 0.2, "internal_rotation": 0.4},
+        "gap_medial_mm": 2.0, "gap_lateral_mm": 3.0,
+        "bound_mm": {"medial": 0.1, "lateral": 0.2},
+        "not_known": None,
+    }  # fmt: skip
+    assert "limb" not in frame_to_json(a_result(), {})
+
+
+def test_of_a_limb_without_axes_only_the_gaps_are_known() -> None:
+    known = limb_to_json(LimbMeasurement(None, {"medial": Gap(2.0, 0.1)}, "no hip centre"))
+    assert (known["flexion_deg"], known["bound_deg"]["varus"]) == (None, None)
+    assert (known["gap_medial_mm"], known["gap_lateral_mm"]) == (2.0, None)
+    assert known["not_known"] == "no hip centre"
+
+
+def test_gaps_in_extension_and_flexion_are_those_of_the_nearest_frames() -> None:
+    limbs = [None, a_limb(84.0, 1.0), a_limb(88.0, 2.0), a_limb(40.0, 3.0)]
+    summary = summarise_gaps(limbs)
+    assert summary["at_90_deg"]["gap_medial_mm"] == 2.0
+    assert summary["at_0_deg"] is None

@@ -208,6 +208,39 @@ def test_a_session_with_cuts_replays_and_keeps_them_whatever_is_changed(tmp_path
     assert changed == versions[5:]
 
 
+@pytest.mark.slow
+@pytest.mark.release
+def test_the_tibia_is_found_from_the_accepted_femur_and_a_replay_finds_it_in_the_same_frame(
+    tmp_path: Path,
+) -> None:
+    session, knee = tmp_path / "session", tmp_path / "knee.toml"
+    knee.write_text('[camera.simulated]\nseed = 1305\nside = "left"\n', encoding="utf-8")
+    first, second = tmp_path / "a.json", tmp_path / "b.json"
+    options = ["--quiet", "--config", str(knee), "run", "--headless", "--frames", "12"]
+    options += ["--also", "tibia", "--record", str(session), "--json", str(first)]
+    assert run(options) == 0
+    frames = result(first)["frames"]
+    turns = [frame for frame in frames if frame["bodies"]]
+    assert len(turns) >= 3
+    assert all(frame["state"] == "navigating" for frame in turns)
+    assert all(frame["bodies"]["tibia"]["status"] == "OK" for frame in turns)
+    assert all(frame["bodies"]["tibia"]["tre_mm"] < 0.4 for frame in turns)
+    # Angles and gaps are of pairs in which both are OK, and of no other.
+    assert [("limb" in frame) for frame in frames] == [bool(frame["bodies"]) for frame in frames]
+    limb = turns[0]["limb"]
+    assert 80.0 < limb["flexion_deg"] < 88.0
+    assert result(first)["summary"]["limb"]["at_90_deg"] is not None
+    taken = [event for event in events_of(session) if event["type"] == "other_take_over"]
+    assert len(taken) == 1
+    assert run(["--quiet", "replay", str(session), "--json", str(second)]) == 0
+    for a, b in zip(frames, result(second)["frames"], strict=True):
+        assert set(a["bodies"]) == set(b["bodies"])
+        assert a.get("limb") == b.get("limb")
+        for name, body in a["bodies"].items():
+            for key in ("status", "reasons", "camera_from_model", "covariance"):
+                assert body[key] == b["bodies"][name][key]
+
+
 def test_a_session_is_never_recorded_over_another(
     session: Path, moving: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

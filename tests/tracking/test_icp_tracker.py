@@ -1,18 +1,15 @@
 """The paper's chains as trackers."""
 
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 import pytest
 
 from navapp.registration import solve_bimcc_literal, solve_icp
-from navapp.registration.register import Method as RegisterMethod
-from navapp.tracking import Method, TrackerSettings, TrackState, make_tracker
+from navapp.tracking import TrackerSettings, TrackState, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.icp_tracker import IcpTracker
-from navapp.tracking.methods import REGISTER_METHODS
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, WIDE_VIEW
@@ -35,12 +32,6 @@ def test_a_tracker_is_made_by_the_name_of_its_method() -> None:
     assert type(made) is IcpTracker
     assert made.settings.max_points == 900
     assert type(make_tracker(a.rig, bone, TrackerSettings("paper"))) is PaperTracker
-
-
-def test_the_methods_of_a_session_are_those_of_a_registration() -> None:
-    """One table, which knows them all."""
-    assert set(REGISTER_METHODS) == set(get_args(Method))
-    assert set(REGISTER_METHODS.values()) == set(get_args(RegisterMethod))
 
 
 @pytest.mark.parametrize("kind", [IcpTracker, PaperTracker])

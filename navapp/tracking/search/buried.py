@@ -91,7 +91,7 @@ class BuriedSearch:
         places = _select_best(places, _N_FRAME_PLACES)
         for one in _FRAME_ROUNDS:
             places = self._improve(frame, places, one, random)
-        fit = self._select_rest(frame, places)
+        fit = self.select(self._rest(frame, places))
         if fit is not None:
             yield fit
 
@@ -101,15 +101,19 @@ class BuriedSearch:
         The fit says so when it is ambiguous; None when nothing is matched.
         """
         begin = tell_part(frame.on_progress, 0.0, _SEARCH_FRACTION)
-        go_on = tell_part(frame.on_progress, _SEARCH_FRACTION, 1.0)
         depth = DepthMap.of(self._meter.geometry, measured.disparity)
         found = self._sampler.search(depth, frame.start, _N_PLACES, begin)
-        places = self._step_from(frame, [one.scene_from_bone for one in found])
+        return self.select(self.rest_from(frame, [one.scene_from_bone for one in found]))
+
+    def rest_from(self, frame: Frame, starts: list[RigidTransform]) -> list[Fit]:
+        """Fits at rest, of the best that starts a millimetre or two off lead to."""
+        go_on = tell_part(frame.on_progress, _SEARCH_FRACTION, 1.0)
+        places = self._step_from(frame, starts)
         random = np.random.default_rng(_SEED)
         for number, one in enumerate(_ROUNDS):
             go_on(number / len(_ROUNDS))
             places = self._improve(frame, places, one, random)
-        return self._select_rest(frame, places)
+        return self._rest(frame, places)
 
     def _step_from(self, frame: Frame, starts: list[RigidTransform]) -> list[Place]:
         """Where one step onto the model leads from each start."""
@@ -142,10 +146,12 @@ class BuriedSearch:
         twists[1::2] @= loose.T
         return [fit.pose.move(twist, centre_mm) for twist in twists]
 
-    def _select_rest(self, frame: Frame, places: list[Place]) -> Fit | None:
-        """The fit at rest with the smallest residuals; ambiguous when another's are as small."""
+    def _rest(self, frame: Frame, places: list[Place]) -> list[Fit]:
         found = (self._follower.follow(frame, one.fit.pose, skips_samples=True) for one in places)
-        fits = [fit for fit in found if fit is not None]
+        return [fit for fit in found if fit is not None]
+
+    def select(self, fits: list[Fit]) -> Fit | None:
+        """The fit at rest with the smallest residuals; ambiguous when another's are as small."""
         if not fits:
             return None
         fitting = [max(fit.variance_ratio, 1e-6) ** -0.5 for fit in fits]

@@ -1,0 +1,116 @@
+"""The joint's gap on either side: the shortest distance between what is left of the two bones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import FloatArray
+from navapp.limb.angles import SIGMAS_95
+from navapp.values import PoseEstimate, Side
+
+# Both chosen. Wider gaps are not looked for; points of a surface are no further apart.
+_WIDEST_MM, _SPACING_MM = 40.0, 1.2
+_SOME = 50  # one point of so many tells roughly how wide a gap is
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A distance, and its 95 % bound by the two poses."""
+
+    mm: float
+    bound_mm: float
+
+
+class GapMeter:
+    """Measures the gaps between two bones as they are now: whole, or what cuts have left.
+
+    Args:
+        femur: its surface.
+        tibia: its surface.
+        middle_x_mm: of the plan's x, parts the two sides of the femur.
+        side: of the patient.
+    """
+
+    def __init__(
+        self, femur: TriangleMesh, tibia: TriangleMesh, middle_x_mm: float, side: Side
+    ) -> None:
+        self._tibia_mm = cover_with_points(tibia)
+        self._tree = cKDTree(self._tibia_mm)
+        points_mm = cover_with_points(femur)
+        is_left = points_mm[:, 0] > middle_x_mm
+        is_medial = is_left if side == "right" else ~is_left
+        self._sides = {"medial": points_mm[is_medial], "lateral": points_mm[~is_medial]}
+
+    def measure(
+        self,
+        femur: PoseEstimate,
+        tibia: PoseEstimate,
+        centres_mm: tuple[FloatArray, FloatArray],
+    ) -> dict[str, Gap]:
+        """`medial` and `lateral`, of two poses of one pair of pictures; without wider ones.
+
+        Args:
+            femur: its pose.
+            tibia: its pose.
+            centres_mm: (3,) of each, about which the covariances are, in their own coordinates.
+        """
+        gaps = {}
+        for name, points_mm in self._sides.items():
+            gap = self._measure(points_mm, femur, tibia, centres_mm)
+            if gap is not None:
+                gaps[name] = gap
+        return gaps
+
+    def _measure(
+        self,
+        points_mm: FloatArray,
+        femur: PoseEstimate,
+        tibia: PoseEstimate,
+        centres_mm: tuple[FloatArray, FloatArray],
+    ) -> Gap | None:
+        tibia_from_femur = tibia.camera_from_bone.inverse() @ femur.camera_from_bone
+        placed_mm = tibia_from_femur.apply(points_mm)
+        # Some points bound the distance of all; what lies further is not looked for.
+        some_mm = np.asarray(self._tree.query(placed_mm[::_SOME])[0])
+        widest_mm = min(float(some_mm.min(initial=np.inf)) + 1e-6, _WIDEST_MM)
+        found = self._tree.query(placed_mm, distance_upper_bound=widest_mm)
+        distances_mm, nearest = (np.asarray(one) for one in found)
+        if not np.isfinite(distances_mm.min(initial=np.inf)):
+            return None
+        k = int(np.argmin(distances_mm))
+        gap_mm = float(distances_mm[k])
+        on_femur = femur.camera_from_bone.apply(points_mm[k])
+        on_tibia = tibia.camera_from_bone.apply(self._tibia_mm[int(nearest[k])])
+        direction = (on_femur - on_tibia) / max(gap_mm, 1e-9)
+        variance = sum(
+            _variance(direction, point - one.camera_from_bone.apply(centre), one.covariance)
+            for point, one, centre in zip(
+                (on_femur, on_tibia), (femur, tibia), centres_mm, strict=True
+            )
+        )
+        return Gap(gap_mm, SIGMAS_95 * float(np.sqrt(variance)))
+
+
+def cover_with_points(mesh: TriangleMesh) -> FloatArray:
+    """(N, 3) corners of a mesh's triangles and points between them: faces of cuts have few corners.
+
+    They are at most about `_SPACING_MM` apart.
+    """
+    corners_mm = mesh.vertices_mm[mesh.faces]
+    edges_mm = np.linalg.norm(corners_mm - np.roll(corners_mm, 1, axis=1), axis=2)
+    n_steps = np.maximum(np.ceil(edges_mm.max(axis=1, initial=0.0) / _SPACING_MM).astype(int), 1)
+    points_mm = [mesh.vertices_mm[np.unique(mesh.faces)]]
+    for n in np.unique(n_steps[n_steps > 1]):
+        first, second = np.mgrid[0 : n + 1, 0 : n + 1].reshape(2, -1)
+        shares = np.stack([first, second, n - first - second], axis=1) / n
+        inner = shares[(shares >= 0.0).all(axis=1) & (shares < 1.0).all(axis=1)]
+        points_mm.append(np.einsum("ks,tsd->tkd", inner, corners_mm[n_steps == n]).reshape(-1, 3))
+    return np.concatenate(points_mm)
+
+
+def _variance(direction: FloatArray, from_centre_mm: FloatArray, covariance: FloatArray) -> float:
+    """Of a point's place along a direction, when its body moves by a twist of that covariance."""
+    jacobian = np.concatenate([direction, np.cross(from_centre_mm, direction)])
+    return float(jacobian @ covariance @ jacobian)

@@ -1,0 +1,55 @@
+"""A simulated tibia found from its femur alone."""
+
+import numpy as np
+import pytest
+
+from navapp.evaluation import compute_mean_tre_mm
+from navapp.geometry.mesh import TriangleMesh
+from navapp.joint import KneeSearch, OccludedTracker
+from navapp.limb import Hinge
+from navapp.tracking import Goal, make_tracker
+from navapp.values import BoneModel, Reason, Status
+from sim_devices.scenario import Scenario
+from tests.knees import SimulatedKnee
+from tests.many import few_of
+
+GOAL = Goal(np.empty((0, 3)), 2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", few_of([1405, 1406, 1408]))
+def test_a_tibia_is_found_from_the_femur_and_a_search_can_be_stopped(seed: int) -> None:
+    knee = SimulatedKnee(Scenario(seed=seed, side="left" if seed % 2 else "right"))
+    meshes = {
+        name: TriangleMesh(mesh.vertices_mm, mesh.faces)
+        for name, mesh in knee.world.anatomy.bones.items()
+    }
+    frame = knee.frames(1)[0]
+    true = {
+        name: knee.oracle.left_from_body(name, frame.captured_ns) for name in ("femur", "tibia")
+    }
+    bone = BoneModel("tibia", meshes["tibia"], knee.world.scenario.side)
+    tracker = make_tracker(knee.rig, bone)
+    hidden = OccludedTracker(tracker, meshes["femur"], true["femur"])
+    search = KneeSearch(Hinge.of(meshes["femur"]))
+    told: list[float] = []
+    found = search.find(hidden, frame.left, frame.right, true["femur"], GOAL, told.append)
+    tracked = found.tracked
+    error_mm = compute_mean_tre_mm(tracked.left_from_bone, true["tibia"], bone, GOAL.targets_mm)
+    assert tracked.verdict.status is Status.OK
+    assert error_mm < min(0.4, tracked.verdict.predicted_tre_mm)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert (np.linalg.eigvalsh(found.spread) > -1e-12).all()
+    # The plain tracker's own search is not what was asked.
+    assert Reason.AMBIGUOUS not in tracked.verdict.reasons
+
+    class StopError(Exception):
+        pass
+
+    def stop(share: float) -> None:
+        if share > 0.0:
+            raise StopError
+
+    with pytest.raises(StopError):
+        search.find(hidden, frame.left, frame.right, true["femur"], GOAL, stop)
