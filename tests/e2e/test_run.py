@@ -100,15 +100,15 @@ do = "stage"
 stage = "opening"
 at_frame = 4
 [[step]]
-do = "override"
-stage = "spacer"
-reason = "a test"
-[[step]]
 do = "register"
 [[step]]
 do = "stage"
 stage = "drilling"
 at_frame = 9
+[[step]]
+do = "override"
+stage = "drilling"
+reason = "a test"
 [[step]]
 do = "blank"
 at_frame = 12
@@ -138,7 +138,7 @@ def test_the_operators_script_has_two_bones_followed_at_once_and_they_replay_to_
     write_plan(tmp_path / "plan", plan_with_tibia_at_the_opening(seed))
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     script.write_text(TWO_BONES, encoding="utf-8")
-    options = ["--quiet", "--config", str(knee), "run", "--headless", "--frames", "14"]
+    options = ["--quiet", "--config", str(knee), "run", "--headless", "--frames", "17"]
     options += ["--plan", str(tmp_path / "plan"), "--stage", "drilling"]
     options += ["--operator", str(script), "--record", str(session)]
     assert run([*options, "--json", str(first)]) == 0
