@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -27,7 +28,7 @@ from tests.knees import SimulatedKnee
 
 _GOAL = Goal(np.empty((0, 3)), 2.0)
 # Name, module, and the module's constants.
-_VARIATIONS: tuple[tuple[str, str, dict[str, object]], ...] = (
+_VARIATIONS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("in force", "navapp.limb.flexion", {}),
     ("play at most 6 mm, 6 deg", "navapp.limb.flexion",
      {"_MOST_PLAY_MM": 6.0, "_MOST_PLAY_DEG": 6.0}),
@@ -86,7 +87,7 @@ def _make_knee(seed: int) -> Knee:
 
 
 @contextmanager
-def _in_force(module: str, constants: dict[str, object]) -> Iterator[None]:
+def _in_force(module: str, constants: dict[str, Any]) -> Iterator[None]:
     if not constants:
         yield
         return
