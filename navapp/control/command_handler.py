@@ -30,6 +30,7 @@ from navapp.control.commands import (
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
+from navapp.control.gate_keeper import GateKeeper
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.rig_watch import RigWatch
 from navapp.control.rules import why_refused
@@ -37,7 +38,7 @@ from navapp.control.session import Session
 from navapp.control.stages import stage_by_number
 from navapp.control.states import EventLevel, Snapshot
 from navapp.errors import UsageError
-from navapp.values import Plan
+from navapp.values import Plan, StageSpec
 
 # What a refusal calls the command.
 _NAMES: dict[type[Command], str] = {
@@ -72,8 +73,9 @@ class CommandHandler:
         mirror: MirrorChecking,
         eye: EyePreview,
         plan: Plan,
+        gates: GateKeeper,
     ) -> None:
-        self._session = session
+        self._session, self._gates = session, gates
         self._camera = camera
         self._display = display
         self._rig = rig
@@ -116,9 +118,9 @@ class CommandHandler:
             case NudgeCross() | ConfirmCross():
                 self._on_cross(command)
             case EnterStage():
-                self._on_enter_stage(command)
+                self._gates.enter(self._stage(command.number))
             case OverrideGate():
-                self._on_override(command)
+                self._gates.override(self._stage(command.number), command.reason)
             case ConfirmCut() | WithdrawCut() | ConfirmCondition() | WithdrawCondition():
                 self._on_word(command)
             case Reconnect():
@@ -178,24 +180,6 @@ class CommandHandler:
             text = f"mirror checked: off by {found.residual_mm:.2f} mm"
             self._session.add_event("mirror", text)
 
-    def _on_enter_stage(self, command: EnterStage) -> None:
-        stage = self._plan.stage(stage_by_number(command.number))
-        gate = self._session.gate(stage.number)
-        open_lines = [line for line in gate if not line.is_met]
-        if open_lines:
-            self._session.refuse_stage(stage, open_lines)
-        else:
-            self._session.enter_stage(stage, "gate met" if gate else "")
-
-    def _on_override(self, command: OverrideGate) -> None:
-        stage = self._plan.stage(stage_by_number(command.number))
-        open_texts = [line.text for line in self._session.gate(stage.number) if not line.is_met]
-        text = f"gate of stage {stage.number} overridden ({command.reason.strip()})"
-        self._session.add_event(
-            "override", f"{text}; open: {'; '.join(open_texts)}", EventLevel.WARNING
-        )
-        self._session.enter_stage(stage, "gate overridden")
-
     def _on_word(
         self, command: ConfirmCut | WithdrawCut | ConfirmCondition | WithdrawCondition
     ) -> None:
@@ -208,9 +192,9 @@ class CommandHandler:
                 case WithdrawCut():
                     session.withdraw_cut(command.name)
                 case ConfirmCondition():
-                    session.confirm_condition(command.name)
+                    self._gates.confirm(command.name)
                 case WithdrawCondition():
-                    session.withdraw_condition(command.name)
+                    self._gates.withdraw(command.name)
         except UsageError as error:
             is_cut = isinstance(command, ConfirmCut | WithdrawCut)
             self._refuse("cut" if is_cut else "gate", str(error))
@@ -218,6 +202,9 @@ class CommandHandler:
     def _on_quit(self) -> None:
         self._display.darken()
         self._session.end("quit", "session ended by the operator")
+
+    def _stage(self, number: int) -> StageSpec:
+        return self._plan.stage(stage_by_number(number))
 
     def _refuse(self, what: str, why: str) -> None:
         self._session.add_event("refused", f"{what} refused: {why}", EventLevel.WARNING)

@@ -30,6 +30,7 @@ from navapp.control.executors import Executor, InlineExecutor
 from navapp.control.eye_preview import EyePreview
 from navapp.control.frame_presenter import FramePresenter
 from navapp.control.frame_result import FrameResult
+from navapp.control.gate_keeper import GateKeeper
 from navapp.control.gates import Gates
 from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
 from navapp.control.layer_choice import LayerChoice
@@ -104,6 +105,13 @@ class SessionController:
             devices.clock, specification, hooks, executor, other_executor or InlineExecutor(),
             make_tracker,
         )  # fmt: skip
+        gates = GateKeeper(
+            self._session,
+            Gates(
+                plan, self._session,
+                are_asked=specification.has_gates, check_minutes=specification.check_minutes,
+            ),
+        )  # fmt: skip
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._presenter = FramePresenter(
             self._session, self._display, composer, self._mirror_checking, self._eye,
@@ -115,12 +123,12 @@ class SessionController:
         )
         self._commands = CommandHandler(
             self._session, self._camera, self._display, self._rig_watch, self._monitored,
-            self._mirror_checking, self._eye, plan,
+            self._mirror_checking, self._eye, plan, gates,
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
             _make_mirror_judge(specification, composer), self._eye, specification,
-            self._rig_watch,
+            self._rig_watch, gates,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -280,7 +288,6 @@ def _make_session(
         RegistrationJob(trackers, executor),
         OtherBones(tracks, plan, beside, asked, log.tell_other_take_over),
         MadeCuts(plan, trackers, specification.made_cuts, specification.frames_between_faces),
-        Gates(plan, are_asked=specification.has_gates, check_minutes=specification.check_minutes),
         specification.stage,
         LayerChoice(specification.layers),
         RateMeter(specification.display_delay_ms, specification.display_delay_bound_ms),

@@ -5,6 +5,7 @@ left and the entry conditions of every stage that is entered. Going back is alwa
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from navapp.control.stages import STAGES, TIME_OUT
@@ -42,27 +43,28 @@ class Gates:
 
     Args:
         plan: of the operation.
+        known: to the session.
         are_asked: whether there are gates at all.
         check_minutes: how long what is repeated counts.
     """
 
-    def __init__(self, plan: Plan, *, are_asked: bool, check_minutes: float) -> None:
-        self._plan, self._are_asked = plan, are_asked
+    def __init__(self, plan: Plan, known: Known, *, are_asked: bool, check_minutes: float) -> None:
+        self._plan, self._known, self._are_asked = plan, known, are_asked
         self._check_ns = round(check_minutes * _NS_PER_MINUTE)
         self._stages = tuple(plan.stage(stage) for stage in STAGES)
         self._confirmed_ns: dict[str, int] = {}
 
-    def confirm(self, name: str, known: Known) -> None:
+    def confirm(self, name: str) -> None:
         """A person says that a condition is met, now.
 
         Raises:
             UsageError: no person answers for it, or there is no such condition.
         """
-        names = self._personal_names(known)
+        names = self._personal_names()
         if name not in names:
             remedy = f"choose one of {', '.join(names)}" if names else "nothing is asked for"
             raise UsageError(f"nobody is asked for '{name}'", subject=name, remedy=remedy)
-        self._confirmed_ns[name] = known.time_ns
+        self._confirmed_ns[name] = self._known.time_ns
 
     def withdraw(self, name: str) -> None:
         """A condition is not met after all.
@@ -74,7 +76,7 @@ class Gates:
             raise UsageError(f"'{name}' was not confirmed", subject=name)
         del self._confirmed_ns[name]
 
-    def time_out(self, known: Known) -> tuple[ConditionLine, ...]:
+    def time_out(self) -> tuple[ConditionLine, ...]:
         """What must be so before the first guides."""
         if not self._are_asked:
             return ()
@@ -84,19 +86,13 @@ class Gates:
             "side": " and ".join(sorted(sides)).upper() or "not known",
             "plan": self._plan.digest[:8],
         }
-        lines = [line for one in TIME_OUT for line in self._lines(one, self._stages[0], known)]
+        lines = [line for one in TIME_OUT for line in self._lines(one, self._stages[0])]
         return tuple(
-            ConditionLine(
-                line.name,
-                f"{line.text}: {asked[line.name]}" if line.name in asked else line.text,
-                line.is_met,
-                line.is_personal,
-                line.note,
-            )
+            replace(line, text=f"{line.text}: {asked[line.name]}") if line.name in asked else line
             for line in lines
         )
 
-    def before(self, number: int, present: StageSpec, known: Known) -> tuple[ConditionLine, ...]:
+    def before(self, number: int, present: StageSpec) -> tuple[ConditionLine, ...]:
         """What must be so on the way from the present stage to a later one; empty: nothing."""
         if not self._are_asked:
             return ()
@@ -108,18 +104,16 @@ class Gates:
             if present.number <= stage.number < number:
                 asked += stage.exit
             for condition in asked:
-                for line in self._lines(condition, stage, known):
+                for line in self._lines(condition, stage):
                     lines.setdefault(f"{line.name} {stage.bone}", line)
         return tuple(lines.values())
 
-    def _lines(
-        self, condition: Condition, stage: StageSpec, known: Known
-    ) -> Iterator[ConditionLine]:
+    def _lines(self, condition: Condition, stage: StageSpec) -> Iterator[ConditionLine]:
         """A condition as it stands: a line, or one for each cut."""
-        name, text = condition.name, condition.text
+        known, name, text = self._known, condition.name, condition.text
         match condition.kind:
             case ConditionKind.PERSON:
-                yield self._personal(condition, known.time_ns)
+                yield self._personal(condition)
             case ConditionKind.BONE_OK:
                 yield ConditionLine(name, f"{stage.bone}: {text}", known.is_bone_ok(stage))
             case ConditionKind.RIG_VALID:
@@ -128,11 +122,11 @@ class Gates:
                 for cut in known.cuts_of(stage):
                     yield self._cut(cut, stage)
 
-    def _personal(self, condition: Condition, time_ns: int) -> ConditionLine:
+    def _personal(self, condition: Condition) -> ConditionLine:
         said_ns = self._confirmed_ns.get(condition.name)
         if said_ns is None:
             return ConditionLine(condition.name, condition.text, False, True)
-        age_ns = time_ns - said_ns
+        age_ns = self._known.time_ns - said_ns
         is_met = not condition.is_repeated or age_ns <= self._check_ns
         note = f"confirmed {age_ns // _NS_PER_MINUTE} min ago{'' if is_met else ': too old'}"
         return ConditionLine(condition.name, condition.text, is_met, True, note)
@@ -150,7 +144,7 @@ class Gates:
         note = "checked by hand" if is_met else "not measurable: check it by hand, or override"
         return ConditionLine(cut.name, text, is_met, True, note)
 
-    def _personal_names(self, known: Known) -> tuple[str, ...]:
+    def _personal_names(self) -> tuple[str, ...]:
         """All that a person may confirm."""
         if not self._are_asked:
             return ()
@@ -161,7 +155,7 @@ class Gates:
         names += [
             cut.name
             for stage in self._stages
-            for cut in known.cuts_of(stage)
+            for cut in self._known.cuts_of(stage)
             if cut.is_made and cut.face is None
         ]
         return tuple(dict.fromkeys(names))

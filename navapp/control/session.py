@@ -1,14 +1,11 @@
 """What a session knows, and every way in which frames and commands change it."""
 
-from collections.abc import Sequence
-
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from navapp.control.bone_tracks import BoneTracks, Candidate
 from navapp.control.commands import Command, Interrupt
 from navapp.control.event_log import EventLog
 from navapp.control.frame_result import FrameResult
-from navapp.control.gates import Gates
 from navapp.control.interlocks import is_current
 from navapp.control.layer_choice import LayerChoice
 from navapp.control.made_cuts import MadeCuts
@@ -17,7 +14,6 @@ from navapp.control.pictures import OperatorPicture
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.states import (
-    ConditionLine,
     CutLine,
     Event,
     EventLevel,
@@ -44,7 +40,6 @@ class Session:
         registration: searches for the stage's bone.
         others: the other bones that are followed.
         cuts: that have been made.
-        gates: between the stages.
         stage: to start in.
         layers: that are drawn; by default those of the stage.
         meter: of its frames.
@@ -58,7 +53,6 @@ class Session:
         registration: RegistrationJob,
         others: OtherBones,
         cuts: MadeCuts,
-        gates: Gates,
         stage: StageSpec,
         layers: LayerChoice | None = None,
         meter: RateMeter | None = None,
@@ -69,8 +63,6 @@ class Session:
         self._registration = registration
         self._others = others
         self._cuts = cuts
-        self._gates = gates
-        self._refused_stage: int | None = None
         self._state = SessionState.STARTING
         self._tracked: TrackedFrame | None = None
         self._shows_depth = False
@@ -256,47 +248,6 @@ class Session:
         return any(other.name == stage.bone and is_current(other) for other in others)
 
     @property
-    def time_out(self) -> tuple[ConditionLine, ...]:
-        """What must be so before the first guides."""
-        return self._gates.time_out(self)
-
-    @property
-    def refused_stage(self) -> int | None:
-        """The stage whose gate was told as not met, and may be overridden."""
-        return self._refused_stage
-
-    def gate(self, number: int) -> tuple[ConditionLine, ...]:
-        """What must be so before a stage is entered from the one in force."""
-        return self._gates.before(number, self._stage, self)
-
-    def confirm_condition(self, name: str) -> None:
-        """A person says that a condition is met.
-
-        Raises:
-            UsageError: no person answers for it.
-        """
-        self._gates.confirm(name, self)
-        self.add_event("gate", f"confirmed: {name}")
-
-    def withdraw_condition(self, name: str) -> None:
-        """A condition is not met after all.
-
-        Raises:
-            UsageError: it was not confirmed.
-        """
-        self._gates.withdraw(name)
-        self.add_event("gate", f"withdrawn: {name}", EventLevel.WARNING)
-
-    def refuse_stage(self, stage: StageSpec, open_lines: Sequence[ConditionLine]) -> None:
-        """Tell item by item why a stage is not entered; now its gate may be overridden."""
-        self._refused_stage = stage.number
-        text = f"stage {stage.number} {stage.name} refused: {len(open_lines)} open"
-        self.add_event("refused", text, EventLevel.WARNING)
-        for line in open_lines:
-            note = f" ({line.note})" if line.note else ""
-            self.add_event("gate", f"open: {line.text}{note}", EventLevel.WARNING)
-
-    @property
     def bone_version(self) -> int:
         """Of the stage's bone; 0 without a model of it."""
         return self._cuts.version(self._stage.bone)
@@ -480,7 +431,6 @@ class Session:
 
     def _put_in_force(self, stage: StageSpec, how: str = "") -> None:
         self._stage = stage
-        self._refused_stage = None
         self._layers.reset()
         # What was judged by the old stage's targets and tolerance says nothing in the new one.
         self._tracked = None

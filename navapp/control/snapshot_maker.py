@@ -9,6 +9,7 @@ from navapp.control.device_lines import camera_line, display_line, rig_line
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
+from navapp.control.gate_keeper import GateKeeper
 from navapp.control.interlocks import judge
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_error import MirrorError
@@ -40,6 +41,7 @@ class SnapshotMaker:
     eye: EyePreview  # into a simulated mirror
     specification: SessionSpecification  # of the session
     rig_watch: RigWatch  # that watches the rig
+    gates: GateKeeper  # between the stages
 
     def make(self) -> Snapshot:
         """As of now."""
@@ -71,9 +73,9 @@ class SnapshotMaker:
             has_eye=self.eye.is_possible,
             shows_eye=shows_eye,
             layers=session.layers,
-            time_out=session.time_out,
-            gate=session.gate(session.refused_stage or session.stage.number + 1),
-            refused_stage=session.refused_stage,
+            time_out=self.gates.time_out,
+            gate=self.gates.gate,
+            refused_stage=self.gates.refused_stage,
             cuts=session.cuts_of(session.stage),
             bone_version=session.bone_version,
             bone_surface=session.bone_surface,

@@ -19,6 +19,7 @@ from navapp.control.commands import (
     Blank,
     CheckMirror,
     ConfirmCross,
+    ConfirmCut,
     DistrustRig,
     EnterStage,
     NudgeCross,
@@ -48,6 +49,7 @@ from navapp.values import (
     TrackedFrame,
 )
 from sim_devices.display import SimulatedDisplay
+from tests.control.cuts import cut_plan
 from tests.control.fakes import PERIOD_NS, Bench, a_plan, a_pose, a_rig, answer, navigating
 from tests.control.test_late_pictures import SlowDisplay
 from tests.overlay.scenes import is_colour
@@ -483,6 +485,17 @@ def test_a_covered_eye_is_named_with_the_error_of_the_one_that_looks() -> None:
     assert error is not None
     assert error.other_eye_mm is None
     assert f"error <= {error.bound_mm:.1f} mm, right eye covered" in status(bench)
+
+
+def test_a_cut_that_is_made_needs_no_guides_and_is_not_judged() -> None:
+    """The bone is a bowl, cut off below its rim."""
+    bench = a_bench(eyes="both", plan=cut_plan(), layers=("planes",))
+    navigating(bench)
+    assert bench.snapshot.mirror_error is not None
+    for name in ("top", "side"):
+        bench.do(ConfirmCut(name))
+    bench.frames(1)
+    assert bench.snapshot.mirror_error is None
 
 
 def test_layers_that_are_off_for_the_other_eye_are_not_lit_and_named() -> None:

@@ -1,0 +1,78 @@
+"""Lets a session pass from stage to stage: by gates that are met, or overridden with a reason."""
+
+from navapp.control.gates import Gates
+from navapp.control.session import Session
+from navapp.control.states import ConditionLine, EventLevel
+from navapp.values import StageSpec
+
+
+class GateKeeper:
+    """Tells what is open before a stage, and enters it when nothing is.
+
+    Args:
+        session: that passes.
+        gates: of its stages.
+    """
+
+    def __init__(self, session: Session, gates: Gates) -> None:
+        self._session, self._gates = session, gates
+        # Numbers of the stage in force and of the one that was refused from there.
+        self._refused: tuple[int, int] | None = None
+
+    @property
+    def time_out(self) -> tuple[ConditionLine, ...]:
+        """What must be so before the first guides."""
+        return self._gates.time_out()
+
+    @property
+    def refused_stage(self) -> int | None:
+        """The stage whose gate was told as not met, and may be overridden."""
+        if self._refused is None or self._refused[0] != self._session.stage.number:
+            return None
+        return self._refused[1]
+
+    @property
+    def gate(self) -> tuple[ConditionLine, ...]:
+        """What must be so before the refused stage is entered, or else the next one."""
+        present = self._session.stage
+        return self._gates.before(self.refused_stage or present.number + 1, present)
+
+    def confirm(self, name: str) -> None:
+        """A person says that a condition is met.
+
+        Raises:
+            UsageError: no person answers for it.
+        """
+        self._gates.confirm(name)
+        self._session.add_event("gate", f"confirmed: {name}")
+
+    def withdraw(self, name: str) -> None:
+        """A condition is not met after all.
+
+        Raises:
+            UsageError: it was not confirmed.
+        """
+        self._gates.withdraw(name)
+        self._session.add_event("gate", f"withdrawn: {name}", EventLevel.WARNING)
+
+    def enter(self, stage: StageSpec) -> None:
+        """Enter a stage, or tell item by item why not; then its gate may be overridden."""
+        gate = self._gates.before(stage.number, self._session.stage)
+        open_lines = [line for line in gate if not line.is_met]
+        if not open_lines:
+            self._session.enter_stage(stage, "gate met" if gate else "")
+            return
+        self._refused = self._session.stage.number, stage.number
+        text = f"stage {stage.number} {stage.name} refused: {len(open_lines)} open"
+        self._session.add_event("refused", text, EventLevel.WARNING)
+        for line in open_lines:
+            note = f" ({line.note})" if line.note else ""
+            self._session.add_event("gate", f"open: {line.text}{note}", EventLevel.WARNING)
+
+    def override(self, stage: StageSpec, reason: str) -> None:
+        """Enter a stage whatever is open; the reason and the open items are told."""
+        gate = self._gates.before(stage.number, self._session.stage)
+        texts = "; ".join(line.text for line in gate if not line.is_met)
+        text = f"gate of stage {stage.number} overridden ({reason.strip()}); open: {texts}"
+        self._session.add_event("override", text, EventLevel.WARNING)
+        self._session.enter_stage(stage, "gate overridden")
