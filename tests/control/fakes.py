@@ -382,4 +382,5 @@ def wait_for(condition: Callable[[], bool], what: str, timeout_s: float = 10.0) 
 
 
 LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
+GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
 DOUBTED = answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)

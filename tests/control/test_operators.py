@@ -22,11 +22,8 @@ from navapp.control.recorder import SessionRecorder
 from navapp.control.runner import run_headless
 from navapp.errors import DeviceLost, SequenceError
 from navapp.values import Reason, Status
-from tests.control.fakes import Bench, FakeCamera, a_pose, answer, navigating
+from tests.control.fakes import LOST, Bench, FakeCamera, a_pose, answer, navigating
 from tests.control.operated import commands_of, kinds
-
-LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
-GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
 
 
 @pytest.fixture

@@ -23,11 +23,8 @@ from navapp.control.scripted_operator import (
 from navapp.errors import ConfigurationError, UsageError
 from navapp.geometry.transform import rotation_angle_deg
 from navapp.values import Reason, Status
-from tests.control.fakes import Bench, FakeCamera, a_pose, answer
+from tests.control.fakes import GONE, LOST, Bench, FakeCamera, a_pose, answer
 from tests.control.operated import commands_of, kinds
-
-LOST = answer(Status.LOST, Reason.COVERAGE_LOW)
-GONE = answer(Status.LOST, Reason.OUT_OF_VIEW, has_pose=False)
 
 
 @pytest.fixture
