@@ -183,7 +183,7 @@ def test_an_abnormal_projector_is_dark_within_the_time_of_its_probes(with_projec
     room = with_projector
     room.happens(lambda projector: projector.break_down(0x04))
     room.until(lambda: room.is_dark_because(Reason.PROJECTOR_LOST), 15.0)
-    room.until(lambda: "abnormal (lamp, heat)" in room.line("projector").detail, 5.0)
+    room.until(lambda: "abnormal (lamp, heat)" in room.line("projector").detail, 15.0)
     room.happens(lambda projector: (projector.lose_mains(), projector.restore_mains()))
     room.until(lambda: room.line("projector").detail == "standby", 10.0)
 
