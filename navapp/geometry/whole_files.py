@@ -6,8 +6,12 @@ from pathlib import Path
 
 
 def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file so that it is there entirely or not at all."""
+    """Write a file so that it is there entirely or not at all; a device or a pipe is written to."""
     path = Path(path)
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        # A file must not take its place.
+        path.write_bytes(content)
+        return
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as stream:
