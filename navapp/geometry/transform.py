@@ -132,11 +132,12 @@ class RigidTransform:
 
     def mean_motion_mm(self, other: "RigidTransform", points_mm: FloatArray) -> float:
         """Mean displacement of points (N, 3) of the source between this pose and another."""
+        from navapp.geometry.motion_kernels import find_mean_motion
+
         turned, shifted_mm = (
             other.rotation - self.rotation, other.translation_mm - self.translation_mm
         )  # fmt: skip
-        moved = points_mm @ turned.T + shifted_mm
-        return float(np.sqrt(np.einsum("ij,ij->i", moved, moved)).mean())
+        return float(find_mean_motion(turned, shifted_mm, np.ascontiguousarray(points_mm)))
 
     def rename(self, target: str, source: str) -> "RigidTransform":
         """The same motion under other frame names (a border between naming schemes)."""

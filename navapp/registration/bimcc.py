@@ -220,7 +220,7 @@ class _Fit:
         pairs.weight[:n] *= near.is_near
         pose = self.pose
         information = compute_information(
-            pairs._replace(direction=self._model.smooth_normals[pairs.vertex[:n]]),
+            pairs._replace(direction=self._model.smooth_normals.take(pairs.vertex[:n], axis=0)),
             n, pose, self._model.centre_mm, self._scene.n_sharing_errors,
         )  # fmt: skip
         reasons = [] if is_converged else [Reason.NOT_CONVERGED]
@@ -239,8 +239,8 @@ class _Fit:
             size_mm=information.size_mm,
             size_sigma_mm=information.size_sigma_mm,
         )
-        fits = near.distance_mm < near.sigma_mm
-        points_mm, residual_mm = pairs.point[:n][fits], pairs.residual[:n][fits]
+        fits = np.flatnonzero(near.distance_mm < near.sigma_mm)
+        points_mm, residual_mm = pairs.point.take(fits, axis=0), pairs.residual[fits]
         return Solution(estimate, information, near.sigma_mm, points_mm, residual_mm)
 
     def too_few_points(self, n_points: int, iterations: int = 0) -> Solution:

@@ -67,12 +67,12 @@ class Scene:
         follow each other, look-ups in the model are faster.
         """
         n = len(self.points_mm)
-        order, is_thinned = np.random.default_rng(n).permutation(n), np.arange(n) % self.every == 0
-        for part in (is_thinned, ~is_thinned):
-            order[part] = np.sort(order[part])
+        order, (is_kept, is_other) = np.random.default_rng(n).permutation(n), np.ones((2, n), bool)
+        is_kept[order], is_other[:: self.every] = np.arange(n) % self.every == 0, False
+        order[:: self.every], order[is_other] = np.flatnonzero(is_kept), np.flatnonzero(~is_kept)
         sigma = np.zeros(n) if self.sigma_ray_mm is None else self.sigma_ray_mm
         return SceneArrays(
-            np.ascontiguousarray(self.points_mm[order], dtype=np.float64),
+            np.ascontiguousarray(self.points_mm.take(order, axis=0), dtype=np.float64),
             np.ascontiguousarray(sigma[order], dtype=np.float64),
             np.zeros(3) if self.camera_mm is None else np.asarray(self.camera_mm, dtype=np.float64),
             self.camera_mm is not None,
