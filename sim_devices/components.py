@@ -15,7 +15,8 @@ from sim_devices.planned_cuts import RESECTION_MM, Cut
 from sim_devices.surface_nets import mesh_solid
 from sim_devices.tools import make_tube
 
-_CELL_MM = 1.0
+# Of the meshes that mirror the room's lamps, and of those that a plan holds.
+_CELL_MM, PLAN_CELL_MM = 1.0, 2.0
 # Narrower than the bone, so that no edge overhangs.
 _NARROWER = 0.955
 # The inner side reaches so far into the bone, and no nearer to its skin: a cut that misses its
@@ -29,12 +30,15 @@ TRAY_MM = 3.0
 _RIM_MM, _DISH_MM = 2.6, 2.4
 
 
-def make_femoral_component(knee: KneeAnatomy, cuts: Sequence[Cut]) -> TriangleMesh:
+def make_femoral_component(
+    knee: KneeAnatomy, cuts: Sequence[Cut], cell_mm: float = _CELL_MM
+) -> TriangleMesh:
     """A shell as thick as what the planned cuts of the femur remove, its outside that of the joint.
 
     Args:
         knee: a right one.
         cuts: the planned ones of its femur.
+        cell_mm: of the mesh.
     """
     shape = replace(knee.shape, groove_depth=knee.shape.groove_depth - _FLATTER_MM)
     size = knee.scale * (_NARROWER, 1.0, 1.0)
@@ -57,7 +61,7 @@ def make_femoral_component(knee: KneeAnatomy, cuts: Sequence[Cut]) -> TriangleMe
     low, high = vertices.min(axis=0) - 3.0, vertices.max(axis=0) + 3.0
     high[2] = top + 3.0
     shell = Union(outside, ((groove, 4.0),))
-    return _mesh(Intersection(shell, beyond, _EDGE_MM), low, high)
+    return _mesh(Intersection(shell, beyond, _EDGE_MM), low, high, cell_mm)
 
 
 def make_patellar_button(knee: KneeAnatomy, cut: Cut) -> TriangleMesh:
@@ -70,7 +74,7 @@ def make_patellar_button(knee: KneeAnatomy, cut: Cut) -> TriangleMesh:
 
 
 def make_tray_and_insert(
-    knee: KneeAnatomy, cut: Cut, thickness_mm: float
+    knee: KneeAnatomy, cut: Cut, thickness_mm: float, cell_mm: float = _CELL_MM
 ) -> tuple[TriangleMesh, TriangleMesh]:
     """The metal tray on the planned cut of the tibia, and the plastic insert on the tray.
 
@@ -78,6 +82,7 @@ def make_tray_and_insert(
         knee: a right one.
         cut: of its tibia.
         thickness_mm: of both together, below the lowest point of the joint surfaces.
+        cell_mm: of the meshes.
     """
     outline = Outline(knee.bones["tibia"], cut)
     width = knee.scale[0]
@@ -101,7 +106,7 @@ def make_tray_and_insert(
     half = np.array([46.0, 34.0, 0.0])
     low = cut.point_mm - half - (0.0, 0.0, _CEMENT_MM + 4.0)
     high = cut.point_mm + half + (0.0, 0.0, thickness_mm + 8.0)
-    return _mesh(tray, low, high), _mesh(insert, low, high)
+    return _mesh(tray, low, high, cell_mm), _mesh(insert, low, high, cell_mm)
 
 
 class Outline:
@@ -144,9 +149,9 @@ class Outline:
         return values
 
 
-def _mesh(field: Field, low: FloatArray, high: FloatArray) -> TriangleMesh:
+def _mesh(field: Field, low: FloatArray, high: FloatArray, cell_mm: float) -> TriangleMesh:
     """A closed mesh with the field's own normals: mirrors show every flaw of computed ones."""
-    mesh = mesh_solid(field, low, high, _CELL_MM)
+    mesh = mesh_solid(field, low, high, cell_mm)
     slope = compute_gradient(field, mesh.vertices_mm, 0.2)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     return TriangleMesh(mesh.vertices_mm, mesh.faces, normals)

@@ -8,6 +8,7 @@ import numpy as np
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from sim_devices.components import (
+    PLAN_CELL_MM,
     make_femoral_component,
     make_patellar_button,
     make_tray_and_insert,
@@ -20,9 +21,9 @@ from sim_devices.tools import merge_meshes
 
 # The cut on whose face a component sits: where the saw missed, the component is off its plan, too.
 SEATS = {
-    "femoral_component": "femur_distal",
-    "patellar_component": "patella",
-    "insert": "tibia_proximal",
+    "femoral_implant": "femur_distal",
+    "patellar_implant": "patella",
+    "spacer": "tibia_proximal",
 }
 # What a surgeon chooses from: thickness of tray and insert together.
 INSERTS_MM = np.arange(5.0, 16.5, 0.5)
@@ -50,7 +51,7 @@ class FittedParts:
     @cached_property
     def rasped(self) -> tuple[Cut, ...]:
         """What the femur loses on top of its cuts until the component sits on the distal one."""
-        motion = self.motion_from_plan("femoral_component")
+        motion = self.motion_from_plan("femoral_implant")
         return tuple(
             replace(cut, point_mm=motion.apply(cut.point_mm), normal=motion.rotate(cut.normal))
             for cut in self._site.planned.values()
@@ -58,17 +59,32 @@ class FittedParts:
         )
 
     @cached_property
+    def planned(self) -> dict[str, TriangleMesh]:
+        """The components as a plan holds them: on the planned cuts, as thick as those take off."""
+        knee, cuts = self._site.knee, self._site.planned
+        femoral = make_femoral_component(knee, self._femoral_cuts, PLAN_CELL_MM)
+        spacer = make_tray_and_insert(knee, cuts["tibia_proximal"], RESECTION_MM, PLAN_CELL_MM)
+        return {
+            "femoral_implant": femoral,
+            "patellar_implant": make_patellar_button(knee, cuts["patella"]),
+            "spacer": merge_meshes(list(spacer)),
+        }
+
+    @property
+    def _femoral_cuts(self) -> list[Cut]:
+        return [cut for cut in self._site.planned.values() if cut.bone == "femur"]
+
+    @cached_property
     def femoral_component(self) -> TriangleMesh:
         """In the femur's coordinates."""
-        planned = [cut for cut in self._site.planned.values() if cut.bone == "femur"]
-        mesh = make_femoral_component(self._site.knee, planned)
-        return mesh.transform(self.motion_from_plan("femoral_component"))
+        mesh = make_femoral_component(self._site.knee, self._femoral_cuts)
+        return mesh.transform(self.motion_from_plan("femoral_implant"))
 
     @cached_property
     def patellar_button(self) -> TriangleMesh:
         """In the patella's coordinates."""
         mesh = make_patellar_button(self._site.knee, self._site.planned["patella"])
-        return mesh.transform(self.motion_from_plan("patellar_component"))
+        return mesh.transform(self.motion_from_plan("patellar_implant"))
 
     @cached_property
     def tray_and_insert(self) -> tuple[TriangleMesh, TriangleMesh]:

@@ -14,35 +14,36 @@ TILT_SD_DEG = 1.5
 REPEATED = 0.1
 
 
-def miss_cut(planned: Cut, rng: np.random.Generator) -> Cut:
+def miss_cut(planned: Cut, rng: np.random.Generator, times: float = 1.0) -> Cut:
     """The cut as the saw makes it.
 
-    One cut in ten is made a second time, and only that attempt's miss counts.
+    One cut in ten is made a second time, and only that attempt's miss counts. A saw misses by so
+    many `times` as much as usual.
     """
     is_repeated = rng.uniform() < REPEATED
-    attempts = [miss_plane(planned.point_mm, planned.normal, rng) for _ in range(2)]
+    attempts = [miss_plane(planned.point_mm, planned.normal, rng, times) for _ in range(2)]
     point_mm, normal = attempts[1 if is_repeated else 0]
     return replace(planned, point_mm=point_mm, normal=normal)
 
 
 def miss_plane(
-    point_mm: FloatArray, normal: FloatArray, rng: np.random.Generator
+    point_mm: FloatArray, normal: FloatArray, rng: np.random.Generator, times: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Point and normal of a plane, set off along the normal and tilted about the point."""
-    offset_mm = OFFSET_SD_MM * float(rng.standard_normal())
-    return point_mm + offset_mm * normal, _tilt(normal, rng)
+    offset_mm = times * OFFSET_SD_MM * float(rng.standard_normal())
+    return point_mm + offset_mm * normal, _tilt(normal, rng, times)
 
 
 def miss_line(
-    entry_mm: FloatArray, axis: FloatArray, rng: np.random.Generator
+    entry_mm: FloatArray, axis: FloatArray, rng: np.random.Generator, times: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """A point and the direction of a line, set off across itself and tilted about the point."""
-    offset_mm = OFFSET_SD_MM * float(rng.standard_normal())
-    return entry_mm + offset_mm * _draw_across(axis, rng), _tilt(axis, rng)
+    offset_mm = times * OFFSET_SD_MM * float(rng.standard_normal())
+    return entry_mm + offset_mm * _draw_across(axis, rng), _tilt(axis, rng, times)
 
 
-def _tilt(direction: FloatArray, rng: np.random.Generator) -> FloatArray:
-    angle_rad = np.radians(TILT_SD_DEG * float(rng.standard_normal()))
+def _tilt(direction: FloatArray, rng: np.random.Generator, times: float) -> FloatArray:
+    angle_rad = np.radians(times * TILT_SD_DEG * float(rng.standard_normal()))
     tilted: FloatArray = rotation_from_vector(angle_rad * _draw_across(direction, rng)) @ direction
     return tilted
 

@@ -21,9 +21,9 @@ from sim_devices.tools import across
 def make_bone(site: Site, fitted: FittedParts, bone: str, state: State) -> tuple[Part, ...]:
     """The parts of a bone: its skin first, the hole, the faces of its cuts, its component."""
     cuts = [site.made[name] for name in state.cuts if site.made[name].bone == bone]
-    if bone == "femur" and state.is_made("femoral_component"):
+    if bone == "femur" and state.is_made("femoral_implant"):
         cuts += fitted.rasped
-    has_hole = bone == "femur" and state.is_made("hole")
+    has_hole = bone == "femur" and state.is_made("femoral_guide")
     intact = site.bones[bone]
     skin, walls = intact, []
     if has_hole:
@@ -45,11 +45,11 @@ def skin_material(site: Site) -> MaterialId:
 
 
 def _make_component(fitted: FittedParts, bone: str, state: State) -> tuple[Part, ...]:
-    if bone == "femur" and state.is_made("femoral_component"):
+    if bone == "femur" and state.is_made("femoral_implant"):
         return (Part(bone, fitted.femoral_component, MaterialId.METAL),)
-    if bone == "patella" and state.is_made("patellar_component"):
+    if bone == "patella" and state.is_made("patellar_implant"):
         return (Part(bone, fitted.patellar_button, MaterialId.PLASTIC),)
-    if bone == "tibia" and state.is_made("insert"):
+    if bone == "tibia" and state.is_made("spacer"):
         tray, insert = fitted.tray_and_insert
         return Part(bone, tray, MaterialId.METAL), Part(bone, insert, MaterialId.PLASTIC)
     return ()

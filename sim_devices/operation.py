@@ -12,7 +12,7 @@ StepKind = Literal["hole", "cut", "part"]
 class Step:
     """Something that is made once."""
 
-    name: str  # a cut has the name of its plane in the plan
+    name: str  # in the plan
     stage: str  # in which it is made
     bone: str  # that is changed
     kind: StepKind
@@ -20,17 +20,17 @@ class Step:
 
 # In the order in which they are made.
 STEPS: tuple[Step, ...] = (
-    Step("hole", "drilling", "femur", "hole"),
+    Step("femoral_guide", "drilling", "femur", "hole"),
     Step("femur_distal", "implant", "femur", "cut"),
     Step("femur_anterior", "implant", "femur", "cut"),
     Step("femur_posterior", "implant", "femur", "cut"),
     Step("femur_chamfer_anterior", "implant", "femur", "cut"),
     Step("femur_chamfer_posterior", "implant", "femur", "cut"),
-    Step("femoral_component", "implant", "femur", "part"),
+    Step("femoral_implant", "implant", "femur", "part"),
     Step("patella", "patella", "patella", "cut"),
-    Step("patellar_component", "patella", "patella", "part"),
+    Step("patellar_implant", "patella", "patella", "part"),
     Step("tibia_proximal", "spacer", "tibia", "cut"),
-    Step("insert", "spacer", "tibia", "part"),
+    Step("spacer", "spacer", "tibia", "part"),
 )
 STAGES = ("opening", "drilling", "implant", "patella", "spacer")
 # How many of its own steps a stage that is entered shows as made already.
@@ -68,6 +68,16 @@ class State:
     def is_made(self, name: str) -> bool:
         """Whether a step has been made."""
         return name in self.made
+
+    def go_on(self, stage: str) -> "State":
+        """Another stage, after what has been made of it: all of the stages before, none later.
+
+        Raises:
+            UsageError: there is no such stage.
+        """
+        own = {step.name for step in STEPS if step.stage == stage}
+        before = enter(stage).made - own
+        return State(stage, before | (own & self.made))
 
     def advance(self) -> "State":
         """With the stage's next step made.

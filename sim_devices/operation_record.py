@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
-from sim_devices.anatomy import MIRROR
+from sim_devices.anatomy import MIRROR, mirror_mesh
 from sim_devices.fitted_parts import SEATS, FittedParts
 from sim_devices.layout import mirror_pose
 from sim_devices.planned_cuts import Cut
@@ -29,6 +30,12 @@ class OperationRecord:
     def planned_cuts(self) -> dict[str, Cut]:
         """All cuts, by name."""
         return {name: self._on_side(cut) for name, cut in self._site.planned.items()}
+
+    @property
+    def planned_parts(self) -> dict[str, TriangleMesh]:
+        """All components where they are planned, by name."""
+        planned = self._fitted.planned.items()
+        return {name: mirror_mesh(mesh) if self._is_left else mesh for name, mesh in planned}
 
     @property
     def planned_hole(self) -> tuple[FloatArray, FloatArray]:

@@ -10,6 +10,9 @@ MotionKind = Literal["still", "breathing", "patient", "jump"]
 InstrumentKind = Literal["none", "sweep"]
 
 
+_HIGHEST = {"cartilage_mm": 2.6, "contrast": 0.2, "blood": 1.0, "misses": 2.0}
+
+
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """Patient, scene and what happens in it; the same values give the same pictures.
@@ -33,9 +36,11 @@ class Scenario:
     # of the bone's texture (RMS of grey levels divided by their mean), 0.03 to 0.08.
     contrast: float = 0.05
     blood: float = 0.3  # 0 is dry, 1 is very bloody
+    # by how much saw and drill miss their plan: times 1 mm and 1.5 deg (standard deviations).
+    misses: float = 1.0
 
     def __post_init__(self) -> None:
-        for name, highest in (("cartilage_mm", 2.6), ("contrast", 0.2), ("blood", 1.0)):
+        for name, highest in _HIGHEST.items():
             value = getattr(self, name)
             if not 0.0 <= value <= highest:
                 raise UsageError(f"{name} is {value:g}", subject=name, remedy=f"use 0 to {highest}")

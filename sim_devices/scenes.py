@@ -45,7 +45,7 @@ class Scene:
 
 def make_scene(site: Site, fitted: FittedParts, state: State) -> Scene:
     """All parts of a state."""
-    femur_from_tibia = fitted.femur_from_tibia if state.is_made("insert") else site.femur_from_tibia
+    femur_from_tibia = fitted.femur_from_tibia if state.is_made("spacer") else site.femur_from_tibia
     femur = site.table_from_femur
     laid = {"femur": femur, "tibia": femur @ femur_from_tibia}
     if state.stage == "patella":

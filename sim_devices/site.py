@@ -47,12 +47,13 @@ def make_site(
     seed: int,
     *,
     is_covered: bool,
+    misses: float = 1.0,
 ) -> Site:
     """A site; see `Site` for the arguments. What saw and drill miss is drawn from the seed."""
     planned = make_planned_cuts(knee)
     number = {step.name: k for k, step in enumerate(STEPS)}
     made = {
-        name: miss_cut(cut, np.random.default_rng([seed, 61, number[name]]))
+        name: miss_cut(cut, np.random.default_rng([seed, 61, number[name]]), misses)
         for name, cut in planned.items()
     }
     femur = bones["femur"]
@@ -60,7 +61,8 @@ def make_site(
     notch = knee.landmarks["femur/notch"]
     made_hole = find_entry_point(femur, notch + np.array([0.0, -10.0, 0.0]), axis), axis
     # The hole is where the notch says, and it is the plan that is set off from it by the miss.
-    near_mm, direction = miss_line(*made_hole, np.random.default_rng([seed, 61, number["hole"]]))
+    rng = np.random.default_rng([seed, 61, number["femoral_guide"]])
+    near_mm, direction = miss_line(*made_hole, rng, misses)
     return Site(
         knee=knee,
         bones=bones,

@@ -117,6 +117,11 @@ class World:
         return self.record.planned_cuts
 
     @property
+    def planned_parts(self) -> dict[str, TriangleMesh]:
+        """The components where they are planned, in the coordinates of their bones, by name."""
+        return self.record.planned_parts
+
+    @property
     def drill_line(self) -> tuple[FloatArray, FloatArray]:
         """Where the drill is planned to enter the femur, and its unit direction, (3,) each."""
         return self.record.planned_hole
@@ -145,17 +150,43 @@ class World:
         unit: FloatArray = direction / np.linalg.norm(direction)
         return unit
 
-    def set_stage(self, name: str) -> tuple[str, ...]:
+    def set_stage(self, name: str) -> frozenset[str]:
         """Show another surgical stage from the next picture on, as it is usually entered.
 
         Returns:
-            Names of the cuts that are made then.
+            Names of all steps that are made then.
 
         Raises:
             UsageError: there is no such stage.
         """
         self._history.show(enter(name))
-        return self.made_cuts
+        return self.made
+
+    def go_on(self, name: str) -> frozenset[str]:
+        """Show another stage from the next picture on, with as much of it made as has been made.
+
+        What belongs to the stages before is made, what belongs to later ones is not.
+
+        Returns:
+            Names of all steps that are made then.
+
+        Raises:
+            UsageError: there is no such stage.
+        """
+        self._history.show(self._state.go_on(name))
+        return self.made
+
+    def make(self, step: str) -> None:
+        """Show a step of the operation as made from the next picture on.
+
+        Raises:
+            UsageError: the operation has no such step.
+        """
+        self.set_made(self.made | {step})
+
+    def unmake(self, step: str) -> None:
+        """Show a step as not made."""
+        self.set_made(self.made - {step})
 
     def set_made(self, made: Iterable[str]) -> None:
         """Show the stage in force with these steps of the operation made, and no others.
@@ -336,7 +367,7 @@ class World:
 
     def _femur_from_tibia(self, state: State) -> RigidTransform:
         """At rest."""
-        return (self._fitted if state.is_made("insert") else self._site).femur_from_tibia
+        return (self._fitted if state.is_made("spacer") else self._site).femur_from_tibia
 
     @property
     def worn_vertices(self) -> NDArray[np.int64]:
@@ -370,4 +401,5 @@ class World:
             self._start,
             self.scenario.seed,
             is_covered=self.scenario.cartilage_mm > 0.0,
+            misses=self.scenario.misses,
         )

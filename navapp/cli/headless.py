@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, write_json
+from navapp.cli.operation_table import StepResult, format_steps, steps_to_json
 from navapp.cli.results import frame_text, summarise, summarise_faces, summarise_gaps, summary_text
 from navapp.control.controller import SessionController
 from navapp.control.frame_result import FrameResult
@@ -125,6 +126,7 @@ def report_result(
     rig: dict[str, Any] | None = None,
     faces: Sequence[Mapping[str, MeasuredFace]] = (),
     limbs: Sequence[LimbMeasurement | None] = (),
+    steps: Sequence[StepResult] = (),
 ) -> int:
     """Write the result, tell its summary, and answer with the exit code.
 
@@ -137,6 +139,7 @@ def report_result(
         rig: what a live session found out about its rig.
         faces: of cuts, as each frame has measured them.
         limbs: what femur and tibia said together in each frame.
+        steps: what was planned, made and measured.
 
     Raises:
         NavappError: that fault.
@@ -145,10 +148,14 @@ def report_result(
     summary = {**summarise(frames, seconds), "measured": summarise_faces(faces)}
     if any(limb is not None for limb in limbs):
         summary["limb"] = summarise_gaps(limbs)
-    told = {} if rig is None else {"rig": rig}
+    told: dict[str, Any] = {} if rig is None else {"rig": rig}
+    if any(step.is_made for step in steps):
+        told["operation"] = steps_to_json(steps)
     write_json(options.json, options.verb, {"frames": frames, "summary": summary, **told})
     if options.json != "-":
         diagnostics.say(summary_text(summary))
+        if table := format_steps(steps):
+            diagnostics.say(table)
     if failure is not None:
         raise failure
     if summary["ok"] == 0:

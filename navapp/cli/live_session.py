@@ -12,7 +12,7 @@ from navapp.errors import ConfigurationError, UsageError
 
 if TYPE_CHECKING:
     from calibration.targets.boards import Board
-    from navapp.cli.practice_cuts import PracticeCuts
+    from navapp.cli.practice_steps import PracticeSteps
     from navapp.config import Configuration
     from navapp.control.board_watch import BoardWatch
     from navapp.control.calibrated_display import CalibratedDisplay
@@ -153,9 +153,10 @@ def make_controller(
     from navapp.control.controller import SessionController
     from navapp.control.executors import InlineExecutor, ThreadExecutor
 
-    hooks, cuts = _make_hooks(session, on_frame, undo), _make_practice_cuts(session)
-    if cuts is not None:
-        hooks = replace(hooks, on_stage=(cuts.enter_stage,))
+    hooks, steps = _make_hooks(session, on_frame, undo), _make_practice_steps(session)
+    if steps is not None:
+        on_command = (*hooks.on_command, steps.on_command)
+        hooks = replace(hooks, on_stage=(steps.enter_stage,), on_command=on_command)
     controller = SessionController(
         session.opened.devices,
         session.specification,
@@ -166,19 +167,19 @@ def make_controller(
         locate_corners=_make_locator(session),
         eye=_make_eye(session, is_inline=is_inline),
     )
-    if cuts is not None:
-        cuts.connect(controller.submit)
+    if steps is not None:
+        steps.connect(controller.submit)
     return controller
 
 
-def _make_practice_cuts(session: LiveSession) -> "PracticeCuts | None":
-    """What tells the session which cuts the simulated room shows; None without such a room."""
-    from navapp.cli.practice_cuts import PracticeCuts
+def _make_practice_steps(session: LiveSession) -> "PracticeSteps | None":
+    """What makes in the simulated room what the operator confirms; None without such a room."""
+    from navapp.cli.practice_steps import PracticeSteps
 
     simulation = session.opened.simulation
     if simulation is None:
         return None
-    return PracticeCuts(simulation.set_stage, frozenset(session.specification.plan.content.planes))
+    return PracticeSteps(simulation, session.specification.plan.content.steps)
 
 
 def _make_locator(session: LiveSession) -> "LocateCorners | None":

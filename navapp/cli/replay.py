@@ -233,7 +233,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         others=others,
         is_each=options.order == "each",
         layers=_layers(options.layers),
-        made_cuts=tuple(dict.fromkeys(options.cut)),
+        made_steps=tuple(dict.fromkeys(options.cut)),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
     other_executor: Executor = InlineExecutor()
@@ -241,7 +241,11 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     if is_as_recorded and session is not None:
         # Who only follows has nobody to answer for conditions.
         specification = replace(
-            specification, others=session.others, is_live=True, has_gates=session.has_gates
+            specification,
+            others=session.others,
+            is_live=True,
+            has_gates=session.has_gates,
+            check_minutes=session.check_minutes,
         )
         other_executor = RecordedExecutor(session.events.other_take_overs)
     if session is None:

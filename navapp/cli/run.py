@@ -127,6 +127,7 @@ def _run_headless(
     diagnostics: Diagnostics,
 ) -> int:
     from navapp.cli.headless import FrameLog, report_result, run_session
+    from navapp.cli.operation_table import list_steps
     from navapp.cli.results import frame_to_json, rig_to_json
     from navapp.control.scripted_operator import ScriptedOperator
 
@@ -140,10 +141,14 @@ def _run_headless(
     rig = rig_to_json(controller.snapshot)
     faces = [result.faces for result in log.results]
     failure = controller.failure
-    if failure is None and operator.failure:
-        failure = ResultError(operator.failure, remedy="see the frames in --json")
+    told = operator.failure or (operator.unfinished if options.operator else "")
+    if failure is None and told:
+        failure = ResultError(told, remedy="see the frames in --json")
     limbs = [result.limb for result in log.results]
-    return report_result(frames, seconds, failure, options, diagnostics, rig, faces, limbs)
+    simulation = session.opened.simulation
+    truth = None if simulation is None else simulation.oracle
+    steps = list_steps(session.specification.plan, controller.made_steps, faces, truth)
+    return report_result(frames, seconds, failure, options, diagnostics, rig, faces, limbs, steps)
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

@@ -36,6 +36,7 @@ class RecordedSession:
     follows_refused: bool
     first_stage: str
     has_gates: bool
+    check_minutes: float  # a check on the patient counted so long
     events: RecordedEvents
     others: tuple[str, ...] = ()  # bones that were looked for unasked
 
@@ -70,6 +71,7 @@ def start_recording(
         "follow_refused": specification.follows_refused,
         "first_stage": specification.stage.name,
         "gates": specification.has_gates,
+        "check_minutes": specification.check_minutes,
         "others": list(specification.others),
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
@@ -106,6 +108,7 @@ def read_session(folder: str | Path) -> RecordedSession:
     try:
         content = json.loads((folder / _FILE).read_text(encoding="utf-8"))
         method, first_stage = str(content["method"]), str(content["first_stage"])
+        check_minutes = float(content.get("check_minutes", 30.0))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise SequenceError(
             f"session {folder} is damaged: {_FILE} cannot be understood",
@@ -127,6 +130,7 @@ def read_session(folder: str | Path) -> RecordedSession:
         content.get("follow_refused") is True,
         first_stage,
         content.get("gates") is True,
+        check_minutes,
         read_events(events_path),
         tuple(str(name) for name in content.get("others", ())),
     )

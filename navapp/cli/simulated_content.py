@@ -9,8 +9,6 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import (
     ANKLE_CENTRE,
     HIP_CENTRE,
-    Box,
-    Cylinder,
     Defect,
     DrillAxis,
     Landmark,
@@ -20,9 +18,8 @@ from navapp.values import (
     StageContent,
     SurgicalContent,
 )
+from navapp.values.contents import PartKind
 
-# Thickness of all components: what the planned cuts remove.
-_COMPONENT_MM = 9.0
 _DRILL_DIAMETER_MM, _DRILL_DEPTH_MM = 9.0, 25.0
 _SAFETY_MM = 5.0
 # Lengths of a thigh and a shank, by way of the knee's own size.
@@ -48,7 +45,7 @@ def make_built_in_content(simulation: Simulation) -> SurgicalContent:
     return SurgicalContent(
         planes=planes,
         drills={"femoral_guide": entry},
-        parts=_parts(planes),
+        parts=_parts(simulation, planes),
         risks={name: RiskStructure("femur", _SAFETY_MM) for name in simulation.curves},
         landmarks=_landmarks(points),
         defects={"worn_medial": Defect("femur", simulation.worn_vertices)},
@@ -70,26 +67,25 @@ def _stage(planes: Mapping[str, ResectionPlane], bone: str, part: str) -> StageC
     return StageContent(bone, planes=names, parts=(part,))
 
 
-def _parts(planes: Mapping[str, ResectionPlane]) -> dict[str, Part]:
-    """Components on their cuts, as thick as what was removed."""
-    plate = Box((66.0, 52.0, _COMPONENT_MM))
-    button = Cylinder(30.0, _COMPONENT_MM)
-    liner = Box((68.0, 44.0, _COMPONENT_MM))
-    return {
-        "femoral_implant": Part("implant", plate, _on(planes["femur_distal"], "femoral_implant")),
-        "patellar_implant": Part("implant", button, _on(planes["patella"], "patellar_implant")),
-        "spacer": Part("spacer", liner, _on(planes["tibia_proximal"], "spacer")),
+def _parts(simulation: Simulation, planes: Mapping[str, ResectionPlane]) -> dict[str, Part]:
+    """The components, each in the frame of the cut that it sits on."""
+    seats: dict[str, tuple[PartKind, str]] = {
+        "femoral_implant": ("implant", "femur_distal"),
+        "patellar_implant": ("implant", "patella"),
+        "spacer": ("spacer", "tibia_proximal"),
     }
+    parts = {}
+    for name, (kind, plane) in seats.items():
+        bone_from_part = _on(planes[plane], name)
+        shape = simulation.planned_parts[name].transform(bone_from_part.inverse())
+        parts[name] = Part(kind, shape, bone_from_part)
+    return parts
 
 
 def _on(plane: ResectionPlane, name: str) -> RigidTransform:
-    """`bone_from_part`: its z along the plane's normal, its lower face on the cut."""
-    corners = plane.corners_mm()
-    across = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
-    rotation = np.column_stack([across, np.cross(plane.normal, across), plane.normal])
-    return RigidTransform.from_parts(
-        plane.bone, name, rotation, plane.point_mm + 0.5 * _COMPONENT_MM * plane.normal
-    )
+    """`bone_from_part`: its origin in the middle of the cut, its z along the plane's normal."""
+    rotation = np.column_stack([*plane.axes, plane.normal])
+    return RigidTransform.from_parts(plane.bone, name, rotation, plane.point_mm)
 
 
 def _landmarks(points: Mapping[str, FloatArray]) -> dict[str, Landmark]:

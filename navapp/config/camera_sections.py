@@ -50,6 +50,8 @@ class SimulationSection(Section):
     """Of the leg."""
     instrument: Literal["none", "sweep"] = "none"
     """What passes in front of the bone."""
+    misses: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
+    """By how much saw and drill miss their plan: times 1 mm and 1.5 deg (standard deviations)."""
     scale: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     """Size of the pictures: 1.0 is 1280 x 720."""
     stepped: bool | None = None

@@ -11,7 +11,7 @@ from navapp.control.commands import (
     Command,
     ConfirmCondition,
     ConfirmCross,
-    ConfirmCut,
+    ConfirmStep,
     DistrustRig,
     EnterStage,
     Interrupt,
@@ -27,7 +27,7 @@ from navapp.control.commands import (
     ToggleEye,
     ToggleLayer,
     WithdrawCondition,
-    WithdrawCut,
+    WithdrawStep,
 )
 from navapp.errors import SequenceError
 from navapp.geometry.transform import RigidTransform
@@ -48,11 +48,11 @@ _PLAIN: dict[str, type] = {
 # Older recordings do not say which candidate was meant: the one that was under review.
 _DECISIONS: dict[str, type[Accept] | type[Reject]] = {"accept": Accept, "reject": Reject}
 # Commands about something that has a name.
-_Named = ToggleLayer | ConfirmCut | WithdrawCut | ConfirmCondition | WithdrawCondition
+_Named = ToggleLayer | ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition
 _NAMED: dict[str, type[_Named]] = {
     "layer": ToggleLayer,
-    "confirm_cut": ConfirmCut,
-    "withdraw_cut": WithdrawCut,
+    "confirm_step": ConfirmStep,
+    "withdraw_step": WithdrawStep,
     "confirm": ConfirmCondition,
     "withdraw": WithdrawCondition,
 }

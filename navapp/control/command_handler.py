@@ -9,7 +9,7 @@ from navapp.control.commands import (
     Command,
     ConfirmCondition,
     ConfirmCross,
-    ConfirmCut,
+    ConfirmStep,
     DistrustRig,
     EnterStage,
     Interrupt,
@@ -25,7 +25,7 @@ from navapp.control.commands import (
     ToggleEye,
     ToggleLayer,
     WithdrawCondition,
-    WithdrawCut,
+    WithdrawStep,
 )
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
@@ -121,7 +121,7 @@ class CommandHandler:
                 self._gates.enter(self._stage(command.number))
             case OverrideGate():
                 self._gates.override(self._stage(command.number), command.reason)
-            case ConfirmCut() | WithdrawCut() | ConfirmCondition() | WithdrawCondition():
+            case ConfirmStep() | WithdrawStep() | ConfirmCondition() | WithdrawCondition():
                 self._on_word(command)
             case Reconnect():
                 session.add_event("reopen", "lost devices are opened again")
@@ -181,26 +181,27 @@ class CommandHandler:
             self._session.add_event("mirror", text)
 
     def _on_word(
-        self, command: ConfirmCut | WithdrawCut | ConfirmCondition | WithdrawCondition
+        self, command: ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition
     ) -> None:
         """A person says what was made, or what is so."""
         session = self._session
         try:
             match command:
-                case ConfirmCut():
-                    session.confirm_cut(command.name)
-                case WithdrawCut():
-                    session.withdraw_cut(command.name)
+                case ConfirmStep():
+                    session.confirm_step(command.name)
+                case WithdrawStep():
+                    session.withdraw_step(command.name)
                 case ConfirmCondition():
                     self._gates.confirm(command.name)
                 case WithdrawCondition():
                     self._gates.withdraw(command.name)
         except UsageError as error:
-            is_cut = isinstance(command, ConfirmCut | WithdrawCut)
-            self._refuse("cut" if is_cut else "gate", str(error))
+            is_step = isinstance(command, ConfirmStep | WithdrawStep)
+            self._refuse("step" if is_step else "gate", str(error))
 
     def _on_quit(self) -> None:
         self._display.darken()
+        self._gates.tell_open_at_end()
         self._session.end("quit", "session ended by the operator")
 
     def _stage(self, number: int) -> StageSpec:

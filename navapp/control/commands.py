@@ -22,6 +22,11 @@ class Propose:
     left_from_bone: RigidTransform
 
 
+# What accept and reject name when no candidate was on the screen: there never is one of that
+# number.
+NO_CANDIDATE = 0
+
+
 @dataclass(frozen=True, slots=True)
 class Accept:
     """Take the candidate that the operator has seen; refused when another one is under review."""
@@ -113,15 +118,15 @@ class WithdrawCondition:
 
 
 @dataclass(frozen=True, slots=True)
-class ConfirmCut:
-    """A planned cut has been made: what lies beyond its plane no longer belongs to the bone."""
+class ConfirmStep:
+    """A planned cut or hole has been made, or a part put in: the bone is what is left of it."""
 
-    name: str  # of the plane
+    name: str  # in the plan
 
 
 @dataclass(frozen=True, slots=True)
-class WithdrawCut:
-    """A cut that was confirmed has not been made after all."""
+class WithdrawStep:
+    """What was confirmed has not been made after all."""
 
     name: str
 
@@ -166,8 +171,8 @@ Command = (
     | OverrideGate
     | ConfirmCondition
     | WithdrawCondition
-    | ConfirmCut
-    | WithdrawCut
+    | ConfirmStep
+    | WithdrawStep
     | Reconnect
     | Interrupt
     | DistrustRig

@@ -34,7 +34,7 @@ from navapp.control.gate_keeper import GateKeeper
 from navapp.control.gates import Gates
 from navapp.control.interlocks import MAX_POSE_AGE_MS, grow_older
 from navapp.control.layer_choice import LayerChoice
-from navapp.control.made_cuts import MadeCuts
+from navapp.control.made_steps import MadeSteps
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import AskedBones, OtherBones
@@ -49,6 +49,7 @@ from navapp.control.states import Snapshot
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import Rectifier
+from navapp.geometry.rig import StereoRig
 from navapp.overlay import DepthMarks
 from navapp.tracking import make_tracker
 from navapp.values import FrameTimings
@@ -110,6 +111,7 @@ class SessionController:
             Gates(
                 plan, self._session,
                 are_asked=specification.has_gates, check_minutes=specification.check_minutes,
+                rig_made_on=_made_on(rig),
             ),
         )  # fmt: skip
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
@@ -136,6 +138,11 @@ class SessionController:
     def failure(self) -> NavappError | None:
         """Why the session stands in FAULT; None when it does not."""
         return self._session.rig_error or self.lost_device
+
+    @property
+    def made_steps(self) -> frozenset[str]:
+        """Names of the plan's steps that are confirmed as made."""
+        return self._session.made_steps
 
     @property
     def snapshot(self) -> Snapshot:
@@ -287,8 +294,14 @@ def _make_session(
         tracks,
         RegistrationJob(trackers, executor),
         OtherBones(tracks, plan, beside, asked, log.tell_other_take_over),
-        MadeCuts(plan, trackers, specification.made_cuts, specification.frames_between_faces),
+        MadeSteps(plan, trackers, specification.made_steps, specification.frames_between_faces),
         specification.stage,
         LayerChoice(specification.layers),
         RateMeter(specification.display_delay_ms, specification.display_delay_bound_ms),
     )
+
+
+def _made_on(rig: StereoRig) -> str:
+    """The day of a rig's calibration; empty when nobody said."""
+    made_on = None if rig.quality is None else rig.quality.made_on
+    return "" if made_on is None else made_on.isoformat()

@@ -1,7 +1,10 @@
 """Lets a session pass from stage to stage: by gates that are met, or overridden with a reason."""
 
+from collections.abc import Sequence
+
 from navapp.control.gates import Gates
 from navapp.control.session import Session
+from navapp.control.stages import STAGES
 from navapp.control.states import ConditionLine, EventLevel
 from navapp.values import StageSpec
 
@@ -16,8 +19,8 @@ class GateKeeper:
 
     def __init__(self, session: Session, gates: Gates) -> None:
         self._session, self._gates = session, gates
-        # Numbers of the stage in force and of the one that was refused from there.
-        self._refused: tuple[int, int] | None = None
+        # Which stage was refused last, from which one, and the names of what was open then.
+        self._refused: tuple[int, int, frozenset[str]] | None = None
 
     @property
     def time_out(self) -> tuple[ConditionLine, ...]:
@@ -33,7 +36,7 @@ class GateKeeper:
 
     @property
     def gate(self) -> tuple[ConditionLine, ...]:
-        """What must be so before the refused stage is entered, or else the next one."""
+        """What must be so before the refused stage, or else the next one or the end."""
         present = self._session.stage
         return self._gates.before(self.refused_stage or present.number + 1, present)
 
@@ -59,20 +62,43 @@ class GateKeeper:
         """Enter a stage, or tell item by item why not; then its gate may be overridden."""
         gate = self._gates.before(stage.number, self._session.stage)
         open_lines = [line for line in gate if not line.is_met]
-        if not open_lines:
-            self._session.enter_stage(stage, "gate met" if gate else "")
-            return
-        self._refused = self._session.stage.number, stage.number
-        text = f"stage {stage.number} {stage.name} refused: {len(open_lines)} open"
-        self._session.add_event("refused", text, EventLevel.WARNING)
-        for line in open_lines:
-            note = f" ({line.note})" if line.note else ""
-            self._session.add_event("gate", f"open: {line.text}{note}", EventLevel.WARNING)
+        if open_lines:
+            self._refuse(stage, open_lines)
+        else:
+            self._pass(stage, "gate met" if gate else "")
 
     def override(self, stage: StageSpec, reason: str) -> None:
-        """Enter a stage whatever is open; the reason and the open items are told."""
+        """Enter a stage whatever was told as open; what has become open since is told first."""
         gate = self._gates.before(stage.number, self._session.stage)
-        texts = "; ".join(line.text for line in gate if not line.is_met)
+        open_lines = [line for line in gate if not line.is_met]
+        told = frozenset[str]() if self._refused is None else self._refused[2]
+        if not told.issuperset(line.name for line in open_lines):
+            self._refuse(stage, open_lines)
+            return
+        texts = "; ".join(line.text for line in open_lines)
         text = f"gate of stage {stage.number} overridden ({reason.strip()}); open: {texts}"
         self._session.add_event("override", text, EventLevel.WARNING)
-        self._session.enter_stage(stage, "gate overridden")
+        self._pass(stage, "gate overridden")
+
+    def tell_open_at_end(self) -> None:
+        """What the operation's end leaves open, when the last stage is in force."""
+        present = self._session.stage
+        if present.number == len(STAGES):
+            self._tell_open(self._gates.before(present.number + 1, present))
+
+    def _pass(self, stage: StageSpec, how: str) -> None:
+        self._refused = None
+        self._session.enter_stage(stage, how)
+
+    def _refuse(self, stage: StageSpec, open_lines: Sequence[ConditionLine]) -> None:
+        names = frozenset(line.name for line in open_lines)
+        self._refused = self._session.stage.number, stage.number, names
+        text = f"stage {stage.number} {stage.name} refused: {len(open_lines)} open"
+        self._session.add_event("refused", text, EventLevel.WARNING)
+        self._tell_open(open_lines)
+
+    def _tell_open(self, lines: Sequence[ConditionLine]) -> None:
+        for line in lines:
+            if not line.is_met:
+                note = f" ({line.note})" if line.note else ""
+                self._session.add_event("gate", f"open: {line.text}{note}", EventLevel.WARNING)

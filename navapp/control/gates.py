@@ -1,19 +1,21 @@
 """The time-out and the gates between stages: which conditions are met, and who said so.
 
-A gate is what must be so on the way to a later stage: the exit conditions of every stage that is
-left and the entry conditions of every stage that is entered. Going back is always allowed.
+A gate is what must be so on the way to a later stage, or from the last one to the operation's end:
+the exit conditions of every stage that is left and the entry conditions of every stage that is
+entered. Going back is always allowed.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from navapp.control.stages import STAGES, TIME_OUT
-from navapp.control.states import ConditionLine, CutLine
+from navapp.control.states import ConditionLine, StepLine
 from navapp.errors import UsageError
 from navapp.values import Condition, ConditionKind, MeasuredFace, Plan, StageSpec
 
 _NS_PER_MINUTE = 60 * 10**9
+_NOT_MADE = "it is not confirmed as made"
 
 
 class Known(Protocol):
@@ -29,13 +31,30 @@ class Known(Protocol):
         """Why the rig is not believed; empty while it is."""
         ...
 
-    def is_bone_ok(self, stage: StageSpec) -> bool:
-        """Whether a stage's bone is accepted, and its newest pose is OK and not too old."""
+    @property
+    def bone(self) -> str:
+        """Of the stage in force."""
         ...
 
-    def cuts_of(self, stage: StageSpec) -> tuple[CutLine, ...]:
-        """The cuts of a stage: planned, made, measured."""
+    def registration_of(self, bone: str) -> int:
+        """How many registrations of a bone were accepted by now."""
         ...
+
+    def is_bone_ok(self, stage: StageSpec) -> bool:
+        """Whether a stage's bone is the present one, accepted, and its newest pose is OK."""
+        ...
+
+    def steps_of(self, stage: StageSpec) -> tuple[StepLine, ...]:
+        """The steps of a stage: planned, made, cuts measured."""
+        ...
+
+
+class _Said(NamedTuple):
+    """A person's word for a condition."""
+
+    time_ns: int
+    # The registration that was checked, or how often a cut had been made; 0: it counts for ever.
+    number: int
 
 
 class Gates:
@@ -46,35 +65,69 @@ class Gates:
         known: to the session.
         are_asked: whether there are gates at all.
         check_minutes: how long what is repeated counts.
+        rig_made_on: day of the rig's calibration; empty when nobody said.
     """
 
-    def __init__(self, plan: Plan, known: Known, *, are_asked: bool, check_minutes: float) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        known: Known,
+        *,
+        are_asked: bool,
+        check_minutes: float,
+        rig_made_on: str = "",
+    ) -> None:
         self._plan, self._known, self._are_asked = plan, known, are_asked
         self._check_ns = round(check_minutes * _NS_PER_MINUTE)
+        self._rig_made_on = rig_made_on
         self._stages = tuple(plan.stage(stage) for stage in STAGES)
-        self._confirmed_ns: dict[str, int] = {}
+        # By the name of the condition, with its bone where it is one's.
+        self._said: dict[str, _Said] = {}
 
     def confirm(self, name: str) -> None:
-        """A person says that a condition is met, now.
+        """A person says that a condition is met, now; of a bone it is the present one.
 
         Raises:
             UsageError: no person answers for it, or there is no such condition.
         """
-        names = self._personal_names()
-        if name not in names:
-            remedy = f"choose one of {', '.join(names)}" if names else "nothing is asked for"
-            raise UsageError(f"nobody is asked for '{name}'", subject=name, remedy=remedy)
-        self._confirmed_ns[name] = self._known.time_ns
+        key, number = self._find(name)
+        self._said[key] = _Said(self._known.time_ns, number)
 
     def withdraw(self, name: str) -> None:
         """A condition is not met after all.
 
         Raises:
-            UsageError: it was not confirmed.
+            UsageError: it was not confirmed, or there is no such condition.
         """
-        if name not in self._confirmed_ns:
+        key, _ = self._find(name)
+        if self._said.pop(key, None) is None:
             raise UsageError(f"'{name}' was not confirmed", subject=name)
-        del self._confirmed_ns[name]
+
+    def _find(self, name: str) -> tuple[str, int]:
+        """Under which key what a person says of a condition is kept, and for which number."""
+        bone = self._known.bone
+        asked = self._personal()
+        if name in asked:
+            is_repeated = asked[name].is_repeated
+            return (_key(asked[name], bone), self._known.registration_of(bone) * is_repeated)
+        cuts = {
+            _cut_name(step): step.n_made
+            for stage in self._stages
+            for step in self._known.steps_of(stage)
+            if self._are_asked and _may_be_checked_by_hand(step, stage)
+        }
+        if name in cuts:
+            return name, cuts[name]
+        names = ", ".join((*asked, *cuts))
+        remedy = f"choose one of {names}" if names else "nothing is asked for"
+        raise UsageError(f"nobody is asked for '{name}'", subject=name, remedy=remedy)
+
+    def _personal(self) -> dict[str, Condition]:
+        """The conditions for which a person answers, by name."""
+        if not self._are_asked:
+            return {}
+        asked = (*TIME_OUT, *(one for s in self._stages for one in (*s.entry, *s.exit)))
+        return {one.name: one for one in asked if one.kind is ConditionKind.PERSON}
 
     def time_out(self) -> tuple[ConditionLine, ...]:
         """What must be so before the first guides."""
@@ -83,7 +136,7 @@ class Gates:
         sides = {bone.side for bone in self._plan.bones.values() if bone.side}
         asked = {
             "patient": self._plan.name,
-            "side": " and ".join(sorted(sides)).upper() or "not known",
+            "side": " and ".join(sorted(sides)).upper() or "the plan does not say which",
             "plan": self._plan.digest[:8],
         }
         lines = [line for one in TIME_OUT for line in self._lines(one, self._stages[0])]
@@ -113,52 +166,74 @@ class Gates:
         known, name, text = self._known, condition.name, condition.text
         match condition.kind:
             case ConditionKind.PERSON:
-                yield self._personal(condition)
+                yield self._tell_said(condition, stage)
             case ConditionKind.BONE_OK:
                 yield ConditionLine(name, f"{stage.bone}: {text}", known.is_bone_ok(stage))
             case ConditionKind.RIG_VALID:
-                yield ConditionLine(name, text, not known.rig_problem, note=known.rig_problem)
-            case ConditionKind.CUTS_MEASURED:
-                for cut in known.cuts_of(stage):
-                    yield self._cut(cut, stage)
+                made = f"on {self._rig_made_on}" if self._rig_made_on else "nobody said when"
+                note = known.rig_problem or made
+                yield ConditionLine(name, text, not known.rig_problem, note=note)
+            case ConditionKind.STEPS_MADE:
+                for step in known.steps_of(stage):
+                    yield self._cut(step, stage) if step.kind == "cut" else _made(step)
 
-    def _personal(self, condition: Condition) -> ConditionLine:
-        said_ns = self._confirmed_ns.get(condition.name)
-        if said_ns is None:
-            return ConditionLine(condition.name, condition.text, False, True)
-        age_ns = self._known.time_ns - said_ns
-        is_met = not condition.is_repeated or age_ns <= self._check_ns
-        note = f"confirmed {age_ns // _NS_PER_MINUTE} min ago{'' if is_met else ': too old'}"
-        return ConditionLine(condition.name, condition.text, is_met, True, note)
+    def _tell_said(self, condition: Condition, stage: StageSpec) -> ConditionLine:
+        """A condition for which a person answers."""
+        said = self._said.get(_key(condition, stage.bone))
+        text = f"{stage.bone}: {condition.text}" if condition.is_repeated else condition.text
+        if said is None:
+            return ConditionLine(condition.name, text, False, True)
+        age_ns = self._known.time_ns - said.time_ns
+        note = f"confirmed {age_ns // _NS_PER_MINUTE} min ago"
+        if not condition.is_repeated:
+            return ConditionLine(condition.name, text, True, True, note)
+        if said.number != self._known.registration_of(stage.bone):
+            note += ", before the bone was registered again"
+            return ConditionLine(condition.name, text, False, True, note)
+        is_met = age_ns <= self._check_ns
+        return ConditionLine(
+            condition.name, text, is_met, True, note + ("" if is_met else ": too old")
+        )
 
-    def _cut(self, cut: CutLine, stage: StageSpec) -> ConditionLine:
+    def _cut(self, cut: StepLine, stage: StageSpec) -> ConditionLine:
         """A cut is measured within tolerance; of one that cannot be measured a person says so."""
-        text = f"cut {cut.name} within tolerance"
+        name, text = _cut_name(cut), f"cut {cut.name} within tolerance"
         if not cut.is_made:
-            return ConditionLine(cut.name, text, False, note="it is not confirmed as made")
+            return ConditionLine(name, text, False, note=_NOT_MADE)
         if cut.face is not None:
             is_met = is_within(cut.face, stage)
             note = f"{cut.face.angle_deg:.2f} deg, {cut.face.offset_mm:+.2f} mm"
-            return ConditionLine(cut.name, text, is_met, note=note)
-        is_met = cut.name in self._confirmed_ns
+            return ConditionLine(name, text, is_met, note=note)
+        if not _may_be_checked_by_hand(cut, stage):
+            note = "it was measured beyond tolerance with an earlier registration"
+            return ConditionLine(name, text, False, note=note)
+        said = self._said.get(name)
+        is_met = said is not None and said.number == cut.n_made
         note = "checked by hand" if is_met else "not measurable: check it by hand, or override"
-        return ConditionLine(cut.name, text, is_met, True, note)
+        return ConditionLine(name, text, is_met, True, note)
 
-    def _personal_names(self) -> tuple[str, ...]:
-        """All that a person may confirm."""
-        if not self._are_asked:
-            return ()
-        asked: Sequence[Condition] = [
-            *TIME_OUT, *(one for stage in self._stages for one in (*stage.entry, *stage.exit)),
-        ]  # fmt: skip
-        names = [one.name for one in asked if one.kind is ConditionKind.PERSON]
-        names += [
-            cut.name
-            for stage in self._stages
-            for cut in self._known.cuts_of(stage)
-            if cut.is_made and cut.face is None
-        ]
-        return tuple(dict.fromkeys(names))
+
+def _key(condition: Condition, bone: str) -> str:
+    """What is repeated is said of one bone."""
+    return f"{condition.name} {bone}" if condition.is_repeated else condition.name
+
+
+def _cut_name(cut: StepLine) -> str:
+    """Of the condition: a plan may give a cut the name of another condition."""
+    return f"cut {cut.name}"
+
+
+def _may_be_checked_by_hand(step: StepLine, stage: StageSpec) -> bool:
+    """A cut that is not measured, and was not measured beyond tolerance since it was made."""
+    if step.kind != "cut" or not step.is_made or step.face is not None:
+        return False
+    return step.last_face is None or is_within(step.last_face, stage)
+
+
+def _made(step: StepLine) -> ConditionLine:
+    """A hole or a part: nothing measures it, an operator has confirmed it."""
+    text = f"hole {step.name} drilled" if step.kind == "hole" else f"{step.name} in its place"
+    return ConditionLine(step.name, text, step.is_made, note="" if step.is_made else _NOT_MADE)
 
 
 def is_within(face: MeasuredFace, stage: StageSpec) -> bool:

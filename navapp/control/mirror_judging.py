@@ -43,7 +43,7 @@ class MirrorJudge:
         tracked: TrackedFrame | None,
         now_ns: int,
         surface: TriangleMesh | None = None,
-        made_cuts: frozenset[str] = frozenset(),
+        made_steps: frozenset[str] = frozenset(),
     ) -> MirrorError | None:
         """Of a stage's layers; None without a pose, or when nothing lies at the bone.
 
@@ -53,7 +53,7 @@ class MirrorJudge:
             tracked: what is said of the stage's bone.
             now_ns: on the session's clock.
             surface: what is left of the bone; None: all of it.
-            made_cuts: names of planes that need no guides any more.
+            made_steps: names of steps that need no guides any more.
         """
         estimate = None if tracked is None else tracked.estimate
         if estimate is None or stage.bone not in self._plan.bones:
@@ -61,14 +61,14 @@ class MirrorJudge:
             return None
         variances = np.diag(estimate.covariance)
         last = self._judged
-        what = (stage.name, layers, made_cuts)
+        what = (stage.name, layers, made_steps)
         is_valid = last is not None and last[0] == what
         if last is None or not is_valid or not 0 <= now_ns - last[1] < _VALID_NS:
             is_valid = False
         # The pose's covariance may grow from one frame to the next.
         if last is None or not is_valid or not (variances <= _MOST_GROWN * last[2]).all():
             self._judged = what, now_ns, variances
-            self._error = self._predict(stage, layers, estimate, surface, made_cuts)
+            self._error = self._predict(stage, layers, estimate, surface, made_steps)
         return self._error
 
     def _predict(
@@ -77,10 +77,10 @@ class MirrorJudge:
         layers: tuple[str, ...],
         estimate: PoseEstimate,
         surface: TriangleMesh | None,
-        made_cuts: frozenset[str],
+        made_steps: frozenset[str],
     ) -> MirrorError | None:
         pose = estimate.camera_from_bone
-        scene = Scene(self._plan, stage, pose, self._view, False, None, layers, surface, made_cuts)
+        scene = Scene(self._plan, stage, pose, self._view, False, None, layers, surface, made_steps)
         points = {name: sample_guides(scene, name) for name in layers}
         points = {name: some for name, some in points.items() if len(some)}
         if not points:

@@ -168,7 +168,7 @@ def _scene(
         foreground,
         snapshot.layers,
         snapshot.bone_surface,
-        frozenset(cut.name for cut in snapshot.cuts if cut.is_made),
+        frozenset(step.name for step in snapshot.steps if step.is_made),
     )
 
 

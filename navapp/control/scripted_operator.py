@@ -13,7 +13,7 @@ from navapp.control.commands import (
     Blank,
     Command,
     ConfirmCondition,
-    ConfirmCut,
+    ConfirmStep,
     EnterStage,
     OverrideGate,
     Propose,
@@ -22,7 +22,7 @@ from navapp.control.commands import (
     Reject,
     Show,
     WithdrawCondition,
-    WithdrawCut,
+    WithdrawStep,
 )
 from navapp.control.stages import TIME_OUT, stage_by_name
 from navapp.control.states import SessionState, Snapshot
@@ -30,6 +30,7 @@ from navapp.errors import ConfigurationError
 from navapp.values import ConditionKind, Status
 
 _MAX_ATTEMPTS = 8
+_MAY_REGISTER = (SessionState.READY, SessionState.SUSPENDED, SessionState.NAVIGATING)
 # What a step waits for besides a state of the session.
 _GUIDES, _DARK, _MEASURED = "guides", "dark", "measured"
 
@@ -44,8 +45,8 @@ class ScriptStep(Section):
         "withdraw",
         "stage",
         "override",
-        "cut",
-        "uncut",
+        "made",
+        "unmade",
         "blank",
         "show",
         "wait",
@@ -59,7 +60,7 @@ class ScriptStep(Section):
     stage: str = ""
     """Of stage and override: name or number."""
     name: str = ""
-    """Of confirm and withdraw: the condition; of cut and uncut: the plane."""
+    """Of confirm and withdraw: the condition; of made and unmade: the cut, hole or part."""
     reason: str = ""
     """Of override."""
     until: str = ""
@@ -111,11 +112,16 @@ class ScriptedOperator:
         self._phase: Literal["idle", "registering", "proposed"] = "idle"
         self._since_frame: int | None = None
         self._told_ns = 0
+        # The stage that was asked for last, until it is known whether it was entered.
+        self._entering: int | None = None
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
-        """The next action of the script, when its time has come."""
+        """The next action of the script, when its time has come; a script that failed ends."""
         if snapshot.state is SessionState.REVIEW:
             return self._decide(snapshot)
+        self._check_entered(snapshot)
+        if self.failure:
+            return [Quit()]
         if not self._steps or snapshot.sequence < self._steps[0].at_frame:
             return []
         step = self._steps[0]
@@ -126,10 +132,32 @@ class ScriptedOperator:
             return []
         self._next_step()
         self._told_ns = snapshot.time_ns
-        return [_command_of(step)]
+        command = _command_of(step)
+        if isinstance(command, EnterStage | OverrideGate):
+            self._entering = command.number
+        return [command]
+
+    @property
+    def unfinished(self) -> str:
+        """What of the script was not done; empty when nothing is left."""
+        if not self._steps:
+            return ""
+        number = self._n_steps - len(self._steps) + 1
+        return f"the session ended before step {number} of the operator's script ({self._steps[0]})"
+
+    def _check_entered(self, snapshot: Snapshot) -> None:
+        """A gate that refuses ends the script, unless its next step expects that."""
+        number, self._entering = self._entering, None
+        if number is None or snapshot.stage.number == number:
+            return
+        if not (self._steps and self._steps[0].do == "expect"):
+            why = "; ".join(line.text for line in snapshot.gate if not line.is_met)
+            number = self._n_steps - len(self._steps)
+            self.failure = f"step {number} of the operator's script: refused, open: {why}"
+            self._steps.clear()
 
     def _begin(self, snapshot: Snapshot) -> list[Command]:
-        if snapshot.state not in (SessionState.READY, SessionState.SUSPENDED):
+        if snapshot.state not in _MAY_REGISTER:
             return []
         self._n_attempts += 1
         if self._n_attempts > _MAX_ATTEMPTS:
@@ -196,15 +224,17 @@ def _command_of(step: ScriptStep) -> Command:
             return ConfirmCondition(step.name)
         case "withdraw":
             return WithdrawCondition(step.name)
-        case "cut":
-            return ConfirmCut(step.name)
-        case "uncut":
-            return WithdrawCut(step.name)
+        case "made":
+            return ConfirmStep(step.name)
+        case "unmade":
+            return WithdrawStep(step.name)
         case "blank":
             return Blank()
         case "show":
             return Show()
-    return Quit()
+        case "quit":
+            return Quit()
+    raise ValueError(f"the step '{step.do}' is no command")
 
 
 def _is_there(until: str, snapshot: Snapshot) -> bool:
@@ -213,7 +243,9 @@ def _is_there(until: str, snapshot: Snapshot) -> bool:
     if until == _DARK:
         return not snapshot.is_navigable
     if until == _MEASURED:
-        return all(cut.face is not None for cut in snapshot.cuts if cut.is_made)
+        return all(
+            step.face is not None for step in snapshot.steps if step.kind == "cut" and step.is_made
+        )
     return snapshot.state.value == until
 
 
@@ -224,7 +256,9 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
         ConfigurationError: an unknown key, action or stage, or a step that lacks what it needs.
     """
     steps = validate(Script, content, name).step
-    waited = {_GUIDES, _DARK, _MEASURED, *(state.value for state in SessionState)}
+    # What is under review is decided at once: nobody could wait for it.
+    states = (state.value for state in SessionState if state is not SessionState.REVIEW)
+    waited = {_GUIDES, _DARK, _MEASURED, *states}
     for number, step in enumerate(steps, start=1):
         if step.do in ("stage", "override"):
             stage_by_name(step.stage)
@@ -248,8 +282,8 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
 _NEEDED = {
     "confirm": "name",
     "withdraw": "name",
-    "cut": "name",
-    "uncut": "name",
+    "made": "name",
+    "unmade": "name",
     "override": "reason",
     "wait": "until",
     "expect": "text",

@@ -1,26 +1,27 @@
 """What a session knows, and every way in which frames and commands change it."""
 
+from collections import Counter
+
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from navapp.control.bone_tracks import BoneTracks, Candidate
 from navapp.control.commands import Command, Interrupt
 from navapp.control.event_log import EventLog
 from navapp.control.frame_result import FrameResult
-from navapp.control.interlocks import is_current
 from navapp.control.layer_choice import LayerChoice
-from navapp.control.made_cuts import MadeCuts
+from navapp.control.made_steps import MadeSteps
 from navapp.control.other_bones import OtherBones
 from navapp.control.pictures import OperatorPicture
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
 from navapp.control.states import (
-    CutLine,
     Event,
     EventLevel,
     LimbLine,
     OtherBone,
     Rates,
     SessionState,
+    StepLine,
 )
 from navapp.errors import RigError
 from navapp.geometry.mesh import TriangleMesh
@@ -39,7 +40,7 @@ class Session:
         tracks: of the session's bones.
         registration: searches for the stage's bone.
         others: the other bones that are followed.
-        cuts: that have been made.
+        steps: that have been made.
         stage: to start in.
         layers: that are drawn; by default those of the stage.
         meter: of its frames.
@@ -52,7 +53,7 @@ class Session:
         tracks: BoneTracks,
         registration: RegistrationJob,
         others: OtherBones,
-        cuts: MadeCuts,
+        steps: MadeSteps,
         stage: StageSpec,
         layers: LayerChoice | None = None,
         meter: RateMeter | None = None,
@@ -62,7 +63,7 @@ class Session:
         self._tracks = tracks
         self._registration = registration
         self._others = others
-        self._cuts = cuts
+        self._steps = steps
         self._state = SessionState.STARTING
         self._tracked: TrackedFrame | None = None
         self._shows_depth = False
@@ -70,6 +71,7 @@ class Session:
         self._tracked_at_ns = self._time_ns = 0
         self._picture: OperatorPicture | None = None
         self._meter = meter or RateMeter()
+        self._n_accepted: Counter[str] = Counter()
         self._is_over = False
         self._rig_error: RigError | None = None
         self._stage = stage
@@ -198,36 +200,41 @@ class Session:
         """What they said together last, as of now; None while they are not both followed."""
         return self._others.describe_limb(self._stage, now_ns)
 
-    def confirm_cut(self, name: str) -> None:
-        """A planned cut has been made.
+    def confirm_step(self, name: str) -> None:
+        """A planned step has been made.
 
         Raises:
-            UsageError: the plan has no such cut.
+            UsageError: the plan has no such step.
         """
-        self._take_cut(self._cuts.confirm(name), f"cut {name} confirmed")
+        self._take_step(self._steps.confirm(name), f"{name} confirmed")
 
-    def withdraw_cut(self, name: str) -> None:
-        """A cut has not been made after all.
+    def withdraw_step(self, name: str) -> None:
+        """A step has not been made after all.
 
         Raises:
             UsageError: it was not confirmed.
         """
-        self._take_cut(self._cuts.withdraw(name), f"cut {name} withdrawn")
+        self._take_step(self._steps.withdraw(name), f"{name} withdrawn")
 
-    def _take_cut(self, bone: CutBone, text: str) -> None:
+    def _take_step(self, bone: CutBone, text: str) -> None:
         name = bone.planned.name
         if name == self._stage.bone:
             # What was judged by the old model says nothing of the new one.
             self._tracked = None
             self._tracks.forget_verdicts()
-        self.add_event("cut", f"{text}: version {bone.version} of the {name} is in force")
+        self.add_event("step", f"{text}: version {bone.version} of the {name} is in force")
         if name == self._stage.bone and self._state is SessionState.REGISTERING:
             # What runs searches for the bone as it was.
             self.begin_registration()
 
-    def cuts_of(self, stage: StageSpec) -> tuple[CutLine, ...]:
-        """The cuts of a stage: planned, made, measured."""
-        return self._cuts.describe(stage)
+    def steps_of(self, stage: StageSpec) -> tuple[StepLine, ...]:
+        """The steps of a stage: planned, made, cuts measured."""
+        return self._steps.describe(stage)
+
+    @property
+    def made_steps(self) -> frozenset[str]:
+        """Names of all steps that are made, of all bones."""
+        return self._steps.names
 
     @property
     def time_ns(self) -> int:
@@ -239,33 +246,39 @@ class Session:
         """Why the rig is not believed; empty while it is."""
         return "" if self._rig_error is None else self._rig_error.problem
 
+    @property
+    def bone(self) -> str:
+        """Of the stage in force."""
+        return self._stage.bone
+
+    def registration_of(self, bone: str) -> int:
+        """How many registrations of a bone were accepted by now."""
+        return self._n_accepted[bone]
+
     def is_bone_ok(self, stage: StageSpec) -> bool:
-        """Whether a stage's bone is accepted, and its newest pose is OK and not too old."""
-        if stage.bone == self._stage.bone:
-            is_ok = self._tracked is not None and self._tracked.verdict.status is Status.OK
-            return is_ok and self._state is SessionState.NAVIGATING
-        others = self._others.describe(self._stage, self._time_ns)
-        return any(other.name == stage.bone and is_current(other) for other in others)
+        """Whether a stage's bone is the present one, accepted, and its newest pose is OK."""
+        is_ok = self._tracked is not None and self._tracked.verdict.status is Status.OK
+        return is_ok and stage.bone == self.bone and self._is_accepted
 
     @property
     def bone_version(self) -> int:
         """Of the stage's bone; 0 without a model of it."""
-        return self._cuts.version(self._stage.bone)
+        return self._steps.version(self._stage.bone)
 
     @property
     def bone_surface(self) -> TriangleMesh | None:
         """What is left of the stage's bone; None: all of it."""
-        return self._cuts.surface(self._stage.bone)
+        return self._steps.surface(self._stage.bone)
 
     def measure_faces(self, frame: StereoFrame) -> dict[str, MeasuredFace]:
         """Measure the faces of cuts of the stage's bone in a frame; in a fault none."""
         if self._state is SessionState.FAULT:
             return {}
         before = self.bone_version
-        faces = self._cuts.measure(frame, self._tracked, is_accepted=self._is_accepted)
+        faces = self._steps.measure(frame, self._tracked, is_accepted=self._is_accepted)
         if self.bone_version != before:
             text = f"faces measured: version {self.bone_version} of the {self._stage.bone}"
-            self.add_event("cut", f"{text} is in force")
+            self.add_event("step", f"{text} is in force")
         return faces
 
     @property
@@ -355,7 +368,8 @@ class Session:
         """Navigate by the candidate under review, if there is one."""
         if (candidate := self._tracks.candidate) is None:
             return
-        self._cuts.forget_faces(self._stage.bone)
+        self._steps.forget_faces(self._stage.bone)
+        self._n_accepted[self._stage.bone] += 1
         self._tracks.accept(self._stage)
         text = add_bound("registration accepted", candidate.tracked.verdict)
         self.change_state(SessionState.NAVIGATING, text)

@@ -76,7 +76,7 @@ class SnapshotMaker:
             time_out=self.gates.time_out,
             gate=self.gates.gate,
             refused_stage=self.gates.refused_stage,
-            cuts=session.cuts_of(session.stage),
+            steps=session.steps_of(session.stage),
             bone_version=session.bone_version,
             bone_surface=session.bone_surface,
             rates=session.rates(self.camera.n_dropped),
@@ -123,7 +123,7 @@ class SnapshotMaker:
         if self.mirror_judge is None:
             return None
         session = self.session
-        made = frozenset(cut.name for cut in session.cuts_of(session.stage) if cut.is_made)
+        made = frozenset(step.name for step in session.steps_of(session.stage) if step.is_made)
         return self.mirror_judge.judge(
             session.stage, session.layers, tracked, now_ns, session.bone_surface, made
         )

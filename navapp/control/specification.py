@@ -38,7 +38,7 @@ class SessionSpecification:
     is_recording: bool = False  # the session is kept in a folder
     layers: tuple[str, ...] | None = None  # drawn in every stage; None: the stage's own
     display: CalibratedDisplay | None = None  # in the mirror; None: it shows the video
-    made_cuts: tuple[str, ...] = ()  # planes of the plan that are cut from the start
+    made_steps: tuple[str, ...] = ()  # of the plan, made from the start
     frames_between_faces: int = 5  # faces of cuts are measured in every so many frames
     # guides wait for the time-out, and stages for what their gates ask for.
     has_gates: bool = False
@@ -75,7 +75,7 @@ def specify_session(
     is_each: bool = False,
     layers: tuple[str, ...] | None = None,
     calibrated_display: CalibratedDisplay | None = None,
-    made_cuts: tuple[str, ...] = (),
+    made_steps: tuple[str, ...] = (),
     has_gates: bool = False,
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
@@ -94,7 +94,7 @@ def specify_session(
         is_each: every frame stands for itself.
         layers: drawn in every stage; None: the stage's own.
         calibrated_display: in the mirror; None: the display shows the video.
-        made_cuts: planes of the plan that are cut from the start.
+        made_steps: cuts, holes and parts of the plan that are made from the start.
         has_gates: guides wait for the time-out, and stages for what their gates ask for.
     """
     display = configuration.display
@@ -116,7 +116,7 @@ def specify_session(
         is_recording=is_live and configuration.recording.folder is not None,
         layers=layers,
         display=calibrated_display,
-        made_cuts=made_cuts,
+        made_steps=made_steps,
         has_gates=has_gates,
         check_minutes=configuration.stages.check_minutes,
     )

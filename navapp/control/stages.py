@@ -20,7 +20,7 @@ _BONE_OK = Condition("bone_ok", "registration accepted, pose OK", ConditionKind.
 _CHECKED = Condition(
     "checked_on_patient", "checked on the patient: known points lie where shown", is_repeated=True
 )
-_CUTS = Condition("cuts", "cuts measured within tolerance", ConditionKind.CUTS_MEASURED)
+_STEPS = Condition("steps", "made as planned", ConditionKind.STEPS_MADE)
 
 STAGES: tuple[StageSpec, ...] = (
     StageSpec(
@@ -42,10 +42,7 @@ STAGES: tuple[StageSpec, ...] = (
         targets=("femur/notch",),
         layers=("bone", "risks", "drills", "targets", "scale"),
         entry=(_CHECKED,),
-        exit=(
-            Condition("entry_point", "the entry point was checked with the tip"),
-            Condition("hole_drilled", "the hole is drilled to its depth"),
-        ),
+        exit=(Condition("entry_point", "the entry point was checked with the tip"), _STEPS),
     ),
     StageSpec(
         number=3,
@@ -56,11 +53,7 @@ STAGES: tuple[StageSpec, ...] = (
         targets=("femur/medial_condyle", "femur/lateral_condyle"),
         layers=("bone", "removal", "risks", "parts", "planes", "scale"),
         entry=(_CHECKED,),
-        exit=(
-            _CUTS,
-            Condition("component_size", "the component's size is confirmed"),
-            Condition("component_seated", "the component is seated"),
-        ),
+        exit=(Condition("component_size", "the component's size is confirmed"), _STEPS),
     ),
     StageSpec(
         number=4,
@@ -70,7 +63,7 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=2.0,
         targets=("patella/centre",),
         layers=("bone", "removal", "parts", "planes", "scale"),
-        exit=(_CUTS, Condition("thickness", "the patella's thickness was measured")),
+        exit=(_STEPS, Condition("thickness", "the patella's thickness was measured")),
     ),
     StageSpec(
         number=5,
@@ -80,8 +73,11 @@ STAGES: tuple[StageSpec, ...] = (
         tolerance_deg=1.0,
         targets=("tibia/medial_plateau", "tibia/lateral_plateau"),
         layers=("bone", "removal", "parts", "planes", "scale"),
-        entry=(_CHECKED,),
-        exit=(_CUTS, Condition("gaps", "the gaps were measured in extension and at 90 deg")),
+        exit=(
+            _CHECKED,
+            _STEPS,
+            Condition("gaps", "the gaps were measured in extension and at 90 deg"),
+        ),
     ),
 )
 

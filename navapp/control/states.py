@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,14 +137,21 @@ class LimbLine:
     age_ms: float | None = None  # since that picture, now
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CutLine:
-    """A cut of the stage: planned, made, measured."""
+StepKind = Literal["cut", "hole", "part"]
 
-    name: str  # of the plane
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepLine:
+    """A planned step of the stage: a cut, a hole, a part; made, and a cut measured."""
+
+    name: str  # in the plan
     is_made: bool  # an operator has confirmed it
     face: MeasuredFace | None = None  # all measurements together; None: not measurable yet
     seen_share: float | None = None  # of the face in the newest look; None: not seen at all
+    kind: StepKind = "cut"
+    n_made: int = 0  # how often it was confirmed: a cut may be made again
+    # the newest measurement since it was confirmed, whatever was registered anew since then.
+    last_face: MeasuredFace | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +199,8 @@ class Snapshot:
     # the stage whose gate was told as not met, and may be overridden; None: none was.
     refused_stage: int | None = None
     gate: tuple[ConditionLine, ...] = ()  # before that stage, or else the next one
-    cuts: tuple[CutLine, ...] = ()  # of the stage
-    bone_version: int = 0  # of the stage's bone: counts the cuts confirmed, measured, withdrawn
+    steps: tuple[StepLine, ...] = ()  # planned for the stage
+    bone_version: int = 0  # of the stage's bone: counts what is confirmed, measured, withdrawn
     bone_surface: TriangleMesh | None = None  # what is left of it; None: all
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()

@@ -112,8 +112,8 @@ class Trackers:
                 meter = self._face_meters.setdefault(bone.planned.name, new)
         known = bone.faces.get(name)
         expected = None if known is None else known.as_plane
-        made = tuple(bone.made.values())
-        return meter.measure(frame.left, frame.right, estimate, made, bone.made[name], expected)
+        made = tuple(bone.cuts.values())
+        return meter.measure(frame.left, frame.right, estimate, made, bone.cuts[name], expected)
 
     def corners_mm(self, bone: str) -> FloatArray:
         """(8, 3) of the box around a bone's model."""

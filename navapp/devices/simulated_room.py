@@ -42,8 +42,14 @@ class Simulation:
     approach_axis: FloatArray
     approach_half_angle_deg: float
     oracle: TruthOracle  # the truth, for evaluation after the run only
-    # tells the room which stage is in force; it answers with the planned cuts that are made there.
-    set_stage: Callable[[str], tuple[str, ...]]
+    planned_parts: Mapping[str, TriangleMesh]  # the components, in the coordinates of their bones
+    # set_stage, go_on: tell the room which stage is in force, as it is usually entered, or as far
+    # as it was made; it answers with the planned steps that are made then.
+    set_stage: Callable[[str], frozenset[str]]
+    go_on: Callable[[str], frozenset[str]]
+    # make, unmake: tell the room that a step is made by now, or is not made after all.
+    make: Callable[[str], None]
+    unmake: Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +93,7 @@ def scenario_of(settings: SimulationSection) -> Scenario:
         cartilage_mm=settings.cartilage_mm,
         motion=settings.motion,
         instrument=settings.instrument,
+        misses=settings.misses,
     )
 
 
@@ -122,6 +129,7 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         drill_entry_mm=entry_mm,
         drill_direction=direction,
         planned_cuts=world.planned_cuts,
+        planned_parts=world.planned_parts,
         worn_vertices=world.worn_vertices,
         nominal_left_from_bone={
             "femur": world.nominal_left_from_femur,
@@ -132,4 +140,7 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         approach_half_angle_deg=world.approach_half_angle_deg,
         oracle=TruthOracle(world, camera.world_time_ns),
         set_stage=world.set_stage,
+        go_on=world.go_on,
+        make=world.make,
+        unmake=world.unmake,
     )

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ from navapp.values import (
     RiskStructure,
     StageSpec,
 )
+
+_Planned = TypeVar("_Planned")
 
 # Guides on the bone are drawn over this margin around its picture: lines beside it as well.
 _MARGIN_PX = 48
@@ -54,7 +57,8 @@ class Scene:
     foreground: Foreground | None = None
     layers: tuple[str, ...] = ()  # to be drawn, in the order of the table of layers
     surface: TriangleMesh | None = None  # what is left of the bone; None: all of it
-    made_cuts: frozenset[str] = frozenset()  # names of planes: they need no guides any more
+    # names of cuts, holes and parts that need no guides any more.
+    made_steps: frozenset[str] = frozenset()
 
     @property
     def mesh(self) -> TriangleMesh:
@@ -100,18 +104,20 @@ class Scene:
     @property
     def planes(self) -> Mapping[str, ResectionPlane]:
         """The stage's that are still to be cut, by name."""
-        planes = self.plan.planes_of(self.stage)
-        return {name: plane for name, plane in planes.items() if name not in self.made_cuts}
+        return self._to_make(self.plan.planes_of(self.stage))
 
     @property
     def drills(self) -> Mapping[str, DrillAxis]:
-        """The stage's, by name."""
-        return self.plan.of_stage(self.plan.content.drills, "drills", self.stage)
+        """The stage's that are still to be drilled, by name."""
+        return self._to_make(self.plan.of_stage(self.plan.content.drills, "drills", self.stage))
 
     @property
     def parts(self) -> Mapping[str, Part]:
-        """The stage's, by name."""
-        return self.plan.of_stage(self.plan.content.parts, "parts", self.stage)
+        """The stage's that are still to be put in, by name."""
+        return self._to_make(self.plan.of_stage(self.plan.content.parts, "parts", self.stage))
+
+    def _to_make(self, planned: Mapping[str, _Planned]) -> dict[str, _Planned]:
+        return {name: one for name, one in planned.items() if name not in self.made_steps}
 
     @property
     def risks(self) -> Mapping[str, RiskStructure]:

@@ -1,4 +1,4 @@
-"""A bone of the plan with the cuts that have been made, and what is known of their faces."""
+"""A bone of the plan with what has been cut, drilled and put in, and its faces as measured."""
 
 import math
 from collections.abc import Mapping
@@ -6,11 +6,18 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.resection.remaining_bone import Cut, cut_surface, remove_cuts
-from navapp.values import BoneModel, MeasuredFace, ResectionPlane
+from navapp.resection.remaining_bone import (
+    Cut,
+    cover_with_parts,
+    cut_surface,
+    remove_cuts,
+    remove_holes,
+)
+from navapp.values import BoneModel, DrillAxis, MeasuredFace, Part, PlannedStep, ResectionPlane
 
-# All chosen. A saw misses its plan: bone so near to a planned face may be gone, until the face is
-# measured. Then what is left: a triangle's height, and what the measurement leaves open.
+# All chosen. Saw and drill miss their plan: bone so near to a planned face or hole may be gone,
+# until the face is measured. Then what is left: a triangle's height, and what the measurement
+# leaves open.
 UNSURE_MM, SURE_MM = 1.5, 0.3
 # The tilt of a face is unsure, too: so far from its middle most of it lies.
 _HALF_FACE_MM = 25.0
@@ -18,44 +25,56 @@ _HALF_FACE_MM = 25.0
 
 @dataclass(frozen=True, eq=False)
 class CutBone:
-    """A bone of the plan, cut; changed by making another one."""
+    """A bone of the plan, worked on; changed by making another one."""
 
     planned: BoneModel
-    made: Mapping[str, ResectionPlane] = field(default_factory=dict)  # by name, as planned
-    faces: Mapping[str, MeasuredFace] = field(default_factory=dict)  # of those that are measured
+    made: Mapping[str, PlannedStep] = field(default_factory=dict)  # by name, as planned
+    faces: Mapping[str, MeasuredFace] = field(default_factory=dict)  # of cuts that are measured
     version: int = 0  # a number for each state; one that comes back has its number again
     earlier: tuple["CutBone", ...] = ()  # the states before, each once
 
     @cached_property
     def model(self) -> BoneModel:
-        """What is left of the bone, to be registered to."""
-        left = remove_cuts(self.planned, [self._cut(name) for name in self.made])
+        """What is left of the bone and not covered, to be registered to."""
+        left = remove_cuts(self.planned, [self._cut(name) for name in self.cuts])
+        holes = [one for one in self.made.values() if isinstance(one, DrillAxis)]
+        left = cover_with_parts(remove_holes(left, holes, UNSURE_MM), self.parts)
         return replace(left, version=self.version)
 
     @cached_property
     def surface(self) -> TriangleMesh | None:
-        """What is left of it, with its faces where they are known or planned; None when whole."""
-        if not self.made:
+        """What is left of it, with its faces where they are known or planned; None when uncut."""
+        if not self.cuts:
             return None
-        planes = [self._cut(name).plane for name in self.made]
+        planes = [self._cut(name).plane for name in self.cuts]
         return cut_surface(self.planned.mesh, planes)
+
+    @property
+    def cuts(self) -> dict[str, ResectionPlane]:
+        """Those that are made, by name, as planned."""
+        return {n: one for n, one in self.made.items() if isinstance(one, ResectionPlane)}
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """Those that are in place, where they are planned."""
+        return tuple(one for one in self.made.values() if isinstance(one, Part))
 
     @property
     def unmeasured(self) -> tuple[str, ...]:
         """Names of the cuts whose face is not known yet."""
-        return tuple(name for name in self.made if name not in self.faces)
+        return tuple(name for name in self.cuts if name not in self.faces)
 
-    def cut(self, name: str, plane: ResectionPlane) -> "CutBone":
-        """With one more cut; its face is not measured."""
-        return self._become({**self.made, name: plane}, self._faces_but(name))
+    def make(self, name: str, step: PlannedStep) -> "CutBone":
+        """With one more step made; the face of a cut is not measured."""
+        return self._become({**self.made, name: step}, self._faces_but(name))
 
     def restore(self, name: str) -> "CutBone":
-        """Without a cut."""
-        made = {other: plane for other, plane in self.made.items() if other != name}
+        """Without a step."""
+        made = {other: step for other, step in self.made.items() if other != name}
         return self._become(made, self._faces_but(name))
 
     def without_faces(self) -> "CutBone":
-        """With its cuts, and nothing known of their faces."""
+        """As it is made, and nothing known of its faces."""
         return self._become(self.made, {})
 
     def with_faces(self, faces: Mapping[str, MeasuredFace]) -> "CutBone":
@@ -66,7 +85,7 @@ class CutBone:
         return {other: face for other, face in self.faces.items() if other != name}
 
     def _become(
-        self, made: Mapping[str, ResectionPlane], faces: Mapping[str, MeasuredFace]
+        self, made: Mapping[str, PlannedStep], faces: Mapping[str, MeasuredFace]
     ) -> "CutBone":
         """Another state: an earlier one if it is the same, else a new version."""
         known = {state.version: state for state in (*self.earlier, self)}
@@ -80,6 +99,6 @@ class CutBone:
     def _cut(self, name: str) -> Cut:
         face = self.faces.get(name)
         if face is None:
-            return Cut(self.made[name], UNSURE_MM)
+            return Cut(self.cuts[name], UNSURE_MM)
         tilt_mm = _HALF_FACE_MM * math.radians(face.bound_deg)
         return Cut(face.as_plane, min(SURE_MM + face.bound_mm + tilt_mm, UNSURE_MM))

@@ -5,11 +5,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.mesh_sections import clip_below, fill_section, find_piece, section_lines
 from navapp.geometry.transform import FloatArray
-from navapp.values import BoneModel, ResectionPlane
+from navapp.values import BoneModel, DrillAxis, Part, ResectionPlane
+from navapp.values.part_shapes import part_mesh
 
 
 class Cut(NamedTuple):
@@ -44,10 +46,42 @@ def remove_cuts(bone: BoneModel, cuts: Sequence[Cut]) -> BoneModel:
         is_gone |= height_mm > 0.0
         lid = fill_section(section_lines(mesh, height_mm), cut.plane.normal)
         lids += [] if lid is None else [lid]
-    # Triangles on the edge of what is unsure: they hide what lies behind, too.
+    return _remove(bone, is_gone, lids)
+
+
+def remove_holes(bone: BoneModel, holes: Sequence[DrillAxis], unsure_mm: float) -> BoneModel:
+    """The bone without what drills took, as far down as they went, and what is unsure beside it."""
+    if not holes:
+        return bone
+    points_mm = bone.mesh.vertices_mm
+    is_gone = np.zeros(len(points_mm), dtype=np.bool_)
+    for hole in holes:
+        along_mm = (points_mm - hole.entry_mm) @ hole.direction
+        away_mm = points_mm - hole.entry_mm - along_mm[:, None] * hole.direction
+        is_beside = np.linalg.norm(away_mm, axis=1) < 0.5 * hole.diameter_mm + unsure_mm
+        # The drill came from outside: whatever lies there over the entry is gone as well.
+        is_gone |= is_beside & (np.abs(along_mm) < hole.depth_mm + unsure_mm)
+    return _remove(bone, is_gone, [])
+
+
+def cover_with_parts(bone: BoneModel, parts: Sequence[Part]) -> BoneModel:
+    """The bone with parts where they are planned: they hide it, and nothing is matched on them."""
+    if not parts:
+        return bone
+    covers = [part_mesh(part) for part in parts]
+    return replace(bone, lid=join_meshes(*([] if bone.lid is None else [bone.lid]), *covers))
+
+
+def _remove(bone: BoneModel, is_gone: NDArray[np.bool_], lids: list[TriangleMesh]) -> BoneModel:
+    """Mark vertices (V,) as gone, and close the bone by its lid, by further ones and by the rim.
+
+    The rim are triangles on the edge of what is gone: they hide what lies behind, too.
+    """
+    mesh = bone.mesh
     n_gone = is_gone[mesh.faces].sum(axis=1)
     rim = TriangleMesh(mesh.vertices_mm, mesh.faces[(n_gone > 0) & (n_gone < 3)], mesh.normals)
-    return replace(bone, is_removed=bone.is_removed | is_gone, lid=join_meshes(rim, *lids))
+    lids = [*([] if bone.lid is None else [bone.lid]), rim, *lids]
+    return replace(bone, is_removed=bone.is_removed | is_gone, lid=join_meshes(*lids))
 
 
 def cut_surface(mesh: TriangleMesh, planes: Sequence[ResectionPlane]) -> TriangleMesh:

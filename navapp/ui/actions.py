@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from textual.binding import Binding, BindingType
 
 from navapp.control.commands import (
+    NO_CANDIDATE,
     Accept,
     Blank,
     Cancel,
@@ -70,6 +71,11 @@ class Action:
         return Binding(self.key, f"app.act('{self.name}')", self.description, show=False)
 
 
+def _shown_candidate(snapshot: Snapshot) -> int:
+    """A key decides about what was on the screen, and about nothing else."""
+    return NO_CANDIDATE if snapshot.candidate_id is None else snapshot.candidate_id
+
+
 def _to_neighbour(step: int) -> Callable[[Snapshot], Command]:
     return lambda snapshot: EnterStage(snapshot.stage.number + step)
 
@@ -125,7 +131,7 @@ ACTIONS: tuple[Action, ...] = (
         "a",
         "accept",
         "accept the candidate under review",
-        lambda snapshot: Accept(snapshot.candidate_id),
+        lambda snapshot: Accept(_shown_candidate(snapshot)),
         slot="accept",
     ),
     Action(
@@ -133,7 +139,7 @@ ACTIONS: tuple[Action, ...] = (
         "r",
         "reject",
         "reject the candidate under review",
-        lambda snapshot: Reject(snapshot.candidate_id),
+        lambda snapshot: Reject(_shown_candidate(snapshot)),
         slot="reject",
     ),
     Action(
@@ -202,11 +208,11 @@ ACTIONS: tuple[Action, ...] = (
         needs_width=True,
     ),
     Action(
-        "cuts",
+        "steps",
         "k",
-        "cuts",
-        "see the cuts of the stage, planned and measured; say that one has been made",
-        slot="cuts",
+        "steps",
+        "see the stage's cuts, holes and parts, planned and measured; say that one has been made",
+        slot="steps",
         needs_width=True,
     ),
     Action(

@@ -13,13 +13,13 @@ from textual.screen import Screen
 
 from navapp.control.commands import (
     ConfirmCondition,
-    ConfirmCut,
+    ConfirmStep,
     EnterStage,
     OverrideGate,
     Quit,
     ToggleLayer,
     WithdrawCondition,
-    WithdrawCut,
+    WithdrawStep,
 )
 from navapp.control.states import (
     DeviceHealth,
@@ -35,7 +35,6 @@ from navapp.ui.actions import (
     bindings,
     is_possible,
 )
-from navapp.ui.cuts_page import CutsPage, cut_of_key
 from navapp.ui.gates_page import REASONS, GatesPage, condition_of_key
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
@@ -44,6 +43,7 @@ from navapp.ui.palette import ActionProvider
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
+from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
 from navapp.ui.theme import NAVAPP_THEME
@@ -62,7 +62,7 @@ _ASKING_STATES = (SessionState.NAVIGATING, SessionState.SUSPENDED)
 _PAGES = {
     "help": HelpPage,
     "layers": LayersPage,
-    "cuts": CutsPage,
+    "steps": StepsPage,
     "gates": GatesPage,
     "devices": DevicesPage,
     "events": EventsPage,
@@ -161,12 +161,17 @@ class NavigationApp(QuietApp):
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
 
-    def action_condition(self, key: str) -> None:
-        """Confirm or withdraw a condition: from the page of the gates."""
-        line = condition_of_key(self._view.snapshot, key)
-        if line is not None:
-            change = WithdrawCondition if line.is_met else ConfirmCondition
-            self._session.submit(change(line.name))
+    def action_confirm_condition(self, key: str) -> None:
+        """Say that a condition is met: from the gates' page."""
+        name = condition_of_key(self._view.snapshot, key)
+        if name is not None and not self._view.is_silent:
+            self._session.submit(ConfirmCondition(name))
+
+    def action_withdraw_condition(self, key: str) -> None:
+        """Say that it is not met after all."""
+        name = condition_of_key(self._view.snapshot, key)
+        if name is not None and not self._view.is_silent:
+            self._session.submit(WithdrawCondition(name))
 
     def action_pass_gate(self) -> None:
         """Enter the stage whose gate the page shows."""
@@ -181,12 +186,17 @@ class NavigationApp(QuietApp):
         """Draw a layer, or no longer: from the page that lists them."""
         self._session.submit(ToggleLayer(name))
 
-    def action_change_cut(self, key: str) -> None:
-        """Say that a cut has been made, or has not been made after all: from the cuts' page."""
-        cut = cut_of_key(self._view.snapshot, key)
-        if cut is not None and not self._view.is_silent:
-            change = WithdrawCut if cut.is_made else ConfirmCut
-            self._session.submit(change(cut.name))
+    def action_confirm_step(self, key: str) -> None:
+        """Say that a step has been made: from the steps' page."""
+        step = step_of_key(self._view.snapshot, key)
+        if step is not None and not self._view.is_silent:
+            self._session.submit(ConfirmStep(step.name))
+
+    def action_withdraw_step(self, key: str) -> None:
+        """Say that a step has not been made after all."""
+        step = step_of_key(self._view.snapshot, key)
+        if step is not None and not self._view.is_silent:
+            self._session.submit(WithdrawStep(step.name))
 
     def _open_gates(self) -> None:
         """A gate was told as not met: its page, unless it is open."""

@@ -11,7 +11,8 @@ from navapp.ui.screens import PageScreen
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
 
-CONDITION_KEYS = "bcdfghijmnosuw"
+# Of all conditions that a person may have to answer for, in their order.
+CONDITION_KEYS = "bcdfghijmnosuwpxyzekl"
 # Why a gate may be overridden; their numbers are the keys.
 REASONS = (
     "decided by the surgeon",
@@ -35,15 +36,16 @@ class GateTable(TextView):
         elif snapshot.has_mirror:
             lines.append(_format(_mirror_line(snapshot), keys, view))
         lines.append(Content(""))
-        if snapshot.gate_stage > len(snapshot.stages):
-            return [*lines, Content.styled(" this is the last stage", "$text-muted")]
-        name = snapshot.stages[snapshot.gate_stage - 1].name
-        title = f" before stage {snapshot.gate_stage} {name}"
+        is_last = snapshot.gate_stage > len(snapshot.stages)
+        title = " before the operation's end"
+        if not is_last:
+            name = snapshot.stages[snapshot.gate_stage - 1].name
+            title = f" before stage {snapshot.gate_stage} {name}"
         lines.append(Content.styled(title, "$text-muted"))
         lines += [_format(line, keys, view) for line in snapshot.gate]
         if not snapshot.gate:
             lines.append(Content("    nothing is asked for"))
-        return [*lines, *_ways_on(snapshot)]
+        return lines if is_last else [*lines, *_ways_on(snapshot)]
 
 
 def _ways_on(snapshot: Snapshot) -> list[Content]:
@@ -80,27 +82,37 @@ def _mirror_line(snapshot: Snapshot) -> ConditionLine:
 
 
 def _keyed(snapshot: Snapshot) -> list[tuple[str, str]]:
-    """Letter and name of every condition that a person answers for."""
+    """Letter and name of every condition that a person may have to answer for.
+
+    A cut keeps its letter when it becomes measured, and so do those after it.
+    """
     lines = [*snapshot.time_out, *snapshot.gate]
-    names = dict.fromkeys(line.name for line in lines if line.is_personal)
+    names = dict.fromkeys(
+        line.name for line in lines if line.is_personal or line.name.startswith("cut ")
+    )
     return list(zip(CONDITION_KEYS, names, strict=False))
 
 
-def condition_of_key(snapshot: Snapshot, key: str) -> ConditionLine | None:
-    """The condition that a letter of the page means."""
-    name = dict(_keyed(snapshot)).get(key)
-    lines = [*snapshot.time_out, *snapshot.gate]
-    return next((line for line in lines if line.name == name), None)
+def condition_of_key(snapshot: Snapshot, key: str) -> str | None:
+    """The name of the condition that a letter of the page means; None: it means nothing."""
+    return dict(_keyed(snapshot)).get(key)
 
 
 class GatesPage(PageScreen):
-    """Conditions by their letters, the stage by ENTER, a reason by its number."""
+    """Conditions by their letters, the stage by ENTER, a reason by its number.
+
+    Confirming and withdrawing are keys of their own: typed at any speed they mean the same.
+    """
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("t", "dismiss", "back", show=False),
         Binding("enter", "app.pass_gate", "enter the stage", show=False),
         *(
-            Binding(key, f"app.condition('{key}')", "condition", show=False)
+            Binding(key, f"app.confirm_condition('{key}')", "confirm", show=False)
+            for key in CONDITION_KEYS
+        ),
+        *(
+            Binding(key.upper(), f"app.withdraw_condition('{key}')", "withdraw", show=False)
             for key in CONDITION_KEYS
         ),
         *(
@@ -111,7 +123,7 @@ class GatesPage(PageScreen):
 
     page_title, keys = (
         "time-out and gates",
-        " back  a letter: confirmed, or not after all  ENTER enter the stage",
+        " back  a letter: confirmed  its capital: not after all  ENTER enter the stage",
     )
 
     def compose_page(self) -> ComposeResult:

@@ -2,6 +2,7 @@
 
 from textual.content import Content
 
+from navapp.control.states import StepLine
 from navapp.ui.gauges import cut
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
@@ -36,18 +37,15 @@ def _gate_row(view: View, width: int) -> Content:
 
 
 def _measured_row(view: View, width: int) -> Content:
-    """The cuts of the stage that are made, against their plan."""
-    items = [
-        f"{cut.name} "
-        + (
-            "not measurable"
-            if cut.face is None
-            else f"{cut.face.angle_deg:.2f} deg {cut.face.offset_mm:+.2f} mm"
-        )
-        for cut in view.snapshot.cuts
-        if cut.is_made
-    ]
+    """The steps of the stage that are made, cuts against their plan."""
+    items = [f"{step.name} {_say_made(step)}" for step in view.snapshot.steps if step.is_made]
     return _format_row("measured here", items, view, width)
+
+
+def _say_made(step: StepLine) -> str:
+    if step.face is not None:
+        return f"{step.face.angle_deg:.2f} deg {step.face.offset_mm:+.2f} mm"
+    return "not measurable" if step.kind == "cut" else "made"
 
 
 def _steps(view: View) -> Content:

@@ -10,7 +10,7 @@ class ConditionKind(Enum):
 
     PERSON = "a person says so, by the condition's name"
     BONE_OK = "the stage's bone is registered and accepted, and its newest pose is OK"
-    CUTS_MEASURED = "every planned cut of the stage is made and measured within its tolerance"
+    STEPS_MADE = "every planned step of the stage is made, cuts measured within the tolerance"
     RIG_VALID = "the rig's calibration was accepted, and nothing says that the rig has moved"
 
 

@@ -136,6 +136,10 @@ class Part:
         return self.bone_from_part.target
 
 
+# What is made of a bone, in one step of the operation: a cut, a hole, a part put in its place.
+PlannedStep = ResectionPlane | DrillAxis | Part
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RiskStructure:
     """A vessel or a nerve: a surface, or without one the plan's curve of the same name."""
@@ -212,6 +216,11 @@ class SurgicalContent:
     def __post_init__(self) -> None:
         for one in fields(self):
             object.__setattr__(self, one.name, MappingProxyType(dict(getattr(self, one.name))))
+
+    @property
+    def steps(self) -> dict[str, PlannedStep]:
+        """All that is to be made, by name; of several with one name the cut, then the hole."""
+        return {**self.parts, **self.drills, **self.planes}
 
     @property
     def is_empty(self) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.bones import AspectGraph, BoneModel
 from navapp.values.conditions import Condition
-from navapp.values.contents import ResectionPlane, SurgicalContent
+from navapp.values.contents import PlannedStep, ResectionPlane, SurgicalContent
 from navapp.values.digests import add_value
 
 
@@ -101,6 +101,13 @@ class Plan:
     def planes_of(self, stage: StageSpec) -> dict[str, ResectionPlane]:
         """The planes of a stage's bone: those that its plan names, or all of them."""
         return self.of_stage(self.content.planes, "planes", stage)
+
+    def steps_of(self, stage: StageSpec) -> dict[str, PlannedStep]:
+        """What is to be made in a stage: holes where it shows holes, else cuts and parts."""
+        content = self.content
+        if "drills" in stage.layers:
+            return dict(self.of_stage(content.drills, "drills", stage))
+        return {**self.planes_of(stage), **self.of_stage(content.parts, "parts", stage)}
 
     def of_stage(self, known: Mapping[str, T], kind: str, stage: StageSpec) -> dict[str, T]:
         """What the plan names of a kind for a stage; where it names nothing, all of its bone."""

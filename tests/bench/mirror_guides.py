@@ -48,7 +48,7 @@ class Crosses:
 
 
 @dataclass(frozen=True, eq=False)
-class CutLine:
+class StepLine:
     """The true cut line where the eye sees it, a sample for each triangle that is cut."""
 
     points_mm: FloatArray  # (n, 3) left camera's frame
@@ -111,7 +111,7 @@ def read_crosses(
     return Crosses(centroid_mm, crossing_mm, is_whole > 0.5)
 
 
-def find_cut(knee: FollowedKnee, sight: Sight) -> CutLine:
+def find_cut(knee: FollowedKnee, sight: Sight) -> StepLine:
     """Where the plane of the distal cut leaves the true femur, as far as the eye sees it."""
     mesh, plane = knee.plan.bones[BONE].mesh, knee.plan.content.planes[PLANE]
     ends = np.array(list(_cut_triangles(mesh, (mesh.vertices_mm - plane.point_mm) @ plane.normal)))
@@ -121,7 +121,7 @@ def find_cut(knee: FollowedKnee, sight: Sight) -> CutLine:
     length_px = np.linalg.norm(end_px - start_px, axis=1)
     is_seen &= length_px > 0.0
     points_mm = knee.true.apply(middles[is_seen])
-    return CutLine(
+    return StepLine(
         points_mm,
         sight.px(points_mm),
         (end_px - start_px)[is_seen] / length_px[is_seen, None],
@@ -134,7 +134,7 @@ def read_cut(
     sight: Sight,
     eye_view: EyeView,
     left_from_bone: RigidTransform,
-    cut: CutLine,
+    cut: StepLine,
 ) -> ReadCut:
     """Draw the plan's cut at a pose, and compare with the true line."""
     content = SurgicalContent(planes={PLANE: knee.plan.content.planes[PLANE]})

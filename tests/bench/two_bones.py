@@ -33,7 +33,7 @@ from navapp.cli.main import _parser
 from navapp.cli.main import run as run_navapp
 from navapp.cli.results import limb_to_json
 from navapp.config import parse
-from navapp.control.operators import ScriptedOperator, ScriptStep
+from navapp.control.scripted_operator import ScriptedOperator, ScriptStep
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig_files import read_rig

@@ -8,7 +8,7 @@ from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.commands import (
     Command,
     ConfirmCondition,
-    ConfirmCut,
+    ConfirmStep,
     EnterStage,
     OverrideGate,
     WithdrawCondition,
@@ -76,7 +76,7 @@ def test_a_gate_is_told_item_by_item_and_met_by_what_is_known_and_said(bench: Be
     told = [event.text for event in bench.events if event.kind == "gate"]
     assert told == [
         "open: the bone is exposed",
-        "open: checked on the patient: known points lie where shown",
+        "open: femur: checked on the patient: known points lie where shown",
     ]
     confirm(bench, "bone_exposed", "checked_on_patient")
     assert bench.do(EnterStage(2)).stage.number == 2
@@ -119,7 +119,7 @@ def test_a_gate_is_overridden_only_after_it_was_told_and_with_a_reason(bench: Be
 def test_a_jump_asks_for_everything_on_the_way_and_going_back_for_nothing(bench: Bench) -> None:
     bench.do(EnterStage(3))
     asked = is_met(bench.snapshot)
-    assert {"bone_exposed", "entry_point", "hole_drilled", "checked_on_patient"} <= set(asked)
+    assert {"bone_exposed", "entry_point", "checked_on_patient"} <= set(asked)
     assert bench.do(OverrideGate(3, "practice")).stage.number == 3
     assert bench.do(EnterStage(1)).stage.number == 1
 
@@ -127,21 +127,21 @@ def test_a_jump_asks_for_everything_on_the_way_and_going_back_for_nothing(bench:
 def test_cuts_must_be_made_and_measured_or_checked_by_hand(bench: Bench, faces: Faces) -> None:
     bench.do(EnterStage(3))
     bench.do(OverrideGate(3, "practice"))
-    confirm(bench, "component_size", "component_seated")
-    assert is_met(bench.snapshot)["top"] is False
-    bench.do(ConfirmCondition("top"))
-    assert "nobody is asked for 'top'" in bench.refused()
-    bench.do(ConfirmCut("top"))
-    bench.do(ConfirmCut("side"))
+    confirm(bench, "component_size")
+    assert is_met(bench.snapshot)["cut top"] is False
+    bench.do(ConfirmCondition("cut top"))
+    assert "nobody is asked for 'cut top'" in bench.refused()
+    bench.do(ConfirmStep("top"))
+    bench.do(ConfirmStep("side"))
     faces.shares["top"] = 0.8
     bench.frames(31)
     lines = {line.name: line for line in bench.snapshot.gate}
-    assert lines["top"].is_met
-    assert lines["top"].note == "0.57 deg, -0.40 mm"
-    assert not lines["side"].is_met
-    assert "not measurable" in lines["side"].note
+    assert lines["cut top"].is_met
+    assert lines["cut top"].note == "0.57 deg, -0.40 mm"
+    assert not lines["cut side"].is_met
+    assert "not measurable" in lines["cut side"].note
     assert bench.do(EnterStage(4)).stage.number == 3
-    confirm(bench, "side")
+    confirm(bench, "cut side")
     assert bench.do(EnterStage(4)).stage.number == 4
 
 

@@ -19,7 +19,7 @@ from navapp.control.commands import (
     Blank,
     CheckMirror,
     ConfirmCross,
-    ConfirmCut,
+    ConfirmStep,
     DistrustRig,
     EnterStage,
     NudgeCross,
@@ -493,7 +493,7 @@ def test_a_cut_that_is_made_needs_no_guides_and_is_not_judged() -> None:
     navigating(bench)
     assert bench.snapshot.mirror_error is not None
     for name in ("top", "side"):
-        bench.do(ConfirmCut(name))
+        bench.do(ConfirmStep(name))
     bench.frames(1)
     assert bench.snapshot.mirror_error is None
 

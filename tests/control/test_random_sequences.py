@@ -13,7 +13,7 @@ from navapp.control.commands import (
     Command,
     ConfirmCondition,
     ConfirmCross,
-    ConfirmCut,
+    ConfirmStep,
     DistrustRig,
     EnterStage,
     Interrupt,
@@ -29,7 +29,7 @@ from navapp.control.commands import (
     ToggleEye,
     ToggleLayer,
     WithdrawCondition,
-    WithdrawCut,
+    WithdrawStep,
 )
 from navapp.control.states import SessionState, Snapshot
 from navapp.errors import DeviceLost
@@ -48,7 +48,7 @@ from tests.many import few_of
 
 N_STEPS = 45
 CONDITIONS = ("patient", "side", "plan", "bone_exposed", "checked_on_patient", "entry_point",
-              "hole_drilled", "component_size", "component_seated", "top", "nothing")  # fmt: skip
+              "component_size", "top", "nothing")  # fmt: skip
 ANSWERS = (answer(), answer(), answer(), DOUBTED, LOST, answer(Status.LOST, has_pose=False))
 
 
@@ -66,7 +66,7 @@ def any_command(rng: np.random.Generator, snapshot: Snapshot) -> Command:
         Blank(), ToggleDepth(), ToggleEye(), ToggleLayer("bone"), ToggleLayer("clouds"),
         CheckMirror(), NudgeCross(1, 0), ConfirmCross(), EnterStage(number),
         OverrideGate(snapshot.gate_stage, "a test"), OverrideGate(number, " "),
-        WithdrawCondition(name), ConfirmCut("top"), WithdrawCut("top"), ConfirmCut("nose"),
+        WithdrawCondition(name), ConfirmStep("top"), WithdrawStep("top"), ConfirmStep("nose"),
         Reconnect(), Interrupt(),
     )  # fmt: skip
     rare: tuple[Command, ...] = (DistrustRig("the board looks longer"), Quit())

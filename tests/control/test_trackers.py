@@ -146,7 +146,7 @@ def test_a_tracker_of_an_older_bone_is_not_used_for_a_newer_one(maker: Maker) ->
     slow = threading.Thread(target=known.tracker, args=("femur",))
     slow.start()
     assert maker.waiting.wait(5.0)
-    known.set_bone(known.bone("femur").cut("top", plane))
+    known.set_bone(known.bone("femur").make("top", plane))
     maker.gate.set()
     slow.join(5.0)
     assert known.tracker("femur").bone.is_removed.any()
@@ -179,7 +179,7 @@ def test_faces_in_the_same_picture_make_a_loose_registration_a_sure_one(
 
     monkeypatch.setattr(FaceMeter, "measure", measure)
     known = Trackers(a_rig(), a_plan(), Prior({"femur": a_pose()}), TrackerSettings(), LooseMaker())
-    known.set_bone(known.bone("femur").cut("top", plane))
+    known.set_bone(known.bone("femur").make("top", plane))
     (best,) = known.register(OPENING, a_frame())
     assert best.verdict.status is (Status.OK if is_seen else Status.DEGRADED)
     # The pose's own error moves bone and face together.

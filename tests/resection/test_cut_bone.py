@@ -19,26 +19,26 @@ def whole() -> CutBone:
 def test_every_new_state_is_a_new_version() -> None:
     bone = whole()
     assert bone.version == 0
-    states = [bone.cut("top", TOP), bone.cut("top", TOP).cut("side", SIDE)]
+    states = [bone.make("top", TOP), bone.make("top", TOP).make("side", SIDE)]
     assert [state.version for state in states] == [1, 2]
     assert states[1].with_faces({"top": FACE}).version == 3
     assert states[1].model.version == 2
 
 
 def test_going_back_restores_the_version_and_going_on_takes_a_new_one() -> None:
-    top = whole().cut("top", TOP)
+    top = whole().make("top", TOP)
     measured = top.with_faces({"top": FACE})
     assert measured.without_faces().version == top.version
     back = measured.restore("top")
     assert back.version == 0
     assert back.surface is None
     assert not back.model.is_removed.any()
-    assert back.cut("side", SIDE).version == 3
-    assert back.cut("top", TOP).version == top.version
+    assert back.make("side", SIDE).version == 3
+    assert back.make("top", TOP).version == top.version
 
 
 def test_states_are_the_same_in_any_order_of_cuts() -> None:
-    both = whole().cut("top", TOP).cut("side", SIDE)
+    both = whole().make("top", TOP).make("side", SIDE)
     side = both.restore("top")
     assert side.version == 3
-    assert side.cut("top", TOP).version == both.version
+    assert side.make("top", TOP).version == both.version

@@ -69,7 +69,7 @@ def test_the_lid_closes_the_bone_and_is_not_seen() -> None:
 
 
 def test_a_measured_face_leaves_less_unsure() -> None:
-    cut = CutBone(bone()).cut("top", PLANNED)
+    cut = CutBone(bone()).make("top", PLANNED)
     assert cut.unmeasured == ("top",)
     known = cut.with_faces({"top": face()})
     assert known.unmeasured == ()
@@ -86,7 +86,7 @@ def test_a_measured_face_leaves_less_unsure() -> None:
 
 def test_a_cut_that_is_withdrawn_gives_the_bone_back() -> None:
     whole = CutBone(bone())
-    cut = whole.cut("top", PLANNED).cut("side", MADE)
+    cut = whole.make("top", PLANNED).make("side", MADE)
     back = cut.restore("top").restore("side")
     assert not back.model.is_removed.any()
     assert back.model.lid is None
@@ -95,14 +95,14 @@ def test_a_cut_that_is_withdrawn_gives_the_bone_back() -> None:
 
 
 def test_a_cut_made_again_is_not_measured() -> None:
-    once = CutBone(bone()).cut("top", PLANNED).with_faces({"top": face()})
-    assert once.cut("top", PLANNED).unmeasured == ("top",)
+    once = CutBone(bone()).make("top", PLANNED).with_faces({"top": face()})
+    assert once.make("top", PLANNED).unmeasured == ("top",)
 
 
 def test_the_surface_that_is_looked_at_ends_at_the_faces() -> None:
     whole = CutBone(bone())
     assert whole.surface is None
-    cut = whole.cut("top", PLANNED)
+    cut = whole.make("top", PLANNED)
     for one, level_mm in ((cut, 12.0), (cut.with_faces({"top": face()}), 11.3)):
         surface = one.surface
         assert surface is not None
@@ -117,7 +117,7 @@ def test_the_surface_that_is_looked_at_ends_at_the_faces() -> None:
 
 def test_the_faces_of_two_cuts_that_cross_close_the_bone() -> None:
     side = ResectionPlane("femur", np.array([12.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
-    surface = CutBone(bone()).cut("top", PLANNED).cut("side", side).surface
+    surface = CutBone(bone()).make("top", PLANNED).make("side", side).surface
     assert surface is not None
     used = surface.vertices_mm[np.unique(surface.faces)]
     assert used[:, [0, 2]].max() == pytest.approx(12.0)

@@ -14,10 +14,10 @@ FEMORAL = (
 
 def test_a_stage_is_entered_after_all_steps_of_the_stages_before() -> None:
     assert enter("opening").made == frozenset()
-    assert enter("drilling").made == {"hole"}
+    assert enter("drilling").made == {"femoral_guide"}
     assert enter("implant").cuts == FEMORAL
-    assert not enter("implant").is_made("femoral_component")
-    assert enter("patella").is_made("femoral_component")
+    assert not enter("implant").is_made("femoral_implant")
+    assert enter("patella").is_made("femoral_implant")
     assert not enter("patella").is_made("patella")
     assert enter("spacer").cuts == (*FEMORAL, "patella", "tibia_proximal")
 
@@ -35,5 +35,5 @@ def test_advancing_makes_the_steps_of_the_stage_in_order_and_then_ends(stage) ->
 def test_what_there_is_not_is_refused() -> None:
     with pytest.raises(UsageError, match=r"lunch.*opening, drilling"):
         enter("lunch")
-    with pytest.raises(UsageError, match=r"nail.*hole"):
+    with pytest.raises(UsageError, match=r"nail.*femoral_guide"):
         State("opening", frozenset({"nail"}))

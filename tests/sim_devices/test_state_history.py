@@ -25,5 +25,5 @@ def test_an_older_picture_does_not_move_the_change_back() -> None:
     history = StateHistory(OPENING)
     history.take_picture(200)
     history.take_picture(100)
-    history.show(State("opening", frozenset({"hole"})))
+    history.show(State("opening", frozenset({"femoral_guide"})))
     assert history.at(150) == OPENING

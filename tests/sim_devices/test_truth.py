@@ -41,6 +41,6 @@ def test_what_was_made_is_that_of_the_world():
     world = World(Scenario(motion="still"))
     oracle = TruthOracle(world, lambda captured_ns: captured_ns)
     assert oracle.made_planes().keys() == world.planned_cuts.keys()
-    assert oracle.made_parts().keys() == {"femoral_component", "patellar_component", "insert"}
+    assert oracle.made_parts().keys() == {"femoral_implant", "patellar_implant", "spacer"}
     np.testing.assert_array_equal(oracle.made_hole()[0], world.record.made_hole[0])
     assert oracle.made_insert() == world.record.made_insert_mm

@@ -58,7 +58,7 @@ def test_what_goes_together_over_40_px_counts_so_often(noise_variance_ratio: flo
     assert (told.measured, told.pose) == (loose.measured, loose.pose)
 
 
-def test_residuals_that_the_kernel_cuts_off_show_the_most() -> None:
+def test_residuals_that_the_kernel_steps_off_show_the_most() -> None:
     saturated = fit_of(0.9)
     saturated = replace(saturated, estimate=replace(saturated.estimate, rms_mm=1.0))
     assert saturated.variance_ratio > 2.0 * NOISE_VARIANCE_RATIO

@@ -94,7 +94,7 @@ TIME_OUT = (
 )
 GATE = (
     condition("entry_point", "the entry point was checked with the tip", 1),
-    condition("hole_drilled", "the hole is drilled to its depth"),
+    ConditionLine("femoral_guide", "hole femoral_guide drilled", False, note="not confirmed"),
     condition("checked_on_patient", "checked on the patient: known points lie where shown"),
 )
 

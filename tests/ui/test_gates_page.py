@@ -35,13 +35,14 @@ def test_conditions_are_told_and_changed_by_their_letters(size: tuple[int, int])
         assert "b  ● met  this is the plan's patient: knee phantom  confirmed 3 min ago" in lines
         assert "● met  the rig is calibrated" in lines
         assert "before stage 3 implant" in lines
-        assert any(line.startswith("f") and "open the hole is drilled" in line for line in lines)
+        assert "▲ open hole femoral_guide drilled  not confirmed" in lines
         assert max(map(len, lines)) <= size[0] - 4
-        await pilot.press("b", "f", "enter", "space")
+        await pilot.press("b", "B", "d", "enter", "space")
 
     app = play(snapshots.navigating(), script, size)
     assert app.session.commands == [
-        WithdrawCondition("patient"), ConfirmCondition("hole_drilled"), EnterStage(3), Blank(),
+        ConfirmCondition("patient"), WithdrawCondition("patient"), ConfirmCondition("entry_point"),
+        EnterStage(3), Blank(),
     ]  # fmt: skip
 
 
@@ -74,6 +75,6 @@ def test_in_a_mirror_its_check_belongs_to_the_time_out() -> None:
 def test_after_the_last_stage_there_is_none() -> None:
     async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press("t")
-        assert "this is the last stage" in app.text_of(GateTable)
+        assert "before the operation's end" in app.text_of(GateTable)
 
     play(snapshots.navigating(stage=STAGES[-1], gate=()), script)

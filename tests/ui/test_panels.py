@@ -7,7 +7,6 @@ import pytest
 
 from navapp.control.stages import STAGES
 from navapp.control.states import (
-    CutLine,
     DeviceHealth,
     DeviceLine,
     Event,
@@ -15,6 +14,7 @@ from navapp.control.states import (
     OtherBone,
     SessionState,
     Snapshot,
+    StepLine,
 )
 from navapp.ui.devices_panel import DevicesPanel
 from navapp.ui.event_list import format_event_line
@@ -312,13 +312,13 @@ def test_wide_stepper_tells_the_next_gate_and_what_was_measured() -> None:
     tilt = np.array([np.tan(np.radians(0.31)), 0.0, -0.42])
     face = MeasuredFace(plane, tilt, np.eye(3), np.eye(3), 0.6)
     cuts = (
-        CutLine("femur_distal", is_made=True, face=face),
-        CutLine("lateral", is_made=True),
-        CutLine("posterior", is_made=False),
+        StepLine("femur_distal", is_made=True, face=face),
+        StepLine("lateral", is_made=True),
+        StepLine("posterior", is_made=False),
     )
-    lines = lines_of(StageStepper(), view_of(snapshots.navigating(cuts=cuts)), 160, 3)
+    lines = lines_of(StageStepper(), view_of(snapshots.navigating(steps=cuts)), 160, 3)
     assert "● the entry point was checked with the tip" in lines[1]
-    assert f"{Level.ATTENTION.mark(UNICODE)} the hole is drilled to its depth" in lines[1]
+    assert f"{Level.ATTENTION.mark(UNICODE)} hole femoral_guide drilled" in lines[1]
     assert "femur_distal 0.31 deg -0.42 mm" in lines[2]
     assert "lateral not measurable" in lines[2]
     assert "posterior" not in lines[2]

@@ -3,8 +3,8 @@
 from navapp.overlay.blend_kernels import compute_face_tints
 from navapp.overlay.colours import PART
 from navapp.overlay.drawing import Body, Drawing
-from navapp.overlay.part_shapes import part_mesh
 from navapp.overlay.scene import Scene
+from navapp.values.part_shapes import part_mesh
 
 _LEAST_SHARE, _STEEP_SHARE = 0.14, 0.25
 

@@ -7,8 +7,8 @@ import numpy as np
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render
 from navapp.overlay.colours import PART
-from navapp.overlay.part_shapes import part_mesh
 from navapp.values import Box, Part, SurgicalContent
+from navapp.values.part_shapes import part_mesh
 from tests.overlay.scenes import CAMERA, POSE, Occluder, draw, grown, scene, seen, words
 from tests.views import find_silhouette
 

@@ -1,34 +1,44 @@
-"""The cuts of a session: made, withdrawn, and their faces measured."""
+"""The steps of a session: cuts, holes and parts that are made, and the faces of cuts measured."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 
 from drivers.frames import StereoFrame
-from navapp.control.states import CutLine
+from navapp.control.states import StepKind, StepLine
 from navapp.control.trackers import Trackers
 from navapp.errors import UsageError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.resection import CutBone
-from navapp.values import MeasuredFace, Plan, StageSpec, Status, TrackedFrame, join_faces
+from navapp.values import (
+    DrillAxis,
+    MeasuredFace,
+    Plan,
+    PlannedStep,
+    ResectionPlane,
+    StageSpec,
+    Status,
+    TrackedFrame,
+    join_faces,
+)
 
 # All chosen. So many measurements of a face make it known; the newest so many are kept.
 _ENOUGH, _KEPT = 3, 60
 
 
-class MadeCuts:
-    """What has been cut of the session's bones; started and asked from the loop alone.
+class MadeSteps:
+    """What has been made of the session's bones; started and asked from the loop alone.
 
     Faces are measured in turns that are counted in frames, one in each: a recorded session replays
     to them.
 
     Args:
-        plan: with the planes.
+        plan: with the steps.
         trackers: of its bones.
-        made: names of planes that are cut from the start.
+        made: names of steps that are made from the start.
         frames_between: a face is measured in every so many frames; with 1, all in each.
 
     Raises:
-        UsageError: the plan has no such plane.
+        UsageError: the plan has no such step.
     """
 
     def __init__(
@@ -41,45 +51,51 @@ class MadeCuts:
         # What all measurements of a face say together, and how much of it was seen last.
         self._joined: dict[str, MeasuredFace] = {}
         self._seen: dict[str, float | None] = {}
+        # As of `StepLine`.
+        self._n_made: Counter[str] = Counter()
+        self._last_faces: dict[str, MeasuredFace] = {}
         for name in made:
             self.confirm(name)
 
     def confirm(self, name: str) -> CutBone:
-        """A planned cut has been made: its bone as it is now.
+        """A planned step has been made: its bone as it is now.
 
         Raises:
-            UsageError: the plan has no such plane or no model of its bone, or it is confirmed.
+            UsageError: the plan has no such step or no model of its bone, or it is confirmed.
         """
-        plane = self._plan.content.planes.get(name)
-        if plane is None:
-            names = ", ".join(self._plan.content.planes)
+        step = self._plan.content.steps.get(name)
+        if step is None:
+            names = ", ".join(self._plan.content.steps)
             remedy = f"choose of {names}" if names else "make the plan with --contents"
-            raise UsageError(f"the plan has no plane '{name}'", subject=name, remedy=remedy)
-        if plane.bone not in self._plan.bones:
+            raise UsageError(f"the plan has no step '{name}'", subject=name, remedy=remedy)
+        if step.bone not in self._plan.bones:
             raise UsageError(
-                f"the plan has no model of the {plane.bone}, which '{name}' cuts",
+                f"the plan has no model of the {step.bone}, on which '{name}' is made",
                 subject=name,
                 remedy="make the plan with that bone",
             )
-        known = self._trackers.bone(plane.bone)
+        known = self._trackers.bone(step.bone)
         if name in known.made:
-            raise UsageError(f"the cut '{name}' is confirmed already", subject=name)
+            raise UsageError(f"'{name}' is confirmed already", subject=name)
         self._forget(name)
-        bone = known.cut(name, plane)
+        self._n_made[name] += 1
+        bone = known.make(name, step)
         self._trackers.set_bone(bone)
         return bone
 
     def withdraw(self, name: str) -> CutBone:
-        """A cut has not been made after all.
+        """A step has not been made after all.
 
         Raises:
             UsageError: it was not said to be made.
         """
-        plane = self._plan.content.planes.get(name)
-        if plane is None or name not in self._trackers.bone(plane.bone).made:
-            raise UsageError(f"the cut '{name}' was not confirmed", subject=name)
+        step = self._plan.content.steps.get(name)
+        bones = self._trackers.bones
+        if step is None or step.bone not in bones or name not in bones[step.bone].made:
+            raise UsageError(f"'{name}' was not confirmed", subject=name)
         self._forget(name)
-        bone = self._trackers.bone(plane.bone).restore(name)
+        self._last_faces.pop(name, None)
+        bone = self._trackers.bone(step.bone).restore(name)
         self._trackers.set_bone(bone)
         return bone
 
@@ -97,6 +113,11 @@ class MadeCuts:
         for known in (self._measured, self._joined, self._seen):
             known.pop(name, None)
 
+    @property
+    def names(self) -> frozenset[str]:
+        """Of all steps that are made, of all bones."""
+        return frozenset(name for bone in self._trackers.bones.values() for name in bone.made)
+
     def version(self, bone: str) -> int:
         """Of a bone; 0 without a model of it."""
         known = self._trackers.bones.get(bone)
@@ -107,13 +128,21 @@ class MadeCuts:
         known = self._trackers.bones.get(bone)
         return None if known is None else known.surface
 
-    def describe(self, stage: StageSpec) -> tuple[CutLine, ...]:
-        """The cuts of a stage: planned, made, measured."""
+    def describe(self, stage: StageSpec) -> tuple[StepLine, ...]:
+        """The steps of a stage: planned, made, cuts measured."""
         bone = self._trackers.bones.get(stage.bone)
         made = {} if bone is None else bone.made
         return tuple(
-            CutLine(name, name in made, self._joined.get(name), self._seen.get(name))
-            for name in self._plan.planes_of(stage)
+            StepLine(
+                name,
+                name in made,
+                self._joined.get(name),
+                self._seen.get(name),
+                _kind_of(step),
+                self._n_made[name],
+                self._last_faces.get(name),
+            )
+            for name, step in self._plan.steps_of(stage).items()
         )
 
     def measure(
@@ -129,7 +158,8 @@ class MadeCuts:
         if tracked is None or tracked.verdict.status is not Status.OK or rest:
             return {}
         bone, is_each = self._trackers.bone(tracked.bone), self._frames_between == 1
-        names = tuple(bone.made)
+        # A part covers the faces that it sits on.
+        names = () if bone.parts else tuple(bone.cuts)
         if names and not is_each:
             names = (names[turn % len(names)],)
         if tracked.estimate is None or not (is_accepted or is_each):
@@ -153,6 +183,7 @@ class MadeCuts:
         for name, told in found.items():
             self._measured.setdefault(name, deque(maxlen=_KEPT)).append(told)
             self._joined[name] = join_faces(tuple(self._measured[name]))
+            self._last_faces[name] = self._joined[name]
         self._learn(bone)
 
     def _learn(self, bone: CutBone) -> None:
@@ -164,3 +195,9 @@ class MadeCuts:
         }
         if known:
             self._trackers.set_bone(bone.with_faces(known))
+
+
+def _kind_of(step: PlannedStep) -> StepKind:
+    if isinstance(step, ResectionPlane):
+        return "cut"
+    return "hole" if isinstance(step, DrillAxis) else "part"

@@ -6,7 +6,7 @@ import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.values import Box, Cylinder, Part
+from navapp.values.contents import Box, Cylinder, Part
 
 _N_AROUND, _N_RINGS = 48, 16
 

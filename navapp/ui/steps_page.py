@@ -1,4 +1,4 @@
-"""The page of the stage's cuts: which are made, and what of them was measured against plan."""
+"""The page of the stage's steps: which are made, and what of cuts was measured against plan."""
 
 from typing import ClassVar
 
@@ -6,7 +6,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.content import Content
 
-from navapp.control.states import CutLine, Snapshot
+from navapp.control.states import Snapshot, StepLine
 from navapp.resection.cut_bone import UNSURE_MM
 from navapp.ui.gauges import draw_bar
 from navapp.ui.screens import PageScreen
@@ -16,39 +16,40 @@ from navapp.ui.view import View
 from navapp.values import MeasuredFace, StageSpec
 from navapp.values.faces import LEAST_SHARE
 
-# The cuts of a stage in their order.
-CUT_KEYS = "bcdfghijmnopstuw"
+# The steps of a stage in their order.
+STEP_KEYS = "bcdfghijmnopstuw"
 _NAME_WIDTH, _BAR_WIDTH = 24, 10
 
 
-class CutTable(TextView):
-    """All cuts of the stage with their letters."""
+class StepTable(TextView):
+    """All cuts, holes and parts of the stage with their letters."""
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
-        """A line a cut, and a second one where its face was measured or looked for."""
+        """A line a step, and more where the face of a cut was measured or looked for."""
         snapshot, lines = view.snapshot, list[Content]()
-        if not snapshot.cuts:
-            return [Content(f" the plan has no cuts of the {snapshot.stage.bone}")]
-        for key, cut in zip(CUT_KEYS, snapshot.cuts, strict=False):
-            word = "made" if cut.is_made else "planned"
+        if not snapshot.steps:
+            return [Content(f" the plan has no cut, hole or part of the {snapshot.stage.bone}")]
+        for key, step in zip(STEP_KEYS, snapshot.steps, strict=False):
+            word = f"{step.kind:<5}{'made' if step.is_made else 'planned'}"
             lines.append(
                 Content.assemble(
-                    (f" {key}  ", "bold $primary"), f"{cut.name:<{_NAME_WIDTH}} {word}"
+                    (f" {key}  ", "bold $primary"), f"{step.name:<{_NAME_WIDTH}} {word}"
                 )
             )
-            lines += _tell_face(cut, snapshot.stage, view.symbols)
+            lines += _tell_face(step, snapshot.stage, view.symbols)
         version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
         notes = (
             version,
-            f" Bone beyond a cut that is made no longer counts, nor {UNSURE_MM} mm beside it",
-            " until its face is measured. +- is the 95 % bound, that of the pose in it.",
+            f" Bone beyond a cut, in a hole or below a part no longer counts, nor {UNSURE_MM} mm",
+            " beside a cut until its face is measured.",
+            " +- is the 95 % bound, that of the pose in it.",
         )
         return [*lines, Content(""), *(Content.styled(note, "$text-muted") for note in notes)]
 
 
-def _tell_face(cut: CutLine, stage: StageSpec, symbols: Symbols) -> list[Content]:
-    """What is known of a face that was made."""
-    if not cut.is_made:
+def _tell_face(cut: StepLine, stage: StageSpec, symbols: Symbols) -> list[Content]:
+    """What is known of the face of a cut that was made."""
+    if cut.kind != "cut" or not cut.is_made:
         return []
     if cut.face is not None:
         return _tell_measured(cut.face, stage, symbols)
@@ -95,25 +96,29 @@ def _style(value: float, bound: float, tolerance: float) -> str:
     return "$warning" if abs(value) - bound <= tolerance else "$error"
 
 
-def cut_of_key(snapshot: Snapshot, key: str) -> CutLine | None:
-    """The cut that a letter of the page means."""
-    number = CUT_KEYS.index(key)
-    return snapshot.cuts[number] if number < len(snapshot.cuts) else None
+def step_of_key(snapshot: Snapshot, key: str) -> StepLine | None:
+    """The step that a letter of the page means."""
+    number = STEP_KEYS.index(key)
+    return snapshot.steps[number] if number < len(snapshot.steps) else None
 
 
-class CutsPage(PageScreen):
-    """Cuts, confirmed and withdrawn by their letters."""
+class StepsPage(PageScreen):
+    """Steps, confirmed and withdrawn by their letters."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("k", "dismiss", "back", show=False),
-        *(Binding(key, f"app.change_cut('{key}')", f"cut {key}", show=False) for key in CUT_KEYS),
+        *(Binding(key, f"app.confirm_step('{key}')", "made", show=False) for key in STEP_KEYS),
+        *(
+            Binding(key.upper(), f"app.withdraw_step('{key}')", "not made", show=False)
+            for key in STEP_KEYS
+        ),
     ]
 
     page_title, keys = (
-        "cuts of the stage",
-        " back  a letter: that cut has been made, or has not been made after all",
+        "steps of the stage",
+        " back  a letter: that one has been made  its capital: not made after all",
     )
 
     def compose_page(self) -> ComposeResult:
-        """Cuts."""
-        yield CutTable("cuts")
+        """Steps."""
+        yield StepTable("steps")

@@ -1,4 +1,4 @@
-"""Cuts are confirmed, measured and withdrawn in a session."""
+"""Steps are confirmed and withdrawn in a session, and the faces of cuts measured."""
 
 import threading
 from itertools import pairwise
@@ -8,10 +8,10 @@ import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.commands import (
-    ConfirmCut,
+    ConfirmStep,
     EnterStage,
     Register,
-    WithdrawCut,
+    WithdrawStep,
 )
 from navapp.control.executors import ThreadExecutor
 from navapp.control.states import Snapshot
@@ -27,7 +27,7 @@ def bench() -> Bench:
 
 
 def told(snapshot: Snapshot) -> dict[str, bool]:
-    return {cut.name: cut.is_made for cut in snapshot.cuts}
+    return {cut.name: cut.is_made for cut in snapshot.steps}
 
 
 def used_by_tracker(bench: Bench) -> np.ndarray:
@@ -35,26 +35,26 @@ def used_by_tracker(bench: Bench) -> np.ndarray:
     return ~bench.trackers["femur"].bone.is_removed
 
 
-def test_the_cuts_of_the_stages_bone_are_told(bench: Bench) -> None:
+def test_the_steps_of_the_stages_bone_are_told(bench: Bench) -> None:
     assert told(bench.snapshot) == {"top": False, "side": False}
     assert told(bench.do(EnterStage(5))) == {"flat": False}
 
 
 def test_what_is_cut_no_longer_belongs_to_the_model(bench: Bench) -> None:
     assert used_by_tracker(bench).all()
-    snapshot = bench.do(ConfirmCut("top"))
+    snapshot = bench.do(ConfirmStep("top"))
     assert told(snapshot) == {"top": True, "side": False}
     assert snapshot.bone_version == 1
     assert not snapshot.is_navigable
-    assert "cut top confirmed: version 1 of the femur is in force" in bench.events[-1].text
+    assert "top confirmed: version 1 of the femur is in force" in bench.events[-1].text
     assert bench.frames(1).is_navigable
     heights_mm = cut_plan().bones["femur"].mesh.vertices_mm[:, 2]
     np.testing.assert_array_equal(used_by_tracker(bench), heights_mm <= 6.5)
 
 
 def test_a_cut_that_is_withdrawn_comes_back(bench: Bench) -> None:
-    bench.do(ConfirmCut("top"))
-    snapshot = bench.do(WithdrawCut("top"))
+    bench.do(ConfirmStep("top"))
+    snapshot = bench.do(WithdrawStep("top"))
     assert told(snapshot) == {"top": False, "side": False}
     assert snapshot.bone_version == 0
     bench.frames(1)
@@ -64,9 +64,9 @@ def test_a_cut_that_is_withdrawn_comes_back(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("command", "why"),
     [
-        (ConfirmCut("nose"), "the plan has no plane 'nose'"),
-        (WithdrawCut("top"), "the cut 'top' was not confirmed"),
-        (WithdrawCut("nose"), "the cut 'nose' was not confirmed"),
+        (ConfirmStep("nose"), "the plan has no step 'nose'"),
+        (WithdrawStep("top"), "'top' was not confirmed"),
+        (WithdrawStep("nose"), "'nose' was not confirmed"),
     ],
 )
 def test_what_cannot_be_done_is_refused_with_a_reason(bench: Bench, command, why: str) -> None:
@@ -78,14 +78,14 @@ def test_what_cannot_be_done_is_refused_with_a_reason(bench: Bench, command, why
 
 
 def test_another_bones_cut_leaves_the_pose_alone(bench: Bench) -> None:
-    snapshot = bench.do(ConfirmCut("flat"))
+    snapshot = bench.do(ConfirmStep("flat"))
     assert snapshot.is_navigable
     assert snapshot.bone_version == 0
 
 
 def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces) -> None:
     faces.shares["top"] = 0.8
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     versions = [bench.frames(1).bone_version for _ in range(40)]
     assert versions[0] == 1
     assert versions[-1] == 2
@@ -93,7 +93,7 @@ def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces
     # In every fifth frame.
     assert 6 <= len(measured) <= 9
     assert versions.index(2) <= 20
-    (top, _) = bench.snapshot.cuts
+    (top, _) = bench.snapshot.steps
     assert top.face is not None
     assert top.face.offset_mm == pytest.approx(-0.4)
     assert top.seen_share == 0.8
@@ -106,9 +106,9 @@ def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces
 
 def test_a_face_of_which_little_is_seen_is_not_told(bench: Bench, faces: Faces) -> None:
     faces.shares["top"] = 0.1
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     bench.frames(40)
-    (top, side) = bench.snapshot.cuts
+    (top, side) = bench.snapshot.steps
     assert top.face is None
     assert top.seen_share == 0.1
     assert side.seen_share is None
@@ -118,7 +118,7 @@ def test_a_face_of_which_little_is_seen_is_not_told(bench: Bench, faces: Faces) 
 
 def test_nothing_is_measured_with_a_pose_that_is_not_ok(bench: Bench, faces: Faces) -> None:
     faces.shares["top"] = 0.8
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     bench.script.tracked = answer(Status.DEGRADED)
     bench.frames(20)
     assert not faces.expected
@@ -126,8 +126,8 @@ def test_nothing_is_measured_with_a_pose_that_is_not_ok(bench: Bench, faces: Fac
 
 def test_with_several_cuts_the_faces_take_turns(bench: Bench, faces: Faces) -> None:
     faces.shares = {"top": 0.8, "side": 0.6}
-    bench.do(ConfirmCut("top"))
-    bench.do(ConfirmCut("side"))
+    bench.do(ConfirmStep("top"))
+    bench.do(ConfirmStep("side"))
     bench.frames(40)
     measured = [tuple(result.faces) for result in bench.results if result.faces]
     assert set(measured) == {("top",), ("side",)}
@@ -137,7 +137,7 @@ def test_with_several_cuts_the_faces_take_turns(bench: Bench, faces: Faces) -> N
 
 def test_nothing_is_kept_of_a_candidate_that_nobody_has_accepted(faces: Faces) -> None:
     faces.shares["top"] = 0.8
-    bench = Bench(plan=cut_plan(), made_cuts=("top",))
+    bench = Bench(plan=cut_plan(), made_steps=("top",))
     bench.frames(1)
     bench.do(Register())
     bench.frames(30)
@@ -145,34 +145,34 @@ def test_nothing_is_kept_of_a_candidate_that_nobody_has_accepted(faces: Faces) -
     assert not faces.expected
     bench.accept()
     bench.frames(20)
-    assert bench.snapshot.cuts[0].face is not None
+    assert bench.snapshot.steps[0].face is not None
 
 
 def test_a_cut_withdrawn_and_made_again_is_measured_again(bench: Bench, faces: Faces) -> None:
     faces.shares["top"] = 0.8
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     bench.frames(30)
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     assert "is confirmed already" in bench.refused()
-    assert bench.snapshot.cuts[0].face is not None
-    bench.do(WithdrawCut("top"))
-    snapshot = bench.do(ConfirmCut("top"))
-    assert snapshot.cuts[0].face is None
-    assert snapshot.cuts[0].seen_share is None
+    assert bench.snapshot.steps[0].face is not None
+    bench.do(WithdrawStep("top"))
+    snapshot = bench.do(ConfirmStep("top"))
+    assert snapshot.steps[0].face is None
+    assert snapshot.steps[0].seen_share is None
 
 
-@pytest.mark.parametrize("command", [ConfirmCut("femur_distal"), WithdrawCut("femur_distal")])
+@pytest.mark.parametrize("command", [ConfirmStep("femur_distal"), WithdrawStep("femur_distal")])
 def test_commands_are_recorded(command) -> None:
     assert command_from_json(command_to_json(command)) == command
 
 
 def test_a_plan_without_that_plane_is_refused_before_the_start() -> None:
-    with pytest.raises(UsageError, match=r"no plane 'nose'.*choose of top, side, flat"):
-        Bench(plan=cut_plan(), made_cuts=("nose",))
+    with pytest.raises(UsageError, match=r"no step 'nose'.*choose of top, side, flat"):
+        Bench(plan=cut_plan(), made_steps=("nose",))
 
 
 def test_a_session_can_begin_with_cuts_made() -> None:
-    bench = navigating(Bench(plan=cut_plan(), made_cuts=("top", "side")))
+    bench = navigating(Bench(plan=cut_plan(), made_steps=("top", "side")))
     assert told(bench.snapshot) == {"top": True, "side": True}
     vertices_mm = cut_plan().bones["femur"].mesh.vertices_mm
     is_left = (vertices_mm[:, 2] <= 6.5) & (vertices_mm[:, 0] <= 23.5)
@@ -183,13 +183,13 @@ def test_a_new_registration_forgets_what_was_measured_with_the_old_one(
     bench: Bench, faces: Faces
 ) -> None:
     faces.shares["top"] = 0.8
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     assert bench.frames(30).bone_version == 2
     bench.do(Register())
     bench.frames(3)
     snapshot = bench.accept()
-    assert snapshot.cuts[0].is_made
-    assert snapshot.cuts[0].face is None
+    assert snapshot.steps[0].is_made
+    assert snapshot.steps[0].face is None
     assert snapshot.bone_version == 1
     bench.frames(1)
     heights_mm = cut_plan().bones["femur"].mesh.vertices_mm[:, 2]
@@ -204,7 +204,7 @@ def test_a_search_begins_anew_when_the_bone_is_cut_meanwhile() -> None:
     bench.frames(1)
     assert bench.script.started.wait(5.0)
     bench.script.started.clear()
-    bench.do(ConfirmCut("top"))
+    bench.do(ConfirmStep("top"))
     bench.frames(1)
     assert bench.script.started.wait(5.0)
     bench.script.gate.set()

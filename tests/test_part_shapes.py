@@ -5,8 +5,8 @@ import pytest
 
 from navapp.geometry.simplify import is_closed
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.overlay.part_shapes import part_mesh
 from navapp.values import Box, Cylinder, Part, Sphere
+from navapp.values.part_shapes import part_mesh
 from tests.geometry.shapes import cube
 
 HERE = RigidTransform.from_parts(

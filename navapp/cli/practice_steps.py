@@ -1,0 +1,84 @@
+"""The practice room makes what an operator confirms, and tells what it shows as made."""
+
+from collections.abc import Callable, Collection
+from typing import Protocol
+
+from navapp.control.commands import Command, ConfirmStep, WithdrawStep
+
+
+class Room(Protocol):
+    """A simulated room as far as steps go: their names, no planes and no poses."""
+
+    def set_stage(self, name: str, /) -> frozenset[str]:
+        """Show a stage as it is usually entered; answers with all steps that are made then."""
+        ...
+
+    def go_on(self, name: str, /) -> frozenset[str]:
+        """Show another stage as far as it was made, and what comes before it; the same answer."""
+        ...
+
+    def make(self, step: str, /) -> None:
+        """Show a step as made."""
+        ...
+
+    def unmake(self, step: str, /) -> None:
+        """Show it as not made."""
+        ...
+
+
+class PracticeSteps:
+    """Keeps what a session has confirmed and what the simulated room shows the same.
+
+    A session begins as its stage is usually entered. Then the operator makes the steps: one that
+    is confirmed is made in the room, one that is withdrawn is undone. A stage that is entered later
+    is shown as far as it was made, with all that comes before it. What changes by that goes through
+    the session's queue as commands, so that a recording holds it.
+
+    Args:
+        room: that is shown.
+        planned: names of the steps of the session's plan, which may not be the room's.
+    """
+
+    def __init__(self, room: Room, planned: Collection[str]) -> None:
+        self._room, self._planned = room, frozenset(planned)
+        self._submit: Callable[[Command], None] | None = None
+        self._is_begun = False
+        # In the room; and what the session knows of it.
+        self._shown: frozenset[str] = frozenset()
+        self._told: frozenset[str] = frozenset()
+
+    def enter_stage(self, name: str) -> None:
+        """The session is in another stage, or in its first one.
+
+        Raises:
+            UsageError: the room cannot show it.
+        """
+        show = self._room.go_on if self._is_begun else self._room.set_stage
+        self._is_begun, self._shown = True, show(name)
+        self._tell()
+
+    def connect(self, submit: Callable[[Command], None]) -> None:
+        """From now on the session takes commands; it is told what it does not know yet."""
+        self._submit = submit
+        self._tell()
+
+    def on_command(self, command: Command, after_sequence: int) -> None:
+        """The session is about to handle a command."""
+        match command:
+            case ConfirmStep(name) if name in self._planned:
+                if name not in self._shown:
+                    self._room.make(name)
+                self._shown, self._told = self._shown | {name}, self._told | {name}
+            case WithdrawStep(name) if name in self._shown:
+                self._room.unmake(name)
+                self._shown, self._told = self._shown - {name}, self._told - {name}
+
+    def _tell(self) -> None:
+        if self._submit is None:
+            return
+        shown = self._shown & self._planned
+        for name in sorted(self._told - shown):
+            self._submit(WithdrawStep(name))
+        for name in sorted(shown - self._told):
+            self._submit(ConfirmStep(name))
+        self._told = shown

@@ -1,0 +1,77 @@
+"""The page of the stage's steps."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from textual.pilot import Pilot
+
+from navapp.control.commands import ConfirmStep, WithdrawStep
+from navapp.control.stages import STAGES
+from navapp.control.states import StepLine
+from navapp.ui.actions import ACTIONS
+from navapp.ui.steps_page import STEP_KEYS, StepsPage, StepTable
+from navapp.values import MeasuredFace, ResectionPlane
+from tests.ui import snapshots
+from tests.ui.test_app import BellCounter, play
+
+PLANE = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, -1.0]))
+SMALL = np.diag([1e-6, 1e-6, 1e-3])
+FACE = MeasuredFace(PLANE, np.array([np.tan(np.radians(1.3)), 0.0, -0.55]), SMALL, SMALL, 0.8)
+STEPS = (
+    StepLine("femur_distal", is_made=True, face=FACE, seen_share=0.8),
+    StepLine("femur_anterior", is_made=True, seen_share=0.38),
+    StepLine("femur_posterior", is_made=True),
+    StepLine("femur_anterior_chamfer", is_made=False),
+    StepLine("femoral_implant", is_made=True, kind="part"),
+)
+
+
+def test_the_letters_mean_nothing_else_on_the_page() -> None:
+    kept = {
+        action.key for action in ACTIONS if action.name in ("quit", "steps", "accept", "reject")
+    }
+    assert not kept & set(STEP_KEYS)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
+def test_steps_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        assert isinstance(app.screen, StepsPage)
+        text = app.text_of(StepTable)
+        lines = [line.rstrip() for line in text.splitlines()]
+        assert lines[0].split() == ["b", "femur_distal", "cut", "made"]
+        assert "tilt     1.30 deg +- 0.20" in lines[1]
+        assert "offset  -0.55 mm  +- 0.09" in lines[2]
+        assert "tolerance 1.0" in lines[2]
+        assert lines[3].split() == ["c", "femur_anterior", "cut", "made"]
+        assert (
+            lines[4].strip() == "not measurable: 38 % of the cut is seen, its bounds are too large"
+        )
+        assert lines[6].strip() == "not measurable: it is not seen, or was not looked for yet"
+        assert lines[7].split() == ["f", "femur_anterior_chamfer", "cut", "planned"]
+        assert lines[8].split() == ["g", "femoral_implant", "part", "made"]
+        assert "version 3 of the femur is in force" in text
+        assert max(map(len, lines)) <= size[0] - 4
+        await pilot.press("B", "f", "f", "G", "h")
+
+    given = snapshots.navigating(steps=STEPS, bone_version=3, stage=STAGES[2])
+    app = play(given, script, size)
+    assert app.session.commands == [
+        WithdrawStep("femur_distal"),
+        ConfirmStep("femur_anterior_chamfer"),
+        ConfirmStep("femur_anterior_chamfer"),
+        WithdrawStep("femoral_implant"),
+    ]
+
+
+def test_without_steps_the_page_says_so() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        assert isinstance(app.screen, StepsPage)
+        assert "the plan has no cut, hole or part of the femur" in str(
+            app.screen.query_one(StepTable).render()
+        )
+
+    play(snapshots.navigating(), script, (80, 24))
