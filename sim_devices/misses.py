@@ -17,12 +17,14 @@ REPEATED = 0.1
 def miss_cut(planned: Cut, rng: np.random.Generator, times: float = 1.0) -> Cut:
     """The cut as the saw makes it.
 
-    One cut in ten is made a second time, and only that attempt's miss counts. A saw misses by so
-    many `times` as much as usual.
+    One cut in ten is made a second time: tilted as then, and no higher than the first time, because
+    no bone comes back. A saw misses by so many `times` as much as usual.
     """
     is_repeated = rng.uniform() < REPEATED
-    attempts = [miss_plane(planned.point_mm, planned.normal, rng, times) for _ in range(2)]
-    point_mm, normal = attempts[1 if is_repeated else 0]
+    first, second = (miss_plane(planned.point_mm, planned.normal, rng, times) for _ in range(2))
+    point_mm, normal = second if is_repeated else first
+    if is_repeated and (first[0] - second[0]) @ planned.normal < 0.0:
+        point_mm = first[0]
     return replace(planned, point_mm=point_mm, normal=normal)
 
 

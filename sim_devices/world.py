@@ -36,6 +36,8 @@ from sim_devices.state_history import StateHistory
 from sim_devices.textures import make_noise_tile
 
 _TISSUE_FOLLOWS = 0.9
+# States that are shown again soon: going back and forth makes none anew.
+_KEPT_STATES = 4
 _DEFECT_RADIUS_MM = 9.0
 _HAND_ABOVE_MM = 32.0
 # Direction in the table's frame (z away from the cameras), strength.
@@ -299,12 +301,20 @@ class World:
         return Renderer(camera, parts, self._surfaces_at(scale), frozenset({"drape"}))
 
     def _scene(self, state: State) -> Scene:
-        """Made at the first call, and kept."""
+        """Made at the first call, and kept until others have taken its place."""
         if state not in self._scenes:
+            self._forget_all_but_newest()
             made = make_scene(self._site, self._fitted, state)
             parts = tuple(self._mirror_if_left(part) for part in made.parts)
             self._scenes[state] = replace(made, parts=parts)
         return self._scenes[state]
+
+    def _forget_all_but_newest(self) -> None:
+        """A renderer takes hundreds of MB, and an operation passes through a dozen states."""
+        for old in list(self._scenes)[: -_KEPT_STATES + 1]:
+            del self._scenes[old]
+            self._renderers = {k: one for k, one in self._renderers.items() if k[0] != old}
+            self._others = {k: one for k, one in self._others.items() if k[0] != old}
 
     def _surfaces_at(self, scale: float) -> Surfaces:
         """Smaller pictures need a blurred texture, or its finest octave would flicker."""

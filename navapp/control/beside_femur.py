@@ -7,10 +7,9 @@ from functools import cached_property
 from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job
 from navapp.control.trackers import Trackers
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.joint import KneeSearch, OccludedTracker
-from navapp.limb import FEMUR, TIBIA, Hinge, LimbMeasurement, LimbMeter
+from navapp.limb import FEMUR, TIBIA, BoneSurface, Hinge, LimbMeasurement, LimbMeter
 from navapp.tracking import Tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import Plan, PoseEstimate, StageSpec, TrackedFrame
@@ -44,7 +43,7 @@ class BesideFemur:
     def __init__(self, trackers: Trackers, plan: Plan, executor: Executor) -> None:
         self._trackers, self._plan, self._executor = trackers, plan, executor
         self._job: Job[FoundBone] | None = None
-        # As the newest search has told it; None before one.
+        # Of the found pose that is followed; None before one.
         self._spread: FloatArray | None = None
 
     @cached_property
@@ -64,18 +63,27 @@ class BesideFemur:
         is_ours = may_start_from(bone, active) and self._search is not None
         return is_ours and isinstance(self._trackers.tracker(bone), BimccTracker)
 
-    def tracker(self, bone: str, left_from_femur: RigidTransform | None) -> Tracker:
-        """Of a bone for one pair of pictures: behind the femur where its pose is known."""
+    def tracker(
+        self, bone: str, left_from_femur: RigidTransform | None, *, is_found: bool
+    ) -> Tracker:
+        """Of a bone for one pair of pictures: behind the femur where its pose is known.
+
+        One that was found from the femur keeps the spread of that search.
+        """
         tracker = self._trackers.tracker(bone)
         if left_from_femur is None or not isinstance(tracker, BimccTracker):
             return tracker
-        return self._hide(tracker, left_from_femur, self._spread)
+        return self._hide(tracker, left_from_femur, self._spread if is_found else None)
+
+    def keep(self, found: FoundBone) -> None:
+        """That pose is followed from now on."""
+        self._spread = found.spread
 
     def _hide(
         self,
         tracker: BimccTracker,
         left_from_femur: RigidTransform,
-        spread: FloatArray | None = None,
+        spread: FloatArray | None,
     ) -> OccludedTracker:
         mesh = self._trackers.tracker(FEMUR).model.rendered_mesh
         return OccludedTracker(tracker, mesh, left_from_femur, spread)
@@ -98,12 +106,14 @@ class BesideFemur:
             ValueError: it `can_find` no such bone.
         """
         tracker, search = self._trackers.tracker(stage.bone), self._search
+        # Of the femur as it is now: a cut may be confirmed before the search begins.
+        femur = self._trackers.tracker(FEMUR).model.rendered_mesh
         goal = self._trackers.goal(stage)
         if search is None or not isinstance(tracker, BimccTracker):
             raise ValueError(f"the {stage.bone} is not found from the femur")
 
         def look(on_progress: Callable[[float], None]) -> FoundBone:
-            hidden = self._hide(tracker, left_from_femur)
+            hidden = OccludedTracker(tracker, femur, left_from_femur)
             found = search.find(hidden, frame.left, frame.right, left_from_femur, goal, on_progress)
             return FoundBone(
                 found.tracked, frame.captured_ns, left_from_femur, track_number, found.spread
@@ -123,8 +133,6 @@ class BesideFemur:
         self._job = None
         if job.error is not None:
             raise job.error
-        if job.result is not None:
-            self._spread = job.result.spread
         return job.result
 
     def cancel(self) -> None:
@@ -143,7 +151,11 @@ class BesideFemur:
         surfaces = self._surface(FEMUR), self._surface(TIBIA)
         return self._limb_meter.measure(femur, tibia, surfaces)
 
-    def _surface(self, name: str) -> TriangleMesh:
-        """What is left of a bone."""
+    def _surface(self, name: str) -> BoneSurface:
+        """What is left of a bone: known where it is whole, or every cut's face is measured."""
         bone = self._trackers.bone(name)
-        return bone.planned.mesh if bone.surface is None else bone.surface
+        mesh = bone.planned.mesh if bone.surface is None else bone.surface
+        unknown = next((f"cut {cut} is not measured" for cut in bone.unmeasured), None)
+        if bone.parts:
+            unknown = f"a part lies on the {name}"
+        return BoneSurface(mesh, bone.faces_bound_mm, unknown)

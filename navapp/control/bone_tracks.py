@@ -72,13 +72,20 @@ class BoneTracks:
         """The stage's bone was accepted, or found beside another one."""
         return self.is_accepted(stage) or stage.bone in self._found
 
+    def is_found(self, stage: StageSpec) -> bool:
+        """It was found beside another one, and nobody has accepted it."""
+        return stage.bone in self._found
+
     def take(self, stage: StageSpec, tracked: TrackedFrame, captured_ns: int) -> None:
-        """Follow a stage's bone, found beside another one, from now on; nothing if it is lost."""
+        """Follow a stage's bone, found beside another one, from now on; nothing if it is lost.
+
+        An accepted pose that it takes the place of is accepted no longer: nobody has seen this one.
+        """
         pose, verdict = tracked.left_from_bone, tracked.verdict
         if pose is None or verdict.status is Status.LOST:
             return
-        tracks = self._tracks if self.is_accepted(stage) else self._found
-        tracks[stage.bone] = TrackState.at_rest(pose, captured_ns, verdict.cause)
+        self._tracks.pop(stage.bone, None)
+        self._found[stage.bone] = TrackState.at_rest(pose, captured_ns, verdict.cause)
 
     def forget(self, bone: str) -> None:
         """A bone is followed no longer."""

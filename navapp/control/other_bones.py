@@ -123,8 +123,11 @@ class OtherBones:
         if is_asked and self._asked.is_each:
             self._tracks.forget(name)
         is_beside = is_trusted and active is not None and self._beside.can_find(name, active_bone)
-        if self._tracks.is_followed(own):
-            tracker = self._beside.tracker(name, active if is_beside else None)
+        # What was found behind the femur is known as well as told only there.
+        is_found = self._tracks.is_found(own)
+        if self._tracks.is_followed(own) and (is_beside or not is_found):
+            known = active if is_beside else None
+            tracker = self._beside.tracker(name, known, is_found=is_found)
             moved = self._active_motion(name, active)
             tracked = self._tracks.glance(own, frame, moved, tracker)
         if active is not None and is_beside and is_asked:
@@ -174,10 +177,11 @@ class OtherBones:
         if not is_now and found.track_number != self._tracks.track_number:
             return None
         self._tracks.take(own, found.tracked, found.captured_ns)
+        self._beside.keep(found)
         if is_now or not self._tracks.is_followed(own):
             return found.tracked
         moved = left_from_femur @ found.left_from_femur.inverse()
-        tracker = self._beside.tracker(own.bone, left_from_femur)
+        tracker = self._beside.tracker(own.bone, left_from_femur, is_found=True)
         return self._tracks.glance(own, frame, moved, tracker)
 
     def measure_limb(

@@ -3,11 +3,12 @@
 from navapp.limb.angles import LimbAngles
 from navapp.limb.flexion import Hinge, Poses
 from navapp.limb.gaps import Gap
-from navapp.limb.limb_meter import FEMUR, TIBIA, LimbMeasurement, LimbMeter
+from navapp.limb.limb_meter import FEMUR, TIBIA, BoneSurface, LimbMeasurement, LimbMeter
 
 __all__ = [
     "FEMUR",
     "TIBIA",
+    "BoneSurface",
     "Gap",
     "Hinge",
     "LimbAngles",

@@ -17,7 +17,7 @@ _SOME = 50  # one point of so many tells roughly how wide a gap is
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A distance, and its 95 % bound by the two poses."""
+    """A distance, and its 95 % bound by the two poses and the faces of cuts."""
 
     mm: float
     bound_mm: float
@@ -48,6 +48,7 @@ class GapMeter:
         femur: PoseEstimate,
         tibia: PoseEstimate,
         centres_mm: tuple[FloatArray, FloatArray],
+        surface_sd_mm: float = 0.0,
     ) -> dict[str, Gap]:
         """`medial` and `lateral`, of two poses of one pair of pictures; without wider ones.
 
@@ -55,10 +56,11 @@ class GapMeter:
             femur: its pose.
             tibia: its pose.
             centres_mm: (3,) of each, about which the covariances are, in their own coordinates.
+            surface_sd_mm: of the two surfaces themselves.
         """
         gaps = {}
         for name, points_mm in self._sides.items():
-            gap = self._measure(points_mm, femur, tibia, centres_mm)
+            gap = self._measure(points_mm, femur, tibia, centres_mm, surface_sd_mm)
             if gap is not None:
                 gaps[name] = gap
         return gaps
@@ -69,6 +71,7 @@ class GapMeter:
         femur: PoseEstimate,
         tibia: PoseEstimate,
         centres_mm: tuple[FloatArray, FloatArray],
+        surface_sd_mm: float,
     ) -> Gap | None:
         tibia_from_femur = tibia.camera_from_bone.inverse() @ femur.camera_from_bone
         placed_mm = tibia_from_femur.apply(points_mm)
@@ -90,7 +93,7 @@ class GapMeter:
                 (on_femur, on_tibia), (femur, tibia), centres_mm, strict=True
             )
         )
-        return Gap(gap_mm, SIGMAS_95 * float(np.sqrt(variance)))
+        return Gap(gap_mm, SIGMAS_95 * float(np.sqrt(variance + surface_sd_mm**2)))
 
 
 def cover_with_points(mesh: TriangleMesh) -> FloatArray:

@@ -1,10 +1,11 @@
 """What two poses of one pair of pictures say of the limb: angles and gaps, or why not."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.limb.angles import LimbAngles, measure_angles
+from navapp.limb.angles import SIGMAS_95, LimbAngles, measure_angles
 from navapp.limb.axes import find_limb_axes, find_missing
 from navapp.limb.flexion import Hinge
 from navapp.limb.gaps import Gap, GapMeter
@@ -14,12 +15,21 @@ FEMUR, TIBIA = "femur", "tibia"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class BoneSurface:
+    """What is left of a bone, as far as that is known."""
+
+    mesh: TriangleMesh
+    bound_mm: float = 0.0  # 95 %, of the faces of its cuts, across them
+    unknown: str | None = None  # why no gap can be told from it, in words
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class LimbMeasurement:
     """Of one pair of pictures."""
 
     angles: LimbAngles | None  # None when an axis is not known
     gaps: Mapping[str, Gap] = field(default_factory=dict)  # `medial`, `lateral`, where found
-    missing: str | None = None  # which axis is not known, in words
+    missing: str | None = None  # which axis is not known, or why there are no gaps, in words
 
 
 class LimbMeter:
@@ -46,21 +56,26 @@ class LimbMeter:
         self,
         femur: PoseEstimate,
         tibia: PoseEstimate,
-        surfaces: tuple[TriangleMesh, TriangleMesh],
+        surfaces: tuple[BoneSurface, BoneSurface],
     ) -> LimbMeasurement:
         """Angles and gaps.
 
         Args:
             femur: its pose.
             tibia: its pose in the same pair.
-            surfaces: what is left of femur and tibia.
+            surfaces: of femur and tibia; without gaps where one is not known.
         """
         angles = None
         if self._axes is not None and self._side is not None:
             angles = measure_angles(self._axes, femur, tibia, self._side)
-        meter = self._gap_meter(surfaces)
-        gaps = {} if meter is None else meter.measure(femur, tibia, self._centres_mm)
-        return LimbMeasurement(angles, gaps, self._missing)
+        unknown = next((one.unknown for one in surfaces if one.unknown is not None), None)
+        missing = "; ".join(why for why in (self._missing, unknown) if why) or None
+        meter = None if unknown else self._gap_meter((surfaces[0].mesh, surfaces[1].mesh))
+        if meter is None:
+            return LimbMeasurement(angles, {}, missing)
+        surface_sd_mm = math.hypot(*(one.bound_mm for one in surfaces)) / SIGMAS_95
+        gaps = meter.measure(femur, tibia, self._centres_mm, surface_sd_mm)
+        return LimbMeasurement(angles, gaps, missing)
 
     def _gap_meter(self, surfaces: tuple[TriangleMesh, TriangleMesh]) -> GapMeter | None:
         """Made anew when a cut has changed a bone."""

@@ -64,6 +64,15 @@ class CutBone:
         """Names of the cuts whose face is not known yet."""
         return tuple(name for name in self.cuts if name not in self.faces)
 
+    @property
+    def faces_bound_mm(self) -> float:
+        """95 %, of the least known of its measured faces: across it, where most of it lies."""
+        bounds_mm = (
+            math.hypot(face.bound_mm, _HALF_FACE_MM * math.radians(face.bound_deg))
+            for face in self.faces.values()
+        )
+        return max(bounds_mm, default=0.0)
+
     def make(self, name: str, step: PlannedStep) -> "CutBone":
         """With one more step made; the face of a cut is not measured."""
         return self._become({**self.made, name: step}, self._faces_but(name))

@@ -39,7 +39,7 @@ from navapp.geometry.ply import read_ply
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform
 from navapp.joint import OccludedTracker
-from navapp.limb import LimbMeter
+from navapp.limb import BoneSurface, LimbMeter
 from navapp.preop import read_plan
 from navapp.tracking import Goal, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
@@ -258,7 +258,8 @@ def measure_true_limb(
     exact = (
         PoseEstimate(true[name], np.zeros((6, 6)), 0, 1.0, 0.0, 1.0, 0, True) for name in _BONES
     )
-    return limb_to_json(LimbMeter(plan).measure(*exact, (meshes[0], meshes[1])))
+    surfaces = BoneSurface(meshes[0]), BoneSurface(meshes[1])
+    return limb_to_json(LimbMeter(plan).measure(*exact, surfaces))
 
 
 def _read_truth(sequence: Path) -> dict[int, dict[str, RigidTransform]]:

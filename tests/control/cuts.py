@@ -27,6 +27,7 @@ class Faces:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.shares: dict[str, float | None] = {}
         self.expected: list[ResectionPlane | None] = []
+        self.offset_mm = -0.4
         monkeypatch.setattr(FaceMeter, "measure", self._measure)
 
     def _measure(self, left, right, estimate, made, planned, expected=None) -> MeasuredFace | None:
@@ -35,4 +36,4 @@ class Faces:
         if share is None:
             return None
         little = np.diag([1e-6, 1e-6, 1e-3])
-        return MeasuredFace(planned, np.array([0.01, 0.0, -0.4]), little, little, share)
+        return MeasuredFace(planned, np.array([0.01, 0.0, self.offset_mm]), little, little, share)

@@ -1,6 +1,7 @@
 """The time-out and the gates between stages, in a session on fakes."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -11,7 +12,10 @@ from navapp.control.commands import (
     ConfirmStep,
     EnterStage,
     OverrideGate,
+    Quit,
+    Register,
     WithdrawCondition,
+    WithdrawStep,
 )
 from navapp.control.stages import STAGES, TIME_OUT
 from navapp.control.states import Snapshot
@@ -169,3 +173,89 @@ def test_conditions_go_by_the_time_of_pictures_so_that_they_replay(bench: Bench)
     assert is_met(bench.do(WithdrawCondition("nothing")))["checked_on_patient"]
     bench.frames(1)
     assert not is_met(bench.snapshot)["checked_on_patient"]
+
+
+def enter_implant(bench: Bench) -> None:
+    bench.do(EnterStage(3))
+    bench.do(OverrideGate(3, "practice"))
+
+
+def register_again(bench: Bench) -> None:
+    bench.do(Register())
+    bench.frames(2)
+    bench.accept()
+
+
+def test_a_cut_beyond_tolerance_is_not_confirmed_by_hand_after_a_new_registration(
+    bench: Bench, faces: Faces
+) -> None:
+    enter_implant(bench)
+    faces.shares["top"], faces.offset_mm = 0.8, -2.4
+    bench.do(ConfirmStep("top"))
+    bench.frames(31)
+    assert not is_met(bench.snapshot)["cut top"]
+    faces.shares["top"] = None
+    register_again(bench)
+    bench.do(ConfirmCondition("cut top"))
+    assert "nobody is asked for 'cut top'" in bench.refused()
+    assert not is_met(bench.snapshot)["cut top"]
+    # One that is made again may be.
+    bench.do(WithdrawStep("top"))
+    bench.do(ConfirmStep("top"))
+    assert is_met(confirm(bench, "cut top"))["cut top"]
+
+
+def test_a_cut_that_is_made_again_is_checked_again(bench: Bench) -> None:
+    enter_implant(bench)
+    bench.do(ConfirmStep("top"))
+    assert is_met(confirm(bench, "cut top"))["cut top"]
+    bench.do(WithdrawStep("top"))
+    bench.do(ConfirmStep("top"))
+    assert not is_met(bench.snapshot)["cut top"]
+
+
+def test_a_cut_has_a_name_of_its_own(bench: Bench) -> None:
+    """The plan has a cut `side`, the time-out an item of that name."""
+    enter_implant(bench)
+    bench.do(ConfirmStep("side"))
+    confirm(bench, "side")
+    assert not is_met(bench.snapshot)["cut side"]
+
+
+def test_a_check_on_the_patient_is_one_of_a_bone_and_of_its_registration(bench: Bench) -> None:
+    confirm(bench, "checked_on_patient")
+    assert is_met(bench.snapshot)["checked_on_patient"]
+    register_again(bench)
+    assert not is_met(bench.snapshot)["checked_on_patient"]
+    assert "registered again" in [line.note for line in bench.snapshot.gate][-1]
+    confirm(bench, "checked_on_patient")
+    bench.do(EnterStage(5))
+    bench.do(OverrideGate(5, "practice"))
+    assert not is_met(bench.snapshot)["checked_on_patient"]
+
+
+def test_an_override_passes_once_and_what_was_told_alone(bench: Bench) -> None:
+    bench.do(EnterStage(2))
+    bench.script.tracked = answer(Status.DEGRADED, Reason.TRE_TOO_LARGE)
+    bench.frames(1)
+    assert bench.do(OverrideGate(2, "haste")).stage.number == 1
+    assert bench.refused() == "stage 2 drilling refused: 3 open"
+    assert bench.do(OverrideGate(2, "haste")).stage.number == 2
+    bench.do(EnterStage(1))
+    assert bench.do(OverrideGate(2, "haste")).stage.number == 1
+    assert "enter stage 2 first" in bench.refused()
+
+
+def test_what_the_end_leaves_open_is_told(bench: Bench) -> None:
+    bench.do(EnterStage(5))
+    bench.do(OverrideGate(5, "practice"))
+    assert {"checked_on_patient", "cut flat", "gaps"} == set(is_met(bench.snapshot))
+    bench.do(Quit())
+    told = [event.text for event in bench.events if event.kind == "gate"]
+    assert "open: the gaps were measured in extension and at 90 deg" in told
+
+
+def test_a_plan_without_a_model_of_the_cut_bone_answers() -> None:
+    bench = navigating(Bench(plan=replace(cut_plan(), bones={"femur": cut_plan().bones["femur"]})))
+    bench.do(WithdrawStep("flat"))
+    assert "'flat' was not confirmed" in bench.refused()

@@ -23,7 +23,7 @@ from navapp.control.scripted_operator import (
 from navapp.errors import ConfigurationError, UsageError
 from navapp.geometry.transform import rotation_angle_deg
 from navapp.values import Reason, Status
-from tests.control.fakes import GONE, LOST, Bench, FakeCamera, a_pose, answer
+from tests.control.fakes import GONE, LOST, Bench, FakeCamera, a_pose, answer, navigating
 from tests.control.operated import commands_of, kinds
 
 
@@ -176,3 +176,39 @@ def test_a_text_that_was_told_before_the_step_does_not_count() -> None:
 def test_a_step_that_lacks_something_is_refused(step, why: str) -> None:
     with pytest.raises(ConfigurationError, match=why):
         read_script({"step": [step]}, "s")
+
+
+def test_a_script_that_waits_in_vain_ends_the_session(bench: Bench) -> None:
+    operator = ScriptedOperator((ScriptStep(do="wait", until="navigating", frames=3),))
+    given = commands_of(bench, operator)
+    assert "not within 3 frames" in operator.failure
+    assert kinds(given) == ["Quit"]
+
+
+def test_what_a_session_left_undone_is_told(bench: Bench) -> None:
+    operator = ScriptedOperator((ScriptStep(do="blank"), ScriptStep(do="show", at_frame=99)))
+    commands_of(bench, operator)
+    assert operator.failure == ""
+    assert operator.unfinished.endswith("before step 2 of the operator's script (show)")
+
+
+@pytest.mark.parametrize("expects", [False, True])
+def test_a_refused_gate_ends_a_script_that_does_not_expect_it(expects: bool) -> None:
+    bench = navigating(Bench(camera=FakeCamera(None, n_frames=40), has_gates=True))
+    expect = (ScriptStep(do="expect", text="open: the bone is exposed"),) if expects else ()
+    operator = ScriptedOperator((ScriptStep(do="stage", stage="drilling"), *expect))
+    commands_of(bench, operator)
+    if expects:
+        assert operator.failure == ""
+    else:
+        assert operator.failure.startswith("step 1 of the operator's script: refused, open: ")
+
+
+def test_a_bone_may_be_registered_again_while_it_is_followed(bench: Bench) -> None:
+    operator = ScriptedOperator((ScriptStep(do="register"),) * 2)
+    assert kinds(commands_of(bench, operator)) == ["Register", "Accept"] * 2
+
+
+def test_nobody_waits_for_a_review_that_is_decided_at_once() -> None:
+    with pytest.raises(ConfigurationError, match="waits for 'review'"):
+        read_script({"step": [{"do": "wait", "until": "review"}]}, "script.toml")

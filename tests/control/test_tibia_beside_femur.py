@@ -8,6 +8,7 @@ import pytest
 from navapp.control.beside_femur import FoundBone
 from navapp.control.bone_tracks import BoneTracks
 from navapp.control.other_bones import AskedBones, OtherBones
+from navapp.control.registration_job import Registration
 from navapp.control.stages import STAGES, stage_of
 from navapp.limb import LimbMeasurement
 from navapp.tracking import Goal
@@ -34,6 +35,8 @@ class FakeBeside:
         self._tracker, self.found, self.after = tracker, found, after
         self.began: list[int] = []
         self.hidden_behind: list[object] = []
+        self.spread, self.kept = 1.0, None
+        self.spreads: list[float | None] = []
         self._due: tuple[int, FoundBone] | None = None
 
     @property
@@ -43,14 +46,22 @@ class FakeBeside:
     def can_find(self, bone, active) -> bool:
         return (bone, active) == ("tibia", "femur")
 
-    def tracker(self, bone, left_from_femur):
+    def tracker(self, bone, left_from_femur, *, is_found):
         self.hidden_behind.append(left_from_femur)
+        self.spreads.append(self.kept if is_found else None)
         return self._tracker
+
+    def keep(self, found) -> None:
+        self.kept = found.spread[0, 0]
 
     def start(self, stage, frame, left_from_femur, track_number) -> None:
         self.began.append(frame.sequence)
         found = FoundBone(
-            self.found, frame.captured_ns, left_from_femur, track_number, np.zeros((6, 6))
+            self.found,
+            frame.captured_ns,
+            left_from_femur,
+            track_number,
+            self.spread * np.eye(6),
         )
         self._due = frame.sequence + self.after, found
 
@@ -179,6 +190,34 @@ def test_what_was_found_beside_a_femur_that_was_registered_anew_is_dropped() -> 
     room.tracks.drop_candidates()
     assert room.step() is None
     assert room.taken_over == [2]
+
+
+def test_a_found_pose_keeps_its_spread_when_a_later_search_finds_nothing() -> None:
+    room = Room(FOUND)
+    room.steps(2)
+    room.script.tracked_of["tibia"] = DEGRADED
+    room.beside.found, room.beside.spread = LOST, 0.0
+    room.steps(3)
+    assert room.beside.spreads == [1.0, 1.0]
+
+
+def test_what_was_found_is_not_followed_where_the_femur_is_not_ok() -> None:
+    room = Room(FOUND)
+    room.steps(2)
+    tracked = room.step(answer(Status.DEGRADED, Reason.SURFACE_MISFIT))
+    assert tracked is None or tracked.verdict.status is Status.LOST
+    assert room.beside.hidden_behind == []
+    assert room.script.tracks == []
+
+
+def test_a_found_pose_takes_the_place_of_an_accepted_one_unaccepted() -> None:
+    room, own = Room(FOUND), stage_of("tibia", a_plan())
+    room.tracks.offer(Registration([answer(pose=a_pose("tibia"))], 10**9))
+    room.tracks.accept(own)
+    room.script.tracked_of["tibia"] = DEGRADED
+    room.steps(2)
+    assert room.tracks.is_followed(own)
+    assert not room.tracks.is_accepted(own)
 
 
 def test_nobody_has_accepted_what_was_found() -> None:

@@ -10,6 +10,7 @@ import pytest
 from navapp.cli.main import run
 from tests.many import few_of
 
+OPERATION = Path(__file__).parents[2] / "docs" / "operation.toml"
 REGISTER = "[[step]]\ndo = 'register'\n"
 STARTS = [(stage, seed) for seed in range(1, 6) for stage in ("implant", "patella", "spacer")]
 # Of one knee's few frames: their errors go together.
@@ -35,16 +36,24 @@ def test_a_stage_to_start_in_is_known_with_the_cuts_that_were_made(start, tmp_pa
     assert np.median([frame["tre_mm"] for frame in frames[1:]]) <= WORST_MM
 
 
-@pytest.mark.release
-def test_one_session_walks_through_all_five_stages(tmp_path) -> None:
-    entered = {"drilling": 4, "implant": 7, "patella": 11, "spacer": 15}
-    script = REGISTER
-    for stage, at_frame in entered.items():
-        script += f"[[step]]\ndo = 'stage'\nstage = '{stage}'\nat_frame = {at_frame}\n"
-        script += REGISTER if stage in ("patella", "spacer") else ""
-    frames = run_headless(tmp_path, 1, script, "--frames", "21")
-    assert list(dict.fromkeys(frame["stage"] for frame in frames)) == ["opening", *entered]
-    for stage in ("opening", *entered):
-        of_stage = [frame for frame in frames if frame["stage"] == stage]
-        assert of_stage[-1]["status"] == "OK", stage
-        assert of_stage[-1]["tre_mm"] < 0.3, stage
+def test_an_operation_goes_through_all_five_stages(tmp_path) -> None:
+    """Every gate is refused once and met once (the script expects it); all that is made is told."""
+    config, result = tmp_path / "c.toml", tmp_path / "r.json"
+    config.write_text("[camera.simulated]\nmisses = 0.2\n", encoding="utf-8")
+    arguments = ["--config", str(config), "run", "--headless", "--json", str(result)]
+    assert run([*arguments, "--operator", str(OPERATION), "--frames", "300"]) == 0
+    told = json.loads(result.read_text(encoding="utf-8"))
+    stages = list(dict.fromkeys(frame["stage"] for frame in told["frames"]))
+    assert stages == ["opening", "drilling", "implant", "patella", "spacer"]
+    right = [frame["tre_mm"] for frame in told["frames"] if frame["status"] == "OK"]
+    assert np.median(right) < 0.1
+    assert max(right) < 0.5
+    steps = {step["step"]: step for step in told["operation"]}
+    assert len(steps) == 11
+    assert all(step["made"] for step in steps.values())
+    measured = [step for step in steps.values() if step["measured"] is not None]
+    assert {step["step"] for step in measured} >= {"femur_distal", "tibia_proximal"}
+    for step in measured:
+        face, truth = step["measured"], step["off_plan"]
+        assert abs(face["offset_mm"] - truth["mm"]) <= face["bound_mm"]
+        assert abs(face["angle_deg"] - truth["deg"]) <= face["bound_deg"]

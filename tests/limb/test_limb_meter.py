@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.transform import RigidTransform
-from navapp.limb import LimbMeter
+from navapp.limb import BoneSurface, LimbMeter
 from navapp.limb.gaps import GapMeter, cover_with_points
 from navapp.values import BoneModel, Plan, SurgicalContent
 from sim_devices.anatomy import KneeSpec, make_knee
@@ -74,9 +74,10 @@ def plan(side="right", known=None) -> Plan:
     )
 
 
-def measure(one: Plan):
+def measure(one: Plan, **of_femur):
     femur = camera_from_femur()
-    surfaces = one.bones["femur"].mesh, one.bones["tibia"].mesh
+    meshes = one.bones["femur"].mesh, one.bones["tibia"].mesh
+    surfaces = BoneSurface(meshes[0], **of_femur), BoneSurface(meshes[1])
     return LimbMeter(one).measure(estimate(femur), estimate(femur @ APART), surfaces)
 
 
@@ -93,6 +94,21 @@ def test_without_a_hip_the_gaps_are_left() -> None:
     assert found.angles is None
     assert found.missing == "no hip centre in the plan"
     assert set(found.gaps) == {"medial", "lateral"}
+
+
+def test_a_bone_that_is_not_known_has_no_gap() -> None:
+    found = measure(plan(), unknown="cut femur_distal is not measured")
+    assert found.gaps == {}
+    assert found.angles is not None
+    assert found.missing == "cut femur_distal is not measured"
+
+
+def test_what_is_not_known_of_a_face_is_in_the_bound() -> None:
+    exact, unsure = measure(plan()), measure(plan(), bound_mm=0.5)
+    for name, gap in unsure.gaps.items():
+        known = exact.gaps[name]
+        assert gap.mm == known.mm
+        assert gap.bound_mm == pytest.approx(np.hypot(known.bound_mm, 0.5))
 
 
 def test_without_a_side_nothing_is_medial() -> None:

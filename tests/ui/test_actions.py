@@ -2,6 +2,7 @@ from collections import Counter
 
 import pytest
 
+from navapp.control.rules import why_refused
 from navapp.control.stages import STAGES
 from navapp.control.states import SessionState
 from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
@@ -57,3 +58,10 @@ def test_a_page_can_always_be_opened() -> None:
     for action in ACTIONS:
         if action.command is None:
             assert is_possible(action, snapshots.starting(), is_silent=True), action.name
+
+
+@pytest.mark.parametrize("name", ["accept", "reject"])
+def test_a_key_decides_about_no_candidate_that_was_not_on_the_screen(name: str) -> None:
+    command = ACTION_OF_NAME[name].command(snapshots.navigating(candidate_id=None))
+    shown = snapshots.navigating(candidate_id=3, verdict=snapshots.navigating().verdict)
+    assert why_refused(command, shown) == "another candidate is under review now"
