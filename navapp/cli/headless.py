@@ -11,7 +11,13 @@ import numpy as np
 
 from navapp.cli.diagnostics import Diagnostics, write_json
 from navapp.cli.operation_table import StepResult, format_steps, steps_to_json
-from navapp.cli.results import frame_text, summarise, summarise_faces, summarise_gaps, summary_text
+from navapp.cli.results import (
+    frame_text,
+    summarise,
+    summarise_gaps,
+    summarise_measured,
+    summary_text,
+)
 from navapp.control.controller import SessionController
 from navapp.control.frame_result import FrameResult
 from navapp.control.operators import Operator
@@ -19,7 +25,7 @@ from navapp.control.runner import run_headless
 from navapp.errors import NavappError, PriorError, ResultError, RigError
 from navapp.geometry.rig import StereoRig
 from navapp.limb import LimbMeasurement
-from navapp.values import MeasuredFace, Prior
+from navapp.values import Measured, Prior
 
 _NO_PICTURE = np.empty((0, 0, 3), dtype=np.uint8)
 
@@ -124,7 +130,7 @@ def report_result(
     options: argparse.Namespace,
     diagnostics: Diagnostics,
     rig: dict[str, Any] | None = None,
-    faces: Sequence[Mapping[str, MeasuredFace]] = (),
+    measured: Sequence[Mapping[str, Measured]] = (),
     limbs: Sequence[LimbMeasurement | None] = (),
     steps: Sequence[StepResult] = (),
 ) -> int:
@@ -137,7 +143,7 @@ def report_result(
         options: of the verb.
         diagnostics: takes the summary.
         rig: what a live session found out about its rig.
-        faces: of cuts, as each frame has measured them.
+        measured: cuts and holes, as each frame has measured them.
         limbs: what femur and tibia said together in each frame.
         steps: what was planned, made and measured.
 
@@ -145,7 +151,7 @@ def report_result(
         NavappError: that fault.
         ResultError: no frame was OK.
     """
-    summary = {**summarise(frames, seconds), "measured": summarise_faces(faces)}
+    summary = {**summarise(frames, seconds), "measured": summarise_measured(measured)}
     if any(limb is not None for limb in limbs):
         summary["limb"] = summarise_gaps(limbs)
     told: dict[str, Any] = {} if rig is None else {"rig": rig}

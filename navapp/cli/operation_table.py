@@ -7,16 +7,17 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from navapp.control.recorder import face_to_json
+from navapp.control.recorder import measured_to_json
 from navapp.control.stages import STAGES
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
 from navapp.values import (
     DrillAxis,
-    MeasuredFace,
+    Measured,
+    MeasuredHole,
     Plan,
     PlannedStep,
     ResectionPlane,
-    join_faces,
+    join_measured,
 )
 
 
@@ -38,7 +39,7 @@ class KnowsMade(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Miss:
-    """How far something is off its plan: a cut along its normal, an entry, a part at its origin."""
+    """How far something is off its plan: a cut along its normal, a hole across, a part's origin."""
 
     mm: float
     deg: float
@@ -53,13 +54,13 @@ class StepResult:
     kind: str
     is_made: bool  # an operator has confirmed it
     miss: Miss | None  # true, of a simulated room; None where nobody knows, or of what is not made
-    face: MeasuredFace | None  # of a cut, all measurements together
+    measured: Measured | None  # a cut or a hole, all measurements together
 
 
 def list_steps(
     plan: Plan,
     made: Collection[str],
-    faces: Sequence[Mapping[str, MeasuredFace]],
+    measured: Sequence[Mapping[str, Measured]],
     truth: KnowsMade | None,
 ) -> list[StepResult]:
     """All steps of a plan, in the order of its stages.
@@ -67,17 +68,17 @@ def list_steps(
     Args:
         plan: of the session.
         made: names of steps that are confirmed at its end.
-        faces: as each frame has measured them.
+        measured: as each frame has it.
         truth: of what was made; None when nobody knows it.
     """
     results = []
     for stage in (plan.stage(one) for one in STAGES[1:]):
         for name, step in plan.steps_of(stage).items():
-            seen = [frame[name] for frame in faces if name in frame]
+            seen = [frame[name] for frame in measured if name in frame]
             is_made = name in made
             miss = _miss(name, step, truth) if is_made and truth is not None else None
-            face = join_faces(seen) if is_made and seen else None
-            results.append(StepResult(stage.name, name, _kind(step), is_made, miss, face))
+            one = join_measured(seen) if is_made and seen else None
+            results.append(StepResult(stage.name, name, _kind(step), is_made, miss, one))
     return results
 
 
@@ -101,7 +102,7 @@ def steps_to_json(steps: Sequence[StepResult]) -> list[dict[str, Any]]:
             "kind": step.kind,
             "made": step.is_made,
             "off_plan": None if step.miss is None else {"mm": step.miss.mm, "deg": step.miss.deg},
-            "measured": None if step.face is None else face_to_json(step.face),
+            "measured": None if step.measured is None else measured_to_json(step.measured),
         }
         for step in steps
     ]
@@ -114,12 +115,17 @@ def _say_made(step: StepResult) -> str:
 
 
 def _say_measured(step: StepResult) -> str:
-    if step.face is None:
-        return "not measured" if step.kind == "cut" and step.is_made else ""
-    face = step.face
+    measured = step.measured
+    if measured is None:
+        return "not measured" if step.kind != "part" and step.is_made else ""
+    if isinstance(measured, MeasuredHole):
+        return (
+            f"{measured.off_mm:+.2f} mm (+-{measured.bound_mm:.2f}), "
+            f"{measured.diameter_mm:.1f} mm wide"
+        )
     return (
-        f"{face.offset_mm:+.2f} mm (+-{face.bound_mm:.2f}), "
-        f"{face.angle_deg:.2f} deg (+-{face.bound_deg:.2f})"
+        f"{measured.offset_mm:+.2f} mm (+-{measured.bound_mm:.2f}), "
+        f"{measured.angle_deg:.2f} deg (+-{measured.bound_deg:.2f})"
     )
 
 
@@ -137,7 +143,7 @@ def _miss(name: str, step: PlannedStep, truth: KnowsMade) -> Miss | None:
         return Miss(float((point_mm - step.point_mm) @ normal), _angle_deg(normal, step.normal))
     if isinstance(step, DrillAxis):
         entry_mm, direction = truth.made_hole()
-        off_mm = float(np.linalg.norm(entry_mm - step.entry_mm))
+        off_mm = float(np.linalg.norm(step.axes @ (entry_mm - step.entry_mm)))
         return Miss(off_mm, _angle_deg(direction, step.direction))
     motion = truth.made_parts().get(name)
     if motion is None:

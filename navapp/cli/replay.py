@@ -134,9 +134,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     frames = [frame_to_json(result, {}) for result in log.results]
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
-    faces = [result.faces for result in log.results]
+    measured = [result.measured for result in log.results]
     limbs = [result.limb for result in log.results]
-    return report_result(frames, seconds, failure, options, diagnostics, told, faces, limbs)
+    return report_result(frames, seconds, failure, options, diagnostics, told, measured, limbs)
 
 
 def _run_session(

@@ -8,11 +8,11 @@ import numpy as np
 
 from navapp.control.commands import DistrustRig
 from navapp.control.frame_result import FrameResult
-from navapp.control.recorder import face_to_json
+from navapp.control.recorder import measured_to_json
 from navapp.control.session import describe_moved_rig
 from navapp.control.states import SessionState, Snapshot
 from navapp.limb import LimbMeasurement
-from navapp.values import FrameTimings, MeasuredFace, Reason, Status, TrackedFrame, join_faces
+from navapp.values import FrameTimings, Measured, Reason, Status, TrackedFrame, join_measured
 
 _ANGLES = ("flexion", "varus", "internal_rotation")
 # Gaps count as those of a flexion when the knee is bent by so much more or less; chosen.
@@ -40,7 +40,7 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
             for name, tracked in result.others.items()
         },
         "bone_version": result.bone_version,
-        "measured": {name: face_to_json(face) for name, face in result.faces.items()},
+        "measured": {name: measured_to_json(one) for name, one in result.measured.items()},
         **({} if result.limb is None else {"limb": limb_to_json(result.limb)}),
     }
 
@@ -79,11 +79,11 @@ def summarise_gaps(limbs: Sequence[LimbMeasurement | None]) -> dict[str, Any]:
     return {"at_0_deg": find(0.0), "at_90_deg": find(90.0)}
 
 
-def summarise_faces(faces: Sequence[Mapping[str, MeasuredFace]]) -> dict[str, Any]:
-    """The faces of cuts, over all frames that have measured them."""
-    names = dict.fromkeys(name for frame in faces for name in frame)
+def summarise_measured(measured: Sequence[Mapping[str, Measured]]) -> dict[str, Any]:
+    """Faces of cuts and holes, over all frames that have measured them."""
+    names = dict.fromkeys(name for frame in measured for name in frame)
     return {
-        name: face_to_json(join_faces([frame[name] for frame in faces if name in frame]))
+        name: measured_to_json(join_measured([frame[name] for frame in measured if name in frame]))
         for name in names
     }
 
@@ -216,7 +216,12 @@ def _count_text(counts: dict[str, int]) -> str:
     )
 
 
-def _face_text(name: str, face: Mapping[str, float]) -> str:
+def _measured_text(name: str, face: Mapping[str, float]) -> str:
+    if "diameter_mm" in face:
+        return (
+            f"hole {name}: {face['off_mm']:.2f} mm (+- {face['bound_mm']:.2f}) off its entry, "
+            f"{face['diameter_mm']:.1f} mm wide, {100.0 * face['seen_share']:.0f} % of its rim seen"
+        )
     return (
         f"cut {name}: {face['angle_deg']:.2f} deg (+- {face['bound_deg']:.2f}) and "
         f"{face['offset_mm']:+.2f} mm (+- {face['bound_mm']:.2f}) from its plan, "
@@ -228,7 +233,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     """The summary for people."""
     lines = [_count_text(summary)]
     lines += [f"other bone, {name}: {_count_text(n)}" for name, n in summary["bodies"].items()]
-    lines += [_face_text(name, face) for name, face in summary.get("measured", {}).items()]
+    lines += [_measured_text(name, face) for name, face in summary.get("measured", {}).items()]
     processing_ms, tre = summary["latency_ms"], summary["tre_mm"]
     if summary["fps"] is not None and processing_ms["p50"] is not None:
         lines.append(

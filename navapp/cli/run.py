@@ -139,7 +139,7 @@ def _run_headless(
         seconds = run_session(controller, operator, log)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
-    faces = [result.faces for result in log.results]
+    measured = [result.measured for result in log.results]
     failure = controller.failure
     told = operator.failure or (operator.unfinished if options.operator else "")
     if failure is None and told:
@@ -147,8 +147,10 @@ def _run_headless(
     limbs = [result.limb for result in log.results]
     simulation = session.opened.simulation
     truth = None if simulation is None else simulation.oracle
-    steps = list_steps(session.specification.plan, controller.made_steps, faces, truth)
-    return report_result(frames, seconds, failure, options, diagnostics, rig, faces, limbs, steps)
+    steps = list_steps(session.specification.plan, controller.made_steps, measured, truth)
+    return report_result(
+        frames, seconds, failure, options, diagnostics, rig, measured, limbs, steps
+    )
 
 
 def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | None]:

@@ -240,7 +240,7 @@ class SessionController:
         version = session.bone_version
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
-        faces = session.measure_faces(frame)
+        measured = session.measure_steps(frame)
         timings = FrameTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,
@@ -251,7 +251,7 @@ class SessionController:
             replace(timings, overlay_ms=overlay_ms),
             snapshot.is_navigable,
             others,
-            faces,
+            measured,
             version,
             session.measure_limb(frame, others),
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from drivers.frames import StereoFrame
 from navapp.control.states import SessionState
 from navapp.limb import LimbMeasurement
-from navapp.values import FrameTimings, MeasuredFace, OverlayPicture, StageSpec, TrackedFrame
+from navapp.values import FrameTimings, Measured, OverlayPicture, StageSpec, TrackedFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,8 +23,8 @@ class FrameResult:
     is_navigable: bool  # guides are in the picture
     # other bones than the active one, whose turn it was in this very frame.
     others: Mapping[str, TrackedFrame] = field(default_factory=dict)
-    # faces of cuts that were measured in this very frame, by the plane's name.
-    faces: Mapping[str, MeasuredFace] = field(default_factory=dict)
+    # faces of cuts and holes that were measured in this very frame, by the step's name.
+    measured: Mapping[str, Measured] = field(default_factory=dict)
     bone_version: int = 0  # of the stage's bone, that the pose was judged by
     # what femur and tibia say together; None unless both are OK in this very frame.
     limb: LimbMeasurement | None = None

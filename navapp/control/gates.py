@@ -175,7 +175,7 @@ class Gates:
                 yield ConditionLine(name, text, not known.rig_problem, note=note)
             case ConditionKind.STEPS_MADE:
                 for step in known.steps_of(stage):
-                    yield self._cut(step, stage) if step.kind == "cut" else _made(step)
+                    yield self._cut(step, stage) if step.kind == "cut" else _made(step, stage)
 
     def _tell_said(self, condition: Condition, stage: StageSpec) -> ConditionLine:
         """A condition for which a person answers."""
@@ -230,10 +230,16 @@ def _may_be_checked_by_hand(step: StepLine, stage: StageSpec) -> bool:
     return step.last_face is None or is_within(step.last_face, stage)
 
 
-def _made(step: StepLine) -> ConditionLine:
-    """A hole or a part: nothing measures it, an operator has confirmed it."""
+def _made(step: StepLine, stage: StageSpec) -> ConditionLine:
+    """A hole or a part that an operator has confirmed; a measured hole also within tolerance."""
     text = f"hole {step.name} drilled" if step.kind == "hole" else f"{step.name} in its place"
-    return ConditionLine(step.name, text, step.is_made, note="" if step.is_made else _NOT_MADE)
+    if not step.is_made:
+        return ConditionLine(step.name, text, False, note=_NOT_MADE)
+    if step.hole is None:
+        return ConditionLine(step.name, text, True)
+    is_met = step.hole.off_mm + step.hole.bound_mm <= stage.tolerance_mm
+    note = f"{step.hole.off_mm:.2f} mm off its entry"
+    return ConditionLine(step.name, text, is_met, note=note)
 
 
 def is_within(face: MeasuredFace, stage: StageSpec) -> bool:

@@ -11,14 +11,17 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.resection import CutBone
 from navapp.values import (
     DrillAxis,
+    Measured,
     MeasuredFace,
+    MeasuredHole,
     Plan,
     PlannedStep,
+    PoseEstimate,
     ResectionPlane,
     StageSpec,
     Status,
     TrackedFrame,
-    join_faces,
+    join_measured,
 )
 
 # All chosen. So many measurements of a face make it known; the newest so many are kept.
@@ -47,9 +50,9 @@ class MadeSteps:
         self._plan, self._trackers = plan, trackers
         self._frames_between = frames_between
         self._n_frames = 0
-        self._measured: dict[str, deque[MeasuredFace]] = {}
-        # What all measurements of a face say together, and how much of it was seen last.
-        self._joined: dict[str, MeasuredFace] = {}
+        self._measured: dict[str, deque[Measured]] = {}
+        # What all measurements of a step say together, and how much of it was seen last.
+        self._joined: dict[str, Measured] = {}
         self._seen: dict[str, float | None] = {}
         # As of `StepLine`.
         self._n_made: Counter[str] = Counter()
@@ -133,22 +136,27 @@ class MadeSteps:
         bone = self._trackers.bones.get(stage.bone)
         made = {} if bone is None else bone.made
         return tuple(
-            StepLine(
-                name,
-                name in made,
-                self._joined.get(name),
-                self._seen.get(name),
-                _kind_of(step),
-                self._n_made[name],
-                self._last_faces.get(name),
-            )
+            self._describe(name, step, is_made=name in made)
             for name, step in self._plan.steps_of(stage).items()
+        )
+
+    def _describe(self, name: str, step: PlannedStep, *, is_made: bool) -> StepLine:
+        joined = self._joined.get(name)
+        return StepLine(
+            name,
+            is_made,
+            joined if isinstance(joined, MeasuredFace) else None,
+            self._seen.get(name),
+            _kind_of(step),
+            self._n_made[name],
+            self._last_faces.get(name),
+            joined if isinstance(joined, MeasuredHole) else None,
         )
 
     def measure(
         self, frame: StereoFrame, tracked: TrackedFrame | None, *, is_accepted: bool
-    ) -> dict[str, MeasuredFace]:
-        """Faces of a bone in a frame in which its pose is OK: one in its turn, or all in every one.
+    ) -> dict[str, Measured]:
+        """Faces and holes of a bone in a frame in which its pose is OK: one in its turn, or all.
 
         With a pose that nobody has accepted they are told, where every frame tells what it can, but
         not kept.
@@ -159,39 +167,44 @@ class MadeSteps:
             return {}
         bone, is_each = self._trackers.bone(tracked.bone), self._frames_between == 1
         # A part covers the faces that it sits on.
-        names = () if bone.parts else tuple(bone.cuts)
+        names = () if bone.parts else (*bone.cuts, *bone.holes)
         if names and not is_each:
             names = (names[turn % len(names)],)
         if tracked.estimate is None or not (is_accepted or is_each):
             return {}
-        looked = {
-            name: self._trackers.measure_face(frame, bone, tracked.estimate, name) for name in names
-        }
-        found = {name: face for name, face in looked.items() if face is not None and face.is_told}
+        looked = {name: self._look(frame, bone, tracked.estimate, name) for name in names}
+        found = {name: one for name, one in looked.items() if one is not None and one.is_told}
         if is_accepted:
             self._keep(bone, looked, found)
         return found
 
+    def _look(
+        self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
+    ) -> Measured | None:
+        if name in bone.holes:
+            return self._trackers.measure_hole(frame, bone, estimate, name)
+        return self._trackers.measure_face(frame, bone, estimate, name)
+
     def _keep(
-        self,
-        bone: CutBone,
-        looked: Mapping[str, MeasuredFace | None],
-        found: Mapping[str, MeasuredFace],
+        self, bone: CutBone, looked: Mapping[str, Measured | None], found: Mapping[str, Measured]
     ) -> None:
-        for name, face in looked.items():
-            self._seen[name] = None if face is None else face.seen_share
+        for name, one in looked.items():
+            self._seen[name] = None if one is None else one.seen_share
         for name, told in found.items():
             self._measured.setdefault(name, deque(maxlen=_KEPT)).append(told)
-            self._joined[name] = join_faces(tuple(self._measured[name]))
-            self._last_faces[name] = self._joined[name]
+            joined = join_measured(tuple(self._measured[name]))
+            self._joined[name] = joined
+            if isinstance(joined, MeasuredFace):
+                self._last_faces[name] = joined
         self._learn(bone)
 
     def _learn(self, bone: CutBone) -> None:
         """Where faces have become known, less of the bone beside them is unsure."""
         known = {
-            name: self._joined[name]
+            name: face
             for name in bone.unmeasured
             if len(self._measured.get(name, ())) >= _ENOUGH
+            and isinstance(face := self._joined[name], MeasuredFace)
         }
         if known:
             self._trackers.set_bone(bone.with_faces(known))

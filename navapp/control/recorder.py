@@ -3,7 +3,7 @@
 session.json   version, plan, options       rig.yml, prior.json, plan/
 frames.csv     one line a frame              left_*.png, right_*.png
 events.jsonl   commands, events and when a registration was taken over
-poses.jsonl    poses and verdicts of every frame, version of the bone, faces that were measured
+poses.jsonl    poses and verdicts of every frame, version of the bone, what was measured
 """
 
 import json
@@ -20,7 +20,7 @@ from navapp.control.commands import Command
 from navapp.control.frame_result import FrameResult
 from navapp.control.states import Event
 from navapp.errors import InputError, NavappError
-from navapp.values import MeasuredFace, TrackedFrame
+from navapp.values import Measured, MeasuredHole, TrackedFrame
 
 
 class FrameSink(Protocol):
@@ -111,7 +111,7 @@ class SessionRecorder:
                 "bodies": {
                     name: _answer_to_json(tracked) for name, tracked in result.others.items()
                 },
-                "measured": {name: face_to_json(face) for name, face in result.faces.items()},
+                "measured": {name: measured_to_json(one) for name, one in result.measured.items()},
             },
         )
 
@@ -166,8 +166,18 @@ class SessionRecorder:
         self._attempt(lambda: (stream.write(line), stream.flush()))
 
 
-def face_to_json(face: MeasuredFace) -> dict[str, Any]:
-    """The face of a cut, in plan coordinates and against its plan."""
+def measured_to_json(measured: Measured) -> dict[str, Any]:
+    """The face of a cut, or the mouth of a hole, in plan coordinates and against its plan."""
+    if isinstance(measured, MeasuredHole):
+        return {
+            "entry_mm": measured.entry_mm.tolist(),
+            "off_mm": measured.off_mm,
+            "bound_mm": measured.bound_mm,
+            "diameter_mm": measured.diameter_mm,
+            "diameter_bound_mm": measured.diameter_bound_mm,
+            "seen_share": measured.seen_share,
+        }
+    face = measured
     return {
         "point_mm": face.point_mm.tolist(),
         "normal": face.normal.tolist(),

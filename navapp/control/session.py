@@ -28,7 +28,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import LimbMeasurement
 from navapp.resection import CutBone
-from navapp.values import MeasuredFace, Reason, StageSpec, Status, TrackedFrame, Verdict
+from navapp.values import Measured, Reason, StageSpec, Status, TrackedFrame, Verdict
 
 
 class Session:
@@ -270,16 +270,16 @@ class Session:
         """What is left of the stage's bone; None: all of it."""
         return self._steps.surface(self._stage.bone)
 
-    def measure_faces(self, frame: StereoFrame) -> dict[str, MeasuredFace]:
-        """Measure the faces of cuts of the stage's bone in a frame; in a fault none."""
+    def measure_steps(self, frame: StereoFrame) -> dict[str, Measured]:
+        """Measure faces of cuts and holes of the stage's bone in a frame; in a fault none."""
         if self._state is SessionState.FAULT:
             return {}
         before = self.bone_version
-        faces = self._steps.measure(frame, self._tracked, is_accepted=self._is_accepted)
+        measured = self._steps.measure(frame, self._tracked, is_accepted=self._is_accepted)
         if self.bone_version != before:
             text = f"faces measured: version {self.bone_version} of the {self._stage.bone}"
             self.add_event("step", f"{text} is in force")
-        return faces
+        return measured
 
     @property
     def shows_depth(self) -> bool:

@@ -12,7 +12,7 @@ from navapp.control.mirror_error import MirrorError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import LimbMeasurement
-from navapp.values import MeasuredFace, Reason, StageSpec, Verdict
+from navapp.values import MeasuredFace, MeasuredHole, Reason, StageSpec, Verdict
 
 
 class SessionState(Enum):
@@ -152,6 +152,7 @@ class StepLine:
     n_made: int = 0  # how often it was confirmed: a cut may be made again
     # the newest measurement since it was confirmed, whatever was registered anew since then.
     last_face: MeasuredFace | None = None
+    hole: MeasuredHole | None = None  # all measurements together; None: not measurable yet
 
 
 @dataclass(frozen=True, slots=True)

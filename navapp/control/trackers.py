@@ -11,12 +11,13 @@ from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.preop import build_aspects
-from navapp.resection import CutBone, FaceMeter
+from navapp.resection import CutBone, FaceMeter, HoleMeter
 from navapp.tracking import Goal, Tracker, TrackerSettings, make_tracker
 from navapp.values import (
     AspectGraph,
     BoneModel,
     MeasuredFace,
+    MeasuredHole,
     Plan,
     PoseEstimate,
     Prior,
@@ -64,6 +65,7 @@ class Trackers:
         self._trackers: dict[tuple[str, int], Tracker] = {}
         self._with_aspects: dict[tuple[str, int], Tracker] = {}
         self._face_meters: dict[str, FaceMeter] = {}
+        self._hole_meters: dict[str, HoleMeter] = {}
 
     def tracker(self, bone: str) -> Tracker:
         """The tracker that follows a bone."""
@@ -114,6 +116,16 @@ class Trackers:
         expected = None if known is None else known.as_plane
         made = tuple(bone.cuts.values())
         return meter.measure(frame.left, frame.right, estimate, made, bone.cuts[name], expected)
+
+    def measure_hole(
+        self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
+    ) -> MeasuredHole | None:
+        """The mouth of a hole in a frame; None when it is not seen."""
+        with self._lock:
+            meter = self._hole_meters.setdefault(
+                bone.planned.name, HoleMeter(self._rig, bone.planned)
+            )
+        return meter.measure(frame.left, frame.right, estimate, bone.holes[name])
 
     def corners_mm(self, bone: str) -> FloatArray:
         """(8, 3) of the box around a bone's model."""

@@ -2,5 +2,6 @@
 
 from navapp.resection.cut_bone import CutBone
 from navapp.resection.face_meter import FaceMeter
+from navapp.resection.hole_meter import HoleMeter
 
-__all__ = ["CutBone", "FaceMeter"]
+__all__ = ["CutBone", "FaceMeter", "HoleMeter"]

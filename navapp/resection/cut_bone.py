@@ -37,7 +37,7 @@ class CutBone:
     def model(self) -> BoneModel:
         """What is left of the bone and not covered, to be registered to."""
         left = remove_cuts(self.planned, [self._cut(name) for name in self.cuts])
-        holes = [one for one in self.made.values() if isinstance(one, DrillAxis)]
+        holes = tuple(self.holes.values())
         left = cover_with_parts(remove_holes(left, holes, UNSURE_MM), self.parts)
         return replace(left, version=self.version)
 
@@ -53,6 +53,11 @@ class CutBone:
     def cuts(self) -> dict[str, ResectionPlane]:
         """Those that are made, by name, as planned."""
         return {n: one for n, one in self.made.items() if isinstance(one, ResectionPlane)}
+
+    @property
+    def holes(self) -> dict[str, DrillAxis]:
+        """Those that are made, by name, as planned."""
+        return {n: one for n, one in self.made.items() if isinstance(one, DrillAxis)}
 
     @property
     def parts(self) -> tuple[Part, ...]:

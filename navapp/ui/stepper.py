@@ -45,7 +45,9 @@ def _measured_row(view: View, width: int) -> Content:
 def _say_made(step: StepLine) -> str:
     if step.face is not None:
         return f"{step.face.angle_deg:.2f} deg {step.face.offset_mm:+.2f} mm"
-    return "not measurable" if step.kind == "cut" else "made"
+    if step.hole is not None:
+        return f"{step.hole.off_mm:.2f} mm"
+    return "made" if step.kind == "part" else "not measurable"
 
 
 def _steps(view: View) -> Content:

@@ -13,7 +13,7 @@ from navapp.ui.screens import PageScreen
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
-from navapp.values import MeasuredFace, StageSpec
+from navapp.values import MeasuredFace, MeasuredHole, StageSpec
 from navapp.values.faces import LEAST_SHARE
 
 # The steps of a stage in their order.
@@ -48,45 +48,48 @@ class StepTable(TextView):
 
 
 def _tell_face(cut: StepLine, stage: StageSpec, symbols: Symbols) -> list[Content]:
-    """What is known of the face of a cut that was made."""
-    if cut.kind != "cut" or not cut.is_made:
+    """What is known of a cut or a hole that was made."""
+    if cut.kind == "part" or not cut.is_made:
         return []
     if cut.face is not None:
         return _tell_measured(cut.face, stage, symbols)
+    if cut.hole is not None:
+        return _tell_hole(cut.hole, stage, symbols)
     seen = "it is not seen, or was not looked for yet"
     if cut.seen_share is not None:
-        seen = f"{100.0 * cut.seen_share:.0f} % of the cut is seen"
+        seen = f"{100.0 * cut.seen_share:.0f} % of the {cut.kind} is seen"
         seen += "" if cut.seen_share < LEAST_SHARE else ", its bounds are too large"
     return [Content.styled(f"      not measurable: {seen}", "$warning")]
 
 
 def _tell_measured(face: MeasuredFace, stage: StageSpec, symbols: Symbols) -> list[Content]:
-    rows = (
-        (
-            "tilt",
-            f"{face.angle_deg:.2f}",
-            face.angle_deg,
-            face.bound_deg,
-            stage.tolerance_deg,
-            "deg",
-        ),
-        (
-            "offset",
-            f"{face.offset_mm:+.2f}",
-            face.offset_mm,
-            face.bound_mm,
-            stage.tolerance_mm,
-            "mm",
-        ),
+    tilt = f"{face.angle_deg:.2f}", face.angle_deg, face.bound_deg, stage.tolerance_deg
+    offset = f"{face.offset_mm:+.2f}", face.offset_mm, face.bound_mm, stage.tolerance_mm
+    return [_row("tilt", *tilt, "deg", symbols), _row("offset", *offset, "mm", symbols)]
+
+
+def _tell_hole(hole: MeasuredHole, stage: StageSpec, symbols: Symbols) -> list[Content]:
+    off = f"{hole.off_mm:.2f}", hole.off_mm, hole.bound_mm, stage.tolerance_mm
+    wide = f"      width  {hole.diameter_mm:6.2f} mm   +-{hole.diameter_bound_mm:5.2f}"
+    wide += f"  drill {hole.drill.diameter_mm:.1f}"
+    return [_row("entry", *off, "mm", symbols), Content(wide)]
+
+
+def _row(
+    what: str,
+    told: str,
+    value: float,
+    bound: float,
+    tolerance: float,
+    unit: str,
+    symbols: Symbols,
+) -> Content:
+    """A measurement with its bound and a bar of its tolerance."""
+    return Content.assemble(
+        f"      {what:<7}{told:>6} {unit:<4}+-{bound:5.2f}  ",
+        (draw_bar(abs(value), tolerance, _BAR_WIDTH, symbols), _style(value, bound, tolerance)),
+        (f"  tolerance {tolerance:.1f}", "$text-muted"),
     )
-    return [
-        Content.assemble(
-            f"      {what:<7}{told:>6} {unit:<4}+-{bound:5.2f}  ",
-            (draw_bar(abs(value), tolerance, _BAR_WIDTH, symbols), _style(value, bound, tolerance)),
-            (f"  tolerance {tolerance:.1f}", "$text-muted"),
-        )
-        for what, told, value, bound, tolerance, unit in rows
-    ]
 
 
 def _style(value: float, bound: float, tolerance: float) -> str:

@@ -29,6 +29,7 @@ from navapp.values.contents import (
     SurgicalContent,
 )
 from navapp.values.faces import MeasuredFace, join_faces
+from navapp.values.holes import Measured, MeasuredHole, join_measured
 from navapp.values.measured import (
     DisparityMap,
     Foreground,
@@ -66,7 +67,9 @@ __all__ = [
     "Foreground",
     "FrameTimings",
     "Landmark",
+    "Measured",
     "MeasuredFace",
+    "MeasuredHole",
     "Origin",
     "OverlayMode",
     "OverlayPicture",
@@ -92,4 +95,5 @@ __all__ = [
     "TrackedFrame",
     "Verdict",
     "join_faces",
+    "join_measured",
 ]

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.directions import perpendicular_axes
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform, read_only
 
@@ -83,6 +84,12 @@ class DrillAxis:
         )
         for name in ("depth_mm", "diameter_mm"):
             object.__setattr__(self, name, _positive(getattr(self, name), f"{name} of a drill"))
+
+    @property
+    def axes(self) -> FloatArray:
+        """(2, 3) unit directions across the hole."""
+        axes: FloatArray = perpendicular_axes(self.direction[None])[0]
+        return axes
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Every state of the simulated operation: poses of its own bone, their bounds, faces of its cuts.
+"""Every state of the simulated operation: poses of its own bone, their bounds, cuts and holes.
 
 usage: python -m tests.bench.stages [--knees N] [--first SEED] [--only STATE] [--frames]
 
@@ -42,7 +42,7 @@ class State:
 
 STATES = (
     State("intact", "femur", "opening"),
-    State("drilled", "femur", "drilling"),
+    State("drilled", "femur", "drilling", (), 24),
     State("cut", "femur", "implant"),
     State("metal", "femur", "implant", ("femoral_implant",), 90),
     State("whole", "patella", "patella"),
@@ -79,7 +79,7 @@ def run_state(state: State, seed: int, folder: Path) -> dict[str, Any]:
     config, operator, result = (folder / name for name in ("c.toml", "s.toml", "r.json"))
     config.write_text(knee_options(seed), encoding="utf-8")
     operator.write_text(script, encoding="utf-8")
-    n_frames = (state.after + len(state.made) if state.made else 4) + _N_JUDGED + 4
+    n_frames = state.after + len(state.made) + _N_JUDGED + 4
     arguments = ["--config", str(config), "--quiet", "run", "--headless", "--stage", state.stage]
     arguments += ["--operator", str(operator), "--frames", str(n_frames), "--json", str(result)]
     result.unlink(missing_ok=True)
@@ -114,28 +114,37 @@ def tell(name: str, found: Found) -> str:
     )
 
 
-def faces_of(told: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, float]]]:
-    """Name, measurement and truth of every measured face of a session."""
+def measured_of(told: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, float]]]:
+    """Name, measurement and truth of every measured face and hole of a session."""
     for step in told.get("operation", ()):
         if step["measured"] is not None and step["off_plan"] is not None:
             yield step["step"], step["measured"], step["off_plan"]
 
 
-def tell_faces(faces: dict[str, list[tuple[dict[str, Any], dict[str, float]]]]) -> Iterator[str]:
-    """Rows of the table of faces; offsets are judged along the plan's normal, tilts in size."""
-    yield "| face | sessions | mostly seen | angle off: median, worst deg | offset off: median, worst mm | bounds cover |"
+Measured = list[tuple[dict[str, Any], dict[str, float]]]
+
+
+def tell_measured(measured: dict[str, Measured]) -> Iterator[str]:
+    """Rows of the table; offsets are judged along the plan's normal, tilts and ways in size."""
+    yield (
+        "| measured | sessions | mostly seen | angle off: median, worst deg "
+        "| offset off: median, worst mm | bounds cover |"
+    )
     yield "|---|---|---|---|---|---|"
-    for name, found in faces.items():
-        angle = np.array([abs(one["angle_deg"] - true["deg"]) for one, true in found])
-        offset = np.array([abs(one["offset_mm"] - true["mm"]) for one, true in found])
-        covers = [
-            abs(one["angle_deg"] - true["deg"]) <= one["bound_deg"]
-            and abs(one["offset_mm"] - true["mm"]) <= one["bound_mm"]
-            for one, true in found
-        ]
+    for name, found in measured.items():
+        is_hole = "diameter_mm" in found[0][0]
+        offset = np.array(
+            [abs(one["off_mm" if is_hole else "offset_mm"] - true["mm"]) for one, true in found]
+        )
+        covers = offset <= [one["bound_mm"] for one, _ in found]
+        angles = "-"
+        if not is_hole:
+            angle = np.array([abs(one["angle_deg"] - true["deg"]) for one, true in found])
+            covers &= angle <= [one["bound_deg"] for one, _ in found]
+            angles = f"{np.median(angle):.2f}, {angle.max():.2f}"
         n_seen = sum(one["seen_share"] >= _MOSTLY_SEEN for one, _ in found)
         yield (
-            f"| {name} | {len(found)} | {n_seen} | {np.median(angle):.2f}, {angle.max():.2f} | "
+            f"| {name} | {len(found)} | {n_seen} | {angles} | "
             f"{np.median(offset):.3f}, {offset.max():.3f} | {np.mean(covers):.2f} |"
         )
 
@@ -149,7 +158,7 @@ def main() -> None:
     parser.add_argument("--frames", action="store_true", help="a line a session")
     options = parser.parse_args()
     results: dict[str, Found] = {}
-    faces: dict[str, list[tuple[dict[str, Any], dict[str, float]]]] = defaultdict(list)
+    measured: dict[str, Measured] = defaultdict(list)
     states = [one for one in STATES if options.only in f"{one.bone} {one.name}"]
     with tempfile.TemporaryDirectory() as folder:
         for state in states:
@@ -157,8 +166,8 @@ def main() -> None:
             for seed in range(options.first, options.first + options.knees):
                 told = run_state(state, seed, Path(folder))
                 judge(found, told["frames"])
-                for name, one, true in faces_of(told):
-                    faces[name].append((one, true))
+                for name, one, true in measured_of(told):
+                    measured[name].append((one, true))
                 if options.frames:
                     alone = Found()
                     judge(alone, told["frames"])
@@ -173,7 +182,7 @@ def main() -> None:
         pooled.bounds_mm += found.bounds_mm
     print(tell("all", pooled))
     print()
-    for line in tell_faces(faces):
+    for line in tell_measured(measured):
         print(line)
 
 

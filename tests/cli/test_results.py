@@ -11,8 +11,8 @@ from navapp.cli.results import (
     limb_to_json,
     rig_alarm_to_json,
     summarise,
-    summarise_faces,
     summarise_gaps,
+    summarise_measured,
     summary_text,
 )
 from navapp.control.commands import DistrustRig
@@ -99,11 +99,11 @@ def test_faces_are_told_against_their_plan_and_joined_over_frames() -> None:
         for off, share in ((-0.5, 0.6), (-0.3, 0.8))
     ]
     told = [{"top": face} for face in faces]
-    frame = frame_to_json(replace(a_result(), faces=told[0]), {})
+    frame = frame_to_json(replace(a_result(), measured=told[0]), {})
     assert frame["measured"]["top"]["offset_mm"] == -0.5
     assert frame["measured"]["top"]["angle_deg"] == pytest.approx(1.0)
     assert frame["measured"]["top"]["point_mm"][2] == pytest.approx(-0.5, abs=1e-3)
-    measured = summarise_faces([*told, {}])
+    measured = summarise_measured([*told, {}])
     assert measured["top"]["offset_mm"] == pytest.approx(-0.4)
     assert measured["top"]["seen_share"] == 0.8
     lines = summary_text({**summarise([frame], 1.0), "measured": measured}).splitlines()

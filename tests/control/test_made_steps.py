@@ -89,7 +89,7 @@ def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces
     versions = [bench.frames(1).bone_version for _ in range(40)]
     assert versions[0] == 1
     assert versions[-1] == 2
-    measured = [result.faces for result in bench.results if result.faces]
+    measured = [result.measured for result in bench.results if result.measured]
     # In every fifth frame.
     assert 6 <= len(measured) <= 9
     assert versions.index(2) <= 20
@@ -112,7 +112,7 @@ def test_a_face_of_which_little_is_seen_is_not_told(bench: Bench, faces: Faces) 
     assert top.face is None
     assert top.seen_share == 0.1
     assert side.seen_share is None
-    assert not any(result.faces for result in bench.results)
+    assert not any(result.measured for result in bench.results)
     assert bench.snapshot.bone_version == 1
 
 
@@ -129,7 +129,7 @@ def test_with_several_cuts_the_faces_take_turns(bench: Bench, faces: Faces) -> N
     bench.do(ConfirmStep("top"))
     bench.do(ConfirmStep("side"))
     bench.frames(40)
-    measured = [tuple(result.faces) for result in bench.results if result.faces]
+    measured = [tuple(result.measured) for result in bench.results if result.measured]
     assert set(measured) == {("top",), ("side",)}
     assert all(one != other for one, other in pairwise(measured))
     assert bench.snapshot.bone_version == 4
