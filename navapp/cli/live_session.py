@@ -179,7 +179,7 @@ def _make_practice_steps(session: LiveSession) -> "PracticeSteps | None":
     simulation = session.opened.simulation
     if simulation is None:
         return None
-    return PracticeSteps(simulation, session.specification.plan.content.steps)
+    return PracticeSteps(simulation.steps, session.specification.plan.content.steps)
 
 
 def _make_locator(session: LiveSession) -> "LocateCorners | None":

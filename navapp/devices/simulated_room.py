@@ -24,6 +24,19 @@ from sim_devices.world import World
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RoomSteps:
+    """Tells the room what to show as made, by names of planned steps: it leads to no truth."""
+
+    # set_stage, go_on: which stage is in force, as it is usually entered, or as far as it was made;
+    # answered with all steps that are made then.
+    set_stage: Callable[[str], frozenset[str]]
+    go_on: Callable[[str], frozenset[str]]
+    # make, unmake: a step is made by now, or is not made after all.
+    make: Callable[[str], None]
+    unmake: Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
     """What the simulated room hands to its caller, apart from the devices."""
 
@@ -43,13 +56,7 @@ class Simulation:
     approach_half_angle_deg: float
     oracle: TruthOracle  # the truth, for evaluation after the run only
     planned_parts: Mapping[str, TriangleMesh]  # the components, in the coordinates of their bones
-    # set_stage, go_on: tell the room which stage is in force, as it is usually entered, or as far
-    # as it was made; it answers with the planned steps that are made then.
-    set_stage: Callable[[str], frozenset[str]]
-    go_on: Callable[[str], frozenset[str]]
-    # make, unmake: tell the room that a step is made by now, or is not made after all.
-    make: Callable[[str], None]
-    unmake: Callable[[str], None]
+    steps: RoomSteps  # what the room shows as made
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +146,5 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,
         oracle=TruthOracle(world, camera.world_time_ns),
-        set_stage=world.set_stage,
-        go_on=world.go_on,
-        make=world.make,
-        unmake=world.unmake,
+        steps=RoomSteps(world.set_stage, world.go_on, world.make, world.unmake),
     )

@@ -219,11 +219,11 @@ def _fit_circle(
 
 def _solve(rows: FloatArray, residual_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(3,) step, (3, 3) its normal matrix and (N,) what is left of the residuals."""
-    step: FloatArray = np.zeros(3)
+    step = np.zeros(3)
     for _ in range(_STEPS):
         weighted = rows.T * _weigh(residual_mm - rows @ step)
         normal = weighted @ rows
-        step = np.linalg.solve(normal, weighted @ residual_mm)
+        step = np.asarray(np.linalg.solve(normal, weighted @ residual_mm), dtype=np.float64)
     return step, normal, residual_mm - rows @ step
 
 

@@ -122,9 +122,11 @@ def test_the_built_in_plan_is_where_the_bones_are(built_in) -> None:
         # Some of the bone is removed, most stays.
         assert 0.01 < (beyond > 0.0).mean() < 0.5, name
     for name, part in content.parts.items():
-        lower = part.bone_from_part.apply([0.0, 0.0, -4.5])
-        away = [abs((lower - p.point_mm) @ p.normal) for p in content.planes.values()]
+        origin = part.bone_from_part.translation_mm
+        away = [abs((origin - p.point_mm) @ p.normal) for p in content.planes.values()]
         assert min(away) < 1e-6, name
+        # It stands on its cut, about as thick as what that takes off.
+        assert 6.0 < part.shape.vertices_mm[:, 2].max() < 14.0, name
     worn = femur.vertices_mm[content.defects["worn_medial"].vertices]
     assert (sign * worn[:, 0] > 0.0).all()
     hip, ankle = (content.landmarks[name].point_mm for name in (HIP_CENTRE, ANKLE_CENTRE))

@@ -25,7 +25,15 @@ def session(*, is_moved: bool = True) -> RecordedSession:
     commands = [(0, Register()), (1, Accept(None)), *([(AFTER, FOUND)] if is_moved else [])]
     here = Path()
     return RecordedSession(
-        here, here, here, "bimcc", False, "opening", False, RecordedEvents(commands, [1], True)
+        here,
+        here,
+        here,
+        "bimcc",
+        False,
+        "opening",
+        False,
+        30.0,
+        RecordedEvents(commands, [1], True),
     )
 
 

@@ -26,6 +26,7 @@ CHANGED: dict[str, Any] = {
             "cartilage_mm": 1.25,
             "motion": "jump",
             "instrument": "sweep",
+            "misses": 0.25,
             "scale": 0.5,
             "stepped": True,
             "skew_ms": -3.5,

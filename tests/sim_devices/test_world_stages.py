@@ -128,7 +128,7 @@ def test_any_steps_can_be_shown() -> None:
     assert site.stage == "implant"
     with pytest.raises(UsageError, match="nail"):
         site.set_made(["nail"])
-    assert site.set_stage("spacer") == enter("spacer").cuts
+    assert site.set_stage("spacer") == enter("spacer").made
 
 
 def test_metal_mirrors_the_lamps_and_bone_does_not() -> None:
