@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -10,9 +10,11 @@ import numpy as np
 from navapp.control.recorder import measured_to_json
 from navapp.control.stages import STAGES
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
+from navapp.resection import Thickness, measure_thickness
 from navapp.values import (
     DrillAxis,
     Measured,
+    MeasuredFace,
     MeasuredHole,
     Plan,
     PlannedStep,
@@ -55,6 +57,7 @@ class StepResult:
     is_made: bool  # an operator has confirmed it
     miss: Miss | None  # true, of a simulated room; None where nobody knows, or of what is not made
     measured: Measured | None  # a cut or a hole, all measurements together
+    thickness: Thickness | None = None  # of what a measured cut took off
 
 
 def list_steps(
@@ -78,7 +81,11 @@ def list_steps(
             is_made = name in made
             miss = _miss(name, step, truth) if is_made and truth is not None else None
             one = join_measured(seen) if is_made and seen else None
-            results.append(StepResult(stage.name, name, _kind(step), is_made, miss, one))
+            results.append(
+                StepResult(
+                    stage.name, name, _kind(step), is_made, miss, one, _thickness(plan, step, one)
+                )
+            )
     return results
 
 
@@ -103,9 +110,16 @@ def steps_to_json(steps: Sequence[StepResult]) -> list[dict[str, Any]]:
             "made": step.is_made,
             "off_plan": None if step.miss is None else {"mm": step.miss.mm, "deg": step.miss.deg},
             "measured": None if step.measured is None else measured_to_json(step.measured),
+            "thickness": None if step.thickness is None else asdict(step.thickness),
         }
         for step in steps
     ]
+
+
+def _thickness(plan: Plan, step: PlannedStep, measured: Measured | None) -> Thickness | None:
+    if not isinstance(measured, MeasuredFace):
+        return None
+    return measure_thickness(plan.bones[step.bone].mesh, measured)
 
 
 def _say_made(step: StepResult) -> str:
@@ -126,6 +140,7 @@ def _say_measured(step: StepResult) -> str:
     return (
         f"{measured.offset_mm:+.2f} mm (+-{measured.bound_mm:.2f}), "
         f"{measured.angle_deg:.2f} deg (+-{measured.bound_deg:.2f})"
+        + ("" if step.thickness is None else f", {step.thickness.mm:.1f} mm thick")
     )
 
 

@@ -8,7 +8,7 @@ from navapp.control.states import StepKind, StepLine
 from navapp.control.trackers import Trackers
 from navapp.errors import UsageError
 from navapp.geometry.mesh import TriangleMesh
-from navapp.resection import CutBone
+from navapp.resection import CutBone, Thickness, measure_thickness
 from navapp.values import (
     DrillAxis,
     Measured,
@@ -57,6 +57,7 @@ class MadeSteps:
         # As of `StepLine`.
         self._n_made: Counter[str] = Counter()
         self._last_faces: dict[str, MeasuredFace] = {}
+        self._thicknesses: dict[str, Thickness | None] = {}
         for name in made:
             self.confirm(name)
 
@@ -113,7 +114,7 @@ class MadeSteps:
             self._trackers.set_bone(known.without_faces())
 
     def _forget(self, name: str) -> None:
-        for known in (self._measured, self._joined, self._seen):
+        for known in (self._measured, self._joined, self._seen, self._thicknesses):
             known.pop(name, None)
 
     @property
@@ -151,6 +152,7 @@ class MadeSteps:
             self._n_made[name],
             self._last_faces.get(name),
             joined if isinstance(joined, MeasuredHole) else None,
+            self._thicknesses.get(name),
         )
 
     def measure(
@@ -196,6 +198,7 @@ class MadeSteps:
             self._joined[name] = joined
             if isinstance(joined, MeasuredFace):
                 self._last_faces[name] = joined
+                self._thicknesses[name] = measure_thickness(bone.planned.mesh, joined)
         self._learn(bone)
 
     def _learn(self, bone: CutBone) -> None:

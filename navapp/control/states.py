@@ -12,6 +12,7 @@ from navapp.control.mirror_error import MirrorError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import LimbMeasurement
+from navapp.resection import Thickness
 from navapp.values import MeasuredFace, MeasuredHole, Reason, StageSpec, Verdict
 
 
@@ -153,6 +154,7 @@ class StepLine:
     # the newest measurement since it was confirmed, whatever was registered anew since then.
     last_face: MeasuredFace | None = None
     hole: MeasuredHole | None = None  # all measurements together; None: not measurable yet
+    thickness: Thickness | None = None  # of what the cut took off; None while `face` is
 
 
 @dataclass(frozen=True, slots=True)

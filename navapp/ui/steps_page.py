@@ -7,6 +7,7 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from navapp.control.states import Snapshot, StepLine
+from navapp.resection import Thickness
 from navapp.resection.cut_bone import UNSURE_MM
 from navapp.ui.gauges import draw_bar
 from navapp.ui.screens import PageScreen
@@ -52,7 +53,7 @@ def _tell_face(cut: StepLine, stage: StageSpec, symbols: Symbols) -> list[Conten
     if cut.kind == "part" or not cut.is_made:
         return []
     if cut.face is not None:
-        return _tell_measured(cut.face, stage, symbols)
+        return [*_tell_measured(cut.face, stage, symbols), *_tell_thickness(cut.thickness)]
     if cut.hole is not None:
         return _tell_hole(cut.hole, stage, symbols)
     seen = "it is not seen, or was not looked for yet"
@@ -66,6 +67,13 @@ def _tell_measured(face: MeasuredFace, stage: StageSpec, symbols: Symbols) -> li
     tilt = f"{face.angle_deg:.2f}", face.angle_deg, face.bound_deg, stage.tolerance_deg
     offset = f"{face.offset_mm:+.2f}", face.offset_mm, face.bound_mm, stage.tolerance_mm
     return [_row("tilt", *tilt, "deg", symbols), _row("offset", *offset, "mm", symbols)]
+
+
+def _tell_thickness(thickness: Thickness | None) -> list[Content]:
+    if thickness is None:
+        return []
+    told = f"      thick  {thickness.mm:6.2f} mm   +-{thickness.bound_mm:5.2f}"
+    return [Content(f"{told}  planned {thickness.planned_mm:.2f}")]
 
 
 def _tell_hole(hole: MeasuredHole, stage: StageSpec, symbols: Symbols) -> list[Content]:

@@ -97,6 +97,7 @@ def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces
     assert top.face is not None
     assert top.face.offset_mm == pytest.approx(-0.4)
     assert top.seen_share == 0.8
+    assert top.thickness.mm > top.thickness.planned_mm > 0.0
     # Once it is known, it is looked for there.
     assert faces.expected[0] is None
     assert faces.expected[-1] is not None

@@ -9,6 +9,7 @@ from textual.pilot import Pilot
 from navapp.control.commands import ConfirmStep, WithdrawStep
 from navapp.control.stages import STAGES
 from navapp.control.states import StepLine
+from navapp.resection import Thickness
 from navapp.ui.actions import ACTIONS
 from navapp.ui.steps_page import STEP_KEYS, StepsPage, StepTable
 from navapp.values import MeasuredFace, ResectionPlane
@@ -19,7 +20,13 @@ PLANE = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, -1.0]))
 SMALL = np.diag([1e-6, 1e-6, 1e-3])
 FACE = MeasuredFace(PLANE, np.array([np.tan(np.radians(1.3)), 0.0, -0.55]), SMALL, SMALL, 0.8)
 STEPS = (
-    StepLine("femur_distal", is_made=True, face=FACE, seen_share=0.8),
+    StepLine(
+        "femur_distal",
+        is_made=True,
+        face=FACE,
+        seen_share=0.8,
+        thickness=Thickness(9.0, 9.55, 0.12),
+    ),
     StepLine("femur_anterior", is_made=True, seen_share=0.38),
     StepLine("femur_posterior", is_made=True),
     StepLine("femur_anterior_chamfer", is_made=False),
@@ -45,6 +52,7 @@ def test_steps_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> N
         assert "tilt     1.30 deg +- 0.20" in lines[1]
         assert "offset  -0.55 mm  +- 0.09" in lines[2]
         assert "tolerance 1.0" in lines[2]
+        assert lines.pop(3).split() == ["thick", "9.55", "mm", "+-", "0.12", "planned", "9.00"]
         assert lines[3].split() == ["c", "femur_anterior", "cut", "made"]
         assert (
             lines[4].strip() == "not measurable: 38 % of the cut is seen, its bounds are too large"
