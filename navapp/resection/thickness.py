@@ -13,7 +13,7 @@ _SIGMAS_95 = 1.96
 
 @dataclass(frozen=True, slots=True)
 class Thickness:
-    """Of the bone that a cut takes off, without cartilage and without what the saw's blade takes."""
+    """Of the bone that a cut takes off; cartilage and what the blade takes are no part of it."""
 
     planned_mm: float
     mm: float  # as the face was measured
