@@ -146,11 +146,11 @@ class ScriptedOperator:
         return f"the session ended before step {number} of the operator's script ({self._steps[0]})"
 
     def _check_entered(self, snapshot: Snapshot) -> None:
-        """A gate that refuses ends the script, unless its next step expects that."""
+        """A gate that refuses ends the script, unless its next step expects or overrides that."""
         number, self._entering = self._entering, None
         if number is None or snapshot.stage.number == number:
             return
-        if not (self._steps and self._steps[0].do == "expect"):
+        if not (self._steps and self._steps[0].do in ("expect", "override")):
             why = "; ".join(line.text for line in snapshot.gate if not line.is_met)
             number = self._n_steps - len(self._steps)
             self.failure = f"step {number} of the operator's script: refused, open: {why}"

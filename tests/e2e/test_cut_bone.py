@@ -136,5 +136,5 @@ def test_an_unknown_plane_is_refused(
     ])  # fmt: skip
     assert code == 2
     said = capsys.readouterr().err
-    assert "no plane 'femur_top'" in said
+    assert "no step 'femur_top'" in said
     assert "femur_distal, femur_anterior" in said

@@ -52,8 +52,16 @@ def test_an_operation_goes_through_all_five_stages(tmp_path) -> None:
     assert len(steps) == 11
     assert all(step["made"] for step in steps.values())
     measured = [step for step in steps.values() if step["measured"] is not None]
-    assert {step["step"] for step in measured} >= {"femur_distal", "tibia_proximal"}
+    assert {step["step"] for step in measured} >= {
+        "femur_distal",
+        "tibia_proximal",
+        "femoral_guide",
+    }
     for step in measured:
-        face, truth = step["measured"], step["off_plan"]
-        assert abs(face["offset_mm"] - truth["mm"]) <= face["bound_mm"]
-        assert abs(face["angle_deg"] - truth["deg"]) <= face["bound_deg"]
+        found, truth = step["measured"], step["off_plan"]
+        if step["kind"] == "hole":
+            assert abs(found["off_mm"] - truth["mm"]) <= found["bound_mm"]
+            continue
+        assert abs(found["offset_mm"] - truth["mm"]) <= found["bound_mm"]
+        assert abs(found["angle_deg"] - truth["deg"]) <= found["bound_deg"]
+        assert step["thickness"]["planned_mm"] > 5.0

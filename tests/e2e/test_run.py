@@ -174,14 +174,14 @@ CUTS = """
 [[step]]
 do = "register"
 [[step]]
-do = "cut"
+do = "made"
 name = "femur_distal"
 [[step]]
-do = "uncut"
+do = "unmade"
 name = "femur_distal"
 at_frame = 7
 [[step]]
-do = "cut"
+do = "made"
 name = "femur_distal"
 """
 
