@@ -75,14 +75,14 @@ class HoleMeter:
             circle[:2],
             2.0 * float(circle[2]),
             covariance,
-            self._pose_covariance(estimate, planned, entry_mm),
+            self._common_covariance(estimate, planned, entry_mm),
             share,
         )
 
-    def _pose_covariance(
+    def _common_covariance(
         self, estimate: PoseEstimate, planned: DrillAxis, entry_mm: FloatArray
     ) -> FloatArray:
-        """(3, 3) of offset and diameter by pose, plan and rig, which move the entry alone."""
+        """(3, 3) of offset and diameter by what pictures may share: pose, plan, rig, shading."""
         pose, bone, quality = estimate.camera_from_bone, self._bone, self._rig.quality
         centre_mm = pose.apply(bone.mesh.centroid_mm[None])[0]
         seen_mm = pose.apply(entry_mm[None])[0]
@@ -91,8 +91,8 @@ class HoleMeter:
         cartilage_mm = float(np.sqrt(np.mean(bone.cartilage_sd_mm**2)))
         rig_mm = 0.0 if quality is None else 0.5 * quality.error_mm(float(seen_mm[2]))
         common = cartilage_mm**2 + bone.surface_sd_mm**2 + rig_mm**2
-        covariance = np.zeros((3, 3))
-        covariance[:2, :2] = jacobian @ estimate.covariance @ jacobian.T + common * np.eye(2)
+        covariance = _COMMON_SD_MM**2 * np.diag([1.0, 1.0, 4.0])
+        covariance[:2, :2] += jacobian @ estimate.covariance @ jacobian.T + common * np.eye(2)
         return covariance
 
 
@@ -212,7 +212,7 @@ def _fit_circle(
     share = float(np.count_nonzero(np.abs(misfit_mm) < 2.0 * _KERNEL_MM) / len(rows))
     weight = _weigh(misfit_mm)
     variance = float((weight * misfit_mm**2).sum() / weight.sum())
-    covariance = _SHARING_RAYS * variance * np.linalg.inv(normal) + _COMMON_SD_MM**2 * np.eye(3)
+    covariance = _SHARING_RAYS * variance * np.linalg.inv(normal)
     to_diameter = np.diag([1.0, 1.0, 2.0])
     return circle, to_diameter @ covariance @ to_diameter, share
 

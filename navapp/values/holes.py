@@ -28,13 +28,14 @@ class MeasuredHole:
     # (2,) of it from the planned entry, across the planned direction, along `drill.axes`.
     offset_mm: FloatArray
     diameter_mm: float
-    # (3, 3) of offset and diameter, mm: by the pictures alone, and by the pose they were seen with.
+    # (3, 3) of offset and diameter, mm: by this pair of pictures alone, and by what others share
+    # with it: the pose's error, the plan's, shading.
     matching_covariance: FloatArray
-    pose_covariance: FloatArray
+    common_covariance: FloatArray
     seen_share: float  # of the mouth's rim, 0 to 1
 
     def __post_init__(self) -> None:
-        for name in ("entry_mm", "offset_mm", "matching_covariance", "pose_covariance"):
+        for name in ("entry_mm", "offset_mm", "matching_covariance", "common_covariance"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -45,14 +46,14 @@ class MeasuredHole:
     @property
     def bound_mm(self) -> float:
         """95 % bound of the distance between measured and true entry."""
-        both = self.matching_covariance + self.pose_covariance
+        both = self.matching_covariance + self.common_covariance
         largest = float(np.linalg.eigvalsh(both[:2, :2])[-1])
         return _LENGTH_95 * math.sqrt(max(largest, 0.0))
 
     @property
     def diameter_bound_mm(self) -> float:
         """95 % bound of the error of the diameter."""
-        both = self.matching_covariance + self.pose_covariance
+        both = self.matching_covariance + self.common_covariance
         return _SIZE_95 * math.sqrt(max(float(both[2, 2]), 0.0))
 
     @property
@@ -78,13 +79,13 @@ def join_measured(found: Sequence[Measured]) -> Measured:
 
 
 def _join_holes(holes: Sequence[MeasuredHole]) -> MeasuredHole:
-    """Their mean: errors of the pictures average out, those of poses may all go the same way."""
+    """Their mean: errors of single pairs average out, common ones may all go the same way."""
     return MeasuredHole(
         holes[0].drill,
         np.mean([hole.entry_mm for hole in holes], axis=0),
         np.mean([hole.offset_mm for hole in holes], axis=0),
         float(np.mean([hole.diameter_mm for hole in holes])),
         np.mean([hole.matching_covariance for hole in holes], axis=0) / len(holes),
-        np.mean([hole.pose_covariance for hole in holes], axis=0),
+        np.mean([hole.common_covariance for hole in holes], axis=0),
         max(hole.seen_share for hole in holes),
     )

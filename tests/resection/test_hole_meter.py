@@ -89,5 +89,9 @@ def test_measurements_are_joined() -> None:
     assert isinstance(both, MeasuredHole)
     np.testing.assert_allclose(both.offset_mm, one.offset_mm + np.array([0.1, 0.0]))
     assert both.bound_mm < one.bound_mm
+    # However many there are: what they share stays.
+    many = join_measured([one] * 400)
+    assert many.bound_mm == pytest.approx(2.45 * 0.08, rel=0.05)
+    assert many.diameter_bound_mm == pytest.approx(1.96 * 0.16, rel=0.05)
     with pytest.raises(ValueError, match="no measurement"):
         join_measured([])
