@@ -31,6 +31,7 @@ from navapp.control.commands import (
     WithdrawCondition,
     WithdrawStep,
 )
+from navapp.control.stages import STAGES
 from navapp.control.states import SessionState, Snapshot
 from navapp.errors import DeviceLost
 from navapp.values import Reason, Status
@@ -133,7 +134,7 @@ class Record:
             assert is_told or not self.open_before(came, went, before), (command, came, went)
         if went != came:
             self.told = None
-        elif isinstance(command, EnterStage) and command.number > came:
+        elif isinstance(command, EnterStage) and came < command.number <= len(STAGES):
             self.told = came, command.number
 
     def open_before(self, present: int, number: int, snapshot: Snapshot) -> set[str]:
