@@ -155,7 +155,7 @@ def report_result(
     if any(limb is not None for limb in limbs):
         summary["limb"] = summarise_gaps(limbs)
     told: dict[str, Any] = {} if rig is None else {"rig": rig}
-    if any(step.is_made for step in steps):
+    if any(step.line.is_made for step in steps):
         told["operation"] = steps_to_json(steps)
     write_json(options.json, options.verb, {"frames": frames, "summary": summary, **told})
     if options.json != "-":

@@ -179,7 +179,14 @@ def _make_practice_steps(session: LiveSession) -> "PracticeSteps | None":
     simulation = session.opened.simulation
     if simulation is None:
         return None
-    return PracticeSteps(simulation.steps, session.specification.plan.content.steps)
+    plan, room = session.specification.plan, simulation.steps
+    # A step that the session would refuse is not made in the room either.
+    shared = {
+        name
+        for name, step in plan.content.steps.items()
+        if name in room.names and step.bone in plan.bones
+    }
+    return PracticeSteps(room, shared)
 
 
 def _make_locator(session: LiveSession) -> "LocateCorners | None":

@@ -31,16 +31,16 @@ class PracticeSteps:
 
     A session begins as its stage is usually entered. Then the operator makes the steps: one that
     is confirmed is made in the room, one that is withdrawn is undone. A stage that is entered later
-    is shown as far as it was made, with all that comes before it. What changes by that goes through
-    the session's queue as commands, so that a recording holds it.
+    is shown as far as it was made, with all that comes before it and nothing of later ones. What
+    changes by that goes through the session's queue as commands, so that a recording holds it.
 
     Args:
         room: that is shown.
-        planned: names of the steps of the session's plan, which may not be the room's.
+        shared: names of the steps that both the session's plan and the room have.
     """
 
-    def __init__(self, room: Room, planned: Collection[str]) -> None:
-        self._room, self._planned = room, frozenset(planned)
+    def __init__(self, room: Room, shared: Collection[str]) -> None:
+        self._room, self._shared = room, frozenset(shared)
         self._submit: Callable[[Command], None] | None = None
         self._is_begun = False
         # In the room; and what the session knows of it.
@@ -65,7 +65,7 @@ class PracticeSteps:
     def on_command(self, command: Command, after_sequence: int) -> None:
         """The session is about to handle a command."""
         match command:
-            case ConfirmStep(name) if name in self._planned:
+            case ConfirmStep(name) if name in self._shared:
                 if name not in self._shown:
                     self._room.make(name)
                 self._shown, self._told = self._shown | {name}, self._told | {name}
@@ -76,7 +76,7 @@ class PracticeSteps:
     def _tell(self) -> None:
         if self._submit is None:
             return
-        shown = self._shown & self._planned
+        shown = self._shown & self._shared
         for name in sorted(self._told - shown):
             self._submit(WithdrawStep(name))
         for name in sorted(shown - self._told):

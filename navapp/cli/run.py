@@ -147,7 +147,7 @@ def _run_headless(
     limbs = [result.limb for result in log.results]
     simulation = session.opened.simulation
     truth = None if simulation is None else simulation.oracle
-    steps = list_steps(session.specification.plan, controller.made_steps, measured, truth)
+    steps = list_steps(session.specification.plan, controller.steps_of, truth)
     return report_result(
         frames, seconds, failure, options, diagnostics, rig, measured, limbs, steps
     )

@@ -56,6 +56,8 @@ _NAMED: dict[str, type[_Named]] = {
     "confirm": ConfirmCondition,
     "withdraw": WithdrawCondition,
 }
+# What recordings before holes and parts call them.
+_EARLIER: dict[str, type[_Named]] = {"confirm_cut": ConfirmStep, "withdraw_cut": WithdrawStep}
 _NAMES = {kind: name for name, kind in (_PLAIN | _DECISIONS | _NAMED).items()}
 
 
@@ -92,8 +94,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return EnterStage(int(value["number"]))
         if name == "override":
             return OverrideGate(int(value["number"]), str(value["reason"]))
-        if name in _NAMED:
-            return _NAMED[name](str(value["name"]))
+        if name in _NAMED or name in _EARLIER:
+            return {**_NAMED, **_EARLIER}[name](str(value["name"]))
         if name == "nudge_cross":
             right_px, down_px = value["nudge_px"]
             return NudgeCross(int(right_px), int(down_px))

@@ -45,14 +45,14 @@ from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.snapshot_maker import SnapshotMaker
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Snapshot
+from navapp.control.states import Snapshot, StepLine
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import Rectifier
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import DepthMarks
 from navapp.tracking import make_tracker
-from navapp.values import FrameTimings
+from navapp.values import FrameTimings, StageSpec
 
 
 class SessionController:
@@ -139,10 +139,9 @@ class SessionController:
         """Why the session stands in FAULT; None when it does not."""
         return self._session.rig_error or self.lost_device
 
-    @property
-    def made_steps(self) -> frozenset[str]:
-        """Names of the plan's steps that are confirmed as made."""
-        return self._session.made_steps
+    def steps_of(self, stage: StageSpec) -> tuple[StepLine, ...]:
+        """The steps of a stage: planned, made, measured."""
+        return self._session.steps_of(stage)
 
     @property
     def snapshot(self) -> Snapshot:

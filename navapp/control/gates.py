@@ -12,10 +12,9 @@ from typing import NamedTuple, Protocol
 from navapp.control.stages import STAGES, TIME_OUT
 from navapp.control.states import ConditionLine, StepLine
 from navapp.errors import UsageError
-from navapp.values import Condition, ConditionKind, MeasuredFace, Plan, StageSpec
+from navapp.values import Condition, ConditionKind, Measured, MeasuredHole, Plan, StageSpec
 
 _NS_PER_MINUTE = 60 * 10**9
-_NOT_MADE = "it is not confirmed as made"
 
 
 class Known(Protocol):
@@ -110,15 +109,15 @@ class Gates:
         if name in asked:
             is_repeated = asked[name].is_repeated
             return (_key(asked[name], bone), self._known.registration_of(bone) * is_repeated)
-        cuts = {
-            _cut_name(step): step.n_made
+        steps = {
+            _step_name(step): step.n_made
             for stage in self._stages
             for step in self._known.steps_of(stage)
             if self._are_asked and _may_be_checked_by_hand(step, stage)
         }
-        if name in cuts:
-            return name, cuts[name]
-        names = ", ".join((*asked, *cuts))
+        if name in steps:
+            return name, steps[name]
+        names = ", ".join((*asked, *steps))
         remedy = f"choose one of {names}" if names else "nothing is asked for"
         raise UsageError(f"nobody is asked for '{name}'", subject=name, remedy=remedy)
 
@@ -175,7 +174,7 @@ class Gates:
                 yield ConditionLine(name, text, not known.rig_problem, note=note)
             case ConditionKind.STEPS_MADE:
                 for step in known.steps_of(stage):
-                    yield self._cut(step, stage) if step.kind == "cut" else _made(step, stage)
+                    yield self._tell_step(step, stage)
 
     def _tell_said(self, condition: Condition, stage: StageSpec) -> ConditionLine:
         """A condition for which a person answers."""
@@ -195,21 +194,23 @@ class Gates:
             condition.name, text, is_met, True, note + ("" if is_met else ": too old")
         )
 
-    def _cut(self, cut: StepLine, stage: StageSpec) -> ConditionLine:
-        """A cut is measured within tolerance; of one that cannot be measured a person says so."""
-        name, text = _cut_name(cut), f"cut {cut.name} within tolerance"
-        if not cut.is_made:
-            return ConditionLine(name, text, False, note=_NOT_MADE)
-        if cut.face is not None:
-            is_met = is_within(cut.face, stage)
-            note = f"{cut.face.angle_deg:.2f} deg, {cut.face.offset_mm:+.2f} mm"
-            return ConditionLine(name, text, is_met, note=note)
-        if not _may_be_checked_by_hand(cut, stage):
+    def _tell_step(self, step: StepLine, stage: StageSpec) -> ConditionLine:
+        """Made, and within tolerance; of what cannot be measured a person says so."""
+        name = _step_name(step)
+        text = f"{name} within tolerance" if step.kind != "part" else f"{step.name} in its place"
+        if not step.is_made:
+            return ConditionLine(name, text, False, note="it is not confirmed as made")
+        if step.kind == "part":
+            return ConditionLine(name, text, True)
+        if step.measured is not None:
+            note = _tell_measured(step.measured)
+            return ConditionLine(name, text, is_within(step.measured, stage), note=note)
+        if not _may_be_checked_by_hand(step, stage):
             note = "it was measured beyond tolerance with an earlier registration"
             return ConditionLine(name, text, False, note=note)
         said = self._said.get(name)
-        is_met = said is not None and said.number == cut.n_made
-        note = "checked by hand" if is_met else "not measurable: check it by hand, or override"
+        is_met = said is not None and said.number == step.n_made
+        note = "checked by hand" if is_met else "not measured: check it by hand, or override"
         return ConditionLine(name, text, is_met, True, note)
 
 
@@ -218,33 +219,29 @@ def _key(condition: Condition, bone: str) -> str:
     return f"{condition.name} {bone}" if condition.is_repeated else condition.name
 
 
-def _cut_name(cut: StepLine) -> str:
-    """Of the condition: a plan may give a cut the name of another condition."""
-    return f"cut {cut.name}"
+def _step_name(step: StepLine) -> str:
+    """Of the condition: a plan may give a step the name of another condition."""
+    return f"{step.kind} {step.name}"
 
 
 def _may_be_checked_by_hand(step: StepLine, stage: StageSpec) -> bool:
-    """A cut that is not measured, and was not measured beyond tolerance since it was made."""
-    if step.kind != "cut" or not step.is_made or step.face is not None:
+    """A cut or hole that is not measured, nor was beyond tolerance since it was made."""
+    if step.kind == "part" or not step.is_made or step.measured is not None:
         return False
-    return step.last_face is None or is_within(step.last_face, stage)
+    return step.last_measured is None or is_within(step.last_measured, stage)
 
 
-def _made(step: StepLine, stage: StageSpec) -> ConditionLine:
-    """A hole or a part that an operator has confirmed; a measured hole also within tolerance."""
-    text = f"hole {step.name} drilled" if step.kind == "hole" else f"{step.name} in its place"
-    if not step.is_made:
-        return ConditionLine(step.name, text, False, note=_NOT_MADE)
-    if step.hole is None:
-        return ConditionLine(step.name, text, True)
-    is_met = step.hole.off_mm + step.hole.bound_mm <= stage.tolerance_mm
-    note = f"{step.hole.off_mm:.2f} mm off its entry"
-    return ConditionLine(step.name, text, is_met, note=note)
+def _tell_measured(measured: Measured) -> str:
+    if isinstance(measured, MeasuredHole):
+        return f"{measured.off_mm:.2f} mm off its entry"
+    return f"{measured.angle_deg:.2f} deg, {measured.offset_mm:+.2f} mm"
 
 
-def is_within(face: MeasuredFace, stage: StageSpec) -> bool:
-    """Whether a face lies within the stage's tolerance, its 95 % bounds included."""
+def is_within(measured: Measured, stage: StageSpec) -> bool:
+    """Whether a cut or a hole lies within the stage's tolerance, its 95 % bounds included."""
+    if isinstance(measured, MeasuredHole):
+        return measured.off_mm + measured.bound_mm <= stage.tolerance_mm
     return (
-        face.angle_deg + face.bound_deg <= stage.tolerance_deg
-        and abs(face.offset_mm) + face.bound_mm <= stage.tolerance_mm
+        measured.angle_deg + measured.bound_deg <= stage.tolerance_deg
+        and abs(measured.offset_mm) + measured.bound_mm <= stage.tolerance_mm
     )

@@ -1,37 +1,55 @@
-"""The steps of a session: cuts, holes and parts that are made, and the faces of cuts measured."""
+"""The steps of a session: cuts, holes and parts that are made; cuts and holes are measured."""
 
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
-from navapp.control.states import StepKind, StepLine
+from navapp.control.states import StepLine
 from navapp.control.trackers import Trackers
 from navapp.errors import UsageError
 from navapp.geometry.mesh import TriangleMesh
 from navapp.resection import CutBone, Thickness, measure_thickness
 from navapp.values import (
-    DrillAxis,
+    BoneModel,
     Measured,
     MeasuredFace,
-    MeasuredHole,
     Plan,
     PlannedStep,
     PoseEstimate,
-    ResectionPlane,
     StageSpec,
     Status,
     TrackedFrame,
     join_measured,
+    kind_of,
 )
 
 # All chosen. So many measurements of a face make it known; the newest so many are kept.
 _ENOUGH, _KEPT = 3, 60
 
 
+@dataclass
+class _Known:
+    """What is known of a step that is made."""
+
+    measured: deque[Measured] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    joined: Measured | None = None  # what all of them say together
+    seen_share: float | None = None  # of face or rim, in the newest look
+    last: Measured | None = None  # as of `StepLine.last_measured`
+    thickness: Thickness | None = None
+
+    def add(self, one: Measured, bone: BoneModel) -> None:
+        """One more measurement of it."""
+        self.measured.append(one)
+        self.joined = self.last = join_measured(tuple(self.measured))
+        if isinstance(self.joined, MeasuredFace):
+            self.thickness = measure_thickness(bone, self.joined)
+
+
 class MadeSteps:
     """What has been made of the session's bones; started and asked from the loop alone.
 
-    Faces are measured in turns that are counted in frames, one in each: a recorded session replays
+    They are measured in turns that are counted in frames, one in each: a recorded session replays
     to them.
 
     Args:
@@ -50,14 +68,8 @@ class MadeSteps:
         self._plan, self._trackers = plan, trackers
         self._frames_between = frames_between
         self._n_frames = 0
-        self._measured: dict[str, deque[Measured]] = {}
-        # What all measurements of a step say together, and how much of it was seen last.
-        self._joined: dict[str, Measured] = {}
-        self._seen: dict[str, float | None] = {}
-        # As of `StepLine`.
+        self._known: dict[str, _Known] = {}
         self._n_made: Counter[str] = Counter()
-        self._last_faces: dict[str, MeasuredFace] = {}
-        self._thicknesses: dict[str, Thickness | None] = {}
         for name in made:
             self.confirm(name)
 
@@ -81,7 +93,7 @@ class MadeSteps:
         known = self._trackers.bone(step.bone)
         if name in known.made:
             raise UsageError(f"'{name}' is confirmed already", subject=name)
-        self._forget(name)
+        self._known[name] = _Known()
         self._n_made[name] += 1
         bone = known.make(name, step)
         self._trackers.set_bone(bone)
@@ -97,30 +109,18 @@ class MadeSteps:
         bones = self._trackers.bones
         if step is None or step.bone not in bones or name not in bones[step.bone].made:
             raise UsageError(f"'{name}' was not confirmed", subject=name)
-        self._forget(name)
-        self._last_faces.pop(name, None)
+        del self._known[name]
         bone = self._trackers.bone(step.bone).restore(name)
         self._trackers.set_bone(bone)
         return bone
 
-    def forget_faces(self, bone: str) -> None:
+    def forget_measured(self, bone: str) -> None:
         """What was measured with an earlier registration of a bone counts no longer."""
-        known = self._trackers.bones.get(bone)
-        if known is None or not any(name in self._seen for name in known.made):
-            return
-        for name in known.made:
-            self._forget(name)
-        if known.faces:
-            self._trackers.set_bone(known.without_faces())
-
-    def _forget(self, name: str) -> None:
-        for known in (self._measured, self._joined, self._seen, self._thicknesses):
-            known.pop(name, None)
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Of all steps that are made, of all bones."""
-        return frozenset(name for bone in self._trackers.bones.values() for name in bone.made)
+        bones = self._trackers.bones
+        for name in bones[bone].made if bone in bones else ():
+            self._known[name] = _Known(last=self._known[name].last)
+        if bone in bones and bones[bone].faces:
+            self._trackers.set_bone(bones[bone].without_faces())
 
     def version(self, bone: str) -> int:
         """Of a bone; 0 without a model of it."""
@@ -142,17 +142,16 @@ class MadeSteps:
         )
 
     def _describe(self, name: str, step: PlannedStep, *, is_made: bool) -> StepLine:
-        joined = self._joined.get(name)
+        known = self._known.get(name, _Known())
         return StepLine(
             name,
+            kind_of(step),
             is_made,
-            joined if isinstance(joined, MeasuredFace) else None,
-            self._seen.get(name),
-            _kind_of(step),
+            known.joined,
+            known.seen_share,
             self._n_made[name],
-            self._last_faces.get(name),
-            joined if isinstance(joined, MeasuredHole) else None,
-            self._thicknesses.get(name),
+            known.last,
+            known.thickness,
         )
 
     def measure(
@@ -169,7 +168,7 @@ class MadeSteps:
             return {}
         bone, is_each = self._trackers.bone(tracked.bone), self._frames_between == 1
         # A part covers the faces that it sits on.
-        names = () if bone.parts else (*bone.cuts, *bone.holes)
+        names = () if bone.parts else (*bone.cuts, *bone.whole_holes)
         if names and not is_each:
             names = (names[turn % len(names)],)
         if tracked.estimate is None or not (is_accepted or is_each):
@@ -191,14 +190,9 @@ class MadeSteps:
         self, bone: CutBone, looked: Mapping[str, Measured | None], found: Mapping[str, Measured]
     ) -> None:
         for name, one in looked.items():
-            self._seen[name] = None if one is None else one.seen_share
+            self._known[name].seen_share = None if one is None else one.seen_share
         for name, told in found.items():
-            self._measured.setdefault(name, deque(maxlen=_KEPT)).append(told)
-            joined = join_measured(tuple(self._measured[name]))
-            self._joined[name] = joined
-            if isinstance(joined, MeasuredFace):
-                self._last_faces[name] = joined
-                self._thicknesses[name] = measure_thickness(bone.planned.mesh, joined)
+            self._known[name].add(told, bone.planned)
         self._learn(bone)
 
     def _learn(self, bone: CutBone) -> None:
@@ -206,14 +200,8 @@ class MadeSteps:
         known = {
             name: face
             for name in bone.unmeasured
-            if len(self._measured.get(name, ())) >= _ENOUGH
-            and isinstance(face := self._joined[name], MeasuredFace)
+            if len(self._known[name].measured) >= _ENOUGH
+            and isinstance(face := self._known[name].joined, MeasuredFace)
         }
         if known:
             self._trackers.set_bone(bone.with_faces(known))
-
-
-def _kind_of(step: PlannedStep) -> StepKind:
-    if isinstance(step, ResectionPlane):
-        return "cut"
-    return "hole" if isinstance(step, DrillAxis) else "part"

@@ -32,7 +32,7 @@ from navapp.values import ConditionKind, Status
 _MAX_ATTEMPTS = 8
 _MAY_REGISTER = (SessionState.READY, SessionState.SUSPENDED, SessionState.NAVIGATING)
 # What a step waits for besides a state of the session.
-_GUIDES, _DARK, _MEASURED = "guides", "dark", "measured"
+_GUIDES, _DARK, _MEASURED, _GATE = "guides", "dark", "measured", "gate"
 
 
 class ScriptStep(Section):
@@ -64,7 +64,8 @@ class ScriptStep(Section):
     reason: str = ""
     """Of override."""
     until: str = ""
-    """Of wait: a state of the session, or guides, dark, measured (every cut that was made)."""
+    """Of wait: a state of the session, or guides, dark, measured (every cut and hole that was
+    made), gate (nothing is open before the next stage or the end)."""
     text: str = ""
     """Of expect: part of a reason on the screen, or of an event since the step before."""
     frames: Annotated[int, Field(ge=1)] = 60
@@ -114,12 +115,15 @@ class ScriptedOperator:
         self._told_ns = 0
         # The stage that was asked for last, until it is known whether it was entered.
         self._entering: int | None = None
+        # What was given last is a word of a person, which may be refused.
+        self._is_word = False
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
         """The next action of the script, when its time has come; a script that failed ends."""
         if snapshot.state is SessionState.REVIEW:
             return self._decide(snapshot)
         self._check_entered(snapshot)
+        self._check_obeyed(snapshot)
         if self.failure:
             return [Quit()]
         if not self._steps or snapshot.sequence < self._steps[0].at_frame:
@@ -135,6 +139,9 @@ class ScriptedOperator:
         command = _command_of(step)
         if isinstance(command, EnterStage | OverrideGate):
             self._entering = command.number
+        self._is_word = isinstance(
+            command, ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition
+        )
         return [command]
 
     @property
@@ -155,6 +162,18 @@ class ScriptedOperator:
             number = self._n_steps - len(self._steps)
             self.failure = f"step {number} of the operator's script: refused, open: {why}"
             self._steps.clear()
+
+    def _check_obeyed(self, snapshot: Snapshot) -> None:
+        """A word that is refused ends the script, unless its next step expects that."""
+        is_word, self._is_word = self._is_word, False
+        if not is_word or (self._steps and self._steps[0].do == "expect"):
+            return
+        for event in snapshot.events:
+            if event.kind == "refused" and event.time_ns >= self._told_ns:
+                number = self._n_steps - len(self._steps)
+                self.failure = f"step {number} of the operator's script: {event.text}"
+                self._steps.clear()
+                return
 
     def _begin(self, snapshot: Snapshot) -> list[Command]:
         if snapshot.state not in _MAY_REGISTER:
@@ -242,10 +261,11 @@ def _is_there(until: str, snapshot: Snapshot) -> bool:
         return snapshot.is_navigable
     if until == _DARK:
         return not snapshot.is_navigable
+    if until == _GATE:
+        return all(line.is_met for line in snapshot.gate)
     if until == _MEASURED:
-        return all(
-            step.face is not None for step in snapshot.steps if step.kind == "cut" and step.is_made
-        )
+        made = [step for step in snapshot.steps if step.is_made and step.kind != "part"]
+        return bool(made) and all(step.measured is not None for step in made)
     return snapshot.state.value == until
 
 
@@ -258,7 +278,7 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
     steps = validate(Script, content, name).step
     # What is under review is decided at once: nobody could wait for it.
     states = (state.value for state in SessionState if state is not SessionState.REVIEW)
-    waited = {_GUIDES, _DARK, _MEASURED, *states}
+    waited = {_GUIDES, _DARK, _MEASURED, _GATE, *states}
     for number, step in enumerate(steps, start=1):
         if step.do in ("stage", "override"):
             stage_by_name(step.stage)

@@ -232,11 +232,6 @@ class Session:
         return self._steps.describe(stage)
 
     @property
-    def made_steps(self) -> frozenset[str]:
-        """Names of all steps that are made, of all bones."""
-        return self._steps.names
-
-    @property
     def time_ns(self) -> int:
         """Capture of the newest frame: conditions go by it, so that they replay."""
         return self._time_ns
@@ -368,7 +363,7 @@ class Session:
         """Navigate by the candidate under review, if there is one."""
         if (candidate := self._tracks.candidate) is None:
             return
-        self._steps.forget_faces(self._stage.bone)
+        self._steps.forget_measured(self._stage.bone)
         self._n_accepted[self._stage.bone] += 1
         self._tracks.accept(self._stage)
         text = add_bound("registration accepted", candidate.tracked.verdict)

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import LimbMeasurement
 from navapp.resection import Thickness
-from navapp.values import MeasuredFace, MeasuredHole, Reason, StageSpec, Verdict
+from navapp.values import Measured, Reason, StageSpec, StepKind, Verdict
 
 
 class SessionState(Enum):
@@ -138,23 +137,19 @@ class LimbLine:
     age_ms: float | None = None  # since that picture, now
 
 
-StepKind = Literal["cut", "hole", "part"]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class StepLine:
-    """A planned step of the stage: a cut, a hole, a part; made, and a cut measured."""
+    """A planned step of the stage: a cut, a hole, a part; made, and measured."""
 
     name: str  # in the plan
+    kind: StepKind
     is_made: bool  # an operator has confirmed it
-    face: MeasuredFace | None = None  # all measurements together; None: not measurable yet
-    seen_share: float | None = None  # of the face in the newest look; None: not seen at all
-    kind: StepKind = "cut"
+    measured: Measured | None = None  # all measurements together; None: not measurable yet
+    seen_share: float | None = None  # of face or rim in the newest look; None: not seen at all
     n_made: int = 0  # how often it was confirmed: a cut may be made again
     # the newest measurement since it was confirmed, whatever was registered anew since then.
-    last_face: MeasuredFace | None = None
-    hole: MeasuredHole | None = None  # all measurements together; None: not measurable yet
-    thickness: Thickness | None = None  # of what the cut took off; None while `face` is
+    last_measured: Measured | None = None
+    thickness: Thickness | None = None  # of what a measured cut took off
 
 
 @dataclass(frozen=True, slots=True)

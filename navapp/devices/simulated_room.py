@@ -15,6 +15,7 @@ from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import Scene, SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
+from sim_devices.operation import STEPS
 from sim_devices.planned_cuts import Cut
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -25,8 +26,9 @@ from sim_devices.world import World
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomSteps:
-    """Tells the room what to show as made, by names of planned steps: it leads to no truth."""
+    """Tells the room what to show as made, and asks it, by names of planned steps alone."""
 
+    names: frozenset[str]  # of all steps that the room can show
     # set_stage, go_on: which stage is in force, as it is usually entered, or as far as it was made;
     # answered with all steps that are made then.
     set_stage: Callable[[str], frozenset[str]]
@@ -146,5 +148,11 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,
         oracle=TruthOracle(world, camera.world_time_ns),
-        steps=RoomSteps(world.set_stage, world.go_on, world.make, world.unmake),
+        steps=RoomSteps(
+            frozenset(step.name for step in STEPS),
+            world.set_stage,
+            world.go_on,
+            world.make,
+            world.unmake,
+        ),
     )

@@ -5,11 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+
 from navapp.geometry.mesh import TriangleMesh
+from navapp.resection.hole_meter import MOST_OFF_MM
 from navapp.resection.remaining_bone import (
     Cut,
     cover_with_parts,
     cut_surface,
+    heights_over,
     remove_cuts,
     remove_holes,
 )
@@ -58,6 +62,21 @@ class CutBone:
     def holes(self) -> dict[str, DrillAxis]:
         """Those that are made, by name, as planned."""
         return {n: one for n, one in self.made.items() if isinstance(one, DrillAxis)}
+
+    @cached_property
+    def whole_holes(self) -> tuple[str, ...]:
+        """Names of the holes whose mouth no cut has come near: its rim still lies on the skin."""
+        points_mm = self.planned.mesh.vertices_mm
+        gone_mm = [
+            heights_over(self.planned.mesh, Cut(plane, UNSURE_MM)) for plane in self.cuts.values()
+        ]
+        is_gone = np.any(np.array(gone_mm) > 0.0, axis=0) if gone_mm else np.zeros(len(points_mm))
+        whole = []
+        for name, hole in self.holes.items():
+            away_mm = np.linalg.norm(points_mm - hole.entry_mm, axis=1)
+            if not is_gone[away_mm < hole.diameter_mm + MOST_OFF_MM].any():
+                whole.append(name)
+        return tuple(whole)
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -15,7 +15,7 @@ from navapp.values import BoneModel, DrillAxis, PoseEstimate
 from navapp.values.holes import MeasuredHole
 
 # All chosen. A drill misses its plan by no more; a hole is as wide as its drill within so much.
-_MOST_OFF_MM, _MOST_WIDER = 4.0, 0.25
+MOST_OFF_MM, _MOST_WIDER = 4.0, 0.25
 _GRID_MM, _STEP_MM = 0.3, 0.1
 _N_RAYS, _ROUNDS, _STEPS = 72, 5, 8
 # Of the rim's brightness over the hole's; noise alone shows no such step.
@@ -157,7 +157,7 @@ def _find_dark_disc(
     import cv2
 
     radius_mm = 0.5 * planned.diameter_mm
-    reach_mm = _MOST_OFF_MM + 1.6 * radius_mm
+    reach_mm = MOST_OFF_MM + 1.6 * radius_mm
     line = np.arange(-reach_mm, reach_mm, _GRID_MM)
     flat_mm = np.stack(np.meshgrid(line, line), axis=-1).reshape(-1, 2)
     points_mm = patch.place(flat_mm)
@@ -175,7 +175,7 @@ def _find_dark_disc(
     )
     bone = float(np.percentile(seen[is_known], 75))
     contrast = (light - dark) / max(bone, 1.0)
-    is_near = np.hypot(flat_mm[:, 0], flat_mm[:, 1]).reshape(seen.shape) <= _MOST_OFF_MM
+    is_near = np.hypot(flat_mm[:, 0], flat_mm[:, 1]).reshape(seen.shape) <= MOST_OFF_MM
     best = int(np.argmax(np.where(is_near, contrast, -1.0)))
     if contrast.flat[best] < _LEAST_CONTRAST:
         return None
@@ -205,7 +205,7 @@ def _fit_circle(
             return None
         step, normal, misfit_mm = _solve(rows[known], residual_mm[known])
         circle = circle + step
-        if np.hypot(*circle[:2]) > _MOST_OFF_MM:
+        if np.hypot(*circle[:2]) > MOST_OFF_MM:
             return None
     if abs(circle[2] / radius_mm - 1.0) > _MOST_WIDER:
         return None

@@ -84,11 +84,11 @@ def _mirror_line(snapshot: Snapshot) -> ConditionLine:
 def _keyed(snapshot: Snapshot) -> list[tuple[str, str]]:
     """Letter and name of every condition that a person may have to answer for.
 
-    A cut keeps its letter when it becomes measured, and so do those after it.
+    A cut or hole keeps its letter when it becomes measured, and so do those after it.
     """
     lines = [*snapshot.time_out, *snapshot.gate]
     names = dict.fromkeys(
-        line.name for line in lines if line.is_personal or line.name.startswith("cut ")
+        line.name for line in lines if line.is_personal or line.name.startswith(("cut ", "hole "))
     )
     return list(zip(CONDITION_KEYS, names, strict=False))
 

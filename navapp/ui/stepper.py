@@ -6,7 +6,7 @@ from navapp.control.states import StepLine
 from navapp.ui.gauges import cut
 from navapp.ui.text_view import TextView
 from navapp.ui.view import Level, View
-from navapp.values import StageSpec
+from navapp.values import MeasuredHole, StageSpec
 
 
 class StageStepper(TextView):
@@ -43,10 +43,11 @@ def _measured_row(view: View, width: int) -> Content:
 
 
 def _say_made(step: StepLine) -> str:
-    if step.face is not None:
-        return f"{step.face.angle_deg:.2f} deg {step.face.offset_mm:+.2f} mm"
-    if step.hole is not None:
-        return f"{step.hole.off_mm:.2f} mm"
+    measured = step.measured
+    if isinstance(measured, MeasuredHole):
+        return f"{measured.off_mm:.2f} mm"
+    if measured is not None:
+        return f"{measured.angle_deg:.2f} deg {measured.offset_mm:+.2f} mm"
     return "made" if step.kind == "part" else "not measurable"
 
 

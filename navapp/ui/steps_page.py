@@ -1,4 +1,4 @@
-"""The page of the stage's steps: which are made, and what of cuts was measured against plan."""
+"""The page of the stage's steps: which are made, and what was measured against plan."""
 
 from typing import ClassVar
 
@@ -26,7 +26,7 @@ class StepTable(TextView):
     """All cuts, holes and parts of the stage with their letters."""
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
-        """A line a step, and more where the face of a cut was measured or looked for."""
+        """A line a step, and more where it was measured or looked for."""
         snapshot, lines = view.snapshot, list[Content]()
         if not snapshot.steps:
             return [Content(f" the plan has no cut, hole or part of the {snapshot.stage.bone}")]
@@ -37,7 +37,7 @@ class StepTable(TextView):
                     (f" {key}  ", "bold $primary"), f"{step.name:<{_NAME_WIDTH}} {word}"
                 )
             )
-            lines += _tell_face(step, snapshot.stage, view.symbols)
+            lines += _tell_made(step, snapshot.stage, view.symbols)
         version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
         notes = (
             version,
@@ -48,18 +48,18 @@ class StepTable(TextView):
         return [*lines, Content(""), *(Content.styled(note, "$text-muted") for note in notes)]
 
 
-def _tell_face(cut: StepLine, stage: StageSpec, symbols: Symbols) -> list[Content]:
+def _tell_made(step: StepLine, stage: StageSpec, symbols: Symbols) -> list[Content]:
     """What is known of a cut or a hole that was made."""
-    if cut.kind == "part" or not cut.is_made:
+    if step.kind == "part" or not step.is_made:
         return []
-    if cut.face is not None:
-        return [*_tell_measured(cut.face, stage, symbols), *_tell_thickness(cut.thickness)]
-    if cut.hole is not None:
-        return _tell_hole(cut.hole, stage, symbols)
+    if isinstance(step.measured, MeasuredHole):
+        return _tell_hole(step.measured, stage, symbols)
+    if step.measured is not None:
+        return [*_tell_measured(step.measured, stage, symbols), *_tell_thickness(step.thickness)]
     seen = "it is not seen, or was not looked for yet"
-    if cut.seen_share is not None:
-        seen = f"{100.0 * cut.seen_share:.0f} % of the {cut.kind} is seen"
-        seen += "" if cut.seen_share < LEAST_SHARE else ", its bounds are too large"
+    if step.seen_share is not None:
+        seen = f"{100.0 * step.seen_share:.0f} % of the {step.kind} is seen"
+        seen += "" if step.seen_share < LEAST_SHARE else ", its bounds are too large"
     return [Content.styled(f"      not measurable: {seen}", "$warning")]
 
 

@@ -26,7 +26,9 @@ from navapp.values.contents import (
     Shape,
     Sphere,
     StageContent,
+    StepKind,
     SurgicalContent,
+    kind_of,
 )
 from navapp.values.faces import MeasuredFace, join_faces
 from navapp.values.holes import Measured, MeasuredHole, join_measured
@@ -88,6 +90,7 @@ __all__ = [
     "StageContent",
     "StageSpec",
     "Status",
+    "StepKind",
     "Stopwatch",
     "SurfaceCloud",
     "SurgicalContent",
@@ -96,4 +99,5 @@ __all__ = [
     "Verdict",
     "join_faces",
     "join_measured",
+    "kind_of",
 ]

@@ -145,6 +145,14 @@ class Part:
 
 # What is made of a bone, in one step of the operation: a cut, a hole, a part put in its place.
 PlannedStep = ResectionPlane | DrillAxis | Part
+StepKind = Literal["cut", "hole", "part"]
+
+
+def kind_of(step: PlannedStep) -> StepKind:
+    """What is made by a step."""
+    if isinstance(step, ResectionPlane):
+        return "cut"
+    return "hole" if isinstance(step, DrillAxis) else "part"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

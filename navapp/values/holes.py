@@ -45,7 +45,7 @@ class MeasuredHole:
 
     @property
     def bound_mm(self) -> float:
-        """95 % bound of the distance between measured and true entry."""
+        """95 % bound between measured and true mouth, across the planned direction."""
         both = self.matching_covariance + self.common_covariance
         largest = float(np.linalg.eigvalsh(both[:2, :2])[-1])
         return _LENGTH_95 * math.sqrt(max(largest, 0.0))

@@ -89,8 +89,13 @@ def run_state(state: State, seed: int, folder: Path) -> dict[str, Any]:
 
 
 def judge(found: Found, frames: Sequence[dict[str, Any]]) -> None:
-    """Count the last frames of a session."""
-    for frame in frames[-_N_JUDGED:]:
+    """Count the last frames of a session that show its state; what is missing is not OK."""
+    if not frames:
+        found.n_frames += _N_JUDGED
+        return
+    shown = [frame for frame in frames if frame["bone_version"] == frames[-1]["bone_version"]]
+    found.n_frames += max(0, _N_JUDGED - len(shown))
+    for frame in shown[-_N_JUDGED:]:
         found.n_frames += 1
         if frame["status"] != "OK":
             for reason in frame["reasons"]:
@@ -114,32 +119,29 @@ def tell(name: str, found: Found) -> str:
     )
 
 
-def measured_of(told: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, float]]]:
-    """Name, measurement and truth of every measured face and hole of a session."""
+Measured = list[tuple[dict[str, Any], dict[str, Any]]]
+
+
+def measured_of(told: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Name, measurement and its error of every measured face and hole of a session."""
     for step in told.get("operation", ()):
-        if step["measured"] is not None and step["off_plan"] is not None:
-            yield step["step"], step["measured"], step["off_plan"]
-
-
-Measured = list[tuple[dict[str, Any], dict[str, float]]]
+        if step["error"] is not None:
+            yield step["step"], step["measured"], step["error"]
 
 
 def tell_measured(measured: dict[str, Measured]) -> Iterator[str]:
-    """Rows of the table; offsets are judged along the plan's normal, tilts and ways in size."""
+    """Rows of the table: angle between normals, offset at the planned point; holes across."""
     yield (
         "| measured | sessions | mostly seen | angle off: median, worst deg "
         "| offset off: median, worst mm | bounds cover |"
     )
     yield "|---|---|---|---|---|---|"
     for name, found in measured.items():
-        is_hole = "diameter_mm" in found[0][0]
-        offset = np.array(
-            [abs(one["off_mm" if is_hole else "offset_mm"] - true["mm"]) for one, true in found]
-        )
+        offset = np.array([error["mm"] for _, error in found])
         covers = offset <= [one["bound_mm"] for one, _ in found]
         angles = "-"
-        if not is_hole:
-            angle = np.array([abs(one["angle_deg"] - true["deg"]) for one, true in found])
+        if found[0][1]["deg"] is not None:
+            angle = np.array([error["deg"] for _, error in found])
             covers &= angle <= [one["bound_deg"] for one, _ in found]
             angles = f"{np.median(angle):.2f}, {angle.max():.2f}"
         n_seen = sum(one["seen_share"] >= _MOSTLY_SEEN for one, _ in found)
@@ -165,9 +167,10 @@ def main() -> None:
             found = results.setdefault(f"{state.bone} {state.name}", Found())
             for seed in range(options.first, options.first + options.knees):
                 told = run_state(state, seed, Path(folder))
-                judge(found, told["frames"])
-                for name, one, true in measured_of(told):
-                    measured[name].append((one, true))
+                made = {step["step"] for step in told.get("operation", ()) if step["made"]}
+                judge(found, told["frames"] if made.issuperset(state.made) else [])
+                for name, one, error in measured_of(told):
+                    measured[name].append((one, error))
                 if options.frames:
                     alone = Found()
                     judge(alone, told["frames"])

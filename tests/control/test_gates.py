@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from navapp.control.command_files import command_from_json, command_to_json
@@ -19,7 +20,15 @@ from navapp.control.commands import (
 )
 from navapp.control.stages import STAGES, TIME_OUT
 from navapp.control.states import Snapshot
-from navapp.values import ConditionKind, Reason, Status
+from navapp.resection import HoleMeter
+from navapp.values import (
+    ConditionKind,
+    DrillAxis,
+    MeasuredHole,
+    Reason,
+    Status,
+    SurgicalContent,
+)
 from tests.control.cuts import Faces, cut_plan
 from tests.control.fakes import Bench, answer, navigating
 
@@ -143,7 +152,7 @@ def test_cuts_must_be_made_and_measured_or_checked_by_hand(bench: Bench, faces: 
     assert lines["cut top"].is_met
     assert lines["cut top"].note == "0.57 deg, -0.40 mm"
     assert not lines["cut side"].is_met
-    assert "not measurable" in lines["cut side"].note
+    assert "not measured" in lines["cut side"].note
     assert bench.do(EnterStage(4)).stage.number == 3
     confirm(bench, "cut side")
     assert bench.do(EnterStage(4)).stage.number == 4
@@ -259,3 +268,62 @@ def test_a_plan_without_a_model_of_the_cut_bone_answers() -> None:
     bench = navigating(Bench(plan=replace(cut_plan(), bones={"femur": cut_plan().bones["femur"]})))
     bench.do(WithdrawStep("flat"))
     assert "'flat' was not confirmed" in bench.refused()
+
+
+class Holes:
+    """Stands for what is measured of the mouth of a hole."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.off_mm: float | None = None
+        monkeypatch.setattr(HoleMeter, "measure", self._measure)
+
+    def _measure(self, left, right, estimate, planned) -> MeasuredHole | None:
+        if self.off_mm is None:
+            return None
+        offset_mm, little = np.array([self.off_mm, 0.0]), 1e-4 * np.eye(3)
+        return MeasuredHole(planned, planned.entry_mm, offset_mm, 8.0, little, little, 0.9)
+
+
+@pytest.fixture
+def holes(monkeypatch: pytest.MonkeyPatch) -> Holes:
+    return Holes(monkeypatch)
+
+
+@pytest.fixture
+def drilling() -> Bench:
+    """In the stage with a hole, whose name is that of a condition."""
+    hole = DrillAxis("femur", np.array([0.0, 0.0, -20.0]), np.array([0.0, 0.0, 1.0]), 20.0, 8.0)
+    content = SurgicalContent(drills={"entry_point": hole})
+    bench = navigating(Bench(plan=replace(cut_plan(), content=content, digest=""), has_gates=True))
+    bench.do(EnterStage(2))
+    bench.do(OverrideGate(2, "practice"))
+    confirm(bench, "entry_point", "checked_on_patient")
+    return bench
+
+
+def test_a_hole_is_made_and_measured_or_checked_by_hand(drilling: Bench, holes: Holes) -> None:
+    assert is_met(drilling.snapshot) == {
+        "entry_point": True, "hole entry_point": False, "checked_on_patient": True,
+    }  # fmt: skip
+    drilling.do(ConfirmStep("entry_point"))
+    assert drilling.do(EnterStage(3)).stage.number == 2
+    assert is_met(confirm(drilling, "hole entry_point"))["hole entry_point"]
+    holes.off_mm = 0.4
+    drilling.frames(11)
+    line = {line.name: line for line in drilling.snapshot.gate}["hole entry_point"]
+    assert line.is_met
+    assert line.note == "0.40 mm off its entry"
+
+
+def test_a_hole_beyond_tolerance_stays_so_after_a_new_registration(
+    drilling: Bench, holes: Holes
+) -> None:
+    holes.off_mm = 3.0
+    drilling.do(ConfirmStep("entry_point"))
+    drilling.frames(11)
+    holes.off_mm = None
+    register_again(drilling)
+    confirm(drilling, "checked_on_patient")
+    drilling.do(ConfirmCondition("hole entry_point"))
+    assert "nobody is asked for 'hole entry_point'" in drilling.refused()
+    assert drilling.do(EnterStage(3)).stage.number == 2

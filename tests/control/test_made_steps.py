@@ -94,8 +94,8 @@ def test_faces_are_measured_in_turns_and_become_known(bench: Bench, faces: Faces
     assert 6 <= len(measured) <= 9
     assert versions.index(2) <= 20
     (top, _) = bench.snapshot.steps
-    assert top.face is not None
-    assert top.face.offset_mm == pytest.approx(-0.4)
+    assert top.measured is not None
+    assert top.measured.offset_mm == pytest.approx(-0.4)
     assert top.seen_share == 0.8
     assert top.thickness.mm > top.thickness.planned_mm > 0.0
     # Once it is known, it is looked for there.
@@ -110,7 +110,7 @@ def test_a_face_of_which_little_is_seen_is_not_told(bench: Bench, faces: Faces) 
     bench.do(ConfirmStep("top"))
     bench.frames(40)
     (top, side) = bench.snapshot.steps
-    assert top.face is None
+    assert top.measured is None
     assert top.seen_share == 0.1
     assert side.seen_share is None
     assert not any(result.measured for result in bench.results)
@@ -146,7 +146,7 @@ def test_nothing_is_kept_of_a_candidate_that_nobody_has_accepted(faces: Faces) -
     assert not faces.expected
     bench.accept()
     bench.frames(20)
-    assert bench.snapshot.steps[0].face is not None
+    assert bench.snapshot.steps[0].measured is not None
 
 
 def test_a_cut_withdrawn_and_made_again_is_measured_again(bench: Bench, faces: Faces) -> None:
@@ -155,10 +155,10 @@ def test_a_cut_withdrawn_and_made_again_is_measured_again(bench: Bench, faces: F
     bench.frames(30)
     bench.do(ConfirmStep("top"))
     assert "is confirmed already" in bench.refused()
-    assert bench.snapshot.steps[0].face is not None
+    assert bench.snapshot.steps[0].measured is not None
     bench.do(WithdrawStep("top"))
     snapshot = bench.do(ConfirmStep("top"))
-    assert snapshot.steps[0].face is None
+    assert snapshot.steps[0].measured is None
     assert snapshot.steps[0].seen_share is None
 
 
@@ -190,7 +190,7 @@ def test_a_new_registration_forgets_what_was_measured_with_the_old_one(
     bench.frames(3)
     snapshot = bench.accept()
     assert snapshot.steps[0].is_made
-    assert snapshot.steps[0].face is None
+    assert snapshot.steps[0].measured is None
     assert snapshot.bone_version == 1
     bench.frames(1)
     heights_mm = cut_plan().bones["femur"].mesh.vertices_mm[:, 2]
@@ -213,3 +213,11 @@ def test_a_search_begins_anew_when_the_bone_is_cut_meanwhile() -> None:
     assert bench.script.calls.count("register femur") == 2
     assert bench.trackers["femur"].bone.is_removed.any()
     bench.controller.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [("confirm_cut", ConfirmStep("top")), ("withdraw_cut", WithdrawStep("top"))],
+)
+def test_recordings_from_before_holes_and_parts_are_read(name: str, command) -> None:
+    assert command_from_json({"command": name, "name": "top"}) == command

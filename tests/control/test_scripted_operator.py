@@ -212,3 +212,19 @@ def test_a_bone_may_be_registered_again_while_it_is_followed(bench: Bench) -> No
 def test_nobody_waits_for_a_review_that_is_decided_at_once() -> None:
     with pytest.raises(ConfigurationError, match="waits for 'review'"):
         read_script({"step": [{"do": "wait", "until": "review"}]}, "script.toml")
+
+
+@pytest.mark.parametrize("expects", [False, True])
+def test_a_word_that_is_refused_ends_a_script_that_does_not_expect_it(expects: bool) -> None:
+    bench = navigating(Bench(camera=FakeCamera(None, n_frames=40), has_gates=True))
+    expect = (ScriptStep(do="expect", text="nobody is asked for 'gapz'"),) if expects else ()
+    operator = ScriptedOperator((ScriptStep(do="confirm", name="gapz"), *expect))
+    commands_of(bench, operator)
+    assert ("nobody is asked for 'gapz'" in operator.failure) == (not expects)
+
+
+def test_nothing_made_is_not_measured() -> None:
+    bench = navigating(Bench(camera=FakeCamera(None, n_frames=40), has_gates=True))
+    operator = ScriptedOperator((ScriptStep(do="wait", until="measured", frames=3),))
+    commands_of(bench, operator)
+    assert "not within 3 frames" in operator.failure

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from navapp.resection.thickness import measure_thickness
-from navapp.values import MeasuredFace, ResectionPlane
+from navapp.values import BoneModel, MeasuredFace, ResectionPlane
 from tests.geometry.shapes import sphere
 
-BALL = sphere(20.0)
+BONE = BoneModel("femur", sphere(20.0))
 PLANE = ResectionPlane("femur", np.array([0.0, 0.0, 12.0]), np.array([0.0, 0.0, 1.0]))
 SMALL = np.diag([1e-6, 1e-6, 1e-4])
 
@@ -20,7 +20,7 @@ def face(tilt_rad: float = 0.0, offset_mm: float = 0.0) -> MeasuredFace:
 
 @pytest.mark.parametrize("offset_mm", [0.0, 0.8, -1.5])
 def test_less_bone_is_gone_where_the_face_lies_higher(offset_mm: float) -> None:
-    found = measure_thickness(BALL, face(offset_mm=offset_mm))
+    found = measure_thickness(BONE, face(offset_mm=offset_mm))
     assert found.planned_mm == pytest.approx(8.0, abs=0.02)
     assert found.mm == pytest.approx(8.0 - offset_mm, abs=0.02)
     # The top of the ball stands over the middle of the face: tilts hardly count.
@@ -32,7 +32,7 @@ def test_a_tilt_counts_by_its_arm() -> None:
     beside = replace(PLANE, point_mm=PLANE.point_mm + np.array([9.0, 0.0, 0.0]))
     one = MeasuredFace(beside, np.zeros(3), np.diag([1e-4, 0.0, 0.0]), np.zeros((3, 3)), 0.9)
     tilted = replace(one, tilts_offset=np.array([0.01, 0.0, 0.0]))
-    found, other = measure_thickness(BALL, one), measure_thickness(BALL, tilted)
+    found, other = measure_thickness(BONE, one), measure_thickness(BONE, tilted)
     assert found.bound_mm == pytest.approx(1.96 * 9.0 * 0.01, rel=0.01)
     assert abs(other.mm - found.mm) == pytest.approx(0.09, rel=0.1)
 
@@ -40,4 +40,10 @@ def test_a_tilt_counts_by_its_arm() -> None:
 def test_a_plan_beside_the_bone_takes_nothing_off() -> None:
     away = replace(PLANE, point_mm=np.array([0.0, 0.0, 30.0]))
     one = MeasuredFace(away, np.zeros(3), SMALL, SMALL, 0.9)
-    assert measure_thickness(BALL, one) is None
+    assert measure_thickness(BONE, one) is None
+
+
+def test_what_the_surface_may_be_off_by_is_in_the_bound() -> None:
+    unsure = replace(BONE, surface_sd_mm=0.3)
+    exact, found = measure_thickness(BONE, face()), measure_thickness(unsure, face())
+    assert found.bound_mm == pytest.approx(np.hypot(exact.bound_mm, 1.96 * 0.3))

@@ -312,9 +312,9 @@ def test_wide_stepper_tells_the_next_gate_and_what_was_measured() -> None:
     tilt = np.array([np.tan(np.radians(0.31)), 0.0, -0.42])
     face = MeasuredFace(plane, tilt, np.eye(3), np.eye(3), 0.6)
     cuts = (
-        StepLine("femur_distal", is_made=True, face=face),
-        StepLine("lateral", is_made=True),
-        StepLine("posterior", is_made=False),
+        StepLine("femur_distal", "cut", is_made=True, measured=face),
+        StepLine("lateral", "cut", is_made=True),
+        StepLine("posterior", "cut", is_made=False),
     )
     lines = lines_of(StageStepper(), view_of(snapshots.navigating(steps=cuts)), 160, 3)
     assert "● the entry point was checked with the tip" in lines[1]

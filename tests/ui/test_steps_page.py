@@ -22,15 +22,16 @@ FACE = MeasuredFace(PLANE, np.array([np.tan(np.radians(1.3)), 0.0, -0.55]), SMAL
 STEPS = (
     StepLine(
         "femur_distal",
+        "cut",
         is_made=True,
-        face=FACE,
+        measured=FACE,
         seen_share=0.8,
         thickness=Thickness(9.0, 9.55, 0.12),
     ),
-    StepLine("femur_anterior", is_made=True, seen_share=0.38),
-    StepLine("femur_posterior", is_made=True),
-    StepLine("femur_anterior_chamfer", is_made=False),
-    StepLine("femoral_implant", is_made=True, kind="part"),
+    StepLine("femur_anterior", "cut", is_made=True, seen_share=0.38),
+    StepLine("femur_posterior", "cut", is_made=True),
+    StepLine("femur_anterior_chamfer", "cut", is_made=False),
+    StepLine("femoral_implant", "part", is_made=True),
 )
 
 
