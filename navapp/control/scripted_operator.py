@@ -139,9 +139,9 @@ class ScriptedOperator:
         command = _command_of(step)
         if isinstance(command, EnterStage | OverrideGate):
             self._entering = command.number
-        self._is_word = isinstance(
-            command, ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition
-        )
+        # A session without gates asks for nothing, and says so of every condition.
+        is_asked = isinstance(command, ConfirmCondition | WithdrawCondition) and snapshot.time_out
+        self._is_word = isinstance(command, ConfirmStep | WithdrawStep) or bool(is_asked)
         return [command]
 
     @property
