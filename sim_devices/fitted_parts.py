@@ -7,6 +7,7 @@ import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
+from sim_devices.anatomy import KneeSpec
 from sim_devices.components import (
     PLAN_CELL_MM,
     make_femoral_component,
@@ -28,6 +29,9 @@ SEATS = {
 # What a surgeon chooses from: thickness of tray and insert together.
 INSERTS_MM = np.arange(5.0, 16.5, 0.5)
 _CONTACT_MM = 0.3
+# A plan's components by the knee that they are planned for, which says all of them.
+_KEPT_KNEES = 16
+_planned_of: dict[KneeSpec, dict[str, TriangleMesh]] = {}
 
 
 class FittedParts:
@@ -61,6 +65,14 @@ class FittedParts:
     @cached_property
     def planned(self) -> dict[str, TriangleMesh]:
         """The components as a plan holds them: on the planned cuts, as thick as those take off."""
+        spec = self._site.knee.spec
+        if spec not in _planned_of:
+            if len(_planned_of) >= _KEPT_KNEES:
+                _planned_of.clear()
+            _planned_of[spec] = self._make_planned()
+        return dict(_planned_of[spec])
+
+    def _make_planned(self) -> dict[str, TriangleMesh]:
         knee, cuts = self._site.knee, self._site.planned
         femoral = make_femoral_component(knee, self._femoral_cuts, PLAN_CELL_MM)
         spacer = make_tray_and_insert(knee, cuts["tibia_proximal"], RESECTION_MM, PLAN_CELL_MM)
