@@ -1,7 +1,7 @@
 """The simulated operating site: an opened knee on the table, seen by two cameras."""
 
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -51,13 +51,17 @@ _LAMPS = np.array(
 
 
 class World:
-    """An operation that runs by itself: bodies move with the time, the stage is set from outside.
+    """An operation that runs by itself: bodies move with the time, steps are made from outside.
 
     World time 0 is the start. All methods may be called from any thread.
 
     Args:
         scenario: patient, scene, motion.
         rig: that looks; the default one when absent.
+
+    Attributes:
+        states: which stage is shown, and what is made in it.
+        record: what is planned and what is really made: truth.
 
     Raises:
         UsageError: the scenario starts with a stage that does not exist.
@@ -91,27 +95,12 @@ class World:
         self._renderers: dict[tuple[State, Eye, float, Turn], Renderer] = {}
         self._others: dict[tuple[State, Camera], Renderer] = {}
         self._scenes: dict[State, Scene] = {}
-        self._history = StateHistory(enter(scenario.stage))
+        self.states = StateHistory(enter(scenario.stage))
 
     @property
     def bodies(self) -> tuple[str, ...]:
         """The bodies that can be tracked."""
         return ("femur", "tibia", "patella")
-
-    @property
-    def stage(self) -> str:
-        """The surgical stage in force."""
-        return self._state.stage
-
-    @property
-    def made(self) -> frozenset[str]:
-        """Names of the steps of the operation that have been made (`operation.STEPS`)."""
-        return self._state.made
-
-    @property
-    def made_cuts(self) -> tuple[str, ...]:
-        """Names of the cuts among them, in their order."""
-        return self._state.cuts
 
     @property
     def planned_cuts(self) -> dict[str, Cut]:
@@ -152,63 +141,9 @@ class World:
         unit: FloatArray = direction / np.linalg.norm(direction)
         return unit
 
-    def set_stage(self, name: str) -> frozenset[str]:
-        """Show another surgical stage from the next picture on, as it is usually entered.
-
-        Returns:
-            Names of all steps that are made then.
-
-        Raises:
-            UsageError: there is no such stage.
-        """
-        self._history.show(enter(name))
-        return self.made
-
-    def go_on(self, name: str) -> frozenset[str]:
-        """Show another stage from the next picture on, with as much of it made as has been made.
-
-        What belongs to the stages before is made, what belongs to later ones is not.
-
-        Returns:
-            Names of all steps that are made then.
-
-        Raises:
-            UsageError: there is no such stage.
-        """
-        self._history.show(self._state.go_on(name))
-        return self.made
-
-    def make(self, step: str) -> None:
-        """Show a step of the operation as made from the next picture on.
-
-        Raises:
-            UsageError: the operation has no such step.
-        """
-        self.set_made(self.made | {step})
-
-    def unmake(self, step: str) -> None:
-        """Show a step as not made."""
-        self.set_made(self.made - {step})
-
-    def set_made(self, made: Iterable[str]) -> None:
-        """Show the stage in force with these steps of the operation made, and no others.
-
-        Raises:
-            UsageError: the operation has no such step.
-        """
-        self._history.show(State(self.stage, frozenset(made)))
-
-    def advance(self) -> None:
-        """Make the next step of the stage in force: the next cut, then the component.
-
-        Raises:
-            UsageError: all of its steps are made.
-        """
-        self._history.show(self._state.advance())
-
     @property
     def _state(self) -> State:
-        return self._history.now
+        return self.states.now
 
     def left_from_body(self, body: str, time_ns: int) -> RigidTransform:
         """True pose of a body in the left camera.
@@ -220,7 +155,7 @@ class World:
         Raises:
             UsageError: there is no such body.
         """
-        return self._left_from_body(body, time_ns, self._history.at(time_ns))
+        return self._left_from_body(body, time_ns, self.states.at(time_ns))
 
     def _left_from_body(self, body: str, time_ns: int, state: State) -> RigidTransform:
         return self._place_in_view(self._table_from_body(body, time_ns / 1e9, state))
@@ -251,7 +186,7 @@ class World:
             scale: of the picture against the rig's.
             turn_rad: of the right eye, about its own axes.
         """
-        state = self._history.take_picture(time_ns)
+        state = self.states.take_picture(time_ns)
         with self._lock:
             renderer = self._renderer(state, eye, scale, turn_rad)
         seen_from = camera_from_left(self.rig, eye, turn_rad)

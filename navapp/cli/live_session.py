@@ -179,7 +179,7 @@ def _make_practice_steps(session: LiveSession) -> "PracticeSteps | None":
     simulation = session.opened.simulation
     if simulation is None:
         return None
-    plan, room = session.specification.plan, simulation.steps
+    plan, room = session.specification.plan, simulation.states
     # A step that the session would refuse is not made in the room either.
     shared = {
         name

@@ -57,7 +57,7 @@ _NAMED: dict[str, type[_Named]] = {
     "withdraw": WithdrawCondition,
 }
 # What recordings before holes and parts call them.
-_EARLIER: dict[str, type[_Named]] = {"confirm_cut": ConfirmStep, "withdraw_cut": WithdrawStep}
+_READ_NAMED = {**_NAMED, "confirm_cut": ConfirmStep, "withdraw_cut": WithdrawStep}
 _NAMES = {kind: name for name, kind in (_PLAIN | _DECISIONS | _NAMED).items()}
 
 
@@ -94,8 +94,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return EnterStage(int(value["number"]))
         if name == "override":
             return OverrideGate(int(value["number"]), str(value["reason"]))
-        if name in _NAMED or name in _EARLIER:
-            return {**_NAMED, **_EARLIER}[name](str(value["name"]))
+        if name in _READ_NAMED:
+            return _READ_NAMED[name](str(value["name"]))
         if name == "nudge_cross":
             right_px, down_px = value["nudge_px"]
             return NudgeCross(int(right_px), int(down_px))

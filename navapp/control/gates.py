@@ -44,7 +44,7 @@ class Known(Protocol):
         ...
 
     def steps_of(self, stage: StageSpec) -> tuple[StepLine, ...]:
-        """The steps of a stage: planned, made, cuts measured."""
+        """The steps of a stage: planned, made, measured."""
         ...
 
 
@@ -52,7 +52,7 @@ class _Said(NamedTuple):
     """A person's word for a condition."""
 
     time_ns: int
-    # The registration that was checked, or how often a cut had been made; 0: it counts for ever.
+    # The registration that was checked, or how often the step had been made; 0: it always counts.
     number: int
 
 
@@ -107,8 +107,8 @@ class Gates:
         bone = self._known.bone
         asked = self._personal()
         if name in asked:
-            is_repeated = asked[name].is_repeated
-            return (_key(asked[name], bone), self._known.registration_of(bone) * is_repeated)
+            number = self._known.registration_of(bone) if asked[name].is_repeated else 0
+            return _key(asked[name], bone), number
         steps = {
             _step_name(step): step.n_made
             for stage in self._stages

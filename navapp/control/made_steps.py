@@ -49,14 +49,14 @@ class _Known:
 class MadeSteps:
     """What has been made of the session's bones; started and asked from the loop alone.
 
-    They are measured in turns that are counted in frames, one in each: a recorded session replays
-    to them.
+    Cuts and holes are measured in turns that are counted in frames, one in each: a recorded session
+    replays to them.
 
     Args:
         plan: with the steps.
         trackers: of its bones.
         made: names of steps that are made from the start.
-        frames_between: a face is measured in every so many frames; with 1, all in each.
+        frames_between: one is measured in every so many frames; with 1, all in each.
 
     Raises:
         UsageError: the plan has no such step.
@@ -133,7 +133,7 @@ class MadeSteps:
         return None if known is None else known.surface
 
     def describe(self, stage: StageSpec) -> tuple[StepLine, ...]:
-        """The steps of a stage: planned, made, cuts measured."""
+        """The steps of a stage: planned, made, measured."""
         bone = self._trackers.bones.get(stage.bone)
         made = {} if bone is None else bone.made
         return tuple(

@@ -228,7 +228,7 @@ class Session:
             self.begin_registration()
 
     def steps_of(self, stage: StageSpec) -> tuple[StepLine, ...]:
-        """The steps of a stage: planned, made, cuts measured."""
+        """The steps of a stage: planned, made, measured."""
         return self._steps.describe(stage)
 
     @property

@@ -1,6 +1,6 @@
 """The simulated room as configured: world, camera, and the truth kept apart from them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,27 +15,13 @@ from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import Scene, SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
-from sim_devices.operation import STEPS
 from sim_devices.planned_cuts import Cut
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.sheet import SheetInView
+from sim_devices.state_history import StateHistory
 from sim_devices.truth import TruthOracle
 from sim_devices.world import World
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RoomSteps:
-    """Tells the room what to show as made, and asks it, by names of planned steps alone."""
-
-    names: frozenset[str]  # of all steps that the room can show
-    # set_stage, go_on: which stage is in force, as it is usually entered, or as far as it was made;
-    # answered with all steps that are made then.
-    set_stage: Callable[[str], frozenset[str]]
-    go_on: Callable[[str], frozenset[str]]
-    # make, unmake: a step is made by now, or is not made after all.
-    make: Callable[[str], None]
-    unmake: Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +44,7 @@ class Simulation:
     approach_half_angle_deg: float
     oracle: TruthOracle  # the truth, for evaluation after the run only
     planned_parts: Mapping[str, TriangleMesh]  # the components, in the coordinates of their bones
-    steps: RoomSteps  # what the room shows as made
+    states: StateHistory  # tells the room what to show as made, by names of planned steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +134,5 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,
         oracle=TruthOracle(world, camera.world_time_ns),
-        steps=RoomSteps(
-            frozenset(step.name for step in STEPS),
-            world.set_stage,
-            world.go_on,
-            world.make,
-            world.unmake,
-        ),
+        states=world.states,
     )

@@ -74,12 +74,19 @@ def _common_sd(
     left_from_bone: RigidTransform, bone: BoneModel, quality: RigQuality | None
 ) -> FloatArray:
     """(3,) of tilts and offset: what the plan's surface and the rig add to any pose's error."""
+    sd_mm = find_common_sd_mm(left_from_bone, bone, quality)
+    return np.array([sd_mm / _LEVER_MM, sd_mm / _LEVER_MM, sd_mm])
+
+
+def find_common_sd_mm(
+    left_from_bone: RigidTransform, bone: BoneModel, quality: RigQuality | None
+) -> float:
+    """By how much the plan's surface, its cartilage and the rig may be off at a bone."""
     depth_mm = float(left_from_bone.apply(bone.mesh.centroid_mm[None])[0, 2])
     cartilage_mm = float(np.sqrt(np.mean(bone.cartilage_sd_mm**2)))
     # Told as a 95 % bound.
     rig_mm = 0.0 if quality is None else 0.5 * quality.error_mm(depth_mm)
-    sd_mm = np.sqrt(cartilage_mm**2 + bone.surface_sd_mm**2 + rig_mm**2)
-    return np.array([sd_mm / _LEVER_MM, sd_mm / _LEVER_MM, sd_mm])
+    return float(np.sqrt(cartilage_mm**2 + bone.surface_sd_mm**2 + rig_mm**2))
 
 
 def _tilts_offset(

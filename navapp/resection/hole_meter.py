@@ -11,6 +11,7 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.resection.face_errors import find_common_sd_mm
 from navapp.values import BoneModel, DrillAxis, PoseEstimate
 from navapp.values.holes import MeasuredHole
 
@@ -83,16 +84,14 @@ class HoleMeter:
         self, estimate: PoseEstimate, planned: DrillAxis, entry_mm: FloatArray
     ) -> FloatArray:
         """(3, 3) of offset and diameter by what pictures may share: pose, plan, rig, shading."""
-        pose, bone, quality = estimate.camera_from_bone, self._bone, self._rig.quality
+        pose, bone = estimate.camera_from_bone, self._bone
         centre_mm = pose.apply(bone.mesh.centroid_mm[None])[0]
         seen_mm = pose.apply(entry_mm[None])[0]
         across = planned.axes @ pose.rotation.T
         jacobian = np.hstack([across, np.cross(seen_mm - centre_mm, across)])
-        cartilage_mm = float(np.sqrt(np.mean(bone.cartilage_sd_mm**2)))
-        rig_mm = 0.0 if quality is None else 0.5 * quality.error_mm(float(seen_mm[2]))
-        common = cartilage_mm**2 + bone.surface_sd_mm**2 + rig_mm**2
+        common_mm = find_common_sd_mm(pose, bone, self._rig.quality)
         covariance = _COMMON_SD_MM**2 * np.diag([1.0, 1.0, 4.0])
-        covariance[:2, :2] += jacobian @ estimate.covariance @ jacobian.T + common * np.eye(2)
+        covariance[:2, :2] += jacobian @ estimate.covariance @ jacobian.T + common_mm**2 * np.eye(2)
         return covariance
 
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from navapp.resection.remaining_bone import Cut, heights_over
 from navapp.values import BoneModel, MeasuredFace
-
-_SIGMAS_95 = 1.96
+from navapp.values.faces import SIZE_95
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,4 +38,4 @@ def measure_thickness(bone: BoneModel, face: MeasuredFace) -> Thickness | None:
     jacobian = np.array([*away_mm, -1.0])
     variance = jacobian @ face.covariance @ jacobian + bone.surface_sd_mm**2
     deviation_mm = float(np.sqrt(variance))
-    return Thickness(planned_mm, float(heights_mm[highest]), _SIGMAS_95 * deviation_mm)
+    return Thickness(planned_mm, float(heights_mm[highest]), SIZE_95 * deviation_mm)

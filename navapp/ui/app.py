@@ -4,6 +4,7 @@ import asyncio
 import os
 import sys
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,6 +13,7 @@ from textual.binding import BindingType
 from textual.screen import Screen
 
 from navapp.control.commands import (
+    Command,
     ConfirmCondition,
     ConfirmStep,
     EnterStage,
@@ -155,23 +157,17 @@ class NavigationApp(QuietApp):
         elif name in _PAGES:
             self.push_screen(_PAGES[name](view))
         elif view.is_silent and not is_possible(action, view.snapshot, is_silent=True):
-            # No key is dropped in silence.
-            self.bell()
-            self.notify(f"{action.label} needs a session that answers", severity="warning")
+            self._say_silent(action.label)
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
 
     def action_confirm_condition(self, key: str) -> None:
         """Say that a condition is met: from the gates' page."""
-        name = condition_of_key(self._view.snapshot, key)
-        if name is not None and not self._view.is_silent:
-            self._session.submit(ConfirmCondition(name))
+        self._say_of(condition_of_key(self._view.snapshot, key), ConfirmCondition)
 
     def action_withdraw_condition(self, key: str) -> None:
         """Say that it is not met after all."""
-        name = condition_of_key(self._view.snapshot, key)
-        if name is not None and not self._view.is_silent:
-            self._session.submit(WithdrawCondition(name))
+        self._say_of(condition_of_key(self._view.snapshot, key), WithdrawCondition)
 
     def action_pass_gate(self) -> None:
         """Enter the stage whose gate the page shows."""
@@ -188,15 +184,25 @@ class NavigationApp(QuietApp):
 
     def action_confirm_step(self, key: str) -> None:
         """Say that a step has been made: from the steps' page."""
-        step = step_of_key(self._view.snapshot, key)
-        if step is not None and not self._view.is_silent:
-            self._session.submit(ConfirmStep(step.name))
+        self._say_of(step_of_key(self._view.snapshot, key), ConfirmStep)
 
     def action_withdraw_step(self, key: str) -> None:
         """Say that a step has not been made after all."""
-        step = step_of_key(self._view.snapshot, key)
-        if step is not None and not self._view.is_silent:
-            self._session.submit(WithdrawStep(step.name))
+        self._say_of(step_of_key(self._view.snapshot, key), WithdrawStep)
+
+    def _say_of(self, name: str | None, word: Callable[[str], Command]) -> None:
+        """A person's word for what a letter of a page means; nothing where it means nothing."""
+        if name is None:
+            return
+        if self._view.is_silent:
+            self._say_silent(name)
+        else:
+            self._session.submit(word(name))
+
+    def _say_silent(self, what: str) -> None:
+        """No key is dropped in silence."""
+        self.bell()
+        self.notify(f"{what} needs a session that answers", severity="warning")
 
     def _open_gates(self) -> None:
         """A gate was told as not met: its page, unless it is open."""

@@ -37,7 +37,7 @@ def _gate_row(view: View, width: int) -> Content:
 
 
 def _measured_row(view: View, width: int) -> Content:
-    """The steps of the stage that are made, cuts against their plan."""
+    """The steps of the stage that are made, against their plan."""
     items = [f"{step.name} {_say_made(step)}" for step in view.snapshot.steps if step.is_made]
     return _format_row("measured here", items, view, width)
 

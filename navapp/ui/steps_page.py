@@ -107,10 +107,10 @@ def _style(value: float, bound: float, tolerance: float) -> str:
     return "$warning" if abs(value) - bound <= tolerance else "$error"
 
 
-def step_of_key(snapshot: Snapshot, key: str) -> StepLine | None:
-    """The step that a letter of the page means."""
+def step_of_key(snapshot: Snapshot, key: str) -> str | None:
+    """The name of the step that a letter of the page means; None: it means nothing."""
     number = STEP_KEYS.index(key)
-    return snapshot.steps[number] if number < len(snapshot.steps) else None
+    return snapshot.steps[number].name if number < len(snapshot.steps) else None
 
 
 class StepsPage(PageScreen):

@@ -10,7 +10,7 @@ from navapp.geometry.transform import FloatArray, read_only
 from navapp.values.contents import ResectionPlane
 
 # Of the length of two normal errors, and of the size of one: 95 % lie below so many deviations.
-_LENGTH_95, _SIZE_95 = 2.45, 1.96
+LENGTH_95, SIZE_95 = 2.45, 1.96
 # A face of which less is seen, or that is known less well, is not told; chosen.
 LEAST_SHARE, MOST_DEG, MOST_MM = 0.25, 1.0, 0.4
 
@@ -68,12 +68,12 @@ class MeasuredFace:
     def bound_deg(self) -> float:
         """95 % bound of the angle between the measured and the true face."""
         largest = float(np.linalg.eigvalsh(self.covariance[:2, :2])[-1])
-        return math.degrees(_LENGTH_95 * math.sqrt(max(largest, 0.0)))
+        return math.degrees(LENGTH_95 * math.sqrt(max(largest, 0.0)))
 
     @property
     def bound_mm(self) -> float:
         """95 % bound of the error of the offset."""
-        return _SIZE_95 * math.sqrt(max(float(self.covariance[2, 2]), 0.0))
+        return SIZE_95 * math.sqrt(max(float(self.covariance[2, 2]), 0.0))
 
     @property
     def is_told(self) -> bool:

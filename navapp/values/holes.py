@@ -8,10 +8,8 @@ import numpy as np
 
 from navapp.geometry.transform import FloatArray, read_only
 from navapp.values.contents import DrillAxis
-from navapp.values.faces import MeasuredFace, join_faces
+from navapp.values.faces import LENGTH_95, SIZE_95, MeasuredFace, join_faces
 
-# Of the length of two normal errors, and of the size of one: 95 % lie below so many deviations.
-_LENGTH_95, _SIZE_95 = 2.45, 1.96
 # A mouth of which less is seen, or whose middle is known less well, is not told; chosen.
 LEAST_SHARE, MOST_MM = 0.5, 0.5
 
@@ -48,13 +46,13 @@ class MeasuredHole:
         """95 % bound between measured and true mouth, across the planned direction."""
         both = self.matching_covariance + self.common_covariance
         largest = float(np.linalg.eigvalsh(both[:2, :2])[-1])
-        return _LENGTH_95 * math.sqrt(max(largest, 0.0))
+        return LENGTH_95 * math.sqrt(max(largest, 0.0))
 
     @property
     def diameter_bound_mm(self) -> float:
         """95 % bound of the error of the diameter."""
         both = self.matching_covariance + self.common_covariance
-        return _SIZE_95 * math.sqrt(max(float(both[2, 2]), 0.0))
+        return SIZE_95 * math.sqrt(max(float(both[2, 2]), 0.0))
 
     @property
     def is_told(self) -> bool:

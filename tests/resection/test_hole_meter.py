@@ -8,6 +8,7 @@ import pytest
 
 from navapp.resection import HoleMeter
 from navapp.values import DrillAxis, MeasuredHole, PoseEstimate, join_measured
+from sim_devices.operation import State
 from sim_devices.scenario import Scenario
 from sim_devices.world import World
 from tests.knees import SimulatedKnee
@@ -17,7 +18,7 @@ from tests.knees import SimulatedKnee
 def drilled(*, is_made: bool = True):
     """A femur before its cuts, one pair of pictures, its true pose, the plan of its hole."""
     world = World(Scenario(seed=104, stage="implant", motion="still"))
-    world.set_made({"femoral_guide"} if is_made else set())
+    world.states.show(State("implant", frozenset({"femoral_guide"} if is_made else ())))
     knee = SimulatedKnee(world)
     (frame,) = knee.frames(1)
     entry_mm, direction = world.drill_line

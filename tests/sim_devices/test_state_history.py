@@ -27,3 +27,17 @@ def test_an_older_picture_does_not_move_the_change_back() -> None:
     history.take_picture(100)
     history.show(State("opening", frozenset({"femoral_guide"})))
     assert history.at(150) == OPENING
+
+
+def test_steps_are_made_and_unmade_and_stages_gone_through() -> None:
+    history = StateHistory(OPENING)
+    assert history.go_on("implant") == {"femoral_guide"}
+    history.make("femur_distal")
+    assert history.now.cuts == ("femur_distal",)
+    assert "femur_distal" in history.go_on("patella")
+    assert history.go_on("drilling") == {"femoral_guide"}
+    assert history.go_on("opening") == frozenset()
+    assert history.set_stage("implant") == IMPLANT.made
+    history.unmake("femur_distal")
+    assert "femur_distal" not in history.now.cuts
+    assert IMPLANT.made < history.names

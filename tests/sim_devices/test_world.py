@@ -144,14 +144,14 @@ def test_the_approach_axis_points_from_the_bone_to_the_cameras():
 
 def test_stages_change_the_picture_and_not_the_pose():
     site = World(PLAIN)
-    assert site.stage == "opening"
+    assert site.states.now.stage == "opening"
     opening, pose = site.render("left", SECOND, 0.5), site.left_from_body("femur", SECOND)
-    site.set_stage("drilling")
-    assert site.stage == "drilling"
+    site.states.set_stage("drilling")
+    assert site.states.now.stage == "drilling"
     drilling = site.render("left", SECOND, 0.5)
     assert (np.abs(opening - drilling).max(axis=2) > 0.05).sum() > 1000
     np.testing.assert_array_equal(site.left_from_body("femur", SECOND).matrix, pose.matrix)
-    site.set_stage("opening")
+    site.states.set_stage("opening")
     np.testing.assert_array_equal(site.render("left", SECOND, 0.5), opening)
 
 
@@ -171,7 +171,7 @@ def test_the_drill_turns():
 
 def test_an_unknown_stage_names_the_known_ones():
     with pytest.raises(UsageError, match=r"lunch.*opening, drilling"):
-        world().set_stage("lunch")
+        world().states.set_stage("lunch")
     with pytest.raises(UsageError, match="opening"):
         World(replace(PLAIN, stage="lunch"))
 

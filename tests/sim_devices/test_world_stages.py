@@ -9,7 +9,7 @@ import pytest
 from navapp.errors import UsageError
 from navapp.geometry.transform import rotation_angle_deg
 from sim_devices.materials import MaterialId
-from sim_devices.operation import enter
+from sim_devices.operation import State, enter
 from sim_devices.rigs import camera_from_left
 from sim_devices.scenario import Scenario
 from sim_devices.world import World
@@ -68,9 +68,9 @@ def share_seen(site, eye, part):
 @pytest.mark.parametrize("stage", list(SEEN))
 def test_both_cameras_see_the_cut_faces_of_the_stage(scenario, stage) -> None:
     site = world(scenario)
-    site.set_stage(stage)
+    site.states.set_stage(stage)
     if stage == "patella":
-        site.advance()
+        site.states.show(site.states.now.advance())
     planes = site.record.made_planes
     faces = [
         part
@@ -89,7 +89,7 @@ def test_both_cameras_see_the_cut_faces_of_the_stage(scenario, stage) -> None:
 @pytest.mark.parametrize("scenario", few_of(PATIENTS))
 def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scenario) -> None:
     site = world(scenario)
-    site.set_stage("patella")
+    site.states.set_stage("patella")
     for eye in ("left", "right"):
         picture = site.depth(eye, 0)
         seen = picture.body == picture.bodies.index("patella")
@@ -107,35 +107,35 @@ def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scen
 def test_advancing_makes_the_next_step_and_changes_the_picture(case: tuple[str, int]) -> None:
     stage, n_steps = case
     site = world()
-    site.set_stage(stage)
+    site.states.set_stage(stage)
     before = site.render("left", 0, 0.5)
     for _ in range(n_steps):
-        made = site.made
-        site.advance()
-        assert len(site.made - made) == 1
+        made = site.states.now.made
+        site.states.show(site.states.now.advance())
+        assert len(site.states.now.made - made) == 1
         after = site.render("left", 0, 0.5)
         assert (np.abs(after - before).max(axis=2) > 0.05).sum() > 500
         before = after
     with pytest.raises(UsageError, match="every step"):
-        site.advance()
+        site.states.show(site.states.now.advance())
 
 
 def test_any_steps_can_be_shown() -> None:
     site = world()
-    site.set_stage("implant")
-    site.set_made(["femur_distal"])
-    assert site.made_cuts == ("femur_distal",)
-    assert site.stage == "implant"
+    site.states.set_stage("implant")
+    site.states.show(State("implant", frozenset({"femur_distal"})))
+    assert site.states.now.cuts == ("femur_distal",)
+    assert site.states.now.stage == "implant"
     with pytest.raises(UsageError, match="nail"):
-        site.set_made(["nail"])
-    assert site.set_stage("spacer") == enter("spacer").made
+        site.states.make("nail")
+    assert site.states.set_stage("spacer") == enter("spacer").made
 
 
 def test_metal_mirrors_the_lamps_and_bone_does_not() -> None:
     site = world()
-    site.set_stage("implant")
+    site.states.set_stage("implant")
     bone = site.render("left", 0, 0.5)
-    site.advance()
+    site.states.show(site.states.now.advance())
     metal = site.render("left", 0, 0.5)
     picture = site.depth("left", 0, 0.5)
     femur = picture.body == picture.bodies.index("femur")
@@ -149,10 +149,10 @@ def test_metal_mirrors_the_lamps_and_bone_does_not() -> None:
 
 def test_the_pose_of_an_earlier_picture_is_still_known_after_the_knee_has_changed() -> None:
     site = World(PLAIN)
-    site.set_stage("spacer")
+    site.states.set_stage("spacer")
     site.render("left", SECOND, 0.25)
     before = site.left_from_body("tibia", SECOND)
-    site.advance()
+    site.states.show(site.states.now.advance())
     np.testing.assert_array_equal(site.left_from_body("tibia", SECOND).matrix, before.matrix)
     after = site.left_from_body("tibia", SECOND + 1)
     assert np.linalg.norm(after.translation_mm - before.translation_mm) > 0.01
@@ -189,11 +189,11 @@ def test_everything_that_is_made_on_a_left_knee_is_the_mirror_image() -> None:
 @pytest.mark.parametrize("stage", ["opening", "drilling", "implant", "patella", "spacer"])
 def test_every_patient_can_be_operated_to_the_end(scenario, stage) -> None:
     site = world(scenario)
-    site.set_stage(stage)
+    site.states.set_stage(stage)
     while True:
         picture = site.render("right", 0, 0.5)
         assert np.isfinite(picture).all()
         try:
-            site.advance()
+            site.states.show(site.states.now.advance())
         except UsageError:
             return

@@ -1,5 +1,6 @@
 """The page of the stage's steps."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,3 +85,16 @@ def test_without_steps_the_page_says_so() -> None:
         )
 
     play(snapshots.navigating(), script, (80, 24))
+
+
+@pytest.mark.parametrize(("page", "keys"), [("k", "bB"), ("t", "bB")])
+def test_a_letter_is_answered_while_the_session_is_silent(page: str, keys: str) -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press(page)
+        app._view = replace(app._view, is_silent=True)
+        before = app.n_bells
+        await pilot.press(*keys)
+        assert app.n_bells == before + len(keys)
+
+    app = play(snapshots.navigating(steps=STEPS, stage=STAGES[2]), script, (80, 24))
+    assert app.session.commands == []
