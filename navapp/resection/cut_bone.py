@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.resection.hole_meter import MOST_OFF_MM
+from navapp.resection.hole_rim import MOST_OFF_MM
 from navapp.resection.remaining_bone import (
     Cut,
     cover_with_parts,
