@@ -70,7 +70,7 @@ def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: E
     assert not any(result.is_navigable for result in after)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_camera_that_swings_back_is_believed_again(undo: ExitStack) -> None:
     room = navigating(SimulatedRoom(undo, faults=bumped((-0.02, 0.0, 0.0), 2.5, 1.5), rate_hz=3.0))
     until_s(room, 6.0)
@@ -119,7 +119,6 @@ def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack) -> N
 
 # For longer than before the turn of the test above.
 @pytest.mark.release
-@pytest.mark.slow
 def test_a_rig_that_has_not_moved_stays_believed(undo: ExitStack) -> None:
     room = navigating(with_board(undo, FaultScript()))
     until_s(room, 12.0)

@@ -98,6 +98,7 @@ def test_a_cut_bone_is_followed_and_its_faces_are_measured(
     assert_measured(data, result["summary"]["measured"])
 
 
+@pytest.mark.release
 def test_every_view_of_a_cut_bone_registers(data: Path, plan: Path, tmp_path: Path) -> None:
     code, result = replay(data, plan, tmp_path, "registration", "--order", "each")
     assert code == 0

@@ -18,7 +18,6 @@ from navapp.values import Plan, StageContent
 from sim_devices.anatomy import KneeSpec
 from sim_devices.world import World
 from tests.bones import femur_model
-from tests.many import few_of
 
 # Small pictures: the bone is found in them as well.
 MOVING = """
@@ -127,9 +126,9 @@ def plan_with_tibia_at_the_opening(seed: int) -> Plan:
     return replace(plan, content=replace(plan.content, stages=stages), digest="")
 
 
-@pytest.mark.slow
+@pytest.mark.release
 # Both bones of the first knee are found at once; those of the other one take a long search.
-@pytest.mark.parametrize("seed", few_of([5, 1]))
+@pytest.mark.parametrize("seed", [5, 1])
 def test_the_operators_script_has_two_bones_followed_at_once_and_they_replay_to_the_same_poses(
     tmp_path: Path, seed: int
 ) -> None:

@@ -8,6 +8,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.resection import FaceMeter
 from navapp.values import MeasuredFace, ResectionPlane, join_faces
+from tests.many import few_of
 from tests.resection.cuts import MADE, PLANNED, POSE_SD, Cover, bone, estimate, pictures, pose, rig
 
 
@@ -89,7 +90,7 @@ def test_measurements_join_but_errors_of_the_pose_stay(meter: FaceMeter) -> None
         join_faces([])
 
 
-@pytest.mark.parametrize("tilt_deg", [60.0, 75.0, 82.0, 86.0, 88.3, 89.0, 90.0, 95.0])
+@pytest.mark.parametrize("tilt_deg", few_of([82.0, 89.0, 60.0, 75.0, 86.0, 88.3, 90.0, 95.0], 2))
 def test_a_face_seen_at_a_grazing_angle_tells_nothing_and_breaks_nothing(
     meter: FaceMeter, tilt_deg: float
 ) -> None:

@@ -23,8 +23,6 @@ from tests.geometry.shapes import sphere
 from tests.knees import SimulatedKnee
 from tests.overlay.scenes import STAGE, grown
 
-pytestmark = pytest.mark.kernel
-
 SETUP = make_practice_setup(make_default_rig())
 # Guides reach so far from the site's middle, along the left camera's axes.
 REACH_MM = np.array([50.0, 40.0, 25.0])
@@ -47,6 +45,7 @@ class OneMarble:
         return Renderer(camera, [self.part], surfaces).render(poses, seen_from)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("seed", range(4))
 def test_a_point_of_the_world_is_seen_where_its_rays_arrive(seed: int) -> None:
     point = SETUP.site_mm + np.random.default_rng(seed).uniform(-1.0, 1.0, 3) * REACH_MM
@@ -57,6 +56,7 @@ def test_a_point_of_the_world_is_seen_where_its_rays_arrive(seed: int) -> None:
     assert np.linalg.norm(seen - eye.view.site_px(point[None])[0]) < 1.0
 
 
+@pytest.mark.kernel
 def test_without_the_shift_of_the_plate_it_would_be_elsewhere() -> None:
     """3 mm at 45 degrees shift the site by 1.0 mm, across the line of sight."""
     eye = SimulatedEye(OneMarble(SETUP.site_mm), SETUP)
@@ -71,6 +71,7 @@ def knee() -> SimulatedKnee:
     return SimulatedKnee(Scenario())
 
 
+@pytest.mark.kernel
 def test_another_camera_sees_what_the_rig_sees_at_that_moment() -> None:
     world, time_ns = knee().world, 400_000_000
     here = RigidTransform.identity("left", "left")
@@ -78,6 +79,7 @@ def test_another_camera_sees_what_the_rig_sees_at_that_moment() -> None:
     np.testing.assert_array_equal(picture, world.render("left", time_ns))
 
 
+@pytest.mark.kernel
 def test_light_of_the_display_is_added_to_the_site() -> None:
     world = knee().world
     eye = SimulatedEye(world, SETUP, 96, 60)

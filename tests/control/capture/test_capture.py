@@ -160,6 +160,7 @@ def test_a_rig_that_is_refused_asks_for_more_pairs(room):
     assert followed(capture, lambda s: s.is_enough).n_kept == 8
 
 
+@pytest.mark.release
 def test_a_view_that_cannot_be_had_is_not_asked_for_again(room):
     capture = capture_in(room, stop_mm=0.3)
     followed(capture, lambda s: s.n_kept == 6)

@@ -425,7 +425,7 @@ def test_two_refused_ends_of_the_depth_are_asked_for_again(room):
     assert steps(session, 4).phase is AlignmentPhase.MOVING
 
 
-@pytest.mark.parametrize("seed", few_of((11, 12, 13)))
+@pytest.mark.parametrize("seed", few_of((11, 12, 13), 0))
 def test_the_board_stays_around_its_first_place(seed):
     """However many crosses are asked for."""
     room = MirrorRoom(seed)

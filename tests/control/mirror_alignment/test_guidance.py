@@ -81,6 +81,7 @@ def test_enough_depth_and_a_corner_that_helps_ask_for_no_move(room):
     assert isinstance(chosen, int)
 
 
+@pytest.mark.release
 def test_a_board_that_lies_badly_is_wanted_elsewhere(room):
     """Aligned at the middle alone, with few marks in view: a place aside tells much more."""
     kept, place = kept_at(room, [-40.0, 0.0, 40.0], spread=0.3), place_in(room)
