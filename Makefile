@@ -59,9 +59,9 @@ checked-kernels: setup bytecode
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
 
-# With +, line by line as they come. More workers than cores: some tests wait in real time.
+# With +, line by line as they come. One more worker than cores: some tests wait in real time.
 tests: check bytecode
-	+$(PYTEST) -n 4 --dist loadgroup
+	+$(PYTEST) -n 3 --dist loadgroup
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -1,6 +1,7 @@
 """The bones as they are after the steps that have been made, with their components."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -10,7 +11,6 @@ from navapp.geometry.transform import FloatArray
 from sim_devices.drilled_hole import HOLE_DEPTH_MM, HOLE_RADIUS_MM, drill_hole
 from sim_devices.fitted_parts import FittedParts
 from sim_devices.materials import MaterialId
-from sim_devices.operation import State
 from sim_devices.planned_cuts import Cut
 from sim_devices.renderer import Part
 from sim_devices.sawn_bone import cut_skin, make_sawn_face
@@ -18,12 +18,23 @@ from sim_devices.site import Site
 from sim_devices.tools import across
 
 
-def make_bone(site: Site, fitted: FittedParts, bone: str, state: State) -> tuple[Part, ...]:
-    """The parts of a bone: its skin first, the hole, the faces of its cuts, its component."""
-    cuts = [site.made[name] for name in state.cuts if site.made[name].bone == bone]
-    if bone == "femur" and state.is_made("femoral_implant"):
+# A step changes one bone of three.
+@lru_cache(maxsize=6)
+def make_bone(
+    site: Site, fitted: FittedParts, bone: str, made: tuple[str, ...]
+) -> tuple[Part, ...]:
+    """The parts of a bone: its skin first, the hole, the faces of its cuts, its component.
+
+    Args:
+        site: of the operation.
+        fitted: its components.
+        bone: which.
+        made: names of the steps of that bone that have been made.
+    """
+    cuts = [site.made[name] for name in made if name in site.made]
+    if "femoral_implant" in made:
         cuts += fitted.rasped
-    has_hole = bone == "femur" and state.is_made("femoral_guide")
+    has_hole = "femoral_guide" in made
     intact = site.bones[bone]
     skin, walls = intact, []
     if has_hole:
@@ -36,7 +47,7 @@ def make_bone(site: Site, fitted: FittedParts, bone: str, state: State) -> tuple
         mark[: len(site.worn)] = site.worn
     whole = Part(bone, skin, skin_material(site), mark=mark if bone == "femur" else None)
     faces = _make_faces(intact, bone, cuts, site.made_hole if has_hole else None)
-    return (whole, *walls, *faces, *_make_component(fitted, bone, state))
+    return (whole, *walls, *faces, *_make_component(fitted, bone, made))
 
 
 def skin_material(site: Site) -> MaterialId:
@@ -44,12 +55,12 @@ def skin_material(site: Site) -> MaterialId:
     return MaterialId.CARTILAGE if site.is_covered else MaterialId.BONE
 
 
-def _make_component(fitted: FittedParts, bone: str, state: State) -> tuple[Part, ...]:
-    if bone == "femur" and state.is_made("femoral_implant"):
+def _make_component(fitted: FittedParts, bone: str, made: tuple[str, ...]) -> tuple[Part, ...]:
+    if "femoral_implant" in made:
         return (Part(bone, fitted.femoral_component, MaterialId.METAL),)
-    if bone == "patella" and state.is_made("patellar_implant"):
+    if "patellar_implant" in made:
         return (Part(bone, fitted.patellar_button, MaterialId.PLASTIC),)
-    if bone == "tibia" and state.is_made("spacer"):
+    if "spacer" in made:
         tray, insert = fitted.tray_and_insert
         return Part(bone, tray, MaterialId.METAL), Part(bone, insert, MaterialId.PLASTIC)
     return ()

@@ -60,10 +60,9 @@ class State:
                 remedy=f"choose of {', '.join(_NAMES)}",
             )
 
-    @property
-    def cuts(self) -> tuple[str, ...]:
-        """Names of the cuts that have been made, in their order."""
-        return tuple(step.name for step in STEPS if step.kind == "cut" and step.name in self.made)
+    def made_of(self, bone: str) -> tuple[str, ...]:
+        """Names of the steps of one bone that have been made, in their order."""
+        return tuple(step.name for step in STEPS if step.bone == bone and step.name in self.made)
 
     def is_made(self, name: str) -> bool:
         """Whether a step has been made."""

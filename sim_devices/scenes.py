@@ -50,7 +50,7 @@ def make_scene(site: Site, fitted: FittedParts, state: State) -> Scene:
     laid = {"femur": femur, "tibia": femur @ femur_from_tibia}
     if state.stage == "patella":
         laid["patella"] = femur @ site.femur_from_patella
-    bones = {name: make_bone(site, fitted, name, state) for name in laid}
+    bones = {name: make_bone(site, fitted, name, state.made_of(name)) for name in laid}
     tissue, drape = _lay_tissue(site, state.stage, bones, laid)
     glove, tool = hand_meshes()
     parts = (

@@ -1,8 +1,12 @@
-"""The joint's gap on either side: the shortest distance between what is left of the two bones."""
+"""The joint's gap on either side: the shortest distance between what is left of the two bones.
+
+Surfaces that overlap have a gap below 0: as far as one reaches into the other.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh
@@ -13,13 +17,15 @@ from navapp.values import PoseEstimate, Side
 # Both chosen. Wider gaps are not looked for; points of a surface are no further apart.
 _WIDEST_MM, _SPACING_MM = 40.0, 1.2
 _SOME = 50  # one point of so many tells roughly how wide a gap is
+# A point is inside when it lies straight below its nearest one (cosine): beside a rim it does not.
+_BELOW = -0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
     """A distance, and its 95 % bound by the two poses and the faces of cuts."""
 
-    mm: float
+    mm: float  # below 0 where the surfaces overlap
     bound_mm: float
 
 
@@ -36,9 +42,9 @@ class GapMeter:
     def __init__(
         self, femur: TriangleMesh, tibia: TriangleMesh, middle_x_mm: float, side: Side
     ) -> None:
-        self._tibia_mm = cover_with_points(tibia)
+        self._tibia_mm, self._normals = cover_with_points(tibia)
         self._tree = cKDTree(self._tibia_mm)
-        points_mm = cover_with_points(femur)
+        points_mm, _ = cover_with_points(femur)
         is_left = points_mm[:, 0] > middle_x_mm
         is_medial = is_left if side == "right" else ~is_left
         self._sides = {"medial": points_mm[is_medial], "lateral": points_mm[~is_medial]}
@@ -78,15 +84,16 @@ class GapMeter:
         # Some points bound the distance of all; what lies further is not looked for.
         some_mm = np.asarray(self._tree.query(placed_mm[::_SOME])[0])
         widest_mm = min(float(some_mm.min(initial=np.inf)) + 1e-6, _WIDEST_MM)
-        found = self._tree.query(placed_mm, distance_upper_bound=widest_mm)
-        distances_mm, nearest = (np.asarray(one) for one in found)
-        if not np.isfinite(distances_mm.min(initial=np.inf)):
+        heights_mm, nearest = self._find_heights(placed_mm, widest_mm)
+        if heights_mm.min(initial=np.inf) < 0.0:  # what lies deepest is further from any surface
+            heights_mm, nearest = self._find_heights(placed_mm, _WIDEST_MM)
+        if not np.isfinite(heights_mm.min(initial=np.inf)):
             return None
-        k = int(np.argmin(distances_mm))
-        gap_mm = float(distances_mm[k])
+        k = int(np.argmin(heights_mm))
+        gap_mm = float(heights_mm[k])
         on_femur = femur.camera_from_bone.apply(points_mm[k])
         on_tibia = tibia.camera_from_bone.apply(self._tibia_mm[int(nearest[k])])
-        direction = (on_femur - on_tibia) / max(gap_mm, 1e-9)
+        direction = (on_femur - on_tibia) / max(abs(gap_mm), 1e-9)
         variance = sum(
             _variance(direction, point - one.camera_from_bone.apply(centre), one.covariance)
             for point, one, centre in zip(
@@ -95,22 +102,42 @@ class GapMeter:
         )
         return Gap(gap_mm, SIGMAS_95 * float(np.sqrt(variance + surface_sd_mm**2)))
 
+    def _find_heights(
+        self, placed_mm: FloatArray, widest_mm: float
+    ) -> tuple[FloatArray, NDArray[np.intp]]:
+        """(N,) distances of the femur's points (N, 3) from the tibia, below 0 inside of it.
 
-def cover_with_points(mesh: TriangleMesh) -> FloatArray:
-    """(N, 3) corners of a mesh's triangles and points between them: faces of cuts have few corners.
+        Infinite beyond `widest_mm`. And which of the tibia's points (N,) is the nearest one.
+        """
+        found = self._tree.query(placed_mm, distance_upper_bound=widest_mm)
+        heights_mm, nearest = (np.asarray(one) for one in found)
+        near = np.flatnonzero(np.isfinite(heights_mm))
+        away_mm = placed_mm[near] - self._tibia_mm[nearest[near]]
+        above_mm = np.einsum("nk,nk->n", away_mm, self._normals[nearest[near]])
+        is_inside = above_mm < _BELOW * heights_mm[near]
+        heights_mm[near[is_inside]] *= -1.0
+        return heights_mm, nearest
 
-    They are at most about `_SPACING_MM` apart.
+
+def cover_with_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
+    """Points (N, 3) of a mesh and their outward normals (N, 3).
+
+    They are corners of its triangles and points between them, at most about `_SPACING_MM` apart:
+    faces of cuts have few corners.
     """
     corners_mm = mesh.vertices_mm[mesh.faces]
     edges_mm = np.linalg.norm(corners_mm - np.roll(corners_mm, 1, axis=1), axis=2)
     n_steps = np.maximum(np.ceil(edges_mm.max(axis=1, initial=0.0) / _SPACING_MM).astype(int), 1)
-    points_mm = [mesh.vertices_mm[np.unique(mesh.faces)]]
+    used = np.unique(mesh.faces)
+    points_mm, normals = [mesh.vertices_mm[used]], [mesh.normals[used]]
     for n in np.unique(n_steps[n_steps > 1]):
         first, second = np.mgrid[0 : n + 1, 0 : n + 1].reshape(2, -1)
         shares = np.stack([first, second, n - first - second], axis=1) / n
         inner = shares[(shares >= 0.0).all(axis=1) & (shares < 1.0).all(axis=1)]
-        points_mm.append(np.einsum("ks,tsd->tkd", inner, corners_mm[n_steps == n]).reshape(-1, 3))
-    return np.concatenate(points_mm)
+        fine = np.flatnonzero(n_steps == n)
+        points_mm.append(np.einsum("ks,tsd->tkd", inner, corners_mm[fine]).reshape(-1, 3))
+        normals.append(np.repeat(mesh.normals[mesh.faces[fine, 0]], len(inner), axis=0))
+    return np.concatenate(points_mm), np.concatenate(normals)
 
 
 def _variance(direction: FloatArray, from_centre_mm: FloatArray, covariance: FloatArray) -> float:

@@ -10,7 +10,7 @@ from navapp.preop.volume import read_ct
 from tests.bench.ct_pose_error import pose_errors_mm, surface_error_mm
 from tests.bench.ct_surfaces import BONES, errors_mm
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.release
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,7 @@ def test_fewer_pairs_than_can_be_solved_are_refused(board, tmp_path, capsys, n_p
     assert "--pairs must be at least 4" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_camera_that_is_unplugged_for_a_while_costs_no_pair(board, tmp_path):
     config, result = tmp_path / "navapp.toml", tmp_path / "result.json"
     fault = '{kind = "unplug", start_s = 4.0, duration_s = 3.0}'

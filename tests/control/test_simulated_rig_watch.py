@@ -94,7 +94,7 @@ def with_board(undo: ExitStack, faults: FaultScript) -> SimulatedRoom:
     )  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_third_of_a_pixel_sideways_is_found_on_the_board(undo: ExitStack) -> None:
     turn_deg = (0.0, -THIRD_OF_A_PIXEL_DEG, 0.0)
     room = navigating(with_board(undo, bumped(turn_deg, 8.0)))

@@ -11,7 +11,7 @@ import pytest
 from tests.many import few_of
 
 # How often something is unplugged; the second half of it must leave nothing.
-CYCLES = few_of([400, 1000])
+CYCLES = few_of([100, 1000])
 _MOST_GROWTH_MB = 8.0
 
 Footprint = tuple[int, int, int, float]

@@ -52,11 +52,22 @@ def test_a_gap_is_as_unsure_as_its_two_points() -> None:
 
 def test_the_face_of_a_cut_is_covered_with_points() -> None:
     corners = np.array([(0.0, 0.0, 0.0), (30.0, 0.0, 0.0), (0.0, 30.0, 0.0), (30.0, 30.0, 0.0)])
-    points_mm = cover_with_points(TriangleMesh(corners, [[0, 1, 2], [1, 3, 2]]))
+    points_mm, normals = cover_with_points(TriangleMesh(corners, [[0, 1, 2], [1, 3, 2]]))
     rng = np.random.default_rng(2)
     asked_mm = np.column_stack([rng.uniform(0.0, 30.0, (200, 2)), np.zeros(200)])
     assert cKDTree(points_mm).query(asked_mm)[0].max() < 0.8
     assert np.ptp(points_mm, axis=0) == pytest.approx((30.0, 30.0, 0.0))
+    np.testing.assert_allclose(np.abs(normals), np.tile((0.0, 0.0, 1.0), (len(points_mm), 1)))
+
+
+def test_surfaces_that_overlap_have_a_gap_below_zero_as_deep_as_they_do() -> None:
+    meter = GapMeter(balls(20.0), balls(20.0), 0.0, "right")
+    femur = camera_from_femur()
+    for depth_mm in (0.5, 3.0):
+        into = RigidTransform.from_parts("femur", "tibia", np.eye(3), (0.0, 0.0, depth_mm - 20.0))
+        gaps = meter.measure(estimate(femur), estimate(femur @ into), (np.zeros(3),) * 2)
+        for gap in gaps.values():
+            assert gap.mm == pytest.approx(-depth_mm, abs=0.3)
 
 
 def test_bones_far_apart_have_no_gap() -> None:

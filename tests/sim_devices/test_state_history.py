@@ -33,11 +33,11 @@ def test_steps_are_made_and_unmade_and_stages_gone_through() -> None:
     history = StateHistory(OPENING)
     assert history.go_on("implant") == {"femoral_guide"}
     history.make("femur_distal")
-    assert history.now.cuts == ("femur_distal",)
+    assert history.now.made_of("femur") == ("femoral_guide", "femur_distal")
     assert "femur_distal" in history.go_on("patella")
     assert history.go_on("drilling") == {"femoral_guide"}
     assert history.go_on("opening") == frozenset()
     assert history.set_stage("implant") == IMPLANT.made
     history.unmake("femur_distal")
-    assert "femur_distal" not in history.now.cuts
+    assert "femur_distal" not in history.now.made
     assert IMPLANT.made < history.names

@@ -81,6 +81,7 @@ def test_the_pitch_is_found_when_it_is_not_told() -> None:
     assert found.model.screen.pitch_mm == pytest.approx(setup.panel.pitch_mm, rel=0.01)
 
 
+@pytest.mark.release
 def test_a_curved_panel_is_found_when_it_is_asked_for() -> None:
     rng = np.random.default_rng(9)
     setup = draw_setup(rng)

@@ -50,7 +50,7 @@ def test_a_cross_is_lit_beside_what_is_expected_and_each_room_beside_another():
         session = alignment_in(room)
         align(room, session, 12)
         until_aimed(session)
-        for _ in range(6):
+        for _ in range(3):
             asked = session.snapshot
             expected = session._solution.found.model.project(room.point_mm(asked.corner)[None])[0]
             offsets.append(asked.cross_px - expected)
