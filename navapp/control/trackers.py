@@ -114,8 +114,8 @@ class Trackers:
                 meter = self._face_meters.setdefault(bone.planned.name, new)
         known = bone.faces.get(name)
         expected = None if known is None else known.as_plane
-        made = tuple(bone.cuts.values())
-        return meter.measure(frame.left, frame.right, estimate, made, bone.cuts[name], expected)
+        others = tuple(cut for other, cut in bone.known_cuts.items() if other != name)
+        return meter.measure(frame.left, frame.right, estimate, bone.cuts[name], others, expected)
 
     def measure_hole(
         self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str

@@ -40,7 +40,7 @@ class CutBone:
     @cached_property
     def model(self) -> BoneModel:
         """What is left of the bone and not covered, to be registered to."""
-        left = remove_cuts(self.planned, [self._cut(name) for name in self.cuts])
+        left = remove_cuts(self.planned, list(self.known_cuts.values()))
         holes = tuple(self.holes.values())
         left = cover_with_parts(remove_holes(left, holes, UNSURE_MM), self.parts)
         return replace(left, version=self.version)
@@ -50,13 +50,18 @@ class CutBone:
         """What is left of it, with its faces where they are known or planned; None when uncut."""
         if not self.cuts:
             return None
-        planes = [self._cut(name).plane for name in self.cuts]
+        planes = [cut.plane for cut in self.known_cuts.values()]
         return cut_surface(self.planned.mesh, planes)
 
     @property
     def cuts(self) -> dict[str, ResectionPlane]:
         """Those that are made, by name, as planned."""
         return {n: one for n, one in self.made.items() if isinstance(one, ResectionPlane)}
+
+    @cached_property
+    def known_cuts(self) -> dict[str, Cut]:
+        """They, by name: as measured, or as planned, and how unsure that is."""
+        return {name: self._cut(name) for name in self.cuts}
 
     @property
     def holes(self) -> dict[str, DrillAxis]:

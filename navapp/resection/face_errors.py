@@ -60,14 +60,9 @@ def make_face(
         ],
         axis=1,
     )
-    common = np.diag(_common_sd(left_from_bone, bone, quality) ** 2)
-    return MeasuredFace(
-        planned,
-        value,
-        by_fit @ fit.covariance @ by_fit.T,
-        by_pose @ estimate.covariance @ by_pose.T + common,
-        seen_share,
-    )
+    covariance = by_fit @ fit.covariance @ by_fit.T + by_pose @ estimate.covariance @ by_pose.T
+    covariance += np.diag(_common_sd(left_from_bone, bone, quality) ** 2)
+    return MeasuredFace(planned, value, covariance, seen_share)
 
 
 def _common_sd(

@@ -4,7 +4,7 @@ In a rectified pair a plane is an affine function of the pixel: with N . X = r f
 d = f B / z = (B / r) (N_x (u - c_x) + N_y (v - c_y) + f N_z).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,10 @@ class DisparityPlane:
     covariance: FloatArray  # (3, 3) of the coefficients, `_COMMON_PX` included
     is_on: NDArray[np.bool_]  # (N,) measured pixels that lie on it
     width_px: float  # what lies nearer than this is on it
+
+    def with_error(self, coefficients: FloatArray) -> "DisparityPlane":
+        """The same plane, one more deviation of which are these coefficients (3,)."""
+        return replace(self, covariance=self.covariance + np.outer(coefficients, coefficients))
 
     def in_camera(self, geometry: RectifiedGeometry) -> tuple[FloatArray, float]:
         """Unit normal N (3,) towards the camera, and N . X in mm of its points X."""

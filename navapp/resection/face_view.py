@@ -27,8 +27,6 @@ LEAST_PIXELS = 300
 # A face that is seen at a grazing angle tells nothing; one of which most lies beside the picture
 # neither.
 _LEAST_COSINE, _MOST_PICTURES = 0.17, 20
-# Another cut's bone is gone as well, and its edge is as wide.
-_BESIDE_MM = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,16 +49,17 @@ class FaceViewer:
     def find(
         self,
         plane: ResectionPlane,
-        made: Sequence[ResectionPlane],
         planned: ResectionPlane,
+        others: Sequence[Cut],
         rectified_from_bone: RigidTransform,
     ) -> FaceView | None:
         """Where a face is seen; None when it looks away, out of view, or where too little is left.
 
         Args:
             plane: of the face, as planned or as known.
-            made: all cuts of the bone that have been made, as planned.
-            planned: this cut among them.
+            planned: the cut.
+            others: the other cuts of the bone that have been made: what is unsure beside them
+                belongs to no face.
             rectified_from_bone: pose of the bone in the rectified left camera.
         """
         normal = rectified_from_bone.rotate(plane.normal[None])[0]
@@ -81,8 +80,7 @@ class FaceViewer:
         is_near = around.width * around.height > _MOST_PICTURES * box.width * box.height
         if box.is_empty or is_near:
             return None
-        others = [one for one in made if one is not planned]
-        rest = self._rest(self._bone, tuple(made))
+        rest = self._rest(self._bone, (planned, *(cut.plane for cut in others)))
         both = render_rectified(join_meshes(rest, face), rectified_from_bone, self._geometry, box)
         alone = render_rectified(face, rectified_from_bone, self._geometry, around)
         is_kept = self._is_kept(alone.depth_mm, around, others, rectified_from_bone)
@@ -97,7 +95,7 @@ class FaceViewer:
         self,
         depth_mm: NDArray[np.float32],
         box: Box,
-        others: Sequence[ResectionPlane],
+        others: Sequence[Cut],
         rectified_from_bone: RigidTransform,
     ) -> NDArray[np.bool_]:
         """(h, w) whether the bone is still there after the other cuts, at those depths."""
@@ -107,8 +105,8 @@ class FaceViewer:
         y = (rows + box.y - self._geometry.centre_y_px) * z / self._geometry.focal_px
         points_mm = rectified_from_bone.inverse().apply(np.column_stack([x, y, z]))
         is_gone = np.zeros(len(points_mm), dtype=np.bool_)
-        for plane in others:
-            is_gone |= (plane.heights_mm(points_mm) > -_BESIDE_MM) & plane.is_over(points_mm)
+        for plane, unsure_mm in others:
+            is_gone |= (plane.heights_mm(points_mm) > -unsure_mm) & plane.is_over(points_mm)
         is_kept = np.zeros(depth_mm.shape, dtype=np.bool_)
         is_kept[rows, columns] = ~is_gone
         return is_kept

@@ -26,13 +26,11 @@ class MeasuredFace:
 
     plane: ResectionPlane  # planned
     tilts_offset: FloatArray  # (3,) rad, rad, mm
-    # (3, 3) of those numbers: by the matching alone, and by the pose it was measured with.
-    matching_covariance: FloatArray
-    pose_covariance: FloatArray
+    covariance: FloatArray  # (3, 3) of those numbers: the pose's errors and those of the matching
     seen_share: float  # of the whole face, 0 to 1
 
     def __post_init__(self) -> None:
-        for name in ("tilts_offset", "matching_covariance", "pose_covariance"):
+        for name in ("tilts_offset", "covariance"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -57,12 +55,6 @@ class MeasuredFace:
     def angle_deg(self) -> float:
         """Between the face and its plan."""
         return math.degrees(math.atan(float(np.hypot(*self.tilts_offset[:2]))))
-
-    @property
-    def covariance(self) -> FloatArray:
-        """(3, 3) of `tilts_offset`, all errors together."""
-        both: FloatArray = self.matching_covariance + self.pose_covariance
-        return both
 
     @property
     def bound_deg(self) -> float:
@@ -90,8 +82,8 @@ class MeasuredFace:
 def join_faces(faces: Sequence[MeasuredFace]) -> MeasuredFace:
     """What several measurements of one face say together.
 
-    Each counts by the inverse of its covariance. The matcher's errors average out; those of poses
-    may all go the same way (they share the model, the rig and the view), and do not.
+    Each counts by the inverse of its covariance. Their errors may all go the same way, because they
+    share model, rig, view and texture: what they say together is known no better than one of them.
 
     Raises:
         ValueError: no measurement.
@@ -101,17 +93,14 @@ def join_faces(faces: Sequence[MeasuredFace]) -> MeasuredFace:
     weights = [np.linalg.inv(face.covariance) for face in faces]
     inverse = np.linalg.inv(np.sum(weights, axis=0))
     shares = [inverse @ weight for weight in weights]
-    return MeasuredFace(
-        faces[0].plane,
-        np.sum([share @ face.tilts_offset for share, face in zip(shares, faces, strict=True)], 0),
-        np.sum(
-            [s @ face.matching_covariance @ s.T for s, face in zip(shares, faces, strict=True)], 0
-        ),
-        _add_all_one_way(
-            [s @ face.pose_covariance @ s.T for s, face in zip(shares, faces, strict=True)]
-        ),
-        max(face.seen_share for face in faces),
+    tilts_offset = np.sum(
+        [share @ face.tilts_offset for share, face in zip(shares, faces, strict=True)], axis=0
     )
+    covariance = _add_all_one_way(
+        [share @ face.covariance @ share.T for share, face in zip(shares, faces, strict=True)]
+    )
+    seen_share = max(face.seen_share for face in faces)
+    return MeasuredFace(faces[0].plane, tilts_offset, covariance, seen_share)
 
 
 def _add_all_one_way(covariances: Sequence[FloatArray]) -> FloatArray:

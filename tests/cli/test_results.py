@@ -95,7 +95,7 @@ def test_faces_are_told_against_their_plan_and_joined_over_frames() -> None:
     plane = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, 1.0]))
     little = np.diag([1e-6, 1e-6, 1e-4])
     faces = [
-        MeasuredFace(plane, np.array([0.0, np.tan(np.radians(1.0)), off]), little, little, share)
+        MeasuredFace(plane, np.array([0.0, np.tan(np.radians(1.0)), off]), 2.0 * little, share)
         for off, share in ((-0.5, 0.6), (-0.3, 0.8))
     ]
     told = [{"top": face} for face in faces]
@@ -108,7 +108,7 @@ def test_faces_are_told_against_their_plan_and_joined_over_frames() -> None:
     assert measured["top"]["seen_share"] == 0.8
     lines = summary_text({**summarise([frame], 1.0), "measured": measured}).splitlines()
     assert (
-        "cut top: 1.00 deg (+- 0.17) and -0.40 mm (+- 0.02) from its plan, 80 % of it seen" in lines
+        "cut top: 1.00 deg (+- 0.20) and -0.40 mm (+- 0.03) from its plan, 80 % of it seen" in lines
     )
 
 

@@ -30,10 +30,12 @@ class Faces:
         self.offset_mm = -0.4
         monkeypatch.setattr(FaceMeter, "measure", self._measure)
 
-    def _measure(self, left, right, estimate, made, planned, expected=None) -> MeasuredFace | None:
+    def _measure(
+        self, left, right, estimate, planned, others, expected=None
+    ) -> MeasuredFace | None:
         self.expected.append(expected)
         share = self.shares.get("top" if planned is TOP else "side")
         if share is None:
             return None
         little = np.diag([1e-6, 1e-6, 1e-3])
-        return MeasuredFace(planned, np.array([0.01, 0.0, self.offset_mm]), little, little, share)
+        return MeasuredFace(planned, np.array([0.01, 0.0, self.offset_mm]), 2.0 * little, share)

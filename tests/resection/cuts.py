@@ -21,6 +21,9 @@ MADE = replace(
     normal=rotation_from_vector(np.radians([1.2, -0.5, 0.0])) @ PLANNED.normal,
 )
 POSE_SD = 0.05, 0.001  # mm, rad
+BONE_COLOUR = np.array([0.5, 0.75, 1.0])  # blue, green, red, in the pictures' tone curve
+# By how much a glint on the face lies elsewhere for the other eye.
+GLINT_SHIFT_MM = np.array([0.2, 0.0, 0.0])
 
 
 def bone() -> BoneModel:
@@ -63,19 +66,28 @@ def pictures(
     made: ResectionPlane = MADE,
     cover: Cover = Cover(),
     seed: int = 0,
+    glint: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Left and right picture of the cut ball: its face, what covers it, and a far wall."""
+    """Left and right picture (BGR) of the cut ball: its face, what covers it, and a far wall.
+
+    So much linear light is mirrored by the face at most, by other places for each eye.
+    """
     views = []
     noise = np.random.default_rng(seed)
     for eye_x in (0.0, BASELINE_MM):
-        depth, value = _ray_cast(left_from_bone, made, cover, eye_x)
-        grey = np.where(np.isfinite(depth), value, 90.0) + noise.normal(0.0, 1.5, depth.shape)
-        views.append(np.clip(grey, 0, 255).astype(np.uint8))
+        depth, value, mirrored = _ray_cast(left_from_bone, made, cover, eye_x)
+        grey = np.clip(np.where(np.isfinite(depth), value, 90.0), 0.0, 255.0)
+        light = (grey[..., None] * BONE_COLOUR / 255.0) ** 2.2 + glint * mirrored[..., None]
+        seen = 255.0 * light ** (1.0 / 2.2) + noise.normal(0.0, 1.5, light.shape)
+        views.append(np.clip(seen, 0, 255).astype(np.uint8))
     return views[0], views[1]
 
 
-def _ray_cast(left_from_bone, made, cover, eye_x) -> tuple[np.ndarray, np.ndarray]:
-    """(H, W) depth of what is nearest and its grey value; four samples a pixel each way."""
+def _ray_cast(left_from_bone, made, cover, eye_x) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(H, W) depth of what is nearest, its grey value, and how much of a lamp it mirrors, 0 to 1.
+
+    Three samples a pixel each way.
+    """
     n = 3
     u = (np.arange(n * WIDTH) + 0.5) / n - 0.5
     v = (np.arange(n * HEIGHT) + 0.5) / n - 0.5
@@ -103,6 +115,8 @@ def _ray_cast(left_from_bone, made, cover, eye_x) -> tuple[np.ndarray, np.ndarra
         return np.linalg.norm(points, axis=-1) < 30.0
 
     hit(to_plane(made), in_ball, 1)
+    places = start + to_plane(made)[..., None] * along + (eye_x > 0.0) * GLINT_SHIFT_MM
+    mirrored = np.where(np.isfinite(depth), np.clip((_texture(places, 9) - 100.0) / 100.0, 0, 1), 0)
     hit(to_plane(made, 6.0), lambda p: in_ball(p) & (p[..., 0] < cover.x_mm), 2)
     half_b, squared = (along @ start), (along**2).sum(-1)
     root = half_b**2 - squared * (start @ start - 30.0**2)
@@ -110,8 +124,10 @@ def _ray_cast(left_from_bone, made, cover, eye_x) -> tuple[np.ndarray, np.ndarra
     ball = np.where(np.isfinite(ball), ball, -1.0)
     hit(ball, lambda p: (p - made.point_mm) @ made.normal < 0.0, 3)
     hit(to_plane(PLANNED, -60.0), lambda p: np.ones(p.shape[:-1], bool), 4)
-    small = cv2.resize(value, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
-    return cv2.resize(depth, (WIDTH, HEIGHT), interpolation=cv2.INTER_NEAREST), small
+    small, lit = (
+        cv2.resize(one, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA) for one in (value, mirrored)
+    )
+    return cv2.resize(depth, (WIDTH, HEIGHT), interpolation=cv2.INTER_NEAREST), small, lit
 
 
 def _texture(points: np.ndarray, seed: int) -> np.ndarray:

@@ -16,7 +16,7 @@ from tests.resection.cuts import MADE, PLANNED, bone
 
 def face(offset_mm: float = -0.7, sd: float = 0.0) -> MeasuredFace:
     covariance = sd**2 * np.eye(3)
-    return MeasuredFace(PLANNED, np.array([0.0, 0.0, offset_mm]), covariance, covariance, 0.8)
+    return MeasuredFace(PLANNED, np.array([0.0, 0.0, offset_mm]), 2.0 * covariance, 0.8)
 
 
 def test_without_cuts_a_bone_is_itself() -> None:

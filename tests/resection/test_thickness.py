@@ -15,7 +15,7 @@ SMALL = np.diag([1e-6, 1e-6, 1e-4])
 
 
 def face(tilt_rad: float = 0.0, offset_mm: float = 0.0) -> MeasuredFace:
-    return MeasuredFace(PLANE, np.array([tilt_rad, 0.0, offset_mm]), SMALL, np.zeros((3, 3)), 0.9)
+    return MeasuredFace(PLANE, np.array([tilt_rad, 0.0, offset_mm]), SMALL, 0.9)
 
 
 @pytest.mark.parametrize("offset_mm", [0.0, 0.8, -1.5])
@@ -30,7 +30,7 @@ def test_less_bone_is_gone_where_the_face_lies_higher(offset_mm: float) -> None:
 def test_a_tilt_counts_by_its_arm() -> None:
     """The plan's middle lies 9 mm beside the thickest place."""
     beside = replace(PLANE, point_mm=PLANE.point_mm + np.array([9.0, 0.0, 0.0]))
-    one = MeasuredFace(beside, np.zeros(3), np.diag([1e-4, 0.0, 0.0]), np.zeros((3, 3)), 0.9)
+    one = MeasuredFace(beside, np.zeros(3), np.diag([1e-4, 0.0, 0.0]), 0.9)
     tilted = replace(one, tilts_offset=np.array([0.01, 0.0, 0.0]))
     found, other = measure_thickness(BONE, one), measure_thickness(BONE, tilted)
     assert found.bound_mm == pytest.approx(1.96 * 9.0 * 0.01, rel=0.01)
@@ -39,7 +39,7 @@ def test_a_tilt_counts_by_its_arm() -> None:
 
 def test_a_plan_beside_the_bone_takes_nothing_off() -> None:
     away = replace(PLANE, point_mm=np.array([0.0, 0.0, 30.0]))
-    one = MeasuredFace(away, np.zeros(3), SMALL, SMALL, 0.9)
+    one = MeasuredFace(away, np.zeros(3), 2.0 * SMALL, 0.9)
     assert measure_thickness(BONE, one) is None
 
 

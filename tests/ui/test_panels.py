@@ -310,7 +310,7 @@ def test_cancel_takes_the_place_of_register_while_that_runs() -> None:
 def test_wide_stepper_tells_the_next_gate_and_what_was_measured() -> None:
     plane = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, -1.0]))
     tilt = np.array([np.tan(np.radians(0.31)), 0.0, -0.42])
-    face = MeasuredFace(plane, tilt, np.eye(3), np.eye(3), 0.6)
+    face = MeasuredFace(plane, tilt, 2.0 * np.eye(3), 0.6)
     cuts = (
         StepLine("femur_distal", "cut", is_made=True, measured=face),
         StepLine("lateral", "cut", is_made=True),

@@ -1,0 +1,57 @@
+"""Pictures without highlights: what a wet face mirrors of a lamp is white, and moves with the eye.
+
+On a sawn face that mirrors a lamp the two cameras see glints in different places, and match a face
+0.1 to 0.2 px off. Light that is mirrored has the lamp's colour, light from within the bone has the
+bone's own: the difference of red and blue holds none of a white lamp's.
+
+Source: the dichromatic model of reflection, Shafer 1985.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.rectification import Image, RectifiedPair
+
+# All chosen. This share of the pixels asked for has values up to this one.
+_MOST_SHARE, _MOST_VALUE = 0.99, 230.0
+# Of linear light, 0 to 1: with less colour there is more noise than texture.
+_LEAST_DIFFERENCE = 0.02
+
+
+def make_matte_pair(pair: RectifiedPair, is_asked: NDArray[np.bool_]) -> RectifiedPair | None:
+    """Both pictures as red less blue, (H, W) uint8; None without colour.
+
+    Args:
+        pair: BGR in the tone curve of sRGB, or grey.
+        is_asked: (h, w) pixels of its box that set the range of values.
+    """
+    if pair.left.ndim != 3 or not is_asked.any():
+        return None
+    left, right = _red_less_blue(pair.left), _red_less_blue(pair.right)
+    most = float(np.quantile(left[pair.box.slices][is_asked], _MOST_SHARE))
+    if most < _LEAST_DIFFERENCE:
+        return None
+    gain = _MOST_VALUE / most
+    return replace(pair, left=_scale(left, gain), right=_scale(right, gain))
+
+
+def _red_less_blue(picture: Image) -> NDArray[np.float32]:
+    light = _light_of_value()
+    difference: NDArray[np.float32] = light[picture[:, :, 2]] - light[picture[:, :, 0]]
+    return difference
+
+
+def _scale(difference: NDArray[np.float32], gain: float) -> Image:
+    scaled = np.clip(np.rint(gain * difference), 0.0, 255.0)
+    return np.asarray(scaled, dtype=np.uint8)
+
+
+@lru_cache(maxsize=1)
+def _light_of_value() -> NDArray[np.float32]:
+    """(256,) linear light of a value (IEC 61966-2-1)."""
+    value = np.arange(256) / 255.0
+    light = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    return light.astype(np.float32)
