@@ -19,12 +19,13 @@ _MOST_STEPS, _REST_PX = 30, 1e-3
 # Most of a nearly parallel plane lies within so much of another.
 _WINDOW_PX = 0.6
 _LEAST_WIDTH_SIGMAS = 1.6
-# Residuals inside a square of this size may go together: marks of the saw's teeth, cortex, blood.
-_BLOCK_PX = 24
-_LEAST_BLOCKS = 6
-# Neighbouring squares share what a matching window sees across their border: of a triangular
-# correlation as long as a window, sums over squares hold all but a third of window over square.
-_ACROSS_BLOCKS = (1.0 - (2 * MODEL_REFINEMENT.radius_px + 1) / (3.0 * _BLOCK_PX)) ** -2
+# Errors of two pixels go together as far as their matching windows overlap: nearly as a Gaussian of
+# this width. A face must hold so many that do not.
+_TOGETHER_PX = (2 * MODEL_REFINEMENT.radius_px + 1) / 6**0.5
+_LEAST_APART = 6.0
+# Residuals that show less noise than this are not believed.
+_LEAST_NOISE_PX = 0.02
+_MOST_CONDITION = 1e12
 # What all disparities of a face may have in common.
 _COMMON_PX = 0.02
 
@@ -77,8 +78,8 @@ def fit_disparity_plane(
     """The plane that most of the measured pixels share.
 
     Weighted least squares under a kernel that narrows (Welsch's, the correntropy of the paper's
-    equation 7), so that a hand, tissue and blood do not count. The covariance is that of sums over
-    squares of pixels, whose residuals go together (Liang and Zeger 1986).
+    equation 7), so that a hand, tissue and blood do not count. The covariance is that of an error
+    as large as the residuals, which neighbouring pixels share.
 
     Args:
         places: (N, 3) of (u - c_x, v - c_y, 1), pixels of the rectified left picture.
@@ -100,7 +101,7 @@ def fit_disparity_plane(
             kernel_px = np.maximum(width_px, least_px)
             weight = np.exp(-0.5 * (residual / kernel_px) ** 2) / sigma_px**2
             normal_matrix = (places * weight[:, None]).T @ places
-            if not np.linalg.cond(normal_matrix) < 1e12:
+            if not np.linalg.cond(normal_matrix) < _MOST_CONDITION:
                 return None
             step = np.linalg.solve(normal_matrix, (places * weight[:, None]).T @ residual)
             coefficients = coefficients + step
@@ -109,10 +110,7 @@ def fit_disparity_plane(
     residual = disparity_px - places @ coefficients
     width_px = 2.0 * max(_WIDTHS_PX[-1], float(np.median(least_px)))
     is_on = np.abs(residual) < width_px
-    kernel_px = np.maximum(_WIDTHS_PX[-1], least_px)
-    # How fast the pull of a residual grows: less than its weight says, near the kernel's edge.
-    growth = weight * (1.0 - (residual / kernel_px) ** 2)
-    covariance = _covariance(places[is_on], weight[is_on], growth[is_on], residual[is_on])
+    covariance = find_covariance(places[is_on], weight[is_on], residual[is_on])
     return None if covariance is None else DisparityPlane(coefficients, covariance, is_on, width_px)
 
 
@@ -127,21 +125,34 @@ def _find_densest(residual: FloatArray, reach_px: float) -> float:
     return min(max(middle, -reach_px), reach_px)
 
 
-def _covariance(
-    places: FloatArray, weight: FloatArray, growth: FloatArray, residual: FloatArray
+def find_covariance(
+    places: FloatArray, weight: FloatArray, residual: FloatArray
 ) -> FloatArray | None:
-    """(3, 3) of the coefficients; None from too few squares of pixels, or without a sure plane."""
-    squares = np.floor(places[:, :2] / _BLOCK_PX).astype(np.int64)
-    _, block = np.unique(squares, axis=0, return_inverse=True)
-    n = int(block.max(initial=-1)) + 1
-    if n < _LEAST_BLOCKS:
+    """(3, 3) of the coefficients of a fit; None from too few pixels whose errors are their own.
+
+    Source: covariance of weighted least squares under correlated errors, H^-1 X' W K W X H^-1 with
+    H = X' W X, of errors K that are Gaussian in distance.
+    """
+    import cv2
+
+    if len(places) < len(places.T):
         return None
-    pulls = places * (weight * residual)[:, None]
-    sums = np.stack([np.bincount(block.ravel(), pulls[:, k], n) for k in range(3)], axis=1)
-    stiffness = (places * growth[:, None]).T @ places
-    if not np.linalg.eigvalsh(stiffness)[0] > 0.0:
+    first = places[:, :2].min(axis=0)
+    columns, rows = np.rint(places[:, :2] - first).astype(np.intp).T
+    # Room around the pixels: at its border the filter mirrors what is there.
+    margin = int(4.0 * _TOGETHER_PX) + 1
+    shape = int(rows.max()) + 2 * margin + 1, int(columns.max()) + 2 * margin + 1
+    pulls = np.zeros((*shape, 4))
+    pulls[rows + margin, columns + margin, :3] = places * weight[:, None]
+    pulls[rows + margin, columns + margin, 3] = weight
+    spread = 2.0 * np.pi * _TOGETHER_PX**2 * cv2.GaussianBlur(pulls, (0, 0), _TOGETHER_PX)
+    shared = np.einsum("ijk,ijl->kl", pulls, spread)
+    n_apart = float(weight.sum()) ** 2 / float(shared[3, 3])
+    stiffness = (places * weight[:, None]).T @ places
+    if n_apart < _LEAST_APART or not np.linalg.cond(stiffness) < _MOST_CONDITION:
         return None
+    noise_px2 = max(float(weight @ residual**2) / float(weight.sum()), _LEAST_NOISE_PX**2)
     inverse = np.linalg.inv(stiffness)
-    spread = inverse @ (sums.T @ sums) @ inverse * n / (n - 3) * _ACROSS_BLOCKS
-    spread[2, 2] += _COMMON_PX**2
-    return np.asarray(spread)
+    covariance = noise_px2 * inverse @ shared[:3, :3] @ inverse
+    covariance[2, 2] += _COMMON_PX**2
+    return np.asarray(covariance)

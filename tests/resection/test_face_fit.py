@@ -6,6 +6,7 @@ import pytest
 from navapp.resection import face_fit
 from navapp.resection.face_fit import (
     disparity_coefficients,
+    find_covariance,
     fit_disparity_plane,
     plane_in_camera,
 )
@@ -63,6 +64,20 @@ def test_the_covariance_belongs_to_the_error(
         assert np.abs(error @ places().T).max() < 0.15
     # Of three numbers: the mean of chi-square is 3.
     assert 1.5 < np.mean(off) < 4.5
+
+
+def test_the_covariance_is_that_of_least_squares_under_errors_that_neighbours_share() -> None:
+    where, rng = places(24), np.random.default_rng(3)
+    weight, residual = rng.uniform(0.5, 1.5, len(where)), rng.normal(0.0, 0.05, len(where))
+    apart_px = np.linalg.norm(where[:, None, :2] - where[None, :, :2], axis=2)
+    shared = np.exp(-0.5 * (apart_px / face_fit._TOGETHER_PX) ** 2) * np.average(
+        residual**2, weights=weight
+    )
+    solve = np.linalg.inv((where * weight[:, None]).T @ where) @ (where * weight[:, None]).T
+    expected = solve @ shared @ solve.T + np.diag([0.0, 0.0, face_fit._COMMON_PX**2])
+    found = find_covariance(where, weight, residual)
+    assert found is not None
+    np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * np.abs(expected).max())
 
 
 def test_what_lies_elsewhere_is_not_on_it() -> None:
