@@ -30,7 +30,8 @@ class StepTable(TextView):
         snapshot, lines = view.snapshot, list[Content]()
         if not snapshot.steps:
             return [Content(f" the plan has no cut, hole or part of the {snapshot.stage.bone}")]
-        for key, step in zip(STEP_KEYS, snapshot.steps, strict=False):
+        more = max(len(snapshot.steps) - len(STEP_KEYS), 0)
+        for key, step in zip(STEP_KEYS + more * " ", snapshot.steps, strict=False):
             word = f"{step.kind:<5}{'made' if step.is_made else 'planned'}"
             lines.append(
                 Content.assemble(
@@ -38,6 +39,10 @@ class StepTable(TextView):
                 )
             )
             lines += _tell_made(step, snapshot.stage, view.symbols)
+        if more:
+            lines.append(
+                Content.styled(f" {more} steps have no letter: a script names them", "$warning")
+            )
         version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
         notes = (
             version,

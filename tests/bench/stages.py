@@ -88,12 +88,14 @@ def run_state(state: State, seed: int, folder: Path) -> dict[str, Any]:
     return told
 
 
-def judge(found: Found, frames: Sequence[dict[str, Any]]) -> None:
+def judge(found: Found, state: State, frames: Sequence[dict[str, Any]]) -> None:
     """Count the last frames of a session that show its state; what is missing is not OK."""
     if not frames:
         found.n_frames += _N_JUDGED
         return
-    shown = [frame for frame in frames if frame["bone_version"] == frames[-1]["bone_version"]]
+    shown = frames[state.after :]
+    if state.made:  # before the last step was made the bone was another one
+        shown = [frame for frame in frames if frame["bone_version"] == frames[-1]["bone_version"]]
     found.n_frames += max(0, _N_JUDGED - len(shown))
     for frame in shown[-_N_JUDGED:]:
         found.n_frames += 1
@@ -168,12 +170,12 @@ def main() -> None:
             for seed in range(options.first, options.first + options.knees):
                 told = run_state(state, seed, Path(folder))
                 made = {step["step"] for step in told.get("operation", ()) if step["made"]}
-                judge(found, told["frames"] if made.issuperset(state.made) else [])
+                judge(found, state, told["frames"] if made.issuperset(state.made) else [])
                 for name, one, error in measured_of(told):
                     measured[name].append((one, error))
                 if options.frames:
                     alone = Found()
-                    judge(alone, told["frames"])
+                    judge(alone, state, told["frames"])
                     print(tell(f"{state.bone} {state.name} {seed}", alone), flush=True)
     print("| state | OK | TRE median mm | 95 % | worst | bound holds | bound / error | most told |")
     print("|---|---|---|---|---|---|---|---|")

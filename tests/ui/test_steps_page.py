@@ -76,6 +76,18 @@ def test_steps_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> N
     ]
 
 
+def test_steps_for_which_there_is_no_letter_are_told() -> None:
+    steps = tuple(StepLine(f"cut_{k}", "cut", is_made=False) for k in range(len(STEP_KEYS) + 2))
+
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        text = app.text_of(StepTable)
+        assert all(step.name in text for step in steps)
+        assert "2 steps have no letter" in text
+
+    play(snapshots.navigating(steps=steps, stage=STAGES[2]), script, (160, 48))
+
+
 def test_without_steps_the_page_says_so() -> None:
     async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press("k")
