@@ -1,6 +1,8 @@
 """Paints what the layers of a scene ask for into a picture."""
 
+import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from navapp.overlay.labels import Image, LabelBoard
 from navapp.overlay.layers import LAYERS
 from navapp.overlay.scene import SKIN_MM, Scene
 from navapp.overlay.shading import draw_body, draw_bone
-from navapp.overlay.strokes import draw_strokes
+from navapp.overlay.strokes import blend_strokes, trace_strokes
 
 
 def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoard) -> Image:
@@ -26,12 +28,13 @@ def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoa
 
     drawing = Drawing()
     # Both threads need the box. What stands in front is looked up and the picture made by the
-    # helper, while the layers, which know nothing of them, are asked and the meshes are rendered.
+    # helper, while the layers, which know nothing of them, are asked and their meshes are rendered;
+    # whoever is free first renders the bone.
     _ = scene.box
-    with begin_on_helper(look_up) as looked_up:
+    with begin_on_helper(look_up) as looked_up, begin_on_helper(lambda: scene.view) as rendered:
         ask_layers(scene, drawing)
-        _ = scene.view
         views = [scene.render(body.mesh) for body in drawing.bodies]
+        rendered.result()
         image = looked_up.result()
     paint(image, scene, drawing, views, labels)
     return image
@@ -52,12 +55,15 @@ def paint(
     labels: LabelBoard,
 ) -> None:
     """All that was asked for, into a picture (H, W, 3); one view for each body."""
-    draw_bone(image, scene, drawing.tints, drawing.outline)
-    for body, view in zip(drawing.bodies, views, strict=True):
-        draw_body(image, scene, view, body)
-    for points_mm, colour in drawing.dots:
-        _draw_dots(image, scene, points_mm, colour)
-    draw_strokes(image, scene, drawing.strokes)
+    _ = scene.ground
+    trace = partial(trace_strokes, scene, drawing.strokes, threading.get_ident())
+    with begin_on_helper(trace) as traced:
+        draw_bone(image, scene, drawing.tints, drawing.outline)
+        for body, view in zip(drawing.bodies, views, strict=True):
+            draw_body(image, scene, view, body)
+        for points_mm, colour in drawing.dots:
+            _draw_dots(image, scene, points_mm, colour)
+        blend_strokes(image, traced.result())
     for panel in drawing.panels:
         panel(image, labels)
     ask_for_words(scene, drawing, labels)

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,8 @@ from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import Colour
 from navapp.overlay.drawing import Stroke
 from navapp.overlay.scene import Scene
-from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_strokes
+from navapp.overlay.stroke_kernels import Ground, Room, blend_places
+from navapp.overlay.stroke_kernels import trace_strokes as trace
 
 Image = NDArray[np.uint8]
 
@@ -58,14 +60,27 @@ def sample_line(points_mm: FloatArray, step_mm: float = _STEP_MM) -> FloatArray:
     return np.column_stack([np.interp(places, known, points_mm[:, k]) for k in range(3)])
 
 
-def draw_strokes(image: Image, scene: Scene, strokes: Sequence[Stroke]) -> None:
-    """Strokes in their order.
+class Traced(NamedTuple):
+    """Strokes, traced: which pixels they cover, and how much of each."""
+
+    room: Room
+    n_places: int
+    colours: NDArray[np.float32]  # (S, 3) of the strokes
+
+
+def trace_strokes(scene: Scene, strokes: Sequence[Stroke], thread: int) -> Traced | None:
+    """Trace strokes in their order; None without any.
 
     They are dashed where they lie beneath something or where that is not known, left out where a
     hand or an instrument hides them.
+
+    Args:
+        scene: that they belong to.
+        strokes: from below to above.
+        thread: that blends them, before it asks for others.
     """
     if not strokes:
-        return
+        return None
     in_camera = scene.to_camera(np.concatenate([stroke.points_mm for stroke in strokes]))
     pixels = scene.camera.project(in_camera)
     firsts = np.cumsum([0, *(len(stroke.points_mm) for stroke in strokes)])
@@ -74,8 +89,16 @@ def draw_strokes(image: Image, scene: Scene, strokes: Sequence[Stroke]) -> None:
     rims = [_RIM_PX if has_rim and width > 1.0 else 0.0 for width in widths]
     colours = [stroke.colour for stroke in strokes]
     is_whole = np.array([stroke.is_judged_whole for stroke in strokes])
+    room = _room(scene.camera.height, scene.camera.width, thread)
     pens = widths, rims, colours
-    _draw(image, pixels, in_camera[:, 2], (firsts, is_whole), pens, scene.ground)
+    return _trace(room, pixels, in_camera[:, 2], (firsts, is_whole), pens, scene.ground)
+
+
+def blend_strokes(image: Image, traced: Traced | None) -> None:
+    """Draw them into a picture (H, W, 3)."""
+    if traced is not None:
+        room, n, colours = traced
+        blend_places(image.reshape(-1, 3), room.place[:n], room.share[:n], room.number[:n], colours)
 
 
 def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: float = 14.0) -> None:
@@ -90,32 +113,32 @@ def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: floa
     ]
     pens = [1.5] * 4, [0.0] * 4, [colour] * 4
     parts = np.arange(0, 9, 2), np.zeros(4, dtype=np.bool_)
-    _draw(image, np.concatenate(arms), np.zeros(8), parts, pens, ground)
+    room = _room(image.shape[0], image.shape[1], threading.get_ident())
+    traced = _trace(room, np.concatenate(arms), np.zeros(8), parts, pens, ground)
+    blend_strokes(image, traced)
 
 
-def _draw(
-    image: Image,
+def _trace(
+    room: Room,
     pixels: FloatArray,
     depth_mm: FloatArray,
     parts: tuple[NDArray[np.int64], NDArray[np.bool_]],
     pens: tuple[list[float], list[float], list[Colour]],
     ground: Ground,
-) -> None:
+) -> Traced:
     """Strokes through places (N, 2) of the picture at depths (N,).
 
     The parts are the numbers (S + 1,) of the strokes' first points and whether (S,) each is judged
     as a whole; the pens are widths and rims in px, and colours.
     """
     widths_px, rims_px, colours = pens
-    room = _room(image.shape[0], image.shape[1], threading.get_ident())
     pens_px = 0.5 * np.array(widths_px), np.array(rims_px)
     depth_mm = np.ascontiguousarray(depth_mm)
-    n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
+    n = trace(pixels, depth_mm, *parts, *pens_px, ground, room)
     while n == len(room.place):
         room = _enlarge(room)
-        n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
-    table = np.array(colours, dtype=np.float32)
-    blend_places(image.reshape(-1, 3), room.place[:n], room.share[:n], room.number[:n], table)
+        n = trace(pixels, depth_mm, *parts, *pens_px, ground, room)
+    return Traced(room, n, np.array(colours, dtype=np.float32))
 
 
 def _enlarge(room: Room) -> Room:
