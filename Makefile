@@ -47,7 +47,7 @@ test: setup  ## style, types, import rules and the tests: some minutes
 	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels tests
 
 test-all: setup check bytecode  ## the release gate: as test, with every case of every test
-	$(PYTEST) -n 4 --dist loadgroup --release
+	$(PYTEST) -n 3 --dist loadgroup --release
 	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
 .PHONY: bytecode checked-kernels tests

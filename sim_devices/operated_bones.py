@@ -18,7 +18,7 @@ from sim_devices.site import Site
 from sim_devices.tools import across
 
 
-# A step changes one bone of three.
+# Three bones, now and before the last step, which has changed one of them.
 @lru_cache(maxsize=6)
 def make_bone(
     site: Site, fitted: FittedParts, bone: str, made: tuple[str, ...]

@@ -16,6 +16,7 @@ from navapp.values import PoseEstimate, Side
 
 # Both chosen. Wider gaps are not looked for; points of a surface are no further apart.
 _WIDEST_MM, _SPACING_MM = 40.0, 1.2
+_REACH_MM = 3.0 * _SPACING_MM  # surfaces that cross have points so near to each other
 _SOME = 50  # one point of so many tells roughly how wide a gap is
 # A point is inside when it lies straight below its nearest one (cosine): beside a rim it does not.
 _BELOW = -0.5
@@ -83,7 +84,8 @@ class GapMeter:
         placed_mm = tibia_from_femur.apply(points_mm)
         # Some points bound the distance of all; what lies further is not looked for.
         some_mm = np.asarray(self._tree.query(placed_mm[::_SOME])[0])
-        widest_mm = min(float(some_mm.min(initial=np.inf)) + 1e-6, _WIDEST_MM)
+        widest_mm = max(float(some_mm.min(initial=np.inf)) + 1e-6, _REACH_MM)
+        widest_mm = min(widest_mm, _WIDEST_MM)
         heights_mm, nearest = self._find_heights(placed_mm, widest_mm)
         if heights_mm.min(initial=np.inf) < 0.0:  # what lies deepest is further from any surface
             heights_mm, nearest = self._find_heights(placed_mm, _WIDEST_MM)
@@ -115,7 +117,7 @@ class GapMeter:
         away_mm = placed_mm[near] - self._tibia_mm[nearest[near]]
         above_mm = np.einsum("nk,nk->n", away_mm, self._normals[nearest[near]])
         is_inside = above_mm < _BELOW * heights_mm[near]
-        heights_mm[near[is_inside]] *= -1.0
+        heights_mm[near[is_inside]] = above_mm[is_inside]
         return heights_mm, nearest
 
 

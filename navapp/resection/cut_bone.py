@@ -60,7 +60,7 @@ class CutBone:
 
     @cached_property
     def known_cuts(self) -> dict[str, Cut]:
-        """They, by name: as measured, or as planned, and how unsure that is."""
+        """The cuts that are made, by name: as measured, else as planned, and how unsure each is."""
         return {name: self._cut(name) for name in self.cuts}
 
     @property

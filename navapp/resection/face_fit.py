@@ -110,7 +110,10 @@ def fit_disparity_plane(
     residual = disparity_px - places @ coefficients
     width_px = 2.0 * max(_WIDTHS_PX[-1], float(np.median(least_px)))
     is_on = np.abs(residual) < width_px
-    covariance = find_covariance(places[is_on], weight[is_on], residual[is_on])
+    kernel_px = np.maximum(_WIDTHS_PX[-1], least_px)
+    # How fast the pull of a residual grows: less than its weight says, near the kernel's edge.
+    growth = weight * (1.0 - (residual / kernel_px) ** 2)
+    covariance = find_covariance(places[is_on], weight[is_on], growth[is_on], residual[is_on])
     return None if covariance is None else DisparityPlane(coefficients, covariance, is_on, width_px)
 
 
@@ -126,12 +129,18 @@ def _find_densest(residual: FloatArray, reach_px: float) -> float:
 
 
 def find_covariance(
-    places: FloatArray, weight: FloatArray, residual: FloatArray
+    places: FloatArray, weight: FloatArray, growth: FloatArray, residual: FloatArray
 ) -> FloatArray | None:
-    """(3, 3) of the coefficients of a fit; None from too few pixels whose errors are their own.
+    """(3, 3) of the coefficients of a fit; None from too few pixels with independent errors.
 
-    Source: covariance of weighted least squares under correlated errors, H^-1 X' W K W X H^-1 with
-    H = X' W X, of errors K that are Gaussian in distance.
+    That of an M-estimator under correlated errors: H^-1 X' W K W X H^-1 with H = X' G X, where the
+    errors' correlation K is Gaussian in distance.
+
+    Args:
+        places: (N, 3) of the pixels.
+        weight: (N,) of their residuals in the fit, W.
+        growth: (N,) by how much a residual's pull grows with it, G.
+        residual: (N,) px.
     """
     import cv2
 
@@ -148,10 +157,11 @@ def find_covariance(
     spread = 2.0 * np.pi * _TOGETHER_PX**2 * cv2.GaussianBlur(pulls, (0, 0), _TOGETHER_PX)
     shared = np.einsum("ijk,ijl->kl", pulls, spread)
     n_apart = float(weight.sum()) ** 2 / float(shared[3, 3])
-    stiffness = (places * weight[:, None]).T @ places
-    if n_apart < _LEAST_APART or not np.linalg.cond(stiffness) < _MOST_CONDITION:
+    stiffness = (places * growth[:, None]).T @ places
+    if n_apart < _LEAST_APART or not np.linalg.eigvalsh(stiffness)[0] > 0.0:
         return None
-    noise_px2 = max(float(weight @ residual**2) / float(weight.sum()), _LEAST_NOISE_PX**2)
+    noise_px2 = float(weight**2 @ residual**2) / float(weight @ weight)
+    noise_px2 = max(noise_px2, _LEAST_NOISE_PX**2) * n_apart / (n_apart - 3.0)
     inverse = np.linalg.inv(stiffness)
     covariance = noise_px2 * inverse @ shared[:3, :3] @ inverse
     covariance[2, 2] += _COMMON_PX**2

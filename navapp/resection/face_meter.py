@@ -21,7 +21,7 @@ from navapp.resection.face_fit import (
     fit_disparity_plane,
 )
 from navapp.resection.face_view import LEAST_PIXELS, FaceView, FaceViewer, grow
-from navapp.resection.matte_pictures import make_matte_pair
+from navapp.resection.matte_pictures import find_clipped, make_matte_pair
 from navapp.resection.remaining_bone import Cut
 from navapp.stereo import match_surface, refine_on_model
 from navapp.values import (
@@ -41,8 +41,11 @@ _MAX_ROUNDS, _REST_PX = 6, 0.02
 # The matcher sees no further from the plane that it is given.
 _NEAR_PX = 1.0
 # By how much highlights move a face (standard deviation; on simulated knees 0.1 to 0.2 px in the
-# light of a lamp, nothing elsewhere), and which share of that is left where they are taken out.
+# light of a lamp, nothing elsewhere), and which share of the difference between the planes with and
+# without them is left open.
 _HIGHLIGHT_PX, _LEFT_OPEN = 0.1, 0.5
+# The lamp may be so much less blue than white is in the pictures (standard deviation).
+_OTHER_LAMP = 0.8
 _SURELY_MOVED = 7.81  # chi-square of 3 degrees of freedom at 95 %
 # A saw misses its plan by no more: what is flat, but lies further off, is something else.
 _MOST_OFF_MM, _MOST_TILT_DEG = 4.0, 6.0
@@ -63,7 +66,7 @@ class FaceMeter:
         right: Image,
         estimate: PoseEstimate,
         planned: ResectionPlane,
-        others: Sequence[Cut] = (),
+        others: Sequence[Cut],
         expected: ResectionPlane | None = None,
     ) -> MeasuredFace | None:
         """One face, against its plan.
@@ -96,7 +99,9 @@ class FaceMeter:
             plane = self._plane_in_bone(fit, plane, rectified_from_bone)
             moved_px = self._moved_px(fit.coefficients - coefficients, view)
             if not is_far and moved_px < _REST_PX:
-                fit = self._fit_without_highlights(left, right, view, fit)
+                fit = self._choose_plane(left, right, replace(pair, box=view.box), view, fit)
+                if fit is None:
+                    return None
                 share = fit.is_on.sum() * _STRIDE_PX**2 / max(view.n_whole, 1)
                 face = make_face(
                     fit, self._geometry, estimate, self._bone, self._quality, planned,
@@ -144,25 +149,64 @@ class FaceMeter:
         inside = view.is_face & ~grow(_without_specks(view.is_face & ~self._is_on(found, fit)))
         return self._fit_pixels(found, inside, fit.coefficients, _NEAR_PX)
 
-    def _fit_without_highlights(
-        self, left: Image, right: Image, view: FaceView, fit: DisparityPlane
-    ) -> DisparityPlane:
-        """The plane in pictures without highlights, where those have moved it.
+    def _choose_plane(
+        self, left: Image, right: Image, grey: RectifiedPair, view: FaceView, fit: DisparityPlane
+    ) -> DisparityPlane | None:
+        """A plane that highlights have not moved, or how far they may have moved it in its bound.
 
-        Else the plane that is known better. How far the two differ is left open; without colour,
-        how far highlights may have moved it.
+        Where the plane without highlights differs for sure, it is taken; else the one that is known
+        better. Without colour the plane stays as it is, and more is left open.
+
+        Returns:
+            None where too little of the face is not clipped.
         """
         pair = self._rectifier.rectify(left, right, view.box, self._band_px(view))
-        matte_pair = make_matte_pair(pair, view.is_face)
-        matte = None
-        if matte_pair is not None:
-            matte = self._fit(matte_pair, view, fit.coefficients, is_far=False)
-        if matte is None:
-            return fit.with_error(np.array([0.0, 0.0, _HIGHLIGHT_PX]))
+        is_clipped = self._find_clipped(pair, view, fit.coefficients)
+        if (is_clipped & view.is_face).any():
+            view = replace(view, is_face=view.is_face & ~grow(is_clipped))
+            unclipped = self._fit(grey, view, fit.coefficients, is_far=False)
+            if unclipped is None:
+                return None
+            fit = unclipped
+        matte = self._fit_matte(pair, view, fit, 1.0)
+        other = matte and self._fit_matte(pair, view, fit, _OTHER_LAMP)
+        if matte is None or other is None:
+            return self._leave_highlights_open(fit, view)
         moved = matte.coefficients - fit.coefficients
         is_moved = moved @ np.linalg.solve(fit.covariance + matte.covariance, moved) > _SURELY_MOVED
         best = matte if is_moved else min(fit, matte, key=lambda one: np.linalg.det(one.covariance))
-        return best.with_error(_LEFT_OPEN * moved)
+        by_lamp = other.coefficients - matte.coefficients
+        return best.with_error(_LEFT_OPEN * moved).with_error(by_lamp)
+
+    def _find_clipped(
+        self, pair: RectifiedPair, view: FaceView, coefficients: FloatArray
+    ) -> NDArray[np.bool_]:
+        """(h, w) pixels of the face's box that are clipped in one of the pictures."""
+        left, right = find_clipped(pair.left), find_clipped(pair.right)
+        rows, columns = np.nonzero(view.is_face)
+        rows, columns = rows + view.box.y, columns + view.box.x
+        disparity_px = self._places(np.column_stack([columns, rows])) @ coefficients
+        seen_at = np.rint(columns - disparity_px).astype(np.intp).clip(0, right.shape[1] - 1)
+        is_clipped = np.zeros(view.is_face.shape, dtype=np.bool_)
+        is_clipped[view.is_face] = left[rows, columns] | right[rows, seen_at]
+        return is_clipped
+
+    def _fit_matte(
+        self, pair: RectifiedPair, view: FaceView, fit: DisparityPlane, blue: float
+    ) -> DisparityPlane | None:
+        """The plane in pictures without highlights, from one that is near; None without colour."""
+        matte = make_matte_pair(pair, view.is_face, blue)
+        return None if matte is None else self._fit(matte, view, fit.coefficients, is_far=False)
+
+    def _leave_highlights_open(self, fit: DisparityPlane, view: FaceView) -> DisparityPlane:
+        """With offset and both tilts as unsure as highlights make them."""
+        rows, columns = np.nonzero(view.is_face)
+        places = self._places(np.column_stack([columns + view.box.x, rows + view.box.y]))
+        u, v, _ = places.mean(axis=0)
+        half_u, half_v, _ = np.maximum(0.5 * np.ptp(places, axis=0), 1.0)
+        for deviation in ((0.0, 0.0, 1.0), (1.0, 0.0, -u) / half_u, (0.0, 1.0, -v) / half_v):
+            fit = fit.with_error(_HIGHLIGHT_PX * np.asarray(deviation))
+        return fit
 
     def _reach_px(self, box: Box, coefficients: FloatArray) -> float:
         """How far a saw may have missed, in disparity: along the view at most."""

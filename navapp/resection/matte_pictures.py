@@ -2,7 +2,8 @@
 
 On a sawn face that mirrors a lamp the two cameras see glints in different places, and match a face
 0.1 to 0.2 px off. Light that is mirrored has the lamp's colour, light from within the bone has the
-bone's own: the difference of red and blue holds none of a white lamp's.
+bone's own. In pictures whose white is the lamp's, red less blue holds nothing of what is mirrored,
+but where a channel is clipped.
 
 Source: the dichromatic model of reflection, Shafer 1985.
 """
@@ -19,18 +20,23 @@ from navapp.geometry.rectification import Image, RectifiedPair
 _MOST_SHARE, _MOST_VALUE = 0.99, 230.0
 # Of linear light, 0 to 1: with less colour there is more noise than texture.
 _LEAST_DIFFERENCE = 0.02
+# Values from here on may be clipped.
+_CLIPPED = 254
 
 
-def make_matte_pair(pair: RectifiedPair, is_asked: NDArray[np.bool_]) -> RectifiedPair | None:
+def make_matte_pair(
+    pair: RectifiedPair, is_asked: NDArray[np.bool_], blue: float = 1.0
+) -> RectifiedPair | None:
     """Both pictures as red less blue, (H, W) uint8; None without colour.
 
     Args:
         pair: BGR in the tone curve of sRGB, or grey.
         is_asked: (h, w) pixels of its box that set the range of values.
+        blue: weight of blue: red over blue of the lamp's light in these pictures.
     """
     if pair.left.ndim != 3 or not is_asked.any():
         return None
-    left, right = _red_less_blue(pair.left), _red_less_blue(pair.right)
+    left, right = (_red_less_blue(picture, blue) for picture in (pair.left, pair.right))
     most = float(np.quantile(left[pair.box.slices][is_asked], _MOST_SHARE))
     if most < _LEAST_DIFFERENCE:
         return None
@@ -38,10 +44,16 @@ def make_matte_pair(pair: RectifiedPair, is_asked: NDArray[np.bool_]) -> Rectifi
     return replace(pair, left=_scale(left, gain), right=_scale(right, gain))
 
 
-def _red_less_blue(picture: Image) -> NDArray[np.float32]:
+def find_clipped(picture: Image) -> NDArray[np.bool_]:
+    """(H, W) pixels of which a channel is clipped."""
+    is_clipped = picture >= _CLIPPED
+    return np.asarray(is_clipped if picture.ndim == 2 else is_clipped.any(axis=2))
+
+
+def _red_less_blue(picture: Image, blue: float) -> NDArray[np.float32]:
     light = _light_of_value()
-    difference: NDArray[np.float32] = light[picture[:, :, 2]] - light[picture[:, :, 0]]
-    return difference
+    red, less = light[picture[:, :, 2]], np.float32(blue) * light[picture[:, :, 0]]
+    return np.asarray(red - less, dtype=np.float32)
 
 
 def _scale(difference: NDArray[np.float32], gain: float) -> Image:

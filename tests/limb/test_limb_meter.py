@@ -63,11 +63,22 @@ def test_the_face_of_a_cut_is_covered_with_points() -> None:
 def test_surfaces_that_overlap_have_a_gap_below_zero_as_deep_as_they_do() -> None:
     meter = GapMeter(balls(20.0), balls(20.0), 0.0, "right")
     femur = camera_from_femur()
-    for depth_mm in (0.5, 3.0):
+    for depth_mm in (0.2, 0.5, 3.0):
         into = RigidTransform.from_parts("femur", "tibia", np.eye(3), (0.0, 0.0, depth_mm - 20.0))
         gaps = meter.measure(estimate(femur), estimate(femur @ into), (np.zeros(3),) * 2)
         for gap in gaps.values():
-            assert gap.mm == pytest.approx(-depth_mm, abs=0.3)
+            assert gap.mm == pytest.approx(-depth_mm, abs=0.1)
+
+
+def test_the_knee_that_is_pushed_together_overlaps_ever_more() -> None:
+    bones = make_knee(KneeSpec(1, "right")).bones
+    meter = GapMeter(bones["femur"], bones["tibia"], 0.0, "right")
+    femur = camera_from_femur()
+    # Some points of the femur lie almost on the tibia, others deep in it.
+    for height_mm in (9.0, 10.0, 11.0):
+        into = RigidTransform.from_parts("femur", "tibia", np.eye(3), (0.0, 0.0, height_mm))
+        gaps = meter.measure(estimate(femur), estimate(femur @ into), (np.zeros(3),) * 2)
+        assert gaps["lateral"].mm < -2.0
 
 
 def test_bones_far_apart_have_no_gap() -> None:

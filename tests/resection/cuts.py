@@ -67,17 +67,21 @@ def pictures(
     cover: Cover = Cover(),
     seed: int = 0,
     glint: float = 0.0,
+    lamp: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Left and right picture (BGR) of the cut ball: its face, what covers it, and a far wall.
 
-    So much linear light is mirrored by the face at most, by other places for each eye.
+    So much linear light of a lamp (blue, green, red) is mirrored by the face at most, by other
+    places for each eye.
     """
     views = []
     noise = np.random.default_rng(seed)
     for eye_x in (0.0, BASELINE_MM):
         depth, value, mirrored = _ray_cast(left_from_bone, made, cover, eye_x)
         grey = np.clip(np.where(np.isfinite(depth), value, 90.0), 0.0, 255.0)
-        light = (grey[..., None] * BONE_COLOUR / 255.0) ** 2.2 + glint * mirrored[..., None]
+        light = (grey[..., None] * BONE_COLOUR / 255.0) ** 2.2 + glint * np.multiply(
+            mirrored[..., None], lamp
+        )
         seen = 255.0 * light ** (1.0 / 2.2) + noise.normal(0.0, 1.5, light.shape)
         views.append(np.clip(seen, 0, 255).astype(np.uint8))
     return views[0], views[1]

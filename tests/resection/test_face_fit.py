@@ -66,18 +66,43 @@ def test_the_covariance_belongs_to_the_error(
     assert 1.5 < np.mean(off) < 4.5
 
 
-def test_the_covariance_is_that_of_least_squares_under_errors_that_neighbours_share() -> None:
+def test_the_covariance_is_that_of_errors_that_neighbours_share() -> None:
     where, rng = places(24), np.random.default_rng(3)
     weight, residual = rng.uniform(0.5, 1.5, len(where)), rng.normal(0.0, 0.05, len(where))
     apart_px = np.linalg.norm(where[:, None, :2] - where[None, :, :2], axis=2)
-    shared = np.exp(-0.5 * (apart_px / face_fit._TOGETHER_PX) ** 2) * np.average(
-        residual**2, weights=weight
-    )
-    solve = np.linalg.inv((where * weight[:, None]).T @ where) @ (where * weight[:, None]).T
-    expected = solve @ shared @ solve.T + np.diag([0.0, 0.0, face_fit._COMMON_PX**2])
-    found = find_covariance(where, weight, residual)
+    shared = np.exp(-0.5 * (apart_px / face_fit._TOGETHER_PX) ** 2)
+    n_apart = weight.sum() ** 2 / (weight @ shared @ weight)
+    noise_px2 = np.average(residual**2, weights=weight**2) * n_apart / (n_apart - 3.0)
+    growth = 0.8 * weight
+    solve = np.linalg.inv((where * growth[:, None]).T @ where) @ (where * weight[:, None]).T
+    expected = noise_px2 * solve @ shared @ solve.T + np.diag([0.0, 0.0, face_fit._COMMON_PX**2])
+    found = find_covariance(where, weight, growth, residual)
     assert found is not None
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("noise_px", [0.05, 0.1, 0.15])
+@pytest.mark.parametrize("half_px", [(30, 6), (20, 10), (30, 30)])
+def test_bounds_of_narrow_faces_hold(
+    half_px: tuple[int, int], noise_px: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import cv2
+
+    monkeypatch.setattr(face_fit, "_COMMON_PX", 0.0)
+    monkeypatch.setattr(face_fit, "_LEAST_NOISE_PX", 0.0)
+    u, v = np.meshgrid(*(np.arange(-n, n, 2.0) for n in half_px))
+    where, rng = np.column_stack([u.ravel(), v.ravel(), np.ones(u.size)]), np.random.default_rng(5)
+    sigma = np.full(len(where), 0.1)
+    n_held, n = 0, 120
+    for _ in range(n):
+        white = rng.normal(0.0, 1.0, (2 * half_px[1] + 40, 2 * half_px[0] + 40))
+        blurred = cv2.GaussianBlur(white, (0, 0), face_fit._TOGETHER_PX / 2**0.5)
+        noise = noise_px * (blurred / blurred.std())[20:-20:2, 20:-20:2]
+        fit = fit_disparity_plane(where, where @ PLANE + noise.ravel(), sigma, PLANE, 1.0)
+        assert fit is not None
+        error = fit.coefficients - PLANE
+        n_held += error @ np.linalg.solve(fit.covariance, error) <= 7.81
+    assert n_held >= 0.85 * n
 
 
 def test_what_lies_elsewhere_is_not_on_it() -> None:

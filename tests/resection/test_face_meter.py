@@ -27,7 +27,7 @@ def errors(face: MeasuredFace, made: ResectionPlane = MADE) -> tuple[float, floa
 
 def test_a_face_is_found_where_it_was_made(meter: FaceMeter) -> None:
     placed = estimate(pose())
-    face = meter.measure(*pictures(pose()), placed, PLANNED)
+    face = meter.measure(*pictures(pose()), placed, PLANNED, ())
     assert face is not None
     angle_deg, off_mm = errors(face)
     assert angle_deg < 0.15
@@ -40,15 +40,36 @@ def test_a_face_is_found_where_it_was_made(meter: FaceMeter) -> None:
     assert abs(off_mm) <= face.bound_mm
 
 
-def test_glints_that_each_eye_sees_elsewhere_do_not_move_the_face(meter: FaceMeter) -> None:
-    left, right = pictures(pose(), glint=0.25)
-    face = meter.measure(left, right, estimate(pose()), PLANNED)
+def measured(meter: FaceMeter, left, right) -> tuple[MeasuredFace, float]:
+    """The face, and how far its offset is off in mm."""
+    face = meter.measure(left, right, estimate(pose()), PLANNED, ())
     assert face is not None
-    assert abs(errors(face)[1]) <= min(face.bound_mm, 0.15)
+    return face, abs(errors(face)[1])
+
+
+def test_glints_that_each_eye_sees_elsewhere_do_not_move_the_face(meter: FaceMeter) -> None:
+    face, off_mm = measured(meter, *pictures(pose(), glint=0.1))
+    assert face.is_told
+    assert off_mm <= min(face.bound_mm, 0.06)
+    left, right = pictures(pose(), glint=0.25)
+    face, off_mm = measured(meter, left, right)
+    assert off_mm <= min(face.bound_mm, 0.1)
     # Without colour they move it; that is in the bound.
-    grey = meter.measure(luma(left), luma(right), estimate(pose()), PLANNED)
-    assert grey is not None
-    assert 0.2 < abs(errors(grey)[1]) <= grey.bound_mm
+    face, off_mm = measured(meter, luma(left), luma(right))
+    assert 0.2 < off_mm <= face.bound_mm
+
+
+def test_of_clipped_pixels_nothing_is_told(meter: FaceMeter) -> None:
+    for glint in (1.0, 2.0, 4.0):
+        left, right = pictures(pose(), glint=glint)
+        face = meter.measure(left, right, estimate(pose()), PLANNED, ())
+        assert face is None or not face.is_told or abs(errors(face)[1]) <= face.bound_mm
+
+
+def test_a_lamp_that_is_not_white_in_the_pictures_is_in_the_bound(meter: FaceMeter) -> None:
+    for lamp in ((0.85, 0.95, 1.0), (0.7, 0.9, 1.0), (1.0, 0.95, 0.8)):
+        face, off_mm = measured(meter, *pictures(pose(), glint=0.25, lamp=lamp))
+        assert off_mm <= face.bound_mm
 
 
 def test_a_pose_that_is_off_is_in_the_bound(meter: FaceMeter) -> None:
@@ -59,7 +80,7 @@ def test_a_pose_that_is_off_is_in_the_bound(meter: FaceMeter) -> None:
     for _ in range(12):
         centre_mm = pose().apply(bone().mesh.centroid_mm[None])[0]
         moved = pose().move(scales * rng.standard_normal(6), centre_mm)
-        face = meter.measure(left, right, estimate(moved), PLANNED)
+        face = meter.measure(left, right, estimate(moved), PLANNED, ())
         assert face is not None
         angle_deg, off_mm = errors(face)
         covered += [angle_deg <= face.bound_deg, abs(off_mm) <= face.bound_mm]
@@ -69,7 +90,7 @@ def test_a_pose_that_is_off_is_in_the_bound(meter: FaceMeter) -> None:
 
 
 def test_what_covers_a_part_of_the_face_does_not_move_it(meter: FaceMeter) -> None:
-    face = meter.measure(*pictures(pose(), cover=Cover(-8.0)), estimate(pose()), PLANNED)
+    face = meter.measure(*pictures(pose(), cover=Cover(-8.0)), estimate(pose()), PLANNED, ())
     assert face is not None
     angle_deg, off_mm = errors(face)
     assert angle_deg <= face.bound_deg
@@ -79,16 +100,16 @@ def test_what_covers_a_part_of_the_face_does_not_move_it(meter: FaceMeter) -> No
 
 def test_a_face_that_is_hidden_or_looks_away_is_not_measured(meter: FaceMeter) -> None:
     hidden = pictures(pose(), cover=Cover(100.0))
-    found = meter.measure(*hidden, estimate(pose()), PLANNED)
+    found = meter.measure(*hidden, estimate(pose()), PLANNED, ())
     assert found is None or not found.is_told
     away = pose(tilt_deg=170.0)
-    assert meter.measure(*pictures(pose()), estimate(away), PLANNED) is None
+    assert meter.measure(*pictures(pose()), estimate(away), PLANNED, ()) is None
 
 
 def test_measurements_of_one_view_join_and_are_known_no_better_than_one(meter: FaceMeter) -> None:
     faces = []
     for seed in range(4):
-        face = meter.measure(*pictures(pose(), seed=seed), estimate(pose()), PLANNED)
+        face = meter.measure(*pictures(pose(), seed=seed), estimate(pose()), PLANNED, ())
         assert face is not None
         faces.append(face)
     joined = join_faces(faces)
@@ -103,7 +124,7 @@ def test_measurements_of_one_view_join_and_are_known_no_better_than_one(meter: F
 def test_a_face_seen_at_a_grazing_angle_tells_nothing_and_breaks_nothing(
     meter: FaceMeter, tilt_deg: float
 ) -> None:
-    face = meter.measure(*pictures(pose()), estimate(pose(tilt_deg)), PLANNED)
+    face = meter.measure(*pictures(pose()), estimate(pose(tilt_deg)), PLANNED, ())
     assert face is None or tilt_deg < 85.0
 
 
@@ -112,13 +133,13 @@ def test_what_lies_beside_the_picture_is_not_seen(meter: FaceMeter) -> None:
     moved = RigidTransform.from_parts(
         "left", "femur", whole.rotation, whole.translation_mm + np.array([0.0, -42.0, 0.0])
     )
-    face = meter.measure(*pictures(moved), estimate(moved), PLANNED)
+    face = meter.measure(*pictures(moved), estimate(moved), PLANNED, ())
     assert face is not None
     assert 0.2 < face.seen_share < 0.75
 
 
 def test_errors_that_the_plan_and_the_rig_share_are_in_the_bound(meter: FaceMeter) -> None:
-    taken = *pictures(pose()), estimate(pose()), PLANNED
+    taken = *pictures(pose()), estimate(pose()), PLANNED, ()
     plain = meter.measure(*taken)
     n = len(bone().mesh.vertices_mm)
     segmented = replace(bone(), surface_sd_mm=0.1)

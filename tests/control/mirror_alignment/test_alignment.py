@@ -28,7 +28,6 @@ from tests.control.mirror_alignment.rooms import (
     steps,
     until_aimed,
 )
-from tests.many import few_of
 
 
 @pytest.fixture
@@ -425,7 +424,8 @@ def test_two_refused_ends_of_the_depth_are_asked_for_again(room):
     assert steps(session, 4).phase is AlignmentPhase.MOVING
 
 
-@pytest.mark.parametrize("seed", few_of((11, 12, 13), 0))
+@pytest.mark.release
+@pytest.mark.parametrize("seed", [11, 12, 13])
 def test_the_board_stays_around_its_first_place(seed):
     """However many crosses are asked for."""
     room = MirrorRoom(seed)
