@@ -47,7 +47,7 @@ test: setup  ## style, types, import rules and the tests: some minutes
 	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels tests
 
 test-all: setup check bytecode  ## the release gate: as test, with every case of every test
-	$(PYTEST) -n 3 --dist loadgroup --release
+	$(PYTEST) -n 4 --dist loadgroup --release
 	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
 .PHONY: bytecode checked-kernels tests
@@ -59,9 +59,9 @@ checked-kernels: setup bytecode
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
 
-# With +, line by line as they come. One more worker than cores: some tests wait in real time.
+# With +, line by line as they come. More workers than cores: some tests wait in real time.
 tests: check bytecode
-	+$(PYTEST) -n 3 --dist loadgroup
+	+$(PYTEST) -n 4 --dist loadgroup
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .
