@@ -1,5 +1,6 @@
 """Words beside what they name, placed so that none lies over another."""
 
+import math
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -33,8 +34,9 @@ class LabelBoard:
 
     def add(self, text: str, at_px: NDArray[np.float64], colour: Colour) -> None:
         """Ask for a label beside a point; one that is not in any picture is left out."""
-        if np.isfinite(at_px).all():
-            self._asked.append((text, (float(at_px[0]), float(at_px[1])), colour))
+        x, y = at_px.tolist()
+        if math.isfinite(x) and math.isfinite(y):
+            self._asked.append((text, (x, y), colour))
 
     def draw(self, image: Image) -> list[Box]:
         """Place and draw what was asked for; where nothing is free, a label is left out."""
@@ -58,10 +60,10 @@ class LabelBoard:
             taken.append((box.x, box.y, box.width, box.height))
             placed.append(box)
             nearest = (
-                int(np.clip(at[0], box.x, box.x + box.width)),
-                int(np.clip(at[1], box.y, box.y + box.height)),
+                int(min(max(at[0], box.x), box.x + box.width)),
+                int(min(max(at[1], box.y), box.y + box.height)),
             )
-            if np.hypot(nearest[0] - at[0], nearest[1] - at[1]) > 1.5 * _DISTANCES_PX[0]:
+            if math.hypot(nearest[0] - at[0], nearest[1] - at[1]) > 1.5 * _DISTANCES_PX[0]:
                 start = round(at[0]), round(at[1])
                 cv2.line(image, start, nearest, colour, 1, cv2.LINE_AA)
             baseline = box.y + box.height - _PADDING_PX - round(8 * self.size)
