@@ -95,7 +95,8 @@ class GapMeter:
         gap_mm = float(heights_mm[k])
         on_femur = femur.camera_from_bone.apply(points_mm[k])
         on_tibia = tibia.camera_from_bone.apply(self._tibia_mm[int(nearest[k])])
-        direction = (on_femur - on_tibia) / max(abs(gap_mm), 1e-9)
+        apart_mm = on_femur - on_tibia
+        direction = apart_mm / max(float(np.linalg.norm(apart_mm)), 1e-9)
         variance = sum(
             _variance(direction, point - one.camera_from_bone.apply(centre), one.covariance)
             for point, one, centre in zip(
