@@ -16,7 +16,7 @@ from navapp.overlay.labels import Image, LabelBoard
 from navapp.overlay.layers import LAYERS
 from navapp.overlay.scene import SKIN_MM, Scene
 from navapp.overlay.shading import draw_body, draw_bone
-from navapp.overlay.strokes import blend_strokes, trace_strokes
+from navapp.overlay.strokes import blend_strokes, prepare_strokes
 
 
 def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoard) -> Image:
@@ -55,9 +55,10 @@ def paint(
     labels: LabelBoard,
 ) -> None:
     """All that was asked for, into a picture (H, W, 3); one view for each body."""
+    # Both threads need the ground. Lines are traced by the helper while surfaces are drawn.
     _ = scene.ground
-    trace = partial(trace_strokes, scene, drawing.strokes, threading.get_ident())
-    with begin_on_helper(trace) as traced:
+    prepare = partial(prepare_strokes, scene, drawing.strokes, threading.get_ident())
+    with begin_on_helper(prepare) as traced:
         draw_bone(image, scene, drawing.tints, drawing.outline)
         for body, view in zip(drawing.bodies, views, strict=True):
             draw_body(image, scene, view, body)

@@ -12,8 +12,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import Colour
 from navapp.overlay.drawing import Stroke
 from navapp.overlay.scene import Scene
-from navapp.overlay.stroke_kernels import Ground, Room, blend_places
-from navapp.overlay.stroke_kernels import trace_strokes as trace
+from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_strokes
 
 Image = NDArray[np.uint8]
 
@@ -63,12 +62,12 @@ def sample_line(points_mm: FloatArray, step_mm: float = _STEP_MM) -> FloatArray:
 class Traced(NamedTuple):
     """Strokes, traced: which pixels they cover, and how much of each."""
 
-    room: Room
+    room: Room  # its first places, until it is traced in again
     n_places: int
     colours: NDArray[np.float32]  # (S, 3) of the strokes
 
 
-def trace_strokes(scene: Scene, strokes: Sequence[Stroke], thread: int) -> Traced | None:
+def prepare_strokes(scene: Scene, strokes: Sequence[Stroke], thread: int) -> Traced | None:
     """Trace strokes in their order; None without any.
 
     They are dashed where they lie beneath something or where that is not known, left out where a
@@ -134,10 +133,10 @@ def _trace(
     widths_px, rims_px, colours = pens
     pens_px = 0.5 * np.array(widths_px), np.array(rims_px)
     depth_mm = np.ascontiguousarray(depth_mm)
-    n = trace(pixels, depth_mm, *parts, *pens_px, ground, room)
+    n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
     while n == len(room.place):
         room = _enlarge(room)
-        n = trace(pixels, depth_mm, *parts, *pens_px, ground, room)
+        n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
     return Traced(room, n, np.array(colours, dtype=np.float32))
 
 

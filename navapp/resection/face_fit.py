@@ -137,7 +137,7 @@ def find_covariance(
     errors' correlation K is Gaussian in distance.
 
     Args:
-        places: (N, 3) of the pixels.
+        places: (N, 3) of pixels, whole px apart.
         weight: (N,) of their residuals in the fit, W.
         growth: (N,) by how much a residual's pull grows with it, G.
         residual: (N,) px.

@@ -40,9 +40,8 @@ _STRIDE_PX = 2
 _MAX_ROUNDS, _REST_PX = 6, 0.02
 # The matcher sees no further from the plane that it is given.
 _NEAR_PX = 1.0
-# By how much highlights move a face (standard deviation; on simulated knees 0.1 to 0.2 px in the
-# light of a lamp, nothing elsewhere), and which share of the difference between the planes with and
-# without them is left open.
+# By how much highlights move a face (standard deviation, as tests.bench.face_highlights shows it on
+# chamfers), and which share of the difference of the planes with and without them is left open.
 _HIGHLIGHT_PX, _LEFT_OPEN = 0.1, 0.5
 # The lamp may be so much less blue than white is in the pictures (standard deviation).
 _OTHER_LAMP = 0.8
@@ -168,8 +167,7 @@ class FaceMeter:
             if unclipped is None:
                 return None
             fit = unclipped
-        matte = self._fit_matte(pair, view, fit, 1.0)
-        other = matte and self._fit_matte(pair, view, fit, _OTHER_LAMP)
+        matte, other = (self._fit_matte(pair, view, fit, blue) for blue in (1.0, _OTHER_LAMP))
         if matte is None or other is None:
             return self._leave_highlights_open(fit, view)
         moved = matte.coefficients - fit.coefficients

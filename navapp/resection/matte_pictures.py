@@ -1,9 +1,9 @@
 """Pictures without highlights: what a wet face mirrors of a lamp is white, and moves with the eye.
 
-On a sawn face that mirrors a lamp the two cameras see glints in different places, and match a face
-0.1 to 0.2 px off. Light that is mirrored has the lamp's colour, light from within the bone has the
-bone's own. In pictures whose white is the lamp's, red less blue holds nothing of what is mirrored,
-but where a channel is clipped.
+On a sawn face that mirrors a lamp the two cameras see glints in different places, and match the
+face beside where it is (`python -m tests.bench.face_highlights`). Light that is mirrored has the
+lamp's colour, light from within the bone has the bone's own. In pictures whose white is the lamp's,
+red less blue holds nothing of what is mirrored, but where a channel is clipped.
 
 Source: the dichromatic model of reflection, Shafer 1985.
 """

@@ -41,7 +41,9 @@ class StepTable(TextView):
             lines += _tell_made(step, snapshot.stage, view.symbols)
         if more:
             lines.append(
-                Content.styled(f" {more} steps have no letter: a script names them", "$warning")
+                Content.styled(
+                    f" {more} steps have no letter: confirm them in a script", "$warning"
+                )
             )
         version = f" version {snapshot.bone_version} of the {snapshot.stage.bone} is in force"
         notes = (

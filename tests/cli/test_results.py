@@ -93,9 +93,9 @@ def test_a_replay_says_where_its_session_found_the_rig_moved() -> None:
 
 def test_faces_are_told_against_their_plan_and_joined_over_frames() -> None:
     plane = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    little = np.diag([1e-6, 1e-6, 1e-4])
+    little = np.diag([2e-6, 2e-6, 2e-4])
     faces = [
-        MeasuredFace(plane, np.array([0.0, np.tan(np.radians(1.0)), off]), 2.0 * little, share)
+        MeasuredFace(plane, np.array([0.0, np.tan(np.radians(1.0)), off]), little, share)
         for off, share in ((-0.5, 0.6), (-0.3, 0.8))
     ]
     told = [{"top": face} for face in faces]

@@ -37,5 +37,5 @@ class Faces:
         share = self.shares.get("top" if planned is TOP else "side")
         if share is None:
             return None
-        little = np.diag([1e-6, 1e-6, 1e-3])
-        return MeasuredFace(planned, np.array([0.01, 0.0, self.offset_mm]), 2.0 * little, share)
+        little = np.diag([2e-6, 2e-6, 2e-3])
+        return MeasuredFace(planned, np.array([0.01, 0.0, self.offset_mm]), little, share)

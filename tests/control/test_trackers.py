@@ -173,8 +173,8 @@ def test_faces_in_the_same_picture_make_a_loose_registration_a_sure_one(
 
     def measure(meter, left, right, estimate, planned, others, expected=None):
         asked.append(estimate)
-        little = np.diag([1e-6, 1e-6, 1e-4])
-        face = MeasuredFace(planned, np.array([0.0, 0.0, 6.0]), 2.0 * little, 0.9)
+        little = np.diag([2e-6, 2e-6, 2e-4])
+        face = MeasuredFace(planned, np.array([0.0, 0.0, 6.0]), little, 0.9)
         return face if is_seen else None
 
     monkeypatch.setattr(FaceMeter, "measure", measure)

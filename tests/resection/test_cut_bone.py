@@ -20,8 +20,8 @@ from tests.geometry.shapes import sphere
 
 TOP = ResectionPlane("femur", np.array([0.0, 0.0, 8.0]), np.array([0.0, 0.0, 1.0]))
 SIDE = ResectionPlane("femur", np.array([8.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
-LITTLE = np.diag([1e-6, 1e-6, 1e-3])
-FACE = MeasuredFace(TOP, np.zeros(3), 2.0 * LITTLE, 0.8)
+LITTLE = np.diag([2e-6, 2e-6, 2e-3])
+FACE = MeasuredFace(TOP, np.zeros(3), LITTLE, 0.8)
 
 
 def whole() -> CutBone:

@@ -39,7 +39,7 @@ def test_a_tilt_counts_by_its_arm() -> None:
 
 def test_a_plan_beside_the_bone_takes_nothing_off() -> None:
     away = replace(PLANE, point_mm=np.array([0.0, 0.0, 30.0]))
-    one = MeasuredFace(away, np.zeros(3), 2.0 * SMALL, 0.9)
+    one = MeasuredFace(away, np.zeros(3), SMALL, 0.9)
     assert measure_thickness(BONE, one) is None
 
 

@@ -18,8 +18,8 @@ from tests.ui import snapshots
 from tests.ui.test_app import BellCounter, play
 
 PLANE = ResectionPlane("femur", np.zeros(3), np.array([0.0, 0.0, -1.0]))
-SMALL = np.diag([1e-6, 1e-6, 1e-3])
-FACE = MeasuredFace(PLANE, np.array([np.tan(np.radians(1.3)), 0.0, -0.55]), 2.0 * SMALL, 0.8)
+SMALL = np.diag([2e-6, 2e-6, 2e-3])
+FACE = MeasuredFace(PLANE, np.array([np.tan(np.radians(1.3)), 0.0, -0.55]), SMALL, 0.8)
 STEPS = (
     StepLine(
         "femur_distal",
