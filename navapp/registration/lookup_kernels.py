@@ -8,6 +8,10 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 
+# Chosen: after two, one voxel in five hundred knows a vertex that is not the nearest, and none of
+# them one that is 0.2 mm further.
+_ROUNDS = 2
+
 
 class VoxelGrid(NamedTuple):
     """Which point is near each place; lengths in mm, in the frame of the points."""
@@ -44,6 +48,16 @@ def find_voxel(x: float, y: float, z: float, grid: VoxelGrid) -> tuple[int, int,
 
 
 @njit(cache=True, nogil=True)
+def _centre_mm(ix: int, iy: int, iz: int, grid: VoxelGrid) -> tuple[float, float, float]:
+    """Of a voxel."""
+    return (
+        grid.origin[0] + ix * grid.voxel,
+        grid.origin[1] + iy * grid.voxel,
+        grid.origin[2] + iz * grid.voxel,
+    )
+
+
+@njit(cache=True, nogil=True)
 def has_voxel(grid: VoxelGrid, ix: int, iy: int, iz: int) -> bool:
     """Whether the voxel lies inside the grid."""
     nx, ny, nz = grid.nearest.shape
@@ -69,9 +83,22 @@ def find_vertex(
     nx, ny, nz = grid.nearest.shape
     ix, iy, iz = find_voxel(x, y, z, grid)
     ix, iy, iz = min(max(ix, 0), nx - 1), min(max(iy, 0), ny - 1), min(max(iz, 0), nz - 1)
-    best: int = grid.nearest[ix, iy, iz]
-    least = squared_distance(x, y, z, points, best)
-    start = -1
+    first: int = grid.nearest[ix, iy, iz]
+    least = squared_distance(x, y, z, points, first)
+    best: int = _descend(x, y, z, points, neighbours, first, least)[0]
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _descend(
+    x: float, y: float, z: float, points: FloatArray, neighbours: NDArray[np.int32],
+    first: int, least: float,
+) -> tuple[int, float]:  # fmt: skip
+    """From a vertex to its neighbour that is nearest to a place, while one is nearer.
+
+    With `least`, its squared distance; the answer's as well.
+    """
+    best, start = first, -1
     while start != best:
         start = best
         for k in range(neighbours.shape[1]):
@@ -82,7 +109,7 @@ def find_vertex(
             if squared < least:
                 least = squared
                 best = other
-    return best
+    return best, least
 
 
 @njit(cache=True, nogil=True)
@@ -105,9 +132,7 @@ def offer_point(
     points_mm: FloatArray, i: int, ix: int, iy: int, iz: int, grid: VoxelGrid, squared: FloatArray
 ) -> None:
     """Point i becomes a voxel's nearest if it is; `squared` holds the distances of the nearest."""
-    x = grid.origin[0] + ix * grid.voxel
-    y = grid.origin[1] + iy * grid.voxel
-    z = grid.origin[2] + iz * grid.voxel
+    x, y, z = _centre_mm(ix, iy, iz, grid)
     offered = squared_distance(x, y, z, points_mm, i)
     if offered < squared[ix, iy, iz]:
         squared[ix, iy, iz] = offered
@@ -124,12 +149,46 @@ def fill_scene_grid(points_mm: FloatArray, every: int, grid: VoxelGrid) -> None:
     Source: vector distance transform, Danielsson 1980; not exact, which pairs that only widen the
     basin do not need.
     """
+    squared = np.full(grid.nearest.shape, np.inf)
+    _seed(points_mm, every, grid, squared)
+    _sweep(points_mm, grid, squared)
+
+
+@njit(cache=True, nogil=True)
+def fill_model_grid(points_mm: FloatArray, neighbours: NDArray[np.int32], grid: VoxelGrid) -> None:
+    """The vertex (V, 3) nearest to each voxel's centre, or one that is hardly further.
+
+    Handed on as in `fill_scene_grid`; each voxel then looks among the neighbours (V, K, -1 padded)
+    of what it was given for a nearer one, and hands that on. `grid.nearest` is written in place and
+    must be -1. A tree takes ten times as long.
+    """
+    squared = np.full(grid.nearest.shape, np.inf)
+    _seed(points_mm, 1, grid, squared)
     nx, ny, nz = grid.nearest.shape
-    squared = np.full((nx, ny, nz), np.inf)
+    for _ in range(_ROUNDS):
+        _sweep(points_mm, grid, squared)
+        for ix in range(nx):
+            for iy in range(ny):
+                for iz in range(nz):
+                    x, y, z = _centre_mm(ix, iy, iz, grid)
+                    first, least = grid.nearest[ix, iy, iz], squared[ix, iy, iz]
+                    best, least = _descend(x, y, z, points_mm, neighbours, first, least)
+                    grid.nearest[ix, iy, iz], squared[ix, iy, iz] = best, least
+
+
+@njit(cache=True, nogil=True)
+def _seed(points_mm: FloatArray, every: int, grid: VoxelGrid, squared: FloatArray) -> None:
+    """Offer every n-th point to the voxel that it lies in, if there is one."""
     for i in range(0, points_mm.shape[0], every):
         ix, iy, iz = find_voxel(points_mm[i, 0], points_mm[i, 1], points_mm[i, 2], grid)
         if has_voxel(grid, ix, iy, iz):
             offer_point(points_mm, i, ix, iy, iz, grid, squared)
+
+
+@njit(cache=True, nogil=True)
+def _sweep(points_mm: FloatArray, grid: VoxelGrid, squared: FloatArray) -> None:
+    """Hand points on from voxel to voxel, forth and back."""
+    nx, ny, nz = grid.nearest.shape
     xs, ys, zs = np.arange(nx), np.arange(ny), np.arange(nz)
     for step in (1, -1):
         for ix in xs[::step]:

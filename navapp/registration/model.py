@@ -13,7 +13,12 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
-from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, find_vertices
+from navapp.registration.lookup_kernels import (
+    ModelArrays,
+    VoxelGrid,
+    fill_model_grid,
+    find_vertices,
+)
 from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.values import BoneModel
 
@@ -80,16 +85,14 @@ class RegistrationModel:
     @cached_property
     def arrays(self) -> ModelArrays:
         """What the compiled loops read; made at first use."""
-        # Most places that are asked for lie far from all points: large, loose boxes answer sooner.
-        tree = cKDTree(self.points_mm, leafsize=64, compact_nodes=False, balanced_tree=False)
-        neighbours = find_neighbours(self.points_mm, self.bone.mesh.faces, tree)
+        neighbours = find_neighbours(self.points_mm, self.bone.mesh.faces)
         curvatures, spacing = compute_curvature(self.points_mm, self.normals, neighbours)
         low = self.points_mm.min(axis=0) - _GRID_MARGIN_MM
         size = np.ptp(self.points_mm, axis=0) + 2.0 * _GRID_MARGIN_MM
         voxel = max(_FINEST_VOXEL_MM, float((size.prod() / _MOST_VOXELS) ** (1.0 / 3.0)))
         shape = np.ceil(size / voxel).astype(int) + 1
-        _, nearest = tree.query(low + voxel * np.indices(shape).reshape(3, -1).T, workers=2)
-        grid = VoxelGrid(np.asarray(nearest, dtype=np.int32).reshape(shape), low, voxel)
+        grid = VoxelGrid(np.full(shape, -1, dtype=np.int32), low, voxel)
+        fill_model_grid(self.points_mm, neighbours, grid)
         is_border = open_border(len(self.points_mm), self.bone.mesh.faces)
         has_normal = np.linalg.norm(self.normals, axis=1) > 0.5
         return ModelArrays(

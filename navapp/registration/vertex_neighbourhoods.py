@@ -1,9 +1,8 @@
 """Neighbours of each model point, and how the surface bends there."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from navapp.geometry.transform import FloatArray
 
@@ -14,13 +13,11 @@ _CLOUD_NEIGHBOURS = 8
 _TIGHTEST_RADIUS = 1.5
 
 
-def find_neighbours(
-    points_mm: FloatArray, faces: NDArray[np.int32], tree: Any
-) -> NDArray[np.int32]:
+def find_neighbours(points_mm: FloatArray, faces: NDArray[np.int32]) -> NDArray[np.int32]:
     """(V, K) vertices beside each of (V, 3), padded with -1.
 
     Along the edges of the faces (F, 3); the nearest ones, made mutual, for vertices that no edge
-    touches. `tree` is a `cKDTree` of the points.
+    touches.
     """
     n = len(points_mm)
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -28,7 +25,7 @@ def find_neighbours(
     is_alone[faces.ravel()] = False
     alone = np.flatnonzero(is_alone)
     if len(alone):
-        _, index = tree.query(points_mm[alone], k=min(_CLOUD_NEIGHBOURS + 1, n))
+        _, index = cKDTree(points_mm).query(points_mm[alone], k=min(_CLOUD_NEIGHBOURS + 1, n))
         index = np.asarray(index).reshape(len(alone), -1)
         near = np.column_stack([np.repeat(alone, index.shape[1]), index.ravel()])
         pairs = np.concatenate([pairs, near[near[:, 0] != near[:, 1]]])

@@ -32,6 +32,20 @@ def test_the_nearest_vertex_is_found(spread_mm: float) -> None:
 
 
 @pytest.mark.kernel
+def test_each_voxel_of_the_models_grid_knows_the_nearest_vertex_or_one_that_is_hardly_further() -> (
+    None
+):
+    grid = MODEL.arrays.grid
+    cells = np.stack(np.indices(grid.nearest.shape), axis=-1).reshape(-1, 3)[::7]
+    centres = grid.origin + grid.voxel * cells
+    known = grid.nearest[tuple(cells.T)]
+    _, least = nearest_by_trying_all(centres, MODEL.points_mm)
+    excess = np.linalg.norm(centres - MODEL.points_mm[known], axis=1) - least
+    assert (excess < 1e-9).mean() > 0.99
+    assert excess.max() < 0.3
+
+
+@pytest.mark.kernel
 def test_a_point_outside_the_grid_gets_a_vertex_on_its_own_side() -> None:
     far = np.concatenate([500.0 * np.eye(3), -1e9 * np.eye(3)])
     index, distance = MODEL.nearest(far)

@@ -9,7 +9,7 @@ NO_FACES = np.empty((0, 3), dtype=np.int32)
 
 
 def table_of(mesh) -> np.ndarray:
-    return find_neighbours(mesh.vertices_mm, mesh.faces, cKDTree(mesh.vertices_mm))
+    return find_neighbours(mesh.vertices_mm, mesh.faces)
 
 
 def matrices(form: np.ndarray) -> np.ndarray:
@@ -39,7 +39,7 @@ def test_padding_stands_at_the_end() -> None:
 
 def test_a_cloud_has_its_nearest_points_as_neighbours_and_they_have_it() -> None:
     points = np.random.default_rng(1).uniform(0.0, 10.0, (200, 3))
-    table = find_neighbours(points, NO_FACES, cKDTree(points))
+    table = find_neighbours(points, NO_FACES)
     nearest = cKDTree(points).query(points, k=2)[1][:, 1]
     assert ((table >= 0).sum(axis=1) >= 8).all()
     is_full = (table >= 0).all(axis=1)
@@ -52,14 +52,14 @@ def test_a_cloud_has_its_nearest_points_as_neighbours_and_they_have_it() -> None
 @pytest.mark.parametrize("n", [1, 2, 5])
 def test_a_cloud_of_few_points_is_allowed(n: int) -> None:
     points = np.random.default_rng(1).uniform(0.0, 10.0, (n, 3))
-    table = find_neighbours(points, NO_FACES, cKDTree(points))
+    table = find_neighbours(points, NO_FACES)
     assert ((table >= 0).sum(axis=1) == n - 1).all()
 
 
 def test_a_vertex_that_no_face_touches_is_joined_to_the_mesh() -> None:
     mesh = grid_mesh(lambda x, y: 0.0 * x, 10.0)
     points = np.concatenate([mesh.vertices_mm, [[0.3, 0.2, 1.0]]])
-    table = find_neighbours(points, mesh.faces, cKDTree(points))
+    table = find_neighbours(points, mesh.faces)
     alone = len(points) - 1
     assert (table[alone] >= 0).sum() == 8
     assert alone in table[table[alone, 0]]
