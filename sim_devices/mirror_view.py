@@ -1,7 +1,6 @@
 """What a camera at the eye's place sees: the site through the plate, the monitor by its faces."""
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.transform import FloatArray, RigidTransform
 from sim_devices.mirror_kernels import reflect_screen, see_sheet
 from sim_devices.mirror_optics import MirrorSetup
+from sim_devices.pixel_rays import corner_rays
 from sim_devices.sheet import PrintedSheet
 
 _INK, _PAPER, _TABLE = 0.05, 0.8, 0.1
@@ -29,14 +29,6 @@ class MirrorView:
         self.setup, self.camera, self.eye_from_left = setup, camera, eye_from_left
         turn, self._eye_mm = eye_from_left.inverse_parts()
         self._turn = np.ascontiguousarray(turn)
-
-    @cached_property
-    def _rays(self) -> FloatArray:
-        """(H + 1, W + 1, 2) directions through the pixels' corners; only pictures need them."""
-        width, height = self.camera.width, self.camera.height
-        u, v = np.meshgrid(np.arange(width + 1) - 0.5, np.arange(height + 1) - 0.5)
-        rays = self.camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
-        return np.ascontiguousarray(rays.reshape(*u.shape, 2))
 
     def render(
         self,
@@ -67,7 +59,7 @@ class MirrorView:
                 ]
             )
             reflect_screen(
-                self._rays, self._turn, self._eye_mm, self._plate_rows(), place,
+                corner_rays(self.camera), self._turn, self._eye_mm, self._plate_rows(), place,
                 self._luminance(screen_image_bgr, n_channels), n_samples, picture,
             )  # fmt: skip
         if site_reflectance is not None:
@@ -89,8 +81,8 @@ class MirrorView:
         )
         picture = np.empty((self.camera.height, self.camera.width), np.float32)
         see_sheet(
-            self._rays, self._turn, self._eye_mm, self._plate_rows(), place, texture, n, _TABLE,
-            picture,
+            corner_rays(self.camera), self._turn, self._eye_mm, self._plate_rows(), place,
+            texture, n, _TABLE, picture,
         )  # fmt: skip
         return picture
 

@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +12,7 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from sim_devices.materials import MaterialId
+from sim_devices.pixel_rays import centre_rays
 from sim_devices.raster_kernels import project_vertices, raster_triangles
 from sim_devices.shading_kernels import shade
 from sim_devices.textures import COARSE_VOXEL_MM, FINE_VOXEL_MM, NoiseTile
@@ -125,7 +125,7 @@ class Renderer:
         self._geometry = _Geometry(parts)
         self._static = [part.body in static_bodies for part in self._geometry.parts]
         self._numbers = _camera_numbers(camera)
-        self._rays = _rays(camera)
+        self._rays = centre_rays(camera)
         shape = (camera.height, camera.width)
         self._screen = np.zeros((len(self._geometry.attributes), 3))
         self._inverse_depth = np.zeros(shape, dtype=np.float32)
@@ -293,11 +293,3 @@ def _camera_numbers(camera: Camera) -> NDArray[np.float64]:
     numbers[:4] = matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]
     numbers[4 : 4 + min(12, camera.distortion.size)] = camera.distortion[:12]
     return numbers
-
-
-@lru_cache(maxsize=4)
-def _rays(camera: Camera) -> FloatImage:
-    """(H, W, 2) x / z and y / z of every pixel's ray; kept, as each stage has its own renderer."""
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
-    rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
-    return np.ascontiguousarray(rays.reshape(camera.height, camera.width, 2), dtype=np.float32)

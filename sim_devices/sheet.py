@@ -10,6 +10,7 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from sim_devices.camera import Scene
+from sim_devices.pixel_rays import corner_rays
 from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
 from sim_devices.sensor import Eye
 from sim_devices.sheet_kernels import draw_sheet
@@ -143,11 +144,7 @@ class SheetScene:
         if key not in self._rays:
             rig = self.rig if scale == 1.0 else self.rig.scale(scale)
             camera = rig.left if eye == "left" else rig.right
-            u, v = np.meshgrid(
-                np.arange(camera.width + 1) - 0.5, np.arange(camera.height + 1) - 0.5
-            )
-            rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
-            self._rays[key] = camera, np.ascontiguousarray(rays.reshape(*u.shape, 2))
+            self._rays[key] = camera, corner_rays(camera)
         return self._rays[key]
 
 

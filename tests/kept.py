@@ -1,4 +1,4 @@
-"""Simulated knees and CTs, kept on disk: making one takes a second and more, in every worker.
+"""Simulated knees, CTs, tissue and components, kept on disk: making one takes a second and more.
 
 Folders are named after a hash of the sources and the libraries that make what is in them, files
 after its parameters: what is read is what would be made now. They may be deleted at any time.
@@ -12,7 +12,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from functools import cache, lru_cache
 from pathlib import Path
@@ -25,11 +25,13 @@ import numpy as np
 import scipy
 
 from navapp.geometry.mesh import TriangleMesh
-from sim_devices import anatomy
+from sim_devices import anatomy, components, tissue
 from sim_devices.anatomy import KneeAnatomy, KneeSpec
 from sim_devices.bone_shapes import ShapeDraws
 from sim_devices.ct_volume import CtVolume
 from sim_devices.ct_volume import make_ct as make_new_ct
+from sim_devices.planned_cuts import Cut
+from sim_devices.tissue import Sheet
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / ".pytest_cache" / "kept"
@@ -41,6 +43,8 @@ _OLD_S = 24 * 3600.0
 Arrays = dict[str, np.ndarray]
 
 make_new_knee = anatomy.make_knee
+make_new_tissue = tissue.make_tissue
+make_new_femoral_component = components.make_femoral_component
 _FIRST = KneeSpec()
 
 
@@ -175,7 +179,54 @@ def make_ct(spec: KneeSpec, spacing_mm: tuple[float, float, float], seed: int) -
     return CtVolume(**arrays)
 
 
+def make_tissue(
+    exposed_bones: Sequence[TriangleMesh],
+    bones: Sequence[TriangleMesh],
+    seed: int,
+    freed: Sequence[TriangleMesh] = (),
+) -> Sheet:
+    """`sim_devices.tissue.make_tissue`, kept."""
+
+    def make() -> Arrays:
+        sheet = make_new_tissue(exposed_bones, bones, seed, freed)
+        return {**_arrays_of_mesh(sheet.mesh), "mark": sheet.mark, "exposure": sheet.exposure}
+
+    meshes = [[_hash_of(mesh) for mesh in one] for one in (exposed_bones, bones, freed)]
+    arrays = keep(FOLDER, ("tissue", meshes, seed), make)
+    return Sheet(_mesh_of(arrays), arrays["mark"], arrays["exposure"])
+
+
+def make_femoral_component(
+    knee: KneeAnatomy, cuts: Sequence[Cut], cell_mm: float | None = None
+) -> TriangleMesh:
+    """`sim_devices.components.make_femoral_component`, kept."""
+    size = () if cell_mm is None else (cell_mm,)
+    planes = [(cut.point_mm.tolist(), cut.normal.tolist()) for cut in cuts]
+    return _mesh_of(
+        keep(
+            FOLDER,
+            ("femoral component", knee.spec, planes, size),
+            lambda: _arrays_of_mesh(make_new_femoral_component(knee, cuts, *size)),
+        )
+    )
+
+
+def _hash_of(mesh: TriangleMesh) -> str:
+    arrays = mesh.vertices_mm, mesh.faces, mesh.normals
+    return hashlib.sha256(b"".join(one.tobytes() for one in arrays)).hexdigest()
+
+
+def _arrays_of_mesh(mesh: TriangleMesh) -> Arrays:
+    return {"vertices": mesh.vertices_mm, "faces": mesh.faces, "normals": mesh.normals}
+
+
+def _mesh_of(arrays: Arrays) -> TriangleMesh:
+    return TriangleMesh(arrays["vertices"], arrays["faces"], arrays["normals"])
+
+
 def install() -> None:
-    """Let `make_knee` be the kept one for all who import it from now on."""
+    """Let what makes them be the kept one for all who import it from now on."""
     sources_hash()  # of the sources as they were imported, whatever is edited meanwhile
     anatomy.make_knee = make_knee
+    tissue.make_tissue = make_tissue
+    components.make_femoral_component = make_femoral_component

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sim_devices.anatomy import KneeSpec
+from sim_devices.planned_cuts import make_planned_cuts
 from tests import kept
 
 SPEC = KneeSpec(3, "left", "male", "old")
@@ -34,6 +35,24 @@ def test_a_kept_knee_is_the_simulators(tmp_path, monkeypatch, is_there: bool) ->
         assert list(found) == list(wanted)
         for name in wanted:
             np.testing.assert_array_equal(found[name], wanted[name])
+
+
+def test_kept_tissue_and_components_are_the_simulators(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(kept, "FOLDER", tmp_path)
+    knee = kept.make_knee(SPEC)
+    femur = knee.bones["femur"]
+    cuts = [cut for cut in make_planned_cuts(knee).values() if cut.bone == "femur"]
+    true = kept.make_new_tissue([femur], [femur], 3), kept.make_new_femoral_component(knee, cuts)
+    for _ in range(2):
+        sheet = kept.make_tissue([femur], [femur], 3)
+        ours = sheet, kept.make_femoral_component(knee, cuts)
+        np.testing.assert_array_equal(sheet.mark, true[0].mark)
+        np.testing.assert_array_equal(sheet.exposure, true[0].exposure)
+        for found, wanted in ((ours[0].mesh, true[0].mesh), (ours[1], true[1])):
+            for part in ("vertices_mm", "faces", "normals"):
+                np.testing.assert_array_equal(getattr(found, part), getattr(wanted, part))
+        monkeypatch.setattr(kept, "make_new_tissue", None)
+        monkeypatch.setattr(kept, "make_new_femoral_component", None)
 
 
 def test_solids_are_made_for_those_who_ask() -> None:

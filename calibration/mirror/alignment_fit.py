@@ -95,7 +95,13 @@ def _whiteners(
     model: DisplayModel, given: Alignments, sd_px: float, wander_sd_mm: float
 ) -> FloatArray:
     """(N, 2, 2) that turn residuals into such of standard deviation one."""
-    noise = compute_noise(model, given.points_mm, given.points_sd_mm, sd_px, wander_sd_mm)
+    return _whiteners_of(
+        compute_noise(model, given.points_mm, given.points_sd_mm, sd_px, wander_sd_mm)
+    )
+
+
+def _whiteners_of(noise: FloatArray) -> FloatArray:
+    """(N, 2, 2) for noise of covariance (N, 2, 2)."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
 
 
@@ -104,7 +110,12 @@ def compute_lengths(
 ) -> FloatArray:
     """(N,) residuals in units of their standard deviation."""
     residual = given.pixels - model.project(given.points_mm)
-    white = (_whiteners(model, given, sd_px, wander_sd_mm) @ residual[:, :, None])[:, :, 0]
+    return _lengths(_whiteners(model, given, sd_px, wander_sd_mm), residual)
+
+
+def _lengths(whiteners: FloatArray, residual: FloatArray) -> FloatArray:
+    """(N,) of residuals (N, 2) px, in units of their standard deviation."""
+    white = (whiteners @ residual[:, :, None])[:, :, 0]
     return np.asarray(np.linalg.norm(white, axis=1))
 
 
@@ -138,10 +149,14 @@ def estimate_sd_px(
 ) -> float:
     """The operator's noise with which the residuals are as large as they should be."""
     aim = max(1.0 - n_solved / (2.0 * len(given.pixels)), 0.1)
+    residual = given.pixels - model.project(given.points_mm)
+    # What the operator adds is the same everywhere.
+    others = compute_noise(model, given.points_mm, given.points_sd_mm, 0.0, wander_sd_mm)
     low, high = _LEAST_SD_PX, _MOST_SD_PX
     for _ in range(24):
         middle = (low * high) ** 0.5
-        lengths = np.minimum(compute_lengths(model, given, middle, wander_sd_mm), WORST)
+        white = _whiteners_of(others + middle**2 * np.eye(2))
+        lengths = np.minimum(_lengths(white, residual), WORST)
         is_larger = 0.5 * float((lengths**2).mean()) > aim
         low, high = (middle, high) if is_larger else (low, middle)
     return high

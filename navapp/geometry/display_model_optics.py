@@ -80,26 +80,6 @@ class VirtualScreen:
         points += (self.bulge_mm * (1.0 - share))[:, None] * self.normal
         return points
 
-    def intersect(self, from_mm: FloatArray, through_mm: FloatArray) -> FloatArray:
-        """(N, 2) px in which lines from (3,) or (N, 3) through (N, 3) meet the screen.
-
-        NaN where they do not, or behind where they begin.
-        """
-        start = (from_mm - self.middle_mm) @ self.axes.T
-        step = (through_mm - from_mm) @ self.axes.T
-        half = self.half_mm
-        curve = self.bulge_mm / float(half @ half)
-        a = curve * (step[..., :2] ** 2).sum(axis=-1)
-        b = step[..., 2] + 2.0 * curve * (start[..., :2] * step[..., :2]).sum(axis=-1)
-        c = start[..., 2] - self.bulge_mm + curve * (start[..., :2] ** 2).sum(axis=-1)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            # Of the two places the one that a flat screen leaves, without loss of digits.
-            reach = -2.0 * c / (b + np.copysign(np.sqrt(b * b - 4.0 * a * c), b))
-        reach = np.where(reach > 0.0, reach, np.nan)
-        flat = start[..., :2] + reach[..., None] * step[..., :2]
-        pixels: FloatArray = (flat + half) / self.pitch_mm
-        return pixels
-
     def move(self, turn_rad: ArrayLike, shift_mm: ArrayLike) -> "VirtualScreen":
         """Turned by a rotation vector (3,) about its middle, then shifted by (3,)."""
         rotation = rotation_from_vector(turn_rad)

@@ -37,21 +37,7 @@ class EyeView:
 
     @cached_property
     def _optics(self) -> "Optics":
-        from navapp.geometry.display_view_kernels import Optics
-
-        screen, glass = self.screen, self.glass
-        return Optics(
-            np.array(self.eye_from_left.inverse().translation_mm),
-            np.array(screen.middle_mm),
-            np.array(screen.axes),
-            np.array(screen.half_mm),
-            float(screen.pitch_mm),
-            float(screen.bulge_mm),
-            np.array([0.0, 0.0, 1.0] if glass is None else glass.normal),
-            0.0 if glass is None else float(glass.thickness_mm),
-            1.0 if glass is None else float(glass.refractive_index),
-            N_TURNS,
-        )
+        return _make_optics(self.screen, self.glass, self.eye_from_left.inverse().translation_mm)
 
     def to_display(self, image: NDArray[Any]) -> NDArray[Any]:
         """A picture (H, W, ...) as the eye reads it, turned for the display; contiguous."""
@@ -95,12 +81,34 @@ class EyeView:
 def project(
     screen: VirtualScreen, glass: Glass | None, eye_mm: FloatArray, points_mm: FloatArray
 ) -> FloatArray:
-    """(N, 2) px of the display's picture where points (N, 3) are drawn for an eye at (3,)."""
-    apparent = points_mm if glass is None else glass.apparent_mm(points_mm, eye_mm)
-    pixels = screen.intersect(eye_mm, apparent)
-    # Through a bulge a line may meet the paraboloid's far branch behind the eye's plane.
-    ahead = ((apparent - eye_mm) @ screen.normal) * ((screen.middle_mm - eye_mm) @ screen.normal)
-    return np.where((ahead > 0.0)[:, None], pixels, np.nan)
+    """(N, 2) px of the display's picture where points (N, 3) are drawn for an eye at (3,).
+
+    NaN at and behind the eye.
+    """
+    from navapp.geometry.display_view_kernels import project_to_screen
+
+    pixels = np.empty((len(points_mm), 2))
+    optics = _make_optics(screen, glass, eye_mm)
+    project_to_screen(np.ascontiguousarray(points_mm), optics, pixels)
+    return pixels
+
+
+def _make_optics(screen: VirtualScreen, glass: Glass | None, eye_mm: FloatArray) -> "Optics":
+    """What the compiled projection reads; arrays that it may write to are of another type."""
+    from navapp.geometry.display_view_kernels import Optics
+
+    return Optics(
+        np.array(eye_mm),
+        np.array(screen.middle_mm),
+        np.array(screen.axes),
+        np.array(screen.half_mm),
+        float(screen.pitch_mm),
+        float(screen.bulge_mm),
+        np.array([0.0, 0.0, 1.0] if glass is None else glass.normal),
+        0.0 if glass is None else float(glass.thickness_mm),
+        1.0 if glass is None else float(glass.refractive_index),
+        N_TURNS,
+    )
 
 
 def make_view(

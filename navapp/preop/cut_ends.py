@@ -1,5 +1,7 @@
 """Finds where a bone's surface was cut: flat caps and open borders."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,8 +51,9 @@ def anatomy_of(bone: BoneModel) -> TriangleMesh:
     )
 
 
+@lru_cache(maxsize=16)
 def on_flat_caps(mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(V,) vertices of flat ends, however oblique the cut was.
+    """(V,) vertices of flat ends, however oblique the cut was; read-only.
 
     A layer below a plane that touches a round surface holds twice the area when it is twice as
     thick, however it is curved; on a cap it holds little more. A cap rougher than the layer is not
@@ -67,6 +70,7 @@ def on_flat_caps(mesh: TriangleMesh) -> NDArray[np.bool_]:
         is_low = depth < _LAYER_MM
         if owned[is_low].sum() > _CAP_MM2 and _is_cap(mesh, areas, normal, depth):
             is_cap |= is_low
+    is_cap.setflags(write=False)
     return is_cap
 
 

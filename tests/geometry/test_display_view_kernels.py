@@ -5,6 +5,7 @@ import pytest
 
 from navapp.geometry.display_model_optics import Glass, VirtualScreen
 from navapp.geometry.display_model_view import make_view, project
+from tests.reference import display_view_reference as reference
 
 MIDDLE = np.array([5.0, -8.0, 450.0])
 AHEAD = np.array([0.1, 0.2, 1.0]) / np.sqrt(1.05)
@@ -29,7 +30,9 @@ def test_points_are_drawn_where_the_readable_formula_says(bulge_mm, thickness_mm
     view = make_view(screen(bulge_mm), glass, EYE, (False, False))
     points = MIDDLE + rng.uniform(-120.0, 120.0, (300, 3))
     points[:3] = EYE - 50.0 * AHEAD  # behind the eye
-    expected = project(view.screen, glass, EYE, points)
-    found = view.camera.project(view.warp(points))
+    expected = reference.project(view.screen, glass, EYE, points)
     assert np.isnan(expected[:3]).all()
+    found = view.camera.project(view.warp(points))
     np.testing.assert_allclose(found, expected, atol=1e-7)
+    found = project(view.screen, glass, EYE, points)
+    np.testing.assert_allclose(found, expected, atol=1e-9)

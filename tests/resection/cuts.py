@@ -105,11 +105,10 @@ def _ray_cast(left_from_bone, made, cover, eye_x) -> tuple[np.ndarray, np.ndarra
     value = np.full(rays.shape[:2], 90.0)
 
     def hit(distance: np.ndarray, is_there: np.ndarray, seed: int) -> None:
-        nonlocal depth, value
         points = start + distance[..., None] * along
         is_new = is_there(points) & (distance > 0.0) & (distance < depth)
-        depth = np.where(is_new, distance, depth)
-        value = np.where(is_new, _texture(points, seed), value)
+        depth[is_new] = distance[is_new]
+        value[is_new] = _texture(points[is_new], seed)
 
     def to_plane(plane: ResectionPlane, above_mm: float = 0.0) -> np.ndarray:
         point = plane.point_mm + above_mm * plane.normal
@@ -120,7 +119,8 @@ def _ray_cast(left_from_bone, made, cover, eye_x) -> tuple[np.ndarray, np.ndarra
 
     hit(to_plane(made), in_ball, 1)
     places = start + to_plane(made)[..., None] * along + (eye_x > 0.0) * GLINT_SHIFT_MM
-    mirrored = np.where(np.isfinite(depth), np.clip((_texture(places, 9) - 100.0) / 100.0, 0, 1), 0)
+    is_face, mirrored = np.isfinite(depth), np.zeros(depth.shape)
+    mirrored[is_face] = np.clip((_texture(places[is_face], 9) - 100.0) / 100.0, 0, 1)
     hit(to_plane(made, 6.0), lambda p: in_ball(p) & (p[..., 0] < cover.x_mm), 2)
     half_b, squared = (along @ start), (along**2).sum(-1)
     root = half_b**2 - squared * (start @ start - 30.0**2)

@@ -1,5 +1,6 @@
 """What is aligned next: a corner of the board as it lies, or the board somewhere else."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -221,26 +222,32 @@ class Guide:
         if self._stays or np.count_nonzero(near) < _FEWEST_AT_PLACE:
             return None
         heights, now = self._heights(known, place)
-        here = self._best_gain(known, found, place.points_mm)
-        best: tuple[float, Goal] | None = None
+        goals: list[Goal] = []
         aside = (-_ASIDE_MM, 0.0, _ASIDE_MM)
         for right, down, height in product(aside, aside, (heights.min(), now, heights.max())):
             wanted = known.kept.middles_mm[0] + np.array([right, down, height]) @ known.axes
             goal = Goal(
                 wanted, known.axes, False, float(height), "eye", self._third_of(known, wanted)
             )
-            if goal.is_reached(middle) or self._is_refused(wanted):
-                continue
-            moved = place.left_from_board.apply(self._board.points_mm) + wanted - middle
-            gain = self._best_gain(known, found, moved)
-            if gain > _WORTH_MOVING * here and (best is None or gain > best[0]):
-                best = gain, goal
-        return None if best is None else best[1]
+            if not (goal.is_reached(middle) or self._is_refused(wanted)):
+                goals.append(goal)
+        corners = place.left_from_board.apply(self._board.points_mm)
+        moved = [corners + goal.middle_mm - middle for goal in goals]
+        here, *gains = self._best_gains(known, found, [place.points_mm, *moved])
+        best = max(range(len(goals)), key=gains.__getitem__, default=None)
+        if best is None or gains[best] <= _WORTH_MOVING * here:
+            return None
+        return goals[best]
 
-    def _best_gain(self, known: Known, found: AlignedCalibration, corners_mm: FloatArray) -> float:
-        """Of a corner among (N, 3); 0 where none can be had."""
-        points = corners_mm[self._can_be_had(known, corners_mm)]
-        return float(compute_gains(found, points).max()) if len(points) else 0.0
+    def _best_gains(
+        self, known: Known, found: AlignedCalibration, places_mm: Sequence[FloatArray]
+    ) -> list[float]:
+        """Of a corner among the (N, 3) of each place; 0 where none can be had."""
+        has = [self._can_be_had(known, corners_mm) for corners_mm in places_mm]
+        points = np.concatenate([one[can] for one, can in zip(places_mm, has, strict=True)])
+        gains = compute_gains(found, points) if len(points) else np.empty(0)
+        ends = np.cumsum([can.sum() for can in has])[:-1]
+        return [float(one.max(initial=0.0)) for one in np.split(gains, ends)]
 
     def _can_be_had(self, known: Known, points_mm: FloatArray) -> NDArray[np.bool_]:
         """(N,) bool: on the display and in both pictures."""
