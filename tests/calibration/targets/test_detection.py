@@ -8,6 +8,9 @@ from navapp.geometry.camera import Camera
 from tests.calibration.pictures import facing, picture_of
 from tests.many import few_of
 
+# Circles take seconds to compile: one worker does it.
+pytestmark = pytest.mark.xdist_group("boards")
+
 CAMERA = Camera(
     np.array([[900.0, 0.0, 322.3], [0.0, 903.0, 236.8], [0.0, 0.0, 1.0]]),
     np.array([-0.1, 0.05, 0.0005, -0.0004]),
