@@ -1,4 +1,4 @@
-"""Simulated knees, CTs, tissue and components, kept on disk: making one takes a second and more.
+"""Simulated knees, CTs, tissue, components and drawn meshes, kept on disk: making one takes long.
 
 Folders are named after a hash of the sources and the libraries that make what is in them, files
 after its parameters: what is read is what would be made now. They may be deleted at any time.
@@ -24,6 +24,7 @@ import numba
 import numpy as np
 import scipy
 
+from navapp.geometry import simplify
 from navapp.geometry.mesh import TriangleMesh
 from sim_devices import anatomy, components, tissue
 from sim_devices.anatomy import KneeAnatomy, KneeSpec
@@ -44,6 +45,7 @@ Arrays = dict[str, np.ndarray]
 
 make_new_knee = anatomy.make_knee
 make_new_tissue = tissue.make_tissue
+make_simplified = simplify.simplify
 make_new_femoral_component = components.make_femoral_component
 _FIRST = KneeSpec()
 
@@ -211,6 +213,19 @@ def make_femoral_component(
     )
 
 
+def make_drawn(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
+    """`navapp.geometry.simplify.simplify`, kept; what has few vertices anyway comes back itself."""
+    if not 0 < n_vertices < len(mesh.vertices_mm):
+        return mesh
+    return _mesh_of(
+        keep(
+            FOLDER,
+            ("simplified", _hash_of(mesh), n_vertices, within_mm),
+            lambda: _arrays_of_mesh(make_simplified(mesh, n_vertices, within_mm)),
+        )
+    )
+
+
 def _hash_of(mesh: TriangleMesh) -> str:
     arrays = mesh.vertices_mm, mesh.faces, mesh.normals
     return hashlib.sha256(b"".join(one.tobytes() for one in arrays)).hexdigest()
@@ -230,3 +245,4 @@ def install() -> None:
     anatomy.make_knee = make_knee
     tissue.make_tissue = make_tissue
     components.make_femoral_component = make_femoral_component
+    simplify.simplify = make_drawn

@@ -322,7 +322,7 @@ class Bench:
         while not condition():
             assert time.monotonic() < end_s
             self.frames(1)
-            time.sleep(0.005)
+            time.sleep(0.02)
 
     def line(self, kind: str) -> DeviceLine:
         """Of the devices panel."""
