@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 
 import numpy as np
@@ -16,27 +17,31 @@ from navapp.overlay.labels import Image, LabelBoard
 from navapp.overlay.layers import LAYERS
 from navapp.overlay.scene import SKIN_MM, Scene
 from navapp.overlay.shading import draw_body, draw_bone
-from navapp.overlay.strokes import blend_strokes, prepare_strokes
+from navapp.overlay.strokes import PlacedStrokes, blend_strokes, place_strokes, trace_strokes
 
 
 def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoard) -> Image:
     """The scene's layers in the order of their table, and their words, in a picture (H, W, 3)."""
 
-    def look_up() -> Image:
-        _ = scene.seen
-        return make_image()
+    def render_bodies() -> list[RenderedView]:
+        return [scene.render(body.mesh) for body in drawing.bodies]
 
     drawing = Drawing()
-    # Both threads need the box. What stands in front is looked up and the picture made by the
-    # helper, while the layers, which know nothing of them, are asked and their meshes are rendered;
-    # whoever is free first renders the bone.
-    _ = scene.box
-    with begin_on_helper(look_up) as looked_up, begin_on_helper(lambda: scene.view) as rendered:
+    # The helper makes the picture, which needs nothing of the scene, looks up what stands in front,
+    # and renders what is not the bone; this thread asks the layers and renders the bone.
+    with ExitStack() as jobs:
+        made = jobs.enter_context(begin_on_helper(make_image))
+        _ = scene.box
+        looked_up = jobs.enter_context(begin_on_helper(lambda: scene.seen))
         ask_layers(scene, drawing)
-        views = [scene.render(body.mesh) for body in drawing.bodies]
-        rendered.result()
-        image = looked_up.result()
-    paint(image, scene, drawing, views, labels)
+        rendered = jobs.enter_context(begin_on_helper(render_bodies))
+        _ = scene.view
+        placed = place_strokes(scene, drawing.strokes)
+        ask_for_words(scene, drawing, labels)
+        looked_up.result()
+        _ = scene.ground
+        image, views = made.result(), rendered.result()
+    paint(image, scene, drawing, views, placed, labels)
     return image
 
 
@@ -52,13 +57,17 @@ def paint(
     scene: Scene,
     drawing: Drawing,
     views: Sequence[RenderedView],
+    placed: PlacedStrokes | None,
     labels: LabelBoard,
 ) -> None:
-    """All that was asked for, into a picture (H, W, 3); one view for each body."""
-    # Both threads need the ground. Lines are traced by the helper while surfaces are drawn.
+    """All that was asked for, into a picture (H, W, 3); one view for each body.
+
+    The board was asked for the words before.
+    """
+    # Lines are traced by the helper while surfaces are drawn; both need the ground.
     _ = scene.ground
-    prepare = partial(prepare_strokes, scene, drawing.strokes, threading.get_ident())
-    with begin_on_helper(prepare) as traced:
+    trace = partial(trace_strokes, scene, placed, threading.get_ident())
+    with begin_on_helper(trace) as traced:
         draw_bone(image, scene, drawing.tints, drawing.outline)
         for body, view in zip(drawing.bodies, views, strict=True):
             draw_body(image, scene, view, body)
@@ -67,7 +76,6 @@ def paint(
         blend_strokes(image, traced.result())
     for panel in drawing.panels:
         panel(image, labels)
-    ask_for_words(scene, drawing, labels)
     labels.draw(image)
 
 

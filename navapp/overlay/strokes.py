@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
+from navapp.overlay import stroke_kernels
 from navapp.overlay.colours import Colour
 from navapp.overlay.drawing import Stroke
 from navapp.overlay.scene import Scene
-from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_strokes
+from navapp.overlay.stroke_kernels import Ground, Room, blend_places
 
 Image = NDArray[np.uint8]
 
@@ -59,41 +60,62 @@ def sample_line(points_mm: FloatArray, step_mm: float = _STEP_MM) -> FloatArray:
     return np.column_stack([np.interp(places, known, points_mm[:, k]) for k in range(3)])
 
 
-class Traced(NamedTuple):
-    """Strokes, traced: which pixels they cover, and how much of each."""
+class PlacedStrokes(NamedTuple):
+    """Strokes where they are in the picture, from below to above."""
+
+    pixels: FloatArray  # (N, 2) of the points of all of them; NaN where they are not seen
+    depth_mm: FloatArray  # (N,)
+    firsts: NDArray[np.int64]  # (S + 1,) number of each stroke's first point, and N
+    is_whole: NDArray[np.bool_]  # (S,) see `Stroke.is_judged_whole`
+    half_px: FloatArray  # (S,) half of their widths
+    rim_px: FloatArray  # (S,)
+    colours: NDArray[np.float32]  # (S, 3)
+
+
+class TracedStrokes(NamedTuple):
+    """Which pixels strokes cover, and how much of each."""
 
     room: Room  # its first places, until it is traced in again
     n_places: int
     colours: NDArray[np.float32]  # (S, 3) of the strokes
 
 
-def prepare_strokes(scene: Scene, strokes: Sequence[Stroke], thread: int) -> Traced | None:
-    """Trace strokes in their order; None without any.
+def place_strokes(scene: Scene, strokes: Sequence[Stroke]) -> PlacedStrokes | None:
+    """Where strokes are in the picture; None without any."""
+    if not strokes:
+        return None
+    in_camera = scene.to_camera(np.concatenate([stroke.points_mm for stroke in strokes]))
+    widths = np.array([stroke.width_px for stroke in strokes])
+    has_rim = scene.viewpoint.is_video & (widths > 1.0)
+    return PlacedStrokes(
+        scene.camera.project(in_camera),
+        np.ascontiguousarray(in_camera[:, 2]),
+        np.cumsum([0, *(len(stroke.points_mm) for stroke in strokes)]),
+        np.array([stroke.is_judged_whole for stroke in strokes]),
+        0.5 * widths,
+        np.where(has_rim, _RIM_PX, 0.0),
+        np.array([stroke.colour for stroke in strokes], dtype=np.float32),
+    )
+
+
+def trace_strokes(scene: Scene, placed: PlacedStrokes | None, thread: int) -> TracedStrokes | None:
+    """Trace strokes in their order.
 
     They are dashed where they lie beneath something or where that is not known, left out where a
     hand or an instrument hides them.
 
     Args:
         scene: that they belong to.
-        strokes: from below to above.
+        placed: the strokes.
         thread: that blends them, before it asks for others.
     """
-    if not strokes:
+    if placed is None:
         return None
-    in_camera = scene.to_camera(np.concatenate([stroke.points_mm for stroke in strokes]))
-    pixels = scene.camera.project(in_camera)
-    firsts = np.cumsum([0, *(len(stroke.points_mm) for stroke in strokes)])
-    widths = [stroke.width_px for stroke in strokes]
-    has_rim = scene.viewpoint.is_video
-    rims = [_RIM_PX if has_rim and width > 1.0 else 0.0 for width in widths]
-    colours = [stroke.colour for stroke in strokes]
-    is_whole = np.array([stroke.is_judged_whole for stroke in strokes])
     room = _room(scene.camera.height, scene.camera.width, thread)
-    pens = widths, rims, colours
-    return _trace(room, pixels, in_camera[:, 2], (firsts, is_whole), pens, scene.ground)
+    return _trace(room, placed, scene.ground)
 
 
-def blend_strokes(image: Image, traced: Traced | None) -> None:
+def blend_strokes(image: Image, traced: TracedStrokes | None) -> None:
     """Draw them into a picture (H, W, 3)."""
     if traced is not None:
         room, n, colours = traced
@@ -110,34 +132,25 @@ def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: floa
         at_px + half_px * np.array([[0.25 * x, 0.25 * y], [x, y]])
         for x, y in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
     ]
-    pens = [1.5] * 4, [0.0] * 4, [colour] * 4
-    parts = np.arange(0, 9, 2), np.zeros(4, dtype=np.bool_)
+    placed = PlacedStrokes(
+        np.concatenate(arms),
+        np.zeros(8),
+        np.arange(0, 9, 2),
+        np.zeros(4, dtype=np.bool_),
+        np.full(4, 0.75),
+        np.zeros(4),
+        np.full((4, 3), colour, dtype=np.float32),
+    )
     room = _room(image.shape[0], image.shape[1], threading.get_ident())
-    traced = _trace(room, np.concatenate(arms), np.zeros(8), parts, pens, ground)
-    blend_strokes(image, traced)
+    blend_strokes(image, _trace(room, placed, ground))
 
 
-def _trace(
-    room: Room,
-    pixels: FloatArray,
-    depth_mm: FloatArray,
-    parts: tuple[NDArray[np.int64], NDArray[np.bool_]],
-    pens: tuple[list[float], list[float], list[Colour]],
-    ground: Ground,
-) -> Traced:
-    """Strokes through places (N, 2) of the picture at depths (N,).
-
-    The parts are the numbers (S + 1,) of the strokes' first points and whether (S,) each is judged
-    as a whole; the pens are widths and rims in px, and colours.
-    """
-    widths_px, rims_px, colours = pens
-    pens_px = 0.5 * np.array(widths_px), np.array(rims_px)
-    depth_mm = np.ascontiguousarray(depth_mm)
-    n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
+def _trace(room: Room, placed: PlacedStrokes, ground: Ground) -> TracedStrokes:
+    n = stroke_kernels.trace_strokes(*placed[:-1], ground, room)
     while n == len(room.place):
         room = _enlarge(room)
-        n = trace_strokes(pixels, depth_mm, *parts, *pens_px, ground, room)
-    return Traced(room, n, np.array(colours, dtype=np.float32))
+        n = stroke_kernels.trace_strokes(*placed[:-1], ground, room)
+    return TracedStrokes(room, n, placed.colours)
 
 
 def _enlarge(room: Room) -> Room:

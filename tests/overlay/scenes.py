@@ -17,6 +17,7 @@ from navapp.overlay import LAYERS, LeftView, Scene
 from navapp.overlay.drawing import Drawing
 from navapp.overlay.labels import LabelBoard
 from navapp.overlay.painting import ask_for_words, paint
+from navapp.overlay.strokes import place_strokes
 from navapp.values import (
     BoneModel,
     DisparityMap,
@@ -125,7 +126,9 @@ def painted(given: Scene, drawing: Drawing, image: np.ndarray | None = None) -> 
     """On black unless a picture is given."""
     image = black() if image is None else image
     views = [given.render(body.mesh) for body in drawing.bodies]
-    paint(image, given, drawing, views, LabelBoard(0.45))
+    board = LabelBoard(0.45)
+    ask_for_words(given, drawing, board)
+    paint(image, given, drawing, views, place_strokes(given, drawing.strokes), board)
     return image
 
 
