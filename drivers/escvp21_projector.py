@@ -117,17 +117,21 @@ class EscVp21Projector:
     def status(self) -> ProjectorStatus:
         """Read everything back; with the lamp off most of it cannot be told.
 
-        Silence is told as a fault: an abnormal projector says nothing at all.
+        Silence is told as a fault, whichever question it meets: an abnormal projector says nothing
+        at all.
 
         Raises:
             DeviceLost, DeviceTimeout, DeviceProtocolError, WrongDevice.
         """
         try:
-            code = self._talk.ask("PWR", _HEX)
+            return self._read_status()
         except DeviceTimeout:
             if not self._talk.is_silent:
                 raise
             return ProjectorStatus(PowerState.FAULT, faults=(SILENT,))
+
+    def _read_status(self) -> ProjectorStatus:
+        code = self._talk.ask("PWR", _HEX)
         power = parse_power_state(code)
         broken = parse_faults(self._talk.ask("ERR", _HEX))
         if power is PowerState.FAULT:

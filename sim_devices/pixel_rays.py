@@ -15,15 +15,16 @@ from navapp.geometry.transform import FloatArray
 
 def centre_rays(camera: Camera) -> NDArray[np.float32]:
     """(H, W, 2) x / z and y / z through every pixel's centre; not to be changed."""
-    return _centre_rays(*_numbers(camera))
+    return _centre_rays(*_key_of(camera))
 
 
 def corner_rays(camera: Camera) -> FloatArray:
     """(H + 1, W + 1, 2) x / z and y / z through the pixels' corners; not to be changed."""
-    return _corner_rays(*_numbers(camera))
+    return _corner_rays(*_key_of(camera))
 
 
-def _numbers(camera: Camera) -> tuple[bytes, bytes, int, int]:
+def _key_of(camera: Camera) -> tuple[bytes, bytes, int, int]:
+    """Equal cameras are made anew for each stage: their numbers tell them apart."""
     return camera.matrix.tobytes(), camera.distortion.tobytes(), camera.width, camera.height
 
 
@@ -41,6 +42,7 @@ def _corner_rays(matrix: bytes, distortion: bytes, width: int, height: int) -> F
 
 def _rays(matrix: bytes, distortion: bytes, u: FloatArray, v: FloatArray) -> FloatArray:
     """(H, W, 2) through places (H, W) of the picture."""
+    # The size does not matter for rays.
     camera = Camera(np.frombuffer(matrix).reshape(3, 3), np.frombuffer(distortion), 1, 1)
     rays = camera.rays(np.column_stack([u.ravel(), v.ravel()]))[:, :2]
     return np.ascontiguousarray(rays.reshape(*u.shape, 2))

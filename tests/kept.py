@@ -15,14 +15,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from functools import cache, lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import cv2
-import numba
 import numpy as np
-import scipy
 
 from navapp.geometry import simplify
 from navapp.geometry.mesh import TriangleMesh
@@ -37,6 +35,9 @@ from sim_devices.tissue import Sheet
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / ".pytest_cache" / "kept"
 # All that a knee is made of; more than it needs costs no more than making it again.
+LIBRARIES = (
+    "numpy", "scipy", "numba", "llvmlite", "fast-simplification", "opencv-python-headless",
+)  # fmt: skip
 SOURCES = ("sim_devices", "navapp/geometry", "tests/kept.py")
 
 _OLD_S = 24 * 3600.0
@@ -45,7 +46,7 @@ Arrays = dict[str, np.ndarray]
 
 make_new_knee = anatomy.make_knee
 make_new_tissue = tissue.make_tissue
-make_simplified = simplify.simplify
+make_new_simplified = simplify.simplify
 make_new_femoral_component = components.make_femoral_component
 _FIRST = KneeSpec()
 
@@ -53,7 +54,7 @@ _FIRST = KneeSpec()
 @cache
 def sources_hash() -> str:
     """Of the simulator, what it stands on, and the libraries that compute it."""
-    libraries = np.__version__, scipy.__version__, numba.__version__, cv2.__version__
+    libraries = [version(name) for name in LIBRARIES]
     checks = os.environ.get("NUMBA_BOUNDSCHECK"), os.environ.get("NUMBA_OPT")
     digest = hashlib.sha256(f"{sys.version} {libraries} {checks}".encode())
     for source in SOURCES:
@@ -198,22 +199,19 @@ def make_tissue(
     return Sheet(_mesh_of(arrays), arrays["mark"], arrays["exposure"])
 
 
-def make_femoral_component(
-    knee: KneeAnatomy, cuts: Sequence[Cut], cell_mm: float | None = None
-) -> TriangleMesh:
-    """`sim_devices.components.make_femoral_component`, kept."""
-    size = () if cell_mm is None else (cell_mm,)
+def make_femoral_component(knee: KneeAnatomy, cuts: Sequence[Cut], *cell_mm: float) -> TriangleMesh:
+    """`sim_devices.components.make_femoral_component`, kept; a knee is what its spec says."""
     planes = [(cut.point_mm.tolist(), cut.normal.tolist()) for cut in cuts]
     return _mesh_of(
         keep(
             FOLDER,
-            ("femoral component", knee.spec, planes, size),
-            lambda: _arrays_of_mesh(make_new_femoral_component(knee, cuts, *size)),
+            ("femoral component", knee.spec, planes, cell_mm),
+            lambda: _arrays_of_mesh(make_new_femoral_component(knee, cuts, *cell_mm)),
         )
     )
 
 
-def make_drawn(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
+def make_simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
     """`navapp.geometry.simplify.simplify`, kept; what has few vertices anyway comes back itself."""
     if not 0 < n_vertices < len(mesh.vertices_mm):
         return mesh
@@ -221,7 +219,7 @@ def make_drawn(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> Triangl
         keep(
             FOLDER,
             ("simplified", _hash_of(mesh), n_vertices, within_mm),
-            lambda: _arrays_of_mesh(make_simplified(mesh, n_vertices, within_mm)),
+            lambda: _arrays_of_mesh(make_new_simplified(mesh, n_vertices, within_mm)),
         )
     )
 
@@ -240,9 +238,9 @@ def _mesh_of(arrays: Arrays) -> TriangleMesh:
 
 
 def install() -> None:
-    """Let what makes them be the kept one for all who import it from now on."""
+    """Replace the makers by the kept ones in all modules that are imported after this."""
     sources_hash()  # of the sources as they were imported, whatever is edited meanwhile
     anatomy.make_knee = make_knee
     tissue.make_tissue = make_tissue
     components.make_femoral_component = make_femoral_component
-    simplify.simplify = make_drawn
+    simplify.simplify = make_simplified

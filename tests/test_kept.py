@@ -37,12 +37,13 @@ def test_a_kept_knee_is_the_simulators(tmp_path, monkeypatch, is_there: bool) ->
             np.testing.assert_array_equal(found[name], wanted[name])
 
 
-def test_kept_tissue_and_components_are_the_simulators(tmp_path, monkeypatch) -> None:
+def test_kept_tissue_components_and_drawn_meshes_are_what_is_made(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(kept, "FOLDER", tmp_path)
     knee = kept.make_knee(SPEC)
     femur = knee.bones["femur"]
     cuts = [cut for cut in make_planned_cuts(knee).values() if cut.bone == "femur"]
     true = kept.make_new_tissue([femur], [femur], 3), kept.make_new_femoral_component(knee, cuts)
+    simplified = kept.make_new_simplified(femur, 300, 5.0)
     for _ in range(2):
         sheet = kept.make_tissue([femur], [femur], 3)
         ours = sheet, kept.make_femoral_component(knee, cuts)
@@ -51,6 +52,10 @@ def test_kept_tissue_and_components_are_the_simulators(tmp_path, monkeypatch) ->
         for found, wanted in ((ours[0].mesh, true[0].mesh), (ours[1], true[1])):
             for part in ("vertices_mm", "faces", "normals"):
                 np.testing.assert_array_equal(getattr(found, part), getattr(wanted, part))
+        simple = kept.make_simplified(femur, 300, 5.0)
+        np.testing.assert_array_equal(simple.vertices_mm, simplified.vertices_mm)
+        np.testing.assert_array_equal(simple.faces, simplified.faces)
+        monkeypatch.setattr(kept, "make_new_simplified", None)
         monkeypatch.setattr(kept, "make_new_tissue", None)
         monkeypatch.setattr(kept, "make_new_femoral_component", None)
 

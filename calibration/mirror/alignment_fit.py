@@ -95,13 +95,13 @@ def _whiteners(
     model: DisplayModel, given: Alignments, sd_px: float, wander_sd_mm: float
 ) -> FloatArray:
     """(N, 2, 2) that turn residuals into such of standard deviation one."""
-    return _whiteners_of(
+    return _invert_roots(
         compute_noise(model, given.points_mm, given.points_sd_mm, sd_px, wander_sd_mm)
     )
 
 
-def _whiteners_of(noise: FloatArray) -> FloatArray:
-    """(N, 2, 2) for noise of covariance (N, 2, 2)."""
+def _invert_roots(noise: FloatArray) -> FloatArray:
+    """(N, 2, 2) that turn noise of covariance (N, 2, 2) into such of standard deviation one."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
 
 
@@ -150,12 +150,12 @@ def estimate_sd_px(
     """The operator's noise with which the residuals are as large as they should be."""
     aim = max(1.0 - n_solved / (2.0 * len(given.pixels)), 0.1)
     residual = given.pixels - model.project(given.points_mm)
-    # What the operator adds is the same everywhere.
-    others = compute_noise(model, given.points_mm, given.points_sd_mm, 0.0, wander_sd_mm)
+    # The operator's noise is the same in every alignment: it is added below.
+    noise_of_rest = compute_noise(model, given.points_mm, given.points_sd_mm, 0.0, wander_sd_mm)
     low, high = _LEAST_SD_PX, _MOST_SD_PX
     for _ in range(24):
         middle = (low * high) ** 0.5
-        white = _whiteners_of(others + middle**2 * np.eye(2))
+        white = _invert_roots(noise_of_rest + middle**2 * np.eye(2))
         lengths = np.minimum(_lengths(white, residual), WORST)
         is_larger = 0.5 * float((lengths**2).mean()) > aim
         low, high = (middle, high) if is_larger else (low, middle)

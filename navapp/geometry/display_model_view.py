@@ -88,13 +88,16 @@ def project(
     from navapp.geometry.display_view_kernels import project_to_screen
 
     pixels = np.empty((len(points_mm), 2))
-    optics = _make_optics(screen, glass, eye_mm)
-    project_to_screen(np.ascontiguousarray(points_mm), optics, pixels)
+    points = np.array(points_mm, dtype=np.float64, order="C")
+    project_to_screen(points, _make_optics(screen, glass, eye_mm), pixels)
     return pixels
 
 
 def _make_optics(screen: VirtualScreen, glass: Glass | None, eye_mm: FloatArray) -> "Optics":
-    """What the compiled projection reads; arrays that it may write to are of another type."""
+    """What the compiled projection reads.
+
+    All arrays are copies: for read-only ones it would be compiled once more.
+    """
     from navapp.geometry.display_view_kernels import Optics
 
     return Optics(

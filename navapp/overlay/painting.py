@@ -22,16 +22,16 @@ from navapp.overlay.strokes import PlacedStrokes, blend_strokes, place_strokes, 
 
 def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoard) -> Image:
     """The scene's layers in the order of their table, and their words, in a picture (H, W, 3)."""
+    drawing = Drawing()
 
     def render_bodies() -> list[RenderedView]:
         return [scene.render(body.mesh) for body in drawing.bodies]
 
-    drawing = Drawing()
     # The helper makes the picture, which needs nothing of the scene, looks up what stands in front,
     # and renders what is not the bone; this thread asks the layers and renders the bone.
     with ExitStack() as jobs:
         made = jobs.enter_context(begin_on_helper(make_image))
-        _ = scene.box
+        _ = scene.box  # the look-up needs it
         looked_up = jobs.enter_context(begin_on_helper(lambda: scene.seen))
         ask_layers(scene, drawing)
         rendered = jobs.enter_context(begin_on_helper(render_bodies))
@@ -39,7 +39,7 @@ def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoa
         placed = place_strokes(scene, drawing.strokes)
         ask_for_words(scene, drawing, labels)
         looked_up.result()
-        _ = scene.ground
+        _ = scene.ground  # needs the bone and what was looked up
         image, views = made.result(), rendered.result()
     paint(image, scene, drawing, views, placed, labels)
     return image
@@ -60,12 +60,17 @@ def paint(
     placed: PlacedStrokes | None,
     labels: LabelBoard,
 ) -> None:
-    """All that was asked for, into a picture (H, W, 3); one view for each body.
+    """All that was asked for.
 
-    The board was asked for the words before.
+    Args:
+        image: (H, W, 3) in place.
+        scene: whose ground is known: both threads need it.
+        drawing: what was asked for.
+        views: of each of its bodies.
+        placed: its strokes.
+        labels: board that knows its words (`ask_for_words`).
     """
-    # Lines are traced by the helper while surfaces are drawn; both need the ground.
-    _ = scene.ground
+    # Lines are traced by the helper while surfaces are drawn.
     trace = partial(trace_strokes, scene, placed, threading.get_ident())
     with begin_on_helper(trace) as traced:
         draw_bone(image, scene, drawing.tints, drawing.outline)

@@ -40,7 +40,7 @@ class Room(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def trace_strokes(
+def trace_lines(
     pixels: NDArray[np.float64],
     depth_mm: NDArray[np.float64],
     firsts: NDArray[np.int64],

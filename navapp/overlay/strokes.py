@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
-from navapp.overlay import stroke_kernels
 from navapp.overlay.colours import Colour
 from navapp.overlay.drawing import Stroke
 from navapp.overlay.scene import Scene
-from navapp.overlay.stroke_kernels import Ground, Room, blend_places
+from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_lines
 
 Image = NDArray[np.uint8]
 
@@ -146,10 +145,14 @@ def draw_cross_px(image: Image, at_px: FloatArray, colour: Colour, half_px: floa
 
 
 def _trace(room: Room, placed: PlacedStrokes, ground: Ground) -> TracedStrokes:
-    n = stroke_kernels.trace_strokes(*placed[:-1], ground, room)
+    lines = (
+        placed.pixels, placed.depth_mm, placed.firsts, placed.is_whole, placed.half_px,
+        placed.rim_px,
+    )  # fmt: skip
+    n = trace_lines(*lines, ground, room)
     while n == len(room.place):
         room = _enlarge(room)
-        n = stroke_kernels.trace_strokes(*placed[:-1], ground, room)
+        n = trace_lines(*lines, ground, room)
     return TracedStrokes(room, n, placed.colours)
 
 

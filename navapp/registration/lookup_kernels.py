@@ -8,15 +8,16 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 
-# Chosen: after two, one voxel in five hundred knows a vertex that is not the nearest, and none of
-# them one that is 0.2 mm further.
+# Chosen: after two rounds 1 voxel in 400 of simulated femurs, tibias and patellas names a vertex
+# that is not the nearest; it is never 0.2 mm further.
 _ROUNDS = 2
 
 
 class VoxelGrid(NamedTuple):
     """Which point is near each place; lengths in mm, in the frame of the points."""
 
-    # (nx, ny, nz) index of the point nearest to each voxel's centre; -1 for none.
+    # (nx, ny, nz) index of the point nearest to each voxel's centre, or of one that is hardly
+    # further; -1 for none.
     nearest: NDArray[np.int32]
     origin: FloatArray  # (3,) centre of voxel (0, 0, 0)
     voxel: float  # edge of the voxels
@@ -49,7 +50,7 @@ def find_voxel(x: float, y: float, z: float, grid: VoxelGrid) -> tuple[int, int,
 
 @njit(cache=True, nogil=True)
 def _centre_mm(ix: int, iy: int, iz: int, grid: VoxelGrid) -> tuple[float, float, float]:
-    """Of a voxel."""
+    """Centre of a voxel."""
     return (
         grid.origin[0] + ix * grid.voxel,
         grid.origin[1] + iy * grid.voxel,
@@ -94,9 +95,9 @@ def _descend(
     x: float, y: float, z: float, points: FloatArray, neighbours: NDArray[np.int32],
     first: int, least: float,
 ) -> tuple[int, float]:  # fmt: skip
-    """From a vertex to its neighbour that is nearest to a place, while one is nearer.
+    """Step from vertex `first` to the neighbour nearest to a place (x, y, z), while one is nearer.
 
-    With `least`, its squared distance; the answer's as well.
+    `least` is the squared distance of `first`; the answer is a vertex and its squared distance.
     """
     best, start = first, -1
     while start != best:

@@ -52,7 +52,6 @@ def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
 
 
 @pytest.mark.slow
-@pytest.mark.release
 @pytest.mark.parametrize("seed", SEEDS)
 def test_cartilage_that_is_known_exactly_costs_nothing(seed: int) -> None:
     for answer, error_mm in tracked(seed, exact):

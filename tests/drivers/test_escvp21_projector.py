@@ -64,6 +64,23 @@ def test_a_lamp_that_does_not_catch_is_silence_and_told_as_abnormal() -> None:
         rig.driver.set_power(True, 150.0)
 
 
+@pytest.mark.parametrize("question", ["PWR?", "ERR?", "SOURCE?", "FREEZE?"])
+def test_one_that_breaks_down_while_it_is_read_is_told_as_silent(monkeypatch, question) -> None:
+    rig = lit()
+    handle = rig.firmware._handle
+
+    def handle_until_broken(command: str) -> None:
+        if command == question:
+            rig.firmware.break_down(0x04)
+        else:
+            handle(command)
+
+    monkeypatch.setattr(rig.firmware, "_handle", handle_until_broken)
+    status = rig.driver.status()
+    assert status.power is PowerState.FAULT
+    assert status.faults == (SILENT,)
+
+
 def test_a_quick_model_is_accepted_long_before_it_is_on() -> None:
     rig = opened(ProjectorModel(is_quick=True))
     assert rig.driver.set_power(True, 5.0) is ACCEPTED

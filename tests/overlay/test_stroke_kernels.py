@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_strokes, weigh
+from navapp.overlay.stroke_kernels import Ground, Room, blend_places, trace_lines, weigh
 
 HEIGHT, WIDTH, X, Y = 40, 60, 100, 50
 ONE = np.float32(1.0)
@@ -35,7 +35,7 @@ def trace(
     given_room, firsts = room(), np.array([0, len(pixels)])
     depths = np.full(len(pixels), depth_mm)
     pens = np.array([half_px]), np.array([rim_px])
-    n = trace_strokes(pixels, depths, firsts, np.array([False]), *pens, given, given_room)
+    n = trace_lines(pixels, depths, firsts, np.array([False]), *pens, given, given_room)
     assert not given_room.line.any()
     assert not given_room.rim.any()
     found = []
@@ -112,7 +112,7 @@ def test_a_point_beyond_the_ground_weighs_what_is_told_of_there() -> None:
 def test_strokes_are_traced_one_after_the_other_each_with_its_pen() -> None:
     both, firsts = np.concatenate([LINE, LINE[::-1] + 3.0]), np.array([0, 4, 8])
     given = room()
-    n = trace_strokes(
+    n = trace_lines(
         both,
         np.full(8, 50.0),
         firsts,
@@ -139,7 +139,7 @@ def test_a_whole_stroke_is_as_its_first_point(weight: float, is_drawn: bool) -> 
     given.weight[:, :110] = weight
     given.weight[:, 110:] = 0.2 if is_drawn else 1.0
     line, given_room = np.array([[104.0, 60.0], [150.0, 60.0]]), room()
-    n = trace_strokes(
+    n = trace_lines(
         line, np.full(2, 50.0), np.array([0, 2]), np.array([True]), np.array([1.0]),
         np.array([0.0]), given, given_room,
     )  # fmt: skip
@@ -154,7 +154,7 @@ def test_what_stands_in_front_hides_parts_of_a_whole_stroke() -> None:
     given, given_room = ground(), room()
     given.is_hidden[:, 130:] = True
     line = np.array([[104.0, 60.0], [150.0, 60.0]])
-    n = trace_strokes(
+    n = trace_lines(
         line, np.full(2, 50.0), np.array([0, 2]), np.array([True]), np.array([1.0]),
         np.array([0.0]), given, given_room,
     )  # fmt: skip
@@ -170,7 +170,7 @@ def test_all_arms_end_as_near_as_the_one_of_which_least_is_seen(hidden_from, rea
     ways = np.array([[1.0, 0], [-1, 0], [0, 1], [0, -1]])
     arms = [np.vstack([middle, middle + 20.0 * way, [[np.nan] * 2]]) for way in ways]
     points = np.concatenate(arms)
-    n = trace_strokes(
+    n = trace_lines(
         points, np.full(12, 50.0), np.array([0, 12]), np.array([True]), np.array([1.0]),
         np.array([0.0]), given, given_room,
     )  # fmt: skip
@@ -186,7 +186,7 @@ def test_all_arms_end_as_near_as_the_one_of_which_least_is_seen(hidden_from, rea
 @pytest.mark.kernel
 def test_what_does_not_fit_into_the_room_is_left_out_and_leaves_no_trace() -> None:
     given = room(n=40)
-    n = trace_strokes(
+    n = trace_lines(
         LINE,
         np.full(4, 50.0),
         np.array([0, 4]),

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh
-from sim_devices.tissue import DRAPE_HOLE_MM, SHEET_RADIUS_MM, make_drape, make_tissue, trim
+from sim_devices.tissue import DRAPE_HOLE_MM, SHEET_RADIUS_MM, make_drape, trim
+from tests.kept import make_new_tissue as make_tissue
 
 
 def ball(radius_mm, centre):

@@ -63,7 +63,7 @@ def test_without_a_start_for_this_bone_there_is_no_candidate() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("is_in_box", few_of([True, False]))
+@pytest.mark.parametrize("is_in_box", few_of([False, True]))
 def test_the_first_registration_finds_the_bone_without_a_pose(is_in_box: bool) -> None:
     a = room()
     axis, half_angle_deg = cone()

@@ -38,6 +38,7 @@ def settled_bytes() -> int:
     looks = []
     for _ in range(5):
         pool().submit(int).result()
+        gc.collect()
         looks.append(tracemalloc.get_traced_memory()[0])
         time.sleep(0.02)
     return min(looks)

@@ -235,19 +235,22 @@ class Guide:
         moved = [corners + goal.middle_mm - middle for goal in goals]
         here, *gains = self._best_gains(known, found, [place.points_mm, *moved])
         best = max(range(len(goals)), key=gains.__getitem__, default=None)
-        if best is None or gains[best] <= _WORTH_MOVING * here:
+        if best is None or not gains[best] > _WORTH_MOVING * here:
             return None
         return goals[best]
 
     def _best_gains(
         self, known: Known, found: AlignedCalibration, places_mm: Sequence[FloatArray]
     ) -> list[float]:
-        """Of a corner among the (N, 3) of each place; 0 where none can be had."""
-        has = [self._can_be_had(known, corners_mm) for corners_mm in places_mm]
-        points = np.concatenate([one[can] for one, can in zip(places_mm, has, strict=True)])
+        """For each place, the largest gain of a corner (N, 3) that can be had there; 0 without one.
+
+        All places at once: a projection costs the same for many points.
+        """
+        offered = [corners_mm[self._can_be_had(known, corners_mm)] for corners_mm in places_mm]
+        points = np.concatenate(offered)
         gains = compute_gains(found, points) if len(points) else np.empty(0)
-        ends = np.cumsum([can.sum() for can in has])[:-1]
-        return [float(one.max(initial=0.0)) for one in np.split(gains, ends)]
+        ends = np.cumsum([len(corners_mm) for corners_mm in offered])[:-1]
+        return [float(of_place.max(initial=0.0)) for of_place in np.split(gains, ends)]
 
     def _can_be_had(self, known: Known, points_mm: FloatArray) -> NDArray[np.bool_]:
         """(N,) bool: on the display and in both pictures."""

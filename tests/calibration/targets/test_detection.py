@@ -8,7 +8,7 @@ from navapp.geometry.camera import Camera
 from tests.calibration.pictures import facing, picture_of
 from tests.many import few_of
 
-# Circles take seconds to compile: one worker does it.
+# The search for circles takes seconds to compile: all its tests run in one worker.
 pytestmark = pytest.mark.xdist_group("boards")
 
 CAMERA = Camera(

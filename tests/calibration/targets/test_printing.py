@@ -15,7 +15,7 @@ from calibration.targets.drawing import make_drawing
 from calibration.targets.printing import Sheet, render_page
 from tests.calibration.targets.test_detection import BOARDS
 
-# The worker that has compiled the search for circles.
+# In the worker of test_detection.py, which has compiled the search for circles.
 pytestmark = pytest.mark.xdist_group("boards")
 
 MM_PER_PT = 25.4 / 72.0
