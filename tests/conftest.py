@@ -12,10 +12,11 @@ import pytest
 
 import navapp  # sets the environment before any heavy import
 from navapp.config import Configuration, load
-from tests import kept
+from tests import compile_once, kept
 
 assert navapp.__version__
 kept.install()
+compile_once.install()
 
 DATA = Path(os.environ.get("NAVAPP_DATA", "../shared/data"))
 
