@@ -61,7 +61,7 @@ checked-kernels: setup bytecode
 
 # With +, line by line as they come. More workers than cores: some tests wait in real time.
 tests: check bytecode
-	+$(PYTEST) -n 4 --dist loadgroup
+	+$(PYTEST) -n 3 --dist loadgroup
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .
