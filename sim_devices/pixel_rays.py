@@ -1,7 +1,7 @@
 """Directions of the pixels of a camera's picture, its distortion removed.
 
-To remove the distortion of a whole picture takes a quarter of a second, and every stage and every
-sheet asks for the same ones.
+To remove the distortion of a whole picture takes long, and every stage and every sheet asks for the
+same ones: they are kept.
 """
 
 from functools import lru_cache

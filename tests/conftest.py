@@ -98,7 +98,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_collection_finish() -> None:
     """What is there now stays: the collector of garbage need not look through it every time.
 
-    It also runs less often than by default: it took a twentieth of the time.
+    It also runs less often than by default.
     """
     gc.collect()
     gc.freeze()

@@ -12,13 +12,13 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, fields
-from functools import cache, lru_cache
+from functools import cache, lru_cache, wraps
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -43,6 +43,7 @@ SOURCES = ("sim_devices", "navapp/geometry", "tests/kept.py")
 _OLD_S = 24 * 3600.0
 
 Arrays = dict[str, np.ndarray]
+_Made = TypeVar("_Made", TriangleMesh, Sheet)
 
 make_new_knee = anatomy.make_knee
 make_new_tissue = tissue.make_tissue
@@ -182,46 +183,40 @@ def make_ct(spec: KneeSpec, spacing_mm: tuple[float, float, float], seed: int) -
     return CtVolume(**arrays)
 
 
-def make_tissue(
-    exposed_bones: Sequence[TriangleMesh],
-    bones: Sequence[TriangleMesh],
-    seed: int,
-    freed: Sequence[TriangleMesh] = (),
-) -> Sheet:
-    """`sim_devices.tissue.make_tissue`, kept."""
+def _kept(make: Callable[..., _Made]) -> Callable[..., _Made]:
+    """A maker of a mesh or of a sheet, whose answers are kept under its name and its arguments."""
 
-    def make() -> Arrays:
-        sheet = make_new_tissue(exposed_bones, bones, seed, freed)
-        return {**_arrays_of_mesh(sheet.mesh), "mark": sheet.mark, "exposure": sheet.exposure}
+    @wraps(make)
+    def make_or_read(*arguments: Any, **named: Any) -> _Made:
+        what = make.__qualname__, _content(arguments), _content(sorted(named.items()))
+        return _made_of(keep(FOLDER, what, lambda: _arrays_of_made(make(*arguments, **named))))
 
-    meshes = [[_hash_of(mesh) for mesh in one] for one in (exposed_bones, bones, freed)]
-    arrays = keep(FOLDER, ("tissue", meshes, seed), make)
-    return Sheet(_mesh_of(arrays), arrays["mark"], arrays["exposure"])
+    return make_or_read
 
 
-def make_femoral_component(knee: KneeAnatomy, cuts: Sequence[Cut], *cell_mm: float) -> TriangleMesh:
-    """`sim_devices.components.make_femoral_component`, kept; a knee is what its spec says."""
-    planes = [(cut.point_mm.tolist(), cut.normal.tolist()) for cut in cuts]
-    return _mesh_of(
-        keep(
-            FOLDER,
-            ("femoral component", knee.spec, planes, cell_mm),
-            lambda: _arrays_of_mesh(make_new_femoral_component(knee, cuts, *cell_mm)),
-        )
-    )
+make_tissue = _kept(make_new_tissue)
+make_femoral_component = _kept(make_new_femoral_component)
+_keep_simplified = _kept(make_new_simplified)
 
 
 def make_simplified(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
     """`navapp.geometry.simplify.simplify`, kept; what has few vertices anyway comes back itself."""
-    if not 0 < n_vertices < len(mesh.vertices_mm):
-        return mesh
-    return _mesh_of(
-        keep(
-            FOLDER,
-            ("simplified", _hash_of(mesh), n_vertices, within_mm),
-            lambda: _arrays_of_mesh(make_new_simplified(mesh, n_vertices, within_mm)),
-        )
-    )
+    is_small = not 0 < n_vertices < len(mesh.vertices_mm)
+    return mesh if is_small else _keep_simplified(mesh, n_vertices, within_mm)
+
+
+def _content(value: Any) -> Any:
+    """What tells an argument from others by its `repr`; a knee is what its spec says."""
+    if isinstance(value, TriangleMesh):
+        return _hash_of(value)
+    if isinstance(value, KneeAnatomy):
+        return value.spec
+    if isinstance(value, Cut):
+        return value.point_mm.tolist(), value.normal.tolist()
+    if isinstance(value, list | tuple):
+        return [_content(one) for one in value]
+    assert isinstance(value, str | int | float), f"{type(value)} has no name among what is kept"
+    return value
 
 
 def _hash_of(mesh: TriangleMesh) -> str:
@@ -229,12 +224,15 @@ def _hash_of(mesh: TriangleMesh) -> str:
     return hashlib.sha256(b"".join(one.tobytes() for one in arrays)).hexdigest()
 
 
-def _arrays_of_mesh(mesh: TriangleMesh) -> Arrays:
-    return {"vertices": mesh.vertices_mm, "faces": mesh.faces, "normals": mesh.normals}
+def _arrays_of_made(made: TriangleMesh | Sheet) -> Arrays:
+    if isinstance(made, Sheet):
+        return {**_arrays_of_made(made.mesh), "mark": made.mark, "exposure": made.exposure}
+    return {"vertices": made.vertices_mm, "faces": made.faces, "normals": made.normals}
 
 
-def _mesh_of(arrays: Arrays) -> TriangleMesh:
-    return TriangleMesh(arrays["vertices"], arrays["faces"], arrays["normals"])
+def _made_of(arrays: Arrays) -> Any:
+    mesh = TriangleMesh(arrays["vertices"], arrays["faces"], arrays["normals"])
+    return Sheet(mesh, arrays["mark"], arrays["exposure"]) if "mark" in arrays else mesh
 
 
 def install() -> None:

@@ -55,9 +55,17 @@ def test_kept_tissue_components_and_drawn_meshes_are_what_is_made(tmp_path, monk
         simple = kept.make_simplified(femur, 300, 5.0)
         np.testing.assert_array_equal(simple.vertices_mm, simplified.vertices_mm)
         np.testing.assert_array_equal(simple.faces, simplified.faces)
-        monkeypatch.setattr(kept, "make_new_simplified", None)
-        monkeypatch.setattr(kept, "make_new_tissue", None)
-        monkeypatch.setattr(kept, "make_new_femoral_component", None)
+        monkeypatch.setattr(kept, "_write", None)  # nothing is made a second time
+
+
+def test_other_arguments_are_other_things(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(kept, "FOLDER", tmp_path)
+    femur, tibia = (kept.make_knee(SPEC).bones[name] for name in ("femur", "tibia"))
+    for asked in ((femur, 300, 5.0), (femur, 400, 5.0), (femur, 300, 6.0), (tibia, 300, 5.0)):
+        kept.make_simplified(*asked)
+    assert len(list(tmp_path.rglob("*.npz"))) == 4
+    with pytest.raises(AssertionError, match="has no name"):
+        kept.make_tissue([femur], [femur], np.arange(3))
 
 
 def test_solids_are_made_for_those_who_ask() -> None:

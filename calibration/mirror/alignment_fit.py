@@ -110,10 +110,10 @@ def compute_lengths(
 ) -> FloatArray:
     """(N,) residuals in units of their standard deviation."""
     residual = given.pixels - model.project(given.points_mm)
-    return _lengths(_whiteners(model, given, sd_px, wander_sd_mm), residual)
+    return _whitened_lengths(_whiteners(model, given, sd_px, wander_sd_mm), residual)
 
 
-def _lengths(whiteners: FloatArray, residual: FloatArray) -> FloatArray:
+def _whitened_lengths(whiteners: FloatArray, residual: FloatArray) -> FloatArray:
     """(N,) of residuals (N, 2) px, in units of their standard deviation."""
     white = (whiteners @ residual[:, :, None])[:, :, 0]
     return np.asarray(np.linalg.norm(white, axis=1))
@@ -156,7 +156,7 @@ def estimate_sd_px(
     for _ in range(24):
         middle = (low * high) ** 0.5
         white = _invert_roots(noise_of_rest + middle**2 * np.eye(2))
-        lengths = np.minimum(_lengths(white, residual), WORST)
+        lengths = np.minimum(_whitened_lengths(white, residual), WORST)
         is_larger = 0.5 * float((lengths**2).mean()) > aim
         low, high = (middle, high) if is_larger else (low, middle)
     return high

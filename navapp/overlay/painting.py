@@ -60,7 +60,7 @@ def paint(
     placed: PlacedStrokes | None,
     labels: LabelBoard,
 ) -> None:
-    """All that was asked for.
+    """Paint all that was asked for.
 
     Args:
         image: (H, W, 3) in place.

@@ -39,7 +39,9 @@ CLOUD = BoneModel("cloud", TriangleMesh(blob().mesh.vertices_mm, np.empty((0, 3)
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("bone", [blob(), femur(), CLOUD, ONE_POINT], ids=lambda bone: bone.name)
+@pytest.mark.parametrize(
+    "bone", [blob(), femur(), CLOUD, ONE_POINT], ids=["blob", "femur", "cloud", "point"]
+)
 def test_each_voxel_of_a_model_knows_the_nearest_vertex_or_almost(bone: BoneModel) -> None:
     model = RegistrationModel(bone)
     grid = model.arrays.grid
