@@ -89,7 +89,6 @@ class SheetScene:
         self._sheet = sheet
         self._left_from_sheet = left_from_sheet
         self._levels = _levels(sheet.white)
-        self._rays: dict[tuple[Eye, float], tuple[Camera, FloatArray]] = {}
 
     def render(
         self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
@@ -140,12 +139,9 @@ class SheetScene:
         return fitting[-1]
 
     def _optics(self, eye: Eye, scale: float) -> tuple[Camera, FloatArray]:
-        key = (eye, scale)
-        if key not in self._rays:
-            rig = self.rig if scale == 1.0 else self.rig.scale(scale)
-            camera = rig.left if eye == "left" else rig.right
-            self._rays[key] = camera, corner_rays(camera)
-        return self._rays[key]
+        rig = self.rig if scale == 1.0 else self.rig.scale(scale)
+        camera = rig.left if eye == "left" else rig.right
+        return camera, corner_rays(camera)
 
 
 class SheetInView:

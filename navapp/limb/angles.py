@@ -12,9 +12,7 @@ import numpy as np
 from navapp.geometry.transform import FloatArray
 from navapp.limb.axes import LimbAxes
 from navapp.values import PoseEstimate, Side
-
-# Of a normal distribution: 95 % lie within so many standard deviations.
-SIGMAS_95 = 1.96
+from navapp.values.faces import SIZE_95
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +41,7 @@ def measure_angles(
     lean_rad = math.asin(max(-1.0, min(1.0, turn[0, 2])))
     twist_rad = math.atan2(-turn[0, 1], turn[0, 0])
     deviations = _deviations(seen_femur[:, 0], seen_tibia[:, 2], femur, tibia)
-    bounds = np.degrees(SIGMAS_95 * deviations)
+    bounds = np.degrees(SIZE_95 * deviations)
     # The tibia leans to the right and turns to the left with positive angles.
     to_medial = 1.0 if side == "right" else -1.0
     return LimbAngles(

@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.limb.angles import SIGMAS_95
 from navapp.values import PoseEstimate, Side
+from navapp.values.faces import SIZE_95
 
 # Both chosen. Wider gaps are not looked for; points of a surface are no further apart.
 _WIDEST_MM, _SPACING_MM = 40.0, 1.2
@@ -103,7 +103,7 @@ class GapMeter:
                 (on_femur, on_tibia), (femur, tibia), centres_mm, strict=True
             )
         )
-        return Gap(gap_mm, SIGMAS_95 * float(np.sqrt(variance + surface_sd_mm**2)))
+        return Gap(gap_mm, SIZE_95 * float(np.sqrt(variance + surface_sd_mm**2)))
 
     def _find_heights(
         self, placed_mm: FloatArray, widest_mm: float

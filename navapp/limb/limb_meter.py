@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.limb.angles import SIGMAS_95, LimbAngles, measure_angles
+from navapp.limb.angles import LimbAngles, measure_angles
 from navapp.limb.axes import find_limb_axes, find_missing
 from navapp.limb.flexion import Hinge
 from navapp.limb.gaps import Gap, GapMeter
 from navapp.values import Plan, PoseEstimate
+from navapp.values.faces import SIZE_95
 
 FEMUR, TIBIA = "femur", "tibia"
 
@@ -73,7 +74,7 @@ class LimbMeter:
         meter = None if unknown else self._gap_meter((surfaces[0].mesh, surfaces[1].mesh))
         if meter is None:
             return LimbMeasurement(angles, {}, missing)
-        surface_sd_mm = math.hypot(*(one.bound_mm for one in surfaces)) / SIGMAS_95
+        surface_sd_mm = math.hypot(*(one.bound_mm for one in surfaces)) / SIZE_95
         gaps = meter.measure(femur, tibia, self._centres_mm, surface_sd_mm)
         return LimbMeasurement(angles, gaps, missing)
 
