@@ -1,12 +1,8 @@
 """Implants and spacers: outline and light shading."""
 
-from functools import lru_cache
-
-from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.transform import FloatArray
 from navapp.overlay.blend_kernels import compute_face_tints
 from navapp.overlay.colours import PART
-from navapp.overlay.drawing import Body, Drawing
+from navapp.overlay.drawing import Body, Drawing, find_middle_mm
 from navapp.overlay.scene import Scene
 from navapp.values.part_shapes import part_mesh
 
@@ -21,10 +17,4 @@ def draw_parts(scene: Scene, drawing: Drawing) -> None:
             mesh.normals, mesh.faces, scene.axis_in_bone, _LEAST_SHARE, _STEEP_SHARE
         )
         drawing.bodies.append(Body(mesh, share, PART))
-        drawing.label(name.replace("_", " "), _middle_mm(mesh), PART)
-
-
-@lru_cache(maxsize=64)
-def _middle_mm(mesh: TriangleMesh) -> FloatArray:
-    """(3,) of all its vertices."""
-    return mesh.centroid_mm
+        drawing.label(name.replace("_", " "), find_middle_mm(mesh), PART)

@@ -1,14 +1,12 @@
 """A scale bar: how long a length at the bone's depth is in the picture."""
 
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
 from navapp.geometry.box import Box
-from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.transform import FloatArray
 from navapp.overlay.colours import SCALE
-from navapp.overlay.drawing import Drawing
+from navapp.overlay.drawing import Drawing, find_middle_mm
 from navapp.overlay.labels import Image, LabelBoard, put_text, text_size
 from navapp.overlay.scene import Scene
 
@@ -19,17 +17,12 @@ _TICK_PX = 5
 
 def draw_scale(scene: Scene, drawing: Drawing) -> None:
     """At the left, above the picture's last lines."""
-    depth_mm = float(scene.to_camera(_centroid_mm(scene.mesh)[None])[0, 2])
+    depth_mm = float(scene.to_camera(find_middle_mm(scene.mesh)[None])[0, 2])
     if depth_mm <= 0.0:
         return
     px_per_mm = scene.camera.focal_px / depth_mm
     length_mm = next((mm for mm in _LENGTHS_MM if mm * px_per_mm >= _LEAST_PX), _LENGTHS_MM[-1])
     drawing.panels.append(partial(_draw_bar, length_mm, length_mm * px_per_mm))
-
-
-@lru_cache(maxsize=16)
-def _centroid_mm(mesh: TriangleMesh) -> FloatArray:
-    return mesh.centroid_mm
 
 
 def _draw_bar(length_mm: float, length: float, image: Image, labels: LabelBoard) -> None:
