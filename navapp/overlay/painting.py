@@ -23,24 +23,22 @@ from navapp.overlay.strokes import PlacedStrokes, blend_strokes, place_strokes, 
 def paint_layers(make_image: Callable[[], Image], scene: Scene, labels: LabelBoard) -> Image:
     """The scene's layers in the order of their table, and their words, in a picture (H, W, 3)."""
     drawing = Drawing()
-
-    def render_bodies() -> list[RenderedView]:
-        return [scene.render(body.mesh) for body in drawing.bodies]
-
-    # The helper makes the picture, which needs nothing of the scene, looks up what stands in front,
-    # and renders what is not the bone; this thread asks the layers and renders the bone.
+    # The helper makes the picture, which needs nothing of the scene, and looks up what stands in
+    # front; this thread asks the layers and renders what is not the bone. Whoever is free first
+    # renders the bone.
     with ExitStack() as jobs:
         made = jobs.enter_context(begin_on_helper(make_image))
         _ = scene.box  # the look-up needs it
         looked_up = jobs.enter_context(begin_on_helper(lambda: scene.seen))
+        rendered = jobs.enter_context(begin_on_helper(lambda: scene.view))
         ask_layers(scene, drawing)
-        rendered = jobs.enter_context(begin_on_helper(render_bodies))
-        _ = scene.view
+        views = [scene.render(body.mesh) for body in drawing.bodies]
         placed = place_strokes(scene, drawing.strokes)
         ask_for_words(scene, drawing, labels)
+        rendered.result()
         looked_up.result()
-        _ = scene.ground  # needs the bone and what was looked up
-        image, views = made.result(), rendered.result()
+        _ = scene.ground  # needs both
+        image = made.result()
     paint(image, scene, drawing, views, placed, labels)
     return image
 
