@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.rig.equilibration import compute_unit_sizes, equilibrate
 from calibration.rig.parameters import RigModel, unpack_shape_mm
@@ -53,9 +54,11 @@ class Views:
 class _PictureLinearisation:
     """Residuals of one picture and their derivatives."""
 
+    ids: NDArray[np.intp]  # (n,) of the marks
     residual_px: FloatArray  # (n, 2) seen less predicted
-    by_shared: FloatArray  # (2 n, n_shared) slopes
-    by_pose: FloatArray  # (2 n, 6) slopes
+    by_rig: FloatArray  # (n, 2, n_rig) slopes
+    by_pose: FloatArray  # (n, 2, 6) slopes
+    by_place: FloatArray  # (n, 2, 3) slopes by the mark's own place; no other pixel depends on it
     sigma_px: FloatArray  # (n,) standard errors
     length: FloatArray  # (n,) of the residuals, in standard errors
 
@@ -122,47 +125,66 @@ class Linearisation:
         points_mm = self.views.board.points_mm[seen.ids]
         if model.n_marks:
             points_mm = points_mm + unpack_shape_mm(model, self.shared)[seen.ids]
-        pixels, by_rig, by_pose, by_point = project(
+        pixels, by_rig, by_pose, by_place = project(
             points_mm, left_from_board, model, self.shared, number
         )
-        by_shared = np.zeros((len(by_rig), model.n_shared))
-        by_shared[:, : model.n_rig] = by_rig
-        if model.n_marks:
-            rows = np.arange(len(by_rig))[:, None]
-            places = model.n_rig + 3 * np.repeat(seen.ids, 2)[:, None] + np.arange(3)
-            by_shared[rows, places] = by_point
         residual_px = seen.pixels - pixels
         length = np.linalg.norm(residual_px / sigma_px[:, None], axis=1)
-        return _PictureLinearisation(residual_px, by_shared, by_pose, sigma_px, length)
+        rows = (len(pixels), 2, -1)
+        return _PictureLinearisation(
+            seen.ids, residual_px, by_rig.reshape(rows), by_pose.reshape(rows),
+            by_place.reshape(rows), sigma_px, length,
+        )  # fmt: skip
 
 
 class NormalEquations:
     """Normal equations of a step from one linearisation, with robust weights."""
 
     def __init__(self, linear: Linearisation) -> None:
-        n = linear.views.model.n_shared
-        self._limit = _HUBER * linear.scale
-        self._shared_normal, self._shared_right = np.zeros((n, n)), np.zeros(n)
+        model = linear.views.model
+        self._limit, self._n_rig, self._n_marks = _HUBER * linear.scale, model.n_rig, model.n_marks
+        self._shared_normal = np.zeros((model.n_shared, model.n_shared))
+        self._shared_right = np.zeros(model.n_shared)
         self._view_normals: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+        # What a picture says of a mark's place, of it together with the rig, and of it alone.
+        self._of_marks = np.zeros((model.n_marks, 3, 3))
+        self._with_rig = np.zeros((model.n_marks, 3, model.n_rig))
         for view in linear.pictures:
             self._add(view)
+        self._place_marks()
         self._expect_board(linear)
 
     def _add(self, view: list[_PictureLinearisation]) -> None:
         """Add one view, weighed as Huber does."""
-        n = len(self._shared_right)
-        mixed, own, right = np.zeros((n, 6)), np.zeros((6, 6)), np.zeros(6)
+        n_rig = self._n_rig
+        mixed, own, right = np.zeros((len(self._shared_right), 6)), np.zeros((6, 6)), np.zeros(6)
         for one in view:
             weight = np.minimum(1.0, self._limit / np.maximum(one.length, 1e-12))
-            root = np.repeat(np.sqrt(weight) / one.sigma_px, 2)
-            a, b = one.by_shared * root[:, None], one.by_pose * root[:, None]
-            r = one.residual_px.ravel() * root
-            self._shared_normal += a.T @ a
-            self._shared_right += a.T @ r
-            mixed += a.T @ b
+            root = (np.sqrt(weight) / one.sigma_px)[:, None, None]
+            by_rig, by_pose = one.by_rig * root, one.by_pose * root
+            r = one.residual_px[..., None] * root
+            a, b = by_rig.reshape(-1, n_rig), by_pose.reshape(-1, 6)
+            self._shared_normal[:n_rig, :n_rig] += a.T @ a
+            self._shared_right[:n_rig] += a.T @ r.ravel()
+            mixed[:n_rig] += a.T @ b
             own += b.T @ b
-            right += b.T @ r
+            right += b.T @ r.ravel()
+            if self._n_marks:
+                by_place = np.swapaxes(one.by_place * root, 1, 2)
+                self._of_marks[one.ids] += by_place @ np.swapaxes(by_place, 1, 2)
+                self._with_rig[one.ids] += by_place @ by_rig
+                mixed[n_rig:].reshape(-1, 3, 6)[one.ids] += by_place @ by_pose
+                self._shared_right[n_rig:].reshape(-1, 3, 1)[one.ids] += by_place @ r
         self._view_normals.append((mixed, own, right))
+
+    def _place_marks(self) -> None:
+        """Put what was added by mark where it belongs in the shared normal equations."""
+        n_rig = self._n_rig
+        with_rig = self._with_rig.reshape(-1, n_rig)
+        self._shared_normal[n_rig:, :n_rig] = with_rig
+        self._shared_normal[:n_rig, n_rig:] = with_rig.T
+        places = n_rig + np.arange(3 * self._n_marks).reshape(-1, 3)
+        self._shared_normal[places[:, :, None], places[:, None, :]] = self._of_marks
 
     def _expect_board(self, linear: Linearisation) -> None:
         """What is known of the marks' places beforehand; it also fixes the board's frame."""

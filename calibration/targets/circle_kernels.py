@@ -79,12 +79,17 @@ def find_pole(p: NDArray[np.float64], horizon: NDArray[np.float64]) -> tuple[flo
 @njit(cache=True, nogil=True)
 def start_shape(px_from_disc: NDArray[np.float64], p: NDArray[np.float64]) -> float:
     """Set b11, b12, b22 for a disc of radius 1 under a linear map; returns the larger half axis."""
-    squared = px_from_disc @ px_from_disc.T
-    # Of a 2x2 matrix: S^1/2 = (S + det^1/2 I) / (trace + 2 det^1/2)^1/2; its inverse is wanted.
-    root = math.sqrt(max(squared[0, 0] * squared[1, 1] - squared[0, 1] ** 2, 1e-12))
-    trace = squared[0, 0] + squared[1, 1]
+    m11, m12, m21, m22 = (
+        px_from_disc[0, 0],
+        px_from_disc[0, 1],
+        px_from_disc[1, 0],
+        px_from_disc[1, 1],
+    )
+    s11, s12, s22 = m11 * m11 + m12 * m12, m11 * m21 + m12 * m22, m21 * m21 + m22 * m22
+    # Of S = M M^T: S^1/2 = (S + det^1/2 I) / (trace + 2 det^1/2)^1/2; its inverse is wanted.
+    root, trace = math.sqrt(max(s11 * s22 - s12 * s12, 1e-12)), s11 + s22
     scale = math.sqrt(trace + 2.0 * root)
-    a, b, d = (squared[0, 0] + root) / scale, squared[0, 1] / scale, (squared[1, 1] + root) / scale
+    a, b, d = (s11 + root) / scale, s12 / scale, (s22 + root) / scale
     determinant = a * d - b * b
     p[2], p[3], p[4] = d / determinant, -b / determinant, a / determinant
     return math.sqrt(0.5 * (trace + math.sqrt(max(trace * trace - 4.0 * root * root, 0.0))))

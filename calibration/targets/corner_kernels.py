@@ -99,6 +99,16 @@ def find_clear_pixels(
 
 
 @njit(cache=True, nogil=True)
+def invert(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Inverse of a regular (2, 2) matrix."""
+    determinant = matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+    inverse = np.empty((2, 2))
+    inverse[0, 0], inverse[0, 1] = matrix[1, 1] / determinant, -matrix[0, 1] / determinant
+    inverse[1, 0], inverse[1, 1] = -matrix[1, 0] / determinant, matrix[0, 0] / determinant
+    return inverse
+
+
+@njit(cache=True, nogil=True)
 def fit_corner(
     picture: NDArray[np.uint8],
     corner_px: NDArray[np.float64],
@@ -121,7 +131,7 @@ def fit_corner(
     height, width = picture.shape
     if x0 < radius or y0 < radius or x0 + radius >= width or y0 + radius >= height:
         return
-    pixels = find_clear_pixels(corner_px, np.linalg.inv(px_from_board), limits)
+    pixels = find_clear_pixels(corner_px, invert(px_from_board), limits)
     n = len(pixels)
     if n <= 2 * N_PARAMETERS:
         return

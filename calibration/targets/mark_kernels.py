@@ -42,21 +42,53 @@ def add_pixel(
 
 
 @njit(cache=True, nogil=True)
+def factorise(normal: NDArray[np.float64]) -> None:
+    """Cholesky's factor L of normal equations, in the place of their lower half.
+
+    Ours, because numba compiles LAPACK's for seconds. NaN when they are not positive definite.
+    """
+    for i in range(len(normal)):
+        for j in range(i + 1):
+            rest = normal[i, j]
+            for k in range(j):
+                rest -= normal[i, k] * normal[j, k]
+            if i > j:
+                normal[i, j] = rest / normal[j, j]
+            else:
+                normal[i, i] = math.sqrt(rest) if rest > 0.0 else math.nan
+
+
+@njit(cache=True, nogil=True)
+def solve_factorised(factor: NDArray[np.float64], right: NDArray[np.float64]) -> None:
+    """Solve L L^T x = right, in place; L as `factorise` leaves it."""
+    n = len(right)
+    for i in range(n):
+        for k in range(i):
+            right[i] -= factor[i, k] * right[k]
+        right[i] /= factor[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            right[i] -= factor[k, i] * right[k]
+        right[i] /= factor[i, i]
+
+
+@njit(cache=True, nogil=True)
 def solve_step(
     normal: NDArray[np.float64], right: NDArray[np.float64], n_shape: int, is_first: bool
-) -> NDArray[np.float64]:
-    """Gauss-Newton's step; the first finds light and contrast alone: the shape stands on them."""
+) -> None:
+    """Gauss-Newton's step in the place of the right side, Cholesky's factor in that of the other.
+
+    The first step finds light and contrast alone: the shape stands on them.
+    """
     for i in range(len(right)):
         normal[i, i] += 1e-9 * (1.0 + normal[i, i])
         for j in range(i):
             if is_first and j < n_shape <= i:
                 normal[i, j] = 0.0
-            normal[j, i] = normal[i, j]
-    step = np.empty(len(right))
-    step[:] = np.linalg.solve(normal, right)
+    factorise(normal)
+    solve_factorised(normal, right)
     if is_first:
-        step[:n_shape] = 0.0
-    return step
+        right[:n_shape] = 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -71,15 +103,15 @@ def has_settled(
 
     Args:
         p: parameters, in place.
-        normal: (n, n) lower half of the normal equations, in place.
-        right: (n,) their right side.
+        normal: (n, n) lower half of the normal equations; their factor takes its place.
+        right: (n,) their right side; the step takes its place.
         n_shape: parameters before the amplitude.
         number: of the step, from 0.
     """
-    step = solve_step(normal, right, n_shape, number == 0)
-    p += step
+    solve_step(normal, right, n_shape, number == 0)
+    p += right
     p[n_shape - 1] = max(p[n_shape - 1], _LEAST_BLUR_PX)
-    rests: bool = number > 1 and abs(step[0]) < _SETTLED_PX and abs(step[1]) < _SETTLED_PX
+    rests: bool = number > 1 and abs(right[0]) < _SETTLED_PX and abs(right[1]) < _SETTLED_PX
     return rests
 
 
@@ -90,7 +122,7 @@ def tell(
     p: NDArray[np.float64],
     n_shape: int,
     variance: float,
-    normal: NDArray[np.float64],
+    factor: NDArray[np.float64],
     told: NDArray[np.float64],
 ) -> None:
     """Write what is told of a mark.
@@ -101,11 +133,16 @@ def tell(
         p: parameters.
         n_shape: of them, before the amplitude.
         variance: of what is left of a pixel.
-        normal: (n, n) normal equations.
+        factor: (n, n) of the normal equations, as `factorise` leaves it.
         told: (5,) written.
     """
-    covariance = np.linalg.inv(normal)
+    trace = 0.0
+    for i in range(2):
+        column = np.zeros(len(p))
+        column[i] = 1.0
+        solve_factorised(factor, column)
+        trace += column[i]
     told[0], told[1] = x, y
-    told[2] = math.sqrt(max(0.5 * variance * (covariance[0, 0] + covariance[1, 1]), 0.0))
+    told[2] = math.sqrt(0.5 * variance * trace)
     told[3] = p[n_shape - 1]
     told[4] = 2.0 * abs(p[n_shape]) / math.sqrt(variance + 1e-12)

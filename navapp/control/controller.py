@@ -48,7 +48,7 @@ from navapp.control.specification import SessionSpecification
 from navapp.control.states import Snapshot, StepLine
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
-from navapp.geometry.rectification import Rectifier
+from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import DepthMarks
 from navapp.tracking import make_tracker
@@ -92,7 +92,7 @@ class SessionController:
         rig, plan = specification.rig, specification.plan
         self._devices = devices
         self._mirror_checking = MirrorChecking(
-            specification.display, Rectifier(rig).geometry, locate_corners
+            specification.display, rectifier_of(rig).geometry, locate_corners
         )
         composer = Composer(rig, plan, self._mirror_checking.view)
         self._eye = eye or EyePreview(None, InlineExecutor())

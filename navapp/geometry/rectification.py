@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -227,6 +227,16 @@ class Rectifier:
         return find_places(left_x, left_y), find_places(right_x, right_y)
 
 
+@lru_cache(maxsize=2)
+def rectifier_of(rig: StereoRig) -> Rectifier:
+    """The rectifier of a rig, for all who rectify its pictures: its maps take a tenth of a second.
+
+    Raises:
+        RigError: the right camera does not stand to the right of the left one.
+    """
+    return Rectifier(rig)
+
+
 def _solve(rig: StereoRig) -> tuple[Any, Any, Any, Any]:
     """R1, R2, P1, P2."""
     import cv2
@@ -305,11 +315,10 @@ def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> "Pla
 
     height, width = columns.shape
     at = np.arange(width)
+    reached = np.maximum.accumulate(_extend(columns), axis=1)
     crossings = np.empty((height, width), dtype=np.float32)
-    for y in range(height):
-        # Interpolation looks beyond either end.
-        reached, found = (np.pad(line[y], 1, _extend) for line in (columns, rows))
-        crossings[y] = np.interp(at, np.maximum.accumulate(reached), found)
+    for y, found in enumerate(_extend(rows)):
+        crossings[y] = np.interp(at, reached[y], found)
     is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
     steps = _lane_blocks(np.floor(columns) - at.astype(np.float32))
     lines = _lane_blocks(np.floor(crossings))
@@ -318,10 +327,11 @@ def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> "Pla
     return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
 
 
-def _extend(line: NDArray[np.float32], *_: object) -> None:
-    """Straight on at either end of a line, by so many pixels as interpolation asks for."""
-    line[0] = line[1] + TAPS_PX * (line[1] - line[2])
-    line[-1] = line[-2] + TAPS_PX * (line[-2] - line[-3])
+def _extend(lines: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(h, w + 2) of (h, w): straight on at either end, by so many pixels as interpolation asks."""
+    before = lines[:, 0] + TAPS_PX * (lines[:, 0] - lines[:, 1])
+    after = lines[:, -1] + TAPS_PX * (lines[:, -1] - lines[:, -2])
+    return np.column_stack([before, lines, after])
 
 
 def _lane_blocks(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.camera import Camera
-from navapp.geometry.rectification import RectifiedGeometry, Rectifier
+from navapp.geometry.rectification import RectifiedGeometry, rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.overlay.viewpoints import rectify_rays
 from navapp.values import DEPTH_COLOURS, Foreground, Origin
@@ -22,7 +22,7 @@ class DepthMarks:
 
     def __init__(self, rig: StereoRig) -> None:
         # No method: it would keep the marks alive.
-        find = partial(_find_places, rig.left, Rectifier(rig).geometry)
+        find = partial(_find_places, rig.left, rectifier_of(rig).geometry)
         self._places = lru_cache(1)(find)
 
     def draw(self, preview: Image, foreground: Foreground | None) -> Image:

@@ -11,7 +11,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.halves import half_box, inside_of_halves
-from navapp.geometry.rectification import RectifiedGeometry, Rectifier
+from navapp.geometry.rectification import RectifiedGeometry, rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.overlay.see_kernels import Measured, look_up_depth
@@ -78,7 +78,7 @@ class LeftView:
 
     def __init__(self, rig: StereoRig) -> None:
         self._camera = rig.left
-        self._geometry = Rectifier(rig).geometry
+        self._geometry = rectifier_of(rig).geometry
         self._columns, self._rows, self._depth_share = _rectified_places(rig.left, self._geometry)
 
     @property
@@ -175,7 +175,7 @@ class MirrorView:
 
     def __init__(self, eye_view: EyeView, rig: StereoRig) -> None:
         self.eye_view = eye_view
-        self._geometry = Rectifier(rig).geometry
+        self._geometry = rectifier_of(rig).geometry
 
     @property
     def camera(self) -> Camera:

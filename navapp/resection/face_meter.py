@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
+from navapp.geometry.rectification import Image, RectifiedPair, rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.resection.face_errors import make_face
@@ -54,7 +54,7 @@ class FaceMeter:
     """Measures the sawn faces of one bone under one rig."""
 
     def __init__(self, rig: StereoRig, bone: BoneModel) -> None:
-        self._rectifier = Rectifier(rig)
+        self._rectifier = rectifier_of(rig)
         self._geometry = self._rectifier.geometry
         self._bone, self._quality = bone, rig.quality
         self._viewer = FaceViewer(bone, self._geometry)

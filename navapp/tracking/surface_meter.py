@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.masks import large_regions
-from navapp.geometry.rectification import Image, RectifiedPair, Rectifier
+from navapp.geometry.rectification import Image, RectifiedPair, rectifier_of
 from navapp.geometry.reduced_rectification import ReducedRectifier
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
@@ -108,7 +108,7 @@ class SurfaceMeter:
         max_points: int,
     ) -> None:
         self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
-        self.rectifier = Rectifier(rig)
+        self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
         self._reduced = {n: ReducedRectifier(self.rectifier, n) for n in NearerSearch.REDUCTIONS}
         # Several steps ask for the same few poses. No method: it would keep the meter alive.

@@ -183,11 +183,14 @@ name = "femur_distal"
 """
 
 
-def test_a_session_with_cuts_replays_and_keeps_them_whatever_is_changed(tmp_path: Path) -> None:
+def test_a_session_with_cuts_replays_and_keeps_them_whatever_is_changed(
+    tmp_path: Path, moving: Path
+) -> None:
     script, session, out = (tmp_path / name for name in ("script.toml", "session", "b.json"))
     script.write_text(CUTS, encoding="utf-8")
     first = tmp_path / "a.json"
-    options = ["--quiet", "run", "--headless", "--frames", "11", "--operator", str(script)]
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "11"]
+    options += ["--operator", str(script)]
     assert run([*options, "--record", str(session), "--json", str(first)]) == 0
     frames = result(first)["frames"]
     versions = [frame["bone_version"] for frame in frames]

@@ -6,7 +6,7 @@ import pytest
 
 from navapp.errors import RigError
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Rectifier, luma
+from navapp.geometry.rectification import Rectifier, luma, rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from tests.geometry.shapes import camera, toed_in_rig
@@ -161,6 +161,13 @@ def test_a_grey_and_a_coloured_picture_are_no_pair(rectifier):
         rectifier.rectify(
             np.zeros((480, 640), dtype=np.uint8), np.zeros((480, 640, 3), dtype=np.uint8)
         )
+
+
+def test_those_who_rectify_for_one_rig_share_its_maps(rectifier):
+    assert rectifier_of(rectifier.rig) is rectifier_of(rectifier.rig)
+    # A rig that was refined is another one, whatever it is called.
+    refined = dataclasses.replace(rectifier.rig)
+    assert rectifier_of(refined) is not rectifier_of(rectifier.rig)
 
 
 def test_swapped_cameras_are_refused():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from calibration.targets import circle_kernels, corner_kernels
+from calibration.targets import circle_kernels, corner_kernels, mark_kernels
 from calibration.targets.mark_kernels import compute_edge
 from navapp.geometry.camera import Camera
 from tests.reference import mark_reference
@@ -51,6 +51,38 @@ def test_a_disc_has_the_grey_values_of_its_equation_everywhere(place):
 def test_a_step_has_its_slope():
     high, low = (compute_edge(0.4 + h, 0.9)[0] for h in (1e-6, -1e-6))
     assert compute_edge(0.4, 0.9)[1] == pytest.approx((high - low) / 2e-6)
+
+
+@pytest.mark.kernel
+def test_a_step_solves_its_normal_equations():
+    rng = np.random.default_rng(1)
+    slopes = rng.normal(size=(40, 9)) * np.logspace(-3, 3, 9)
+    normal, right = slopes.T @ slopes, rng.normal(size=9)
+    expected = np.linalg.solve(normal, right)
+    # Only the lower half is given.
+    factor, step = np.tril(normal), right.copy()
+    mark_kernels.factorise(factor)
+    mark_kernels.solve_factorised(factor, step)
+    np.testing.assert_allclose(step, expected, rtol=1e-9)
+
+
+@pytest.mark.kernel
+def test_equations_that_fix_nothing_give_no_step():
+    factor, step = np.diag([1.0, -1.0]), np.ones(2)
+    mark_kernels.factorise(factor)
+    mark_kernels.solve_factorised(factor, step)
+    assert np.isnan(step).any()
+
+
+@pytest.mark.kernel
+def test_the_first_step_leaves_the_shape():
+    rng = np.random.default_rng(2)
+    slopes = rng.normal(size=(40, 9))
+    normal, right = slopes.T @ slopes, rng.normal(size=9)
+    step = right.copy()
+    mark_kernels.solve_step(np.tril(normal), step, 5, True)
+    assert (step[:5] == 0.0).all()
+    np.testing.assert_allclose(step[5:], np.linalg.solve(normal[5:, 5:], right[5:]), rtol=1e-6)
 
 
 def test_a_disc_begins_as_its_linear_map_has_it():
