@@ -79,6 +79,7 @@ def data() -> Path:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Tests that share what is made once for their module run in one worker: it is made there.
 
+    Those that wait run in one as well: waiting in all workers at once, they leave the cores idle.
     Slow ones come first: what is left for the end is short, and no worker waits for another.
     """
     if not config.getoption("--release"):
@@ -88,6 +89,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: item.get_closest_marker("slow") is None)
     for item in items:
+        if item.get_closest_marker("waits"):
+            item.add_marker(pytest.mark.xdist_group("waits"))
         if not isinstance(item, pytest.Function) or item.get_closest_marker("xdist_group"):
             continue
         used = item._fixtureinfo.name2fixturedefs.values()

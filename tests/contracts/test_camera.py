@@ -22,6 +22,8 @@ from tests.drivers.recordings import frame, write_pairs, write_video
 from tests.drivers.usb_rigs import UsbRig
 from tests.sim_devices.plain_world import PlainWorld
 
+pytestmark = pytest.mark.waits
+
 Make = Callable[[], CameraUnderTest]
 
 

@@ -9,6 +9,8 @@ from navapp.errors import DeviceLost, UnsupportedControl
 from sim_devices.firmware.escvp21 import ProjectorModel
 from tests.drivers.firmware_rigs import ProjectorRig, projector_at, projector_terminal
 
+pytestmark = pytest.mark.waits
+
 
 class Lamp:
     """A projector in memory: the shortest that keeps the contract with all commands."""

@@ -11,6 +11,8 @@ from drivers.window_process import WindowSettings
 from tests.many import few_of
 from tests.x_servers import seen, xvfb
 
+pytestmark = pytest.mark.waits
+
 WIDTH, HEIGHT = 320, 200
 # A hundred times what it takes on an idle machine.
 LATENCY_NS = 500_000_000

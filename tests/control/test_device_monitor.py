@@ -15,6 +15,8 @@ from navapp.errors import DeviceError, DeviceLost, DeviceNotFound
 from navapp.values import Reason
 from tests.control.fakes import wait_for
 
+pytestmark = pytest.mark.waits
+
 
 class FakeHandler:
     """A device in a test's hands."""

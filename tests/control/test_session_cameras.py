@@ -16,6 +16,8 @@ from navapp.values import Reason
 from tests.control.fakes import HEIGHT, WIDTH, Bench, navigating
 from tests.drivers.usb_rigs import UsbRig
 
+pytestmark = pytest.mark.waits
+
 # A picture may stay for half a second (`overlay_valid_ms`); the rest is for a busy machine.
 DARK_S = 0.5 + 2.5
 # Three seconds of silence make a camera lost.

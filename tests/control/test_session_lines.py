@@ -21,6 +21,8 @@ from tests.drivers.firmware_rigs import (
 )
 from tests.many import few_of
 
+pytestmark = pytest.mark.waits
+
 # What is older than 1.5 s counts as lost (MIRROR_TIMES_S; on a clock that stands still:
 # test_device_watch.py). The rest is for a machine that has other things to do.
 MIRROR_DARK_S = 1.5 + 3.5

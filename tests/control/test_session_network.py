@@ -17,6 +17,8 @@ from sim_devices.firmware.fast_clock import FastClock
 from sim_devices.firmware.pjlink_server import PjlinkServer
 from tests.control.fakes import Bench, navigating
 
+pytestmark = pytest.mark.waits
+
 
 class Room:
     """A session, its projector, and the socket between."""

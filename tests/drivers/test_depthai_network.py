@@ -7,6 +7,8 @@ import pytest
 from navapp import environment
 from tests.drivers.preloading import compiled, python
 
+pytestmark = pytest.mark.waits
+
 pytest.importorskip("depthai", reason="the package depthai is not installed (navapp[oak])")
 
 # Import, pipeline on the host, search, and the driver's own opening without a camera.

@@ -23,6 +23,8 @@ from navapp.errors import (
 from tests.drivers.host_oak import HEIGHT, RATE_HZ, WIDTH, HostOak
 from tests.drivers.losing import fails_within
 
+pytestmark = pytest.mark.waits
+
 OAK_ID = "14442C10D13EABCE00"
 SETTINGS = DepthaiSettings(width=WIDTH, height=HEIGHT, rate_hz=RATE_HZ)
 

@@ -27,6 +27,8 @@ from tests.drivers.losing import fails_within
 from tests.drivers.recordings import number_of, write_video
 from tests.drivers.usb_rigs import HEIGHT, RATE_HZ, WIDTH, UsbRig
 
+pytestmark = pytest.mark.waits
+
 
 @pytest.fixture
 def rig(tmp_path):

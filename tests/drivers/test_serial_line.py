@@ -23,6 +23,8 @@ from tests.drivers.footprints import (
     needs_descriptors,
 )
 
+pytestmark = pytest.mark.waits
+
 SOON_S = 1.0
 
 

@@ -6,6 +6,8 @@ import pytest
 
 from tests.drivers.preloading import python, v4l2
 
+pytestmark = pytest.mark.waits
+
 TESTS = ("tests/drivers/preloaded_v4l2.py", "tests/drivers/discovery/preloaded_v4l_cameras.py")
 N_LEAST = 35
 

@@ -17,6 +17,8 @@ from navapp.errors import DeviceLost, DeviceNotFound, WrongDevice
 from tests.drivers.window_application import application
 from tests.x_servers import shot, two_monitors, xvfb
 
+pytestmark = pytest.mark.waits
+
 WIDTH, HEIGHT = 320, 200
 MINUTE_NS = 60 * 10**9
 # docs/devices.md states the first; a busy machine is granted the second on top of every time.

@@ -24,6 +24,8 @@ from sim_devices.firmware.memory_port import MemoryAddress
 from sim_devices.firmware.stage_motion import StageModel
 from tests.drivers.firmware_rigs import STAGE_SERIAL, StageRig, mirror_at, stage_terminal
 
+pytestmark = pytest.mark.waits
+
 # Of the public test-suites of other implementations.
 CHECKSUMS = {"01 0 OK IDLE -- 0": "8D", "01 0 OK IDLE -- 7z": "0C", "1 3 9 OK IDLE -- 0": "61",
              "1 0 foo 2": "C9"}  # fmt: skip

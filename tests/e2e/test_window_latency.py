@@ -15,6 +15,8 @@ from navapp.control.display_delay.code_player import CodePlayer
 from navapp.control.display_delay.code_recording import record_code
 from tests.x_servers import seen, shot, xvfb
 
+pytestmark = pytest.mark.waits
+
 WIDTH, HEIGHT = 320, 200
 RATE_HZ = 60.0
 # By which the right picture is stamped too early.

@@ -14,6 +14,8 @@ from navapp.errors import DeviceLost, DeviceTimeout, ResultError
 from sim_devices.faults import Fault, FaultKind
 from tests.control.display_delay.rooms import MS, Breaking, Room
 
+pytestmark = pytest.mark.waits
+
 HALF_REFRESH_MS = 500.0 / 59.94
 
 

@@ -18,6 +18,8 @@ from navapp.errors import DeviceLost, DeviceNotFound, DeviceTimeout
 from sim_devices.firmware import pjlink
 from sim_devices.firmware.pjlink_server import PjlinkServer, Trouble
 
+pytestmark = pytest.mark.waits
+
 
 @contextmanager
 def served(trouble: Trouble | None = None) -> Iterator[PjlinkServer]:

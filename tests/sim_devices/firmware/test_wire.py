@@ -14,6 +14,8 @@ from sim_devices.firmware import wire
 from sim_devices.firmware.fast_clock import FastClock
 from sim_devices.firmware.wire import Wire
 
+pytestmark = pytest.mark.waits
+
 
 class Talker:
     """Sends what it is told to."""
