@@ -198,11 +198,11 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
-    from navapp.cli.prior_files import read_prior
     from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.executors import InlineExecutor, RecordedExecutor
     from navapp.control.operators import RecordedOperator
+    from navapp.control.prior_files import read_prior
     from navapp.control.specification import specify_session
     from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan

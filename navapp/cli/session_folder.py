@@ -8,9 +8,9 @@ from typing import get_args
 
 from drivers.session_files import SessionWriter
 from navapp import __version__
-from navapp.cli.prior_files import prior_to_json
 from navapp.config import Configuration, format_toml
 from navapp.control.operators import RecordedEvents, read_events
+from navapp.control.prior_files import prior_to_json
 from navapp.control.recorder import BackgroundSink, SessionRecorder
 from navapp.control.specification import SessionSpecification
 from navapp.errors import SequenceError

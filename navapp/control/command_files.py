@@ -29,11 +29,11 @@ from navapp.control.commands import (
     WithdrawCondition,
     WithdrawStep,
 )
+from navapp.control.prior_files import prior_from_json, prior_to_json
 from navapp.errors import SequenceError
 from navapp.geometry.transform import RigidTransform
 
 _PLAIN: dict[str, type] = {
-    "register": Register,
     "cancel": Cancel,
     "blank": Blank,
     "show": Show,
@@ -72,6 +72,9 @@ def command_to_json(command: Command) -> dict[str, Any]:
     if isinstance(command, NudgeCross):
         nudge_px = [command.right_px, command.down_px]
         return {"command": "nudge_cross", "nudge_px": nudge_px}
+    if isinstance(command, Register):
+        start = {} if command.start is None else {"start": prior_to_json(command.start)}
+        return {"command": "register", **start}
     if isinstance(command, Propose):
         pose = command.left_from_bone
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
@@ -99,6 +102,9 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
         if name == "nudge_cross":
             right_px, down_px = value["nudge_px"]
             return NudgeCross(int(right_px), int(down_px))
+        if name == "register":
+            start = value.get("start")
+            return Register(None if start is None else prior_from_json(start))
         if name == "propose":
             matrix = value["camera_from_model"]
             return Propose(RigidTransform("left", str(value["bone"]), matrix))
@@ -109,7 +115,7 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return _DECISIONS[name](None if candidate_id is None else int(candidate_id))
         command: Command = _PLAIN[str(name)]()
         return command
-    except (KeyError, ValueError, TypeError) as error:
+    except (LookupError, ValueError, TypeError, AttributeError) as error:
         raise SequenceError(
             f"the session's events hold an unknown command '{name}'",
             remedy="replay it with the version that recorded it",

@@ -93,7 +93,7 @@ class CommandHandler:
         session = self._session
         match command:
             case Register():
-                session.begin_registration()
+                session.begin_registration(command.start)
             case Propose():
                 session.propose(command.left_from_bone)
             case Cancel():

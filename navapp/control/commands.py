@@ -3,11 +3,16 @@
 from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
+from navapp.values import Prior
 
 
 @dataclass(frozen=True, slots=True)
 class Register:
-    """Start the first registration (again) from the session's prior."""
+    """Start the first registration (again)."""
+
+    # what the operator has just drawn or picked: later ones of the same bone begin from it too.
+    # None: what was given last, at first the session's prior.
+    start: Prior | None = None
 
 
 @dataclass(frozen=True, slots=True)

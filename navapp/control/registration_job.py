@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job
 from navapp.control.trackers import Trackers
-from navapp.values import StageSpec, TrackedFrame
+from navapp.values import Prior, StageSpec, TrackedFrame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +34,10 @@ class RegistrationJob:
     def progress(self) -> float | None:
         """Share done; None when none runs."""
         return None if self._job is None else self._job.progress
+
+    def set_start(self, bone: str, start: Prior) -> None:
+        """From now on a bone is searched for where an operator has said that it is."""
+        self._trackers.set_start(bone, start)
 
     def start(self, stage: StageSpec, frame: StereoFrame) -> bool:
         """Search for a stage's bone in a frame, unless a search runs; whether it was started."""

@@ -27,7 +27,7 @@ from navapp.control.commands import (
 from navapp.control.stages import TIME_OUT, stage_by_name
 from navapp.control.states import SessionState, Snapshot
 from navapp.errors import ConfigurationError
-from navapp.values import ConditionKind, Status
+from navapp.values import ConditionKind, Prior, Status
 
 _MAX_ATTEMPTS = 8
 _MAY_REGISTER = (SessionState.READY, SessionState.SUSPENDED, SessionState.NAVIGATING)
@@ -55,6 +55,8 @@ class ScriptStep(Section):
     ]
     """propose offers the found pose, turned, to see the judge refuse it; wait goes on when the
     session is there, expect when a text is told; both fail when that takes too many frames."""
+    box: tuple[int, int, int, int] | None = None
+    """Of register: drawn around the bone in the left picture: x, y, width, height in px."""
     turn_deg: float = 15.0
     """Of a proposed pose."""
     stage: str = ""
@@ -183,7 +185,8 @@ class ScriptedOperator:
             self._fail(f"no pose was OK in {_MAX_ATTEMPTS} registrations")
             return []
         self._phase = "registering"
-        return [Register()]
+        box = self._steps[0].box if self._steps else None
+        return [Register(None if box is None else Prior(box=box))]
 
     def _look(self, step: ScriptStep, snapshot: Snapshot) -> None:
         """Go on when what is waited for is there."""

@@ -28,7 +28,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import LimbMeasurement
 from navapp.resection import CutBone
-from navapp.values import Measured, Reason, StageSpec, Status, TrackedFrame, Verdict
+from navapp.values import Measured, Prior, Reason, StageSpec, Status, TrackedFrame, Verdict
 
 
 class Session:
@@ -319,7 +319,7 @@ class Session:
         best = self._tracks.candidate
         if best is None:
             failure = registration.answers[0] if registration.answers else None
-            why = f"no start pose is known for the {self._stage.bone}"
+            why = f"nothing tells where the {self._stage.bone} is: draw a box around it"
             if failure is not None and failure.verdict.reasons:
                 why = failure.verdict.reasons[0].value
             self.fall_back(f"registration failed: {why}", EventLevel.WARNING)
@@ -341,11 +341,19 @@ class Session:
             self._stop_search()
             self.fall_back(f"the {stage.bone} is now the bone to follow")
 
-    def begin_registration(self) -> None:
-        """Search for the stage's bone from the next frame on; what is under review is dropped."""
+    def begin_registration(self, start: Prior | None = None) -> None:
+        """Search for the stage's bone from the next frame on; what is under review is dropped.
+
+        Args:
+            start: where an operator says that it is; None: as before.
+        """
         self._stop_search()
         self._tracked = None
-        self.change_state(SessionState.REGISTERING, f"searching for the {self._stage.bone}")
+        text = f"searching for the {self._stage.bone}"
+        if start is not None:
+            self._registration.set_start(self._stage.bone, start)
+            text += f" {describe_start(start)}"
+        self.change_state(SessionState.REGISTERING, text)
 
     def cancel_registration(self) -> None:
         """Stop the search."""
@@ -468,6 +476,11 @@ class Session:
 def describe_moved_rig(why: str) -> str:
     """What is said of a rig that has moved, with how that was found."""
     return f"{Reason.RIG_MOVED.value} ({why})"
+
+
+def describe_start(start: Prior) -> str:
+    """What an operator has given, for people."""
+    return "in the box that was drawn" if start.box is not None else "from a given pose"
 
 
 def add_bound(text: str, verdict: Verdict) -> str:

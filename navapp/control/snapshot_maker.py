@@ -68,6 +68,7 @@ class SnapshotMaker:
             valid_ms=self.specification.overlay_valid_ms,
             pose_at_light=self._predict_pose(now_ns),
             preview=None if picture is None else picture.drawn,
+            picture_size_px=(rig.width, rig.height),
             plain_preview=None if picture is None else picture.plain,
             shows_depth=session.shows_depth and not shows_eye,
             has_eye=self.eye.is_possible,

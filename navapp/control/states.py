@@ -188,6 +188,7 @@ class Snapshot:
     # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
     # frame. `plain_preview` is the same without guides, None when it has none.
     preview: NDArray[np.uint8] | None = None
+    picture_size_px: tuple[int, int] = (0, 0)  # width and height of the left picture
     plain_preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
     has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead

@@ -59,6 +59,8 @@ class Trackers:
     ) -> None:
         self._rig, self._plan, self._prior, self._settings = rig, plan, prior, settings
         self._make_tracker = make_tracker
+        # By bone: where an operator has said that it is, instead of the prior.
+        self._starts: dict[str, Prior] = {}
         self._lock = threading.Lock()
         self._bones = {name: CutBone(bone) for name, bone in plan.bones.items()}
         # By name and version of the bone: what is made of an old one is never used for a new one.
@@ -66,6 +68,26 @@ class Trackers:
         self._with_aspects: dict[tuple[str, int], Tracker] = {}
         self._face_meters: dict[str, FaceMeter] = {}
         self._hole_meters: dict[str, HoleMeter] = {}
+
+    def set_start(self, bone: str, start: Prior) -> None:
+        """From now on a bone is searched for where an operator has said that it is.
+
+        The prior's approach cone stays: it tells from which side the patient is seen.
+        """
+        prior = self._prior
+        if start.approach_axis is None and prior.approach_axis is not None:
+            start = replace(
+                start,
+                approach_axis=prior.approach_axis,
+                approach_half_angle_deg=prior.approach_half_angle_deg,
+            )
+        with self._lock:
+            self._starts[bone] = start
+
+    def start(self, bone: str) -> Prior:
+        """Where a bone is searched for."""
+        with self._lock:
+            return self._starts.get(bone, self._prior)
 
     def tracker(self, bone: str) -> Tracker:
         """The tracker that follows a bone."""
@@ -150,10 +172,10 @@ class Trackers:
         frame: StereoFrame,
         on_progress: Callable[[float], None] = lambda share: None,
     ) -> list[TrackedFrame]:
-        """Search for a stage's bone in a frame, from the prior; best answer first, may be empty."""
-        tracker, goal = self._searching_tracker(stage.bone), self.goal(stage)
-        bone = self.bone(stage.bone)
-        answers = tracker.register(frame.left, frame.right, self._prior, goal, on_progress)
+        """Search for a stage's bone in a frame; best answer first, empty without any start."""
+        start, goal = self.start(stage.bone), self.goal(stage)
+        tracker, bone = self._searching_tracker(stage.bone, start), self.bone(stage.bone)
+        answers = tracker.register(frame.left, frame.right, start, goal, on_progress)
         return self._look_closer(stage, bone, frame, answers)
 
     def _look_closer(
@@ -192,10 +214,10 @@ class Trackers:
         exact = replace(estimate, covariance=np.zeros((6, 6)))
         return self.measure_face(frame, bone, exact, name)
 
-    def _searching_tracker(self, bone: str) -> Tracker:
+    def _searching_tracker(self, bone: str, start: Prior) -> Tracker:
         """The bone's tracker, with aspects when there is no pose to start from."""
-        axis = self._prior.axis_for(bone)
-        if bone in self._prior.left_from_bone or axis is None:
+        axis = start.axis_for(bone)
+        if bone in start.left_from_bone or axis is None:
             return self.tracker(bone)
         with self._lock:
             now = self._bones[bone]
@@ -203,7 +225,7 @@ class Trackers:
             known = self._with_aspects.get(key)
         if known is not None:
             return known
-        half_angle_deg, built = self._prior.approach_half_angle_deg, self._plan.aspects.get(bone)
+        half_angle_deg, built = start.approach_half_angle_deg, self._plan.aspects.get(bone)
         # What was built beforehand has the edges of the whole bone.
         if built is None or now.made:
             aspects = build_aspects(now.model, axis, half_angle_deg)

@@ -146,9 +146,17 @@ ACTIONS: tuple[Action, ...] = (
         "register",
         "g",
         "register",
-        "register: find the bone from the session's start pose",
+        "register: find the bone from where it is known or was drawn to be",
         lambda _: Register(),
         slot="register",
+    ),
+    Action(
+        "start",
+        "b",
+        "box",
+        "draw a box around the bone, by keys or with the mouse, and search in it",
+        slot="start",
+        needs_width=True,
     ),
     Action(
         "cancel",

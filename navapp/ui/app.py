@@ -19,6 +19,7 @@ from navapp.control.commands import (
     EnterStage,
     OverrideGate,
     Quit,
+    Register,
     ToggleLayer,
     WithdrawCondition,
     WithdrawStep,
@@ -45,12 +46,13 @@ from navapp.ui.palette import ActionProvider
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
+from navapp.ui.start_page import StartBox, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
 from navapp.ui.theme import NAVAPP_THEME
 from navapp.ui.view import View
-from navapp.values import Reason
+from navapp.values import Prior, Reason
 
 POLLS_PER_S = 8
 # Numbers that change faster than four times a second cannot be read.
@@ -108,6 +110,7 @@ class NavigationApp(QuietApp):
         start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
         self._view = View(snapshot, symbols, start_ns, title=title)
         self._known_events: frozenset[Event] = frozenset()
+        self._start_box: StartBox | None = None  # as it was drawn last
 
     def get_default_screen(self) -> Screen[None]:
         """The main screen."""
@@ -154,12 +157,22 @@ class NavigationApp(QuietApp):
         action, view = ACTION_OF_NAME[name], self._view
         if name == "quit":
             self._ask_to_quit(view)
+        elif name == "start":
+            self.push_screen(StartPage(view, self._start_box))
         elif name in _PAGES:
             self.push_screen(_PAGES[name](view))
         elif view.is_silent and not is_possible(action, view.snapshot, is_silent=True):
             self._say_silent(action.label)
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
+
+    def on_start_page_drawn(self, message: StartPage.Drawn) -> None:
+        """Search for the bone in the box that was drawn."""
+        self._start_box = box = message.box
+        if self._view.is_silent:
+            self._say_silent("register")
+        else:
+            self._session.submit(Register(Prior(box=(box.x, box.y, box.width, box.height))))
 
     def action_confirm_condition(self, key: str) -> None:
         """Say that a condition is met: from the gates' page."""

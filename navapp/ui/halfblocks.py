@@ -37,13 +37,36 @@ def resize_by_area(picture: NDArray[np.uint8], height: int, width: int) -> Float
     return _mean_over_parts(rows.swapaxes(0, 1), width).swapaxes(0, 1)
 
 
-def fit_size(picture: NDArray[np.uint8], columns: int, rows: int) -> tuple[int, int]:
+def fit_size(shape: tuple[int, ...], columns: int, rows: int) -> tuple[int, int]:
     """Width in columns and height in half rows of the largest picture that fits, height even."""
-    h, w = picture.shape[:2]
+    h, w = shape[:2]
     scale = min(columns / w, 2 * rows / h)
     width = min(max(round(w * scale), 1), columns)
     height = min(max(2 * round(h * scale / 2), 2), 2 * rows)
     return width, height
+
+
+def _find_frame(shape: tuple[int, ...], columns: int, rows: int) -> tuple[int, int, int, int]:
+    """Top, left, height and width of a picture in half rows and columns."""
+    width, height = fit_size(shape, columns, rows)
+    return 2 * ((2 * rows - height) // 4), (columns - width) // 2, height, width
+
+
+def find_place(
+    shape: tuple[int, ...], columns: int, rows: int, x: int, y: int
+) -> tuple[float, float]:
+    """Where the middle of a cell lies in the picture: parts of its width and of its height.
+
+    Args:
+        shape: (h, w) of the picture.
+        columns: of all cells.
+        rows: of all cells.
+        x: column of the cell; beside the picture its edge is told.
+        y: its row.
+    """
+    top, left, height, width = _find_frame(shape, columns, rows)
+    across, down = (x + 0.5 - left) / width, (2 * y + 1 - top) / height
+    return min(max(across, 0.0), 1.0), min(max(down, 0.0), 1.0)
 
 
 def compute_cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> NDArray[np.int32]:
@@ -54,11 +77,10 @@ def compute_cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> N
         columns: of cells, at least 1.
         rows: of cells, at least 1.
     """
-    width, height = fit_size(picture, columns, rows)
+    top, left, height, width = _find_frame(picture.shape[:2], columns, rows)
     levels = np.rint(resize_by_area(picture, height, width) * (_LEVELS / 255.0)).astype(np.int32)
     colours = (levels[:, :, 2] << 8) | (levels[:, :, 1] << 4) | levels[:, :, 0]
     canvas = np.zeros((2 * rows, columns), dtype=np.int32)
-    top, left = 2 * ((2 * rows - height) // 4), (columns - width) // 2
     canvas[top : top + height, left : left + width] = colours
     return (canvas[0::2] << 12) | canvas[1::2]
 

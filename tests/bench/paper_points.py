@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from navapp.cli.main import run
-from navapp.cli.prior_files import read_prior
+from navapp.control.prior_files import read_prior
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform

@@ -116,6 +116,7 @@ class Script:
     error: Exception | None = None
     calls: list[str] = field(default_factory=list)
     tracks: list[tuple[str, TrackState, Goal]] = field(default_factory=list)
+    priors: list[Prior] = field(default_factory=list)
     on_track: Callable[[str], object] = lambda bone: None
 
 
@@ -127,6 +128,7 @@ class FakeTracker:
 
     def register(self, left, right, prior, goal, on_progress=lambda share: None):
         self.script.calls.append(f"register {self.bone.name}")
+        self.script.priors.append(prior)
         self.script.started.set()
         on_progress(0.5)
         if self.script.gate is not None:

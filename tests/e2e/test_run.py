@@ -241,6 +241,27 @@ def test_the_tibia_is_found_from_the_accepted_femur_and_a_replay_finds_it_in_the
                 assert body[key] == b["bodies"][name][key]
 
 
+@pytest.mark.slow
+def test_a_drawn_box_is_all_that_a_registration_needs_and_it_replays(
+    tmp_path: Path, moving: Path
+) -> None:
+    script, session, out = (tmp_path / name for name in ("script.toml", "session", "b.json"))
+    # Around what is seen of the femur, as a hand would draw it.
+    script.write_text('[[step]]\ndo = "register"\nbox = [385, 115, 180, 175]\n', encoding="utf-8")
+    options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "4"]
+    files = ["--record", str(session), "--json", str(tmp_path / "a.json")]
+    assert run([*options, "--operator", str(script), *files]) == 0
+    frames = result(tmp_path / "a.json")["frames"]
+    tracked = [frame for frame in frames if frame["state"] == "navigating"]
+    assert tracked
+    assert all(frame["tre_mm"] < 0.4 for frame in tracked)
+    (asked,) = [event for event in events_of(session) if event.get("command") == "register"]
+    assert asked["start"] == {"box": [385, 115, 180, 175]}
+    assert run(["--quiet", "replay", str(session), "--json", str(out)]) == 0
+    for a, b in zip(frames, result(out)["frames"], strict=True):
+        assert a["camera_from_model"] == b["camera_from_model"]
+
+
 def test_a_session_is_never_recorded_over_another(
     session: Path, moving: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

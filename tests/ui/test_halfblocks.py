@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from navapp.ui.halfblocks import compute_cell_codes, fit_size, make_row_strip, resize_by_area
+from navapp.ui.halfblocks import (
+    compute_cell_codes,
+    find_place,
+    fit_size,
+    make_row_strip,
+    resize_by_area,
+)
 from navapp.ui.symbols import ASCII
 
 
@@ -26,11 +32,21 @@ def test_enlarging_by_a_whole_factor_repeats_pixels() -> None:
 
 @pytest.mark.parametrize(("columns", "rows"), [(52, 15), (114, 30), (3, 40), (1, 1)])
 def test_the_picture_fits_its_box_and_keeps_its_aspect(columns: int, rows: int) -> None:
-    width, height = fit_size(np.zeros((90, 160, 3), dtype=np.uint8), columns, rows)
+    width, height = fit_size((90, 160), columns, rows)
     assert 1 <= width <= columns
     assert 2 <= height <= 2 * rows
     if columns > 10:
         assert width / height == pytest.approx(160 / 90, rel=0.05)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(52, 15), (114, 30), (160, 20)])
+def test_a_cell_tells_which_place_of_the_picture_it_shows(columns: int, rows: int) -> None:
+    picture = np.zeros((90, 160, 3), dtype=np.uint8)
+    picture[30:36, 100:106] = 255
+    lit = np.argwhere(compute_cell_codes(picture, columns, rows) > 0)
+    places = [find_place((90, 160), columns, rows, x, y) for y, x in lit.tolist()]
+    assert np.mean(places, axis=0) == pytest.approx([103 / 160, 33 / 90], abs=0.02)
+    assert find_place((90, 160), columns, rows, 0, -5) == (pytest.approx(0.0, abs=0.01), 0.0)
 
 
 def test_cells_hold_upper_and_lower_colour_in_red_green_blue_order() -> None:

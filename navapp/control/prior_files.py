@@ -1,7 +1,7 @@
-"""Reads and writes the rough start pose as JSON."""
+"""Where a bone is searched for first, as JSON: of a file, and of a recorded command."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +22,7 @@ def read_prior(path: str | Path) -> Prior:
     """
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        poses = {
-            key.removeprefix(_POSE_KEY).lstrip("_") or "femur": value
-            for key, value in content.items()
-            if key == _POSE_KEY or key.startswith(f"{_POSE_KEY}_")
-        }
-        cone = content.get("approach_cone") or {}
-        axis = cone.get("axis")
-        box = content.get("box")
-        return Prior(
-            {bone: RigidTransform("left", bone, value) for bone, value in poses.items()},
-            None if axis is None else _unit(axis),
-            float(cone.get("half_angle_deg", 180.0)),
-            None if box is None else (int(box[0]), int(box[1]), int(box[2]), int(box[3])),
-        )
+        return prior_from_json(json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise PriorError(
             f"prior {path} cannot be read ({error.strerror})",
@@ -49,6 +35,28 @@ def read_prior(path: str | Path) -> Prior:
             subject=str(path),
             remedy="it holds camera_from_model (4x4), approach_cone and box",
         ) from error
+
+
+def prior_from_json(content: Mapping[str, Any]) -> Prior:
+    """The prior of such a content; what is missing is not known.
+
+    Raises:
+        ValueError, TypeError, KeyError, IndexError, AttributeError: it is none.
+    """
+    poses = {
+        key.removeprefix(_POSE_KEY).lstrip("_") or "femur": value
+        for key, value in content.items()
+        if key == _POSE_KEY or key.startswith(f"{_POSE_KEY}_")
+    }
+    cone = content.get("approach_cone") or {}
+    axis = cone.get("axis")
+    box = content.get("box")
+    return Prior(
+        {bone: RigidTransform("left", bone, value) for bone, value in poses.items()},
+        None if axis is None else _unit(axis),
+        float(cone.get("half_angle_deg", 180.0)),
+        None if box is None else (int(box[0]), int(box[1]), int(box[2]), int(box[3])),
+    )
 
 
 def prior_to_json(prior: Prior) -> dict[str, Any]:

@@ -1,0 +1,208 @@
+"""The page on which a box is drawn around the bone, by keys or by mouse, and searched in."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from textual import events
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.message import Message
+
+from navapp.ui.halfblocks import find_place
+from navapp.ui.picture_view import HalfBlocks
+from navapp.ui.screens import PageScreen
+from navapp.ui.text_view import TextView
+from navapp.ui.view import View
+
+_YELLOW = (0, 255, 255)
+# A press of an arrow, and the smallest box, as parts of the picture's width.
+_STEP, _LEAST = 1 / 80, 1 / 16
+_ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+
+
+@dataclass(frozen=True, slots=True)
+class StartBox:
+    """A box in the left picture, px."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @classmethod
+    def in_the_middle(cls, size_px: tuple[int, int]) -> "StartBox":
+        """Half as wide and as high as the picture."""
+        width, height = size_px
+        return cls(width // 4, height // 4, width // 2, height // 2)
+
+    @classmethod
+    def between(
+        cls, a: tuple[float, float], b: tuple[float, float], size_px: tuple[int, int]
+    ) -> "StartBox":
+        """With two places (x, y) px as opposite corners; never smaller than the smallest box."""
+        (x0, x1), (y0, y1) = (sorted((round(p), round(q))) for p, q in zip(a, b, strict=True))
+        return cls(x0, y0, x1 - x0, y1 - y0).within(size_px)
+
+    def moved(self, steps: tuple[int, int], size_px: tuple[int, int]) -> "StartBox":
+        """So many steps to the right and down."""
+        right, down = (round(n * _STEP * size_px[0]) for n in steps)
+        return StartBox(self.x + right, self.y + down, self.width, self.height).within(size_px)
+
+    def resized(self, steps: tuple[int, int], size_px: tuple[int, int]) -> "StartBox":
+        """So many steps wider and higher, about its middle."""
+        wider, higher = (round(n * _STEP * size_px[0]) for n in steps)
+        return StartBox(
+            self.x - wider, self.y - higher, self.width + 2 * wider, self.height + 2 * higher
+        ).within(size_px)
+
+    def within(self, size_px: tuple[int, int]) -> "StartBox":
+        """The nearest box that lies in the picture and is not too small."""
+        least = round(_LEAST * size_px[0])
+        width = min(max(self.width, least), size_px[0])
+        height = min(max(self.height, least), size_px[1])
+        x = min(max(self.x, 0), size_px[0] - width)
+        y = min(max(self.y, 0), size_px[1] - height)
+        return StartBox(x, y, width, height)
+
+    def draw(self, preview: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.uint8]:
+        """A copy of a preview (h, w, 3) of the left picture, with the box."""
+        drawn = preview.copy()
+        height, width = preview.shape[:2]
+        left, right = ((x * width) // size_px[0] for x in (self.x, self.x + self.width - 1))
+        top, bottom = ((y * height) // size_px[1] for y in (self.y, self.y + self.height - 1))
+        drawn[top : bottom + 1, [left, right]] = _YELLOW
+        drawn[[top, bottom], left : right + 1] = _YELLOW
+        return drawn
+
+
+class BoxPicture(HalfBlocks):
+    """The live picture with the box; a drag of the mouse draws another one."""
+
+    class Dragged(Message):
+        """The mouse went from one place to another, both (x, y) px in the left picture."""
+
+        def __init__(self, begin: tuple[float, float], end: tuple[float, float]) -> None:
+            super().__init__()
+            self.begin, self.end = begin, end
+
+    def __init__(self) -> None:
+        super().__init__("start-picture")
+        self._shape, self._size_px = (0, 0), (0, 0)
+        self._begin: tuple[float, float] | None = None
+
+    def show_box(self, view: View, box: StartBox) -> None:
+        """Take over the newest picture."""
+        snapshot = view.snapshot
+        preview = snapshot.preview if snapshot.plain_preview is None else snapshot.plain_preview
+        if preview is None or snapshot.shows_eye:
+            return
+        self._shape, self._size_px = preview.shape[:2], snapshot.picture_size_px
+        self.show_picture(box.draw(preview, self._size_px), view.symbols.ramp)
+
+    def _place(self, event: events.MouseEvent) -> tuple[float, float] | None:
+        at = event.get_content_offset(self)
+        if at is None or 0 in self._shape:
+            return None
+        across, down = find_place(self._shape, *self.content_size, at.x, at.y)
+        return across * self._size_px[0], down * self._size_px[1]
+
+    def on_mouse_down(self, event: events.MouseDown) -> None:
+        """A corner."""
+        self._begin = self._place(event)
+        self.capture_mouse()
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        """The opposite one, while the button is down."""
+        place = self._place(event)
+        if self._begin is not None and place is not None:
+            self.post_message(self.Dragged(self._begin, place))
+
+    def on_mouse_up(self, _event: events.MouseUp) -> None:
+        """The box is drawn."""
+        self._begin = None
+        self.release_mouse()
+
+
+class StartKeys(TextView):
+    """What to do, and where the box is."""
+
+    def __init__(self) -> None:
+        super().__init__("start-keys")
+        self.box: StartBox | None = None
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """Two lines."""
+        bone, box = view.snapshot.stage.bone, self.box
+        if view.snapshot.shows_eye:
+            said = "the video is not shown: leave, and press y"
+        else:
+            said = "" if box is None else f"{box.width} x {box.height} px at {box.x}, {box.y}"
+        return [
+            Content.assemble(
+                f" Draw the box around the {bone} that is seen: with the mouse, or ",
+                ("arrows", "bold $primary"), " move, ",
+                ("SHIFT arrows", "bold $primary"), " size.",
+            ),
+            Content.styled(f" {said}", "$text-muted"),
+        ]  # fmt: skip
+
+
+class StartPage(PageScreen):
+    """Draws a box around the bone; ENTER searches in it."""
+
+    class Drawn(Message):
+        """The box in which the bone is to be searched for."""
+
+        def __init__(self, box: StartBox) -> None:
+            super().__init__()
+            self.box = box
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("b", "dismiss", "back", show=False),
+        Binding("enter", "search", "search", show=False),
+        *(Binding(key, f"move('{key}')", "move", show=False) for key in _ARROWS),
+        *(Binding(f"shift+{key}", f"resize('{key}')", "size", show=False) for key in _ARROWS),
+    ]
+
+    page_title, keys = "where is the bone?", " back  ENTER search in the box"
+
+    def __init__(self, view: View, box: StartBox | None = None) -> None:
+        super().__init__(view)
+        self._box = box or StartBox.in_the_middle(view.snapshot.picture_size_px)
+
+    def compose_page(self) -> ComposeResult:
+        """Picture and words."""
+        yield BoxPicture()
+        yield StartKeys()
+
+    def show(self, view: View, *, is_text_due: bool) -> None:
+        """Take over the newest picture."""
+        self.query_one(StartKeys).box = self._box
+        super().show(view, is_text_due=is_text_due)
+        self.query_one(BoxPicture).show_box(view, self._box)
+
+    def action_move(self, arrow: str) -> None:
+        """Move the box."""
+        self._take(self._box.moved(_ARROWS[arrow], self.view.snapshot.picture_size_px))
+
+    def action_resize(self, arrow: str) -> None:
+        """Wider or narrower, higher (up) or lower."""
+        right, down = _ARROWS[arrow]
+        self._take(self._box.resized((right, -down), self.view.snapshot.picture_size_px))
+
+    def on_box_picture_dragged(self, message: BoxPicture.Dragged) -> None:
+        """Another box."""
+        size_px = self.view.snapshot.picture_size_px
+        self._take(StartBox.between(message.begin, message.end, size_px))
+
+    def action_search(self) -> None:
+        """Begin, and leave."""
+        self.app.post_message(self.Drawn(self._box))
+        self.dismiss()
+
+    def _take(self, box: StartBox) -> None:
+        self._box = box
+        self.show(self.view, is_text_due=True)
