@@ -14,6 +14,7 @@ _VERBS = (
     "run",
     "replay",
     "plan",
+    "prior",
     "stereo",
     "register",
     "calibrate",

@@ -9,7 +9,7 @@ import numpy as np
 
 from navapp.errors import PriorError
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.values import Prior
+from navapp.values import Pick, Prior
 
 _POSE_KEY = "camera_from_model"
 
@@ -33,7 +33,7 @@ def read_prior(path: str | Path) -> Prior:
         raise PriorError(
             f"prior {path} is damaged ({error})",
             subject=str(path),
-            remedy="it holds camera_from_model (4x4), approach_cone and box",
+            remedy="it holds camera_from_model (4x4), approach_cone, box and picks",
         ) from error
 
 
@@ -56,7 +56,14 @@ def prior_from_json(content: Mapping[str, Any]) -> Prior:
         None if axis is None else _unit(axis),
         float(cone.get("half_angle_deg", 180.0)),
         None if box is None else (int(box[0]), int(box[1]), int(box[2]), int(box[3])),
+        tuple(_read_pick(pick) for pick in content.get("picks", ())),
     )
+
+
+def _read_pick(pick: Mapping[str, Any]) -> Pick:
+    u, v = pick["left_px"]
+    model_mm = np.asarray(pick["model_mm"], dtype=np.float64).reshape(3)
+    return Pick(str(pick["name"]), str(pick["bone"]), (float(u), float(v)), model_mm)
 
 
 def prior_to_json(prior: Prior) -> dict[str, Any]:
@@ -71,6 +78,16 @@ def prior_to_json(prior: Prior) -> dict[str, Any]:
         }
     if prior.box is not None:
         content["box"] = list(prior.box)
+    if prior.picks:
+        content["picks"] = [
+            {
+                "name": pick.name,
+                "bone": pick.bone,
+                "left_px": list(pick.left_px),
+                "model_mm": np.asarray(pick.model_mm).tolist(),
+            }
+            for pick in prior.picks
+        ]
     return content
 
 

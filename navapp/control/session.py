@@ -480,6 +480,8 @@ def describe_moved_rig(why: str) -> str:
 
 def describe_start(start: Prior) -> str:
     """What an operator has given, for people."""
+    if start.picks:
+        return f"from {len(start.picks)} picked landmarks"
     return "in the box that was drawn" if start.box is not None else "from a given pose"
 
 

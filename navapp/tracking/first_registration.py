@@ -1,5 +1,6 @@
 """The first registration: from a rough pose, a box or a cone to judged poses, best first."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
 from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.picked_landmarks import find_rough_poses
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
 from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
 from navapp.values.progress import tell_part
@@ -38,7 +40,7 @@ class FirstRegistration:
         """Distinct candidates, best first; see `Tracker.register`."""
         tracker, watch = self._tracker, Stopwatch()
         bone = tracker.model.bone.name
-        start = prior.left_from_bone.get(bone)
+        start = prior.left_from_bone.get(bone) or self._start_at_picks(left, right, prior)
         if start is not None:
             frame = replace(tracker.begin(left, right, start, watch), on_progress=on_progress)
             answers = self._register_around(frame, goal)
@@ -52,6 +54,26 @@ class FirstRegistration:
         around = None if start is None else tracker.rectify_pose(start)
         cause = tracker.diagnosis.explain_failure(left, right, around, answers[0], on_progress)
         return [answer.with_cause(cause) for answer in answers]
+
+    def _start_at_picks(self, left: Image, right: Image, prior: Prior) -> RigidTransform | None:
+        """The pose that an operator's picked landmarks tell; None without any."""
+        tracker = self._tracker
+        picks = prior.picks_of(tracker.model.bone.name)
+        if not picks:
+            return None
+        poses = find_rough_poses(left, right, picks, tracker.meter)
+        if len(poses) < 2:
+            return poses[0] if poses else None
+
+        def score(pose: RigidTransform) -> float:
+            frame = tracker.begin(left, right, pose, Stopwatch())
+            measured = tracker.meter.measure_freely(frame.pair, frame.start, WIDE_BOX)
+            if measured is None or len(measured.cloud) == 0:
+                return -math.inf
+            found = self._scorer.find_poses(measured, [frame.start])
+            return max((one.score for one in found), default=-math.inf)
+
+        return max(poses, key=score)
 
     def _register_around(self, frame: Frame, goal: Goal) -> list[TrackedFrame]:
         """Around a rough pose: near starts, far ones, partly buried, until one gives an OK."""

@@ -41,7 +41,7 @@ from navapp.values.measured import (
     Surroundings,
 )
 from navapp.values.pictures import DEPTH_COLOURS, OverlayMode, OverlayPicture
-from navapp.values.plans import Plan, Prior, StageSpec
+from navapp.values.plans import FEWEST_PICKS, Pick, Plan, Prior, StageSpec
 from navapp.values.timings import FrameTimings, Stopwatch
 from navapp.values.verdicts import (
     PoseEstimate,
@@ -54,6 +54,7 @@ from navapp.values.verdicts import (
 __all__ = [
     "ANKLE_CENTRE",
     "DEPTH_COLOURS",
+    "FEWEST_PICKS",
     "FOLLOWED_BONES",
     "HIP_CENTRE",
     "AspectGraph",
@@ -76,6 +77,7 @@ __all__ = [
     "OverlayMode",
     "OverlayPicture",
     "Part",
+    "Pick",
     "Plan",
     "PlannedStep",
     "PoseEstimate",

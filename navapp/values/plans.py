@@ -24,6 +24,20 @@ class _OfBone(Protocol):
 T = TypeVar("T", bound=_OfBone)
 
 
+# Three points tell a pose.
+FEWEST_PICKS = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pick:
+    """A landmark of a bone that an operator has found in the left picture."""
+
+    name: str  # in the plan
+    bone: str
+    left_px: tuple[float, float]  # column and row
+    model_mm: FloatArray  # (3,) in bone coordinates
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
     """The rough start that an operator can give; any part may be absent."""
@@ -34,11 +48,20 @@ class Prior:
     approach_axis: FloatArray | None = None
     approach_half_angle_deg: float = 180.0  # of the cone around it
     box: tuple[int, int, int, int] | None = None  # x, y, width, height in the left picture, px
+    picks: tuple[Pick, ...] = ()  # of any bones
+
+    def picks_of(self, bone: str) -> tuple[Pick, ...]:
+        """Those of a bone; none when they are too few for a pose."""
+        found = tuple(pick for pick in self.picks if pick.bone == bone)
+        return found if len(found) >= FEWEST_PICKS else ()
 
     def has_start(self, bone: str) -> bool:
         """Whether it says anything of where a bone is."""
         return (
-            bone in self.left_from_bone or self.box is not None or self.axis_for(bone) is not None
+            bone in self.left_from_bone
+            or self.box is not None
+            or self.axis_for(bone) is not None
+            or bool(self.picks_of(bone))
         )
 
     def axis_for(self, bone: str) -> FloatArray | None:
