@@ -36,9 +36,19 @@ class LiveSession:
 
 
 def prepare_session(
-    configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
+    configuration: "Configuration",
+    options: argparse.Namespace,
+    diagnostics: Diagnostics,
+    *,
+    needs_start: bool = True,
 ) -> LiveSession:
     """Read everything that is given, then open the devices; closed again when that is refused.
+
+    Args:
+        configuration: in force.
+        options: of the command line.
+        diagnostics: takes warnings.
+        needs_start: nobody will draw where the bone is: the prior has to say.
 
     Raises:
         NavappError: a file, a device or a combination that cannot be used.
@@ -73,7 +83,7 @@ def prepare_session(
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
         prior = prior or Prior()
         stage = plan.stage(stage)
-        if options.headless:
+        if needs_start:
             check_start(prior, stage.bone)
         undo.pop_all()
     specification = specify_session(

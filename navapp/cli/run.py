@@ -76,7 +76,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     with ExitStack() as undo:
         if options.mirror:
             configuration = add_practice_mirror(configuration, undo)
-        session = prepare_session(configuration, options, diagnostics)
+        draws_box = any(step.box is not None for step in script)
+        session = prepare_session(
+            configuration, options, diagnostics, needs_start=options.headless and not draws_box
+        )
     if options.headless:
         return _run_headless(session, script, options, diagnostics)
     return _run_screen(session, options, diagnostics)
