@@ -23,7 +23,7 @@ from navapp.ui.view import View
 # The first of several actions -> their keys and what they do, in one line.
 _SHARED = {
     "stage-1": ("1 - 5", "go to that stage"),
-    "nudge-left": ("arrows", "check of the mirror: move the cross by 1 px, with SHIFT by 10"),
+    "nudge-left": ("arrows", "check of the mirror: move the cross; SHIFT: faster"),
 }
 
 
