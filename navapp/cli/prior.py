@@ -140,13 +140,11 @@ def _pick(text: str, bone: str, plan: "Plan", rig: "StereoRig") -> "Pick":
             f"--points {text} is not in a picture of {rig.width}x{rig.height}",
             remedy="give column and row in px",
         )
-    known = {name: one.point_mm for name, one in plan.content.landmarks.items()}
-    known |= {name: point for name, point in plan.targets.items() if name not in known}
-    of_bone = sorted(one for one in known if one.startswith(f"{bone}/"))
-    if name not in of_bone:
+    known = plan.landmarks_of(bone)
+    if name not in known:
         raise UsageError(
             f"the plan has no landmark '{name}' of the {bone}",
-            remedy=f"choose of {', '.join(of_bone)}" if of_bone else "give --box instead",
+            remedy=f"choose of {', '.join(sorted(known))}" if known else "give --box instead",
         )
     return Pick(name, bone, (u, v), known[name])
 

@@ -99,14 +99,14 @@ class FramePresenter:
             session.now_ns, has_guides=snapshot.is_navigable, is_hidden=snapshot.is_candidate
         )
         if seen is not None:
-            session.keep_picture(OperatorPicture(*seen, is_of_eye=True))
+            session.keep_picture(OperatorPicture(*seen, is_of_eye=True, left=frame.left))
             return
         has_guides = snapshot.is_navigable or snapshot.is_candidate
         preview = make_preview(video)
         if session.shows_depth:
             preview = self._depth_marks.draw(preview, foreground)
         plain = make_preview(frame.left) if has_guides else None
-        session.keep_picture(OperatorPicture(preview, plain))
+        session.keep_picture(OperatorPicture(preview, plain, left=frame.left))
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
         """Guides where the bone will be when their light is seen."""

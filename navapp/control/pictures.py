@@ -23,6 +23,7 @@ class OperatorPicture:
     drawn: Image  # (h, w, 3) uint8 BGR, with what was drawn over it
     plain: Image | None = None  # the same without guides; None when it has none
     is_of_eye: bool = False  # what an eye sees in a simulated mirror
+    left: Image | None = None  # the left picture that came with it, as it is
 
 
 class Composer:

@@ -1,7 +1,10 @@
 """The snapshot of a session, with the interlocks' answer in it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
+from functools import lru_cache
+from types import MappingProxyType
 
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_handlers import DeviceReport
@@ -24,8 +27,14 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
-from navapp.geometry.transform import RigidTransform
-from navapp.values import Reason, TrackedFrame
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.values import Plan, Reason, TrackedFrame
+
+
+@lru_cache(maxsize=8)
+def _landmarks_of(plan: Plan, bone: str) -> Mapping[str, FloatArray]:
+    # Once, not with every frame.
+    return MappingProxyType(plan.landmarks_of(bone))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +78,8 @@ class SnapshotMaker:
             pose_at_light=self._predict_pose(now_ns),
             preview=None if picture is None else picture.drawn,
             picture_size_px=(rig.width, rig.height),
+            left_picture=None if picture is None else picture.left,
+            landmarks=_landmarks_of(plan, session.stage.bone),
             plain_preview=None if picture is None else picture.plain,
             shows_depth=session.shows_depth and not shows_eye,
             has_eye=self.eye.is_possible,

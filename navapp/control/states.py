@@ -1,5 +1,6 @@
 """States of a session, and the snapshot that all clients read."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from navapp.control.length_check import LengthCheck
 from navapp.control.mirror_error import MirrorError
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.limb import LimbMeasurement
 from navapp.resection import Thickness
 from navapp.values import Measured, Reason, StageSpec, StepKind, Verdict
@@ -189,6 +190,10 @@ class Snapshot:
     # frame. `plain_preview` is the same without guides, None when it has none.
     preview: NDArray[np.uint8] | None = None
     picture_size_px: tuple[int, int] = (0, 0)  # width and height of the left picture
+    # (H, W, 3) BGR or (H, W) grey: the newest left picture as it came; None before the first.
+    left_picture: NDArray[np.uint8] | None = None
+    # of the stage's bone: what can be picked in that picture, (3,) mm in bone coordinates.
+    landmarks: Mapping[str, FloatArray] = field(default_factory=dict)
     plain_preview: NDArray[np.uint8] | None = None
     shows_depth: bool = False  # it is coloured by what is known of the depth
     has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead

@@ -158,6 +158,7 @@ ACTIONS: tuple[Action, ...] = (
         slot="start",
         needs_width=True,
     ),
+    Action("picks", "p", "picks", "pick landmarks in the picture, and search from them"),
     Action(
         "cancel",
         "c",

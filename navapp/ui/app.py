@@ -43,16 +43,17 @@ from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
+from navapp.ui.picks_page import PicksPage, Place
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
-from navapp.ui.start_page import StartBox, StartPage
+from navapp.ui.start_page import StartBox, StartChosen, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
 from navapp.ui.theme import NAVAPP_THEME
 from navapp.ui.view import View
-from navapp.values import Prior, Reason
+from navapp.values import Reason
 
 POLLS_PER_S = 8
 # Numbers that change faster than four times a second cannot be read.
@@ -111,6 +112,7 @@ class NavigationApp(QuietApp):
         self._view = View(snapshot, symbols, start_ns, title=title)
         self._known_events: frozenset[Event] = frozenset()
         self._start_box: StartBox | None = None  # as it was drawn last
+        self._picks: dict[str, Place] = {}  # as they were picked last
 
     def get_default_screen(self) -> Screen[None]:
         """The main screen."""
@@ -159,6 +161,8 @@ class NavigationApp(QuietApp):
             self._ask_to_quit(view)
         elif name == "start":
             self.push_screen(StartPage(view, self._start_box))
+        elif name == "picks":
+            self.push_screen(PicksPage(view, self._picks))
         elif name in _PAGES:
             self.push_screen(_PAGES[name](view))
         elif view.is_silent and not is_possible(action, view.snapshot, is_silent=True):
@@ -166,13 +170,14 @@ class NavigationApp(QuietApp):
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
 
-    def on_start_page_drawn(self, message: StartPage.Drawn) -> None:
-        """Search for the bone in the box that was drawn."""
-        self._start_box = box = message.box
+    def on_start_chosen(self, message: StartChosen) -> None:
+        """Search for the bone where an operator has drawn or picked it."""
+        if message.start.box is not None:
+            self._start_box = StartBox(*message.start.box)
         if self._view.is_silent:
             self._say_silent("register")
         else:
-            self._session.submit(Register(Prior(box=(box.x, box.y, box.width, box.height))))
+            self._session.submit(Register(message.start))
 
     def action_confirm_condition(self, key: str) -> None:
         """Say that a condition is met: from the gates' page."""

@@ -16,11 +16,20 @@ from navapp.ui.picture_view import HalfBlocks
 from navapp.ui.screens import PageScreen
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
+from navapp.values import Prior
 
 _YELLOW = (0, 255, 255)
 # A press of an arrow, and the smallest box, as parts of the picture's width.
 _STEP, _LEAST = 1 / 80, 1 / 16
-_ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+
+
+class StartChosen(Message):
+    """Where the bone is to be searched for."""
+
+    def __init__(self, start: Prior) -> None:
+        super().__init__()
+        self.start = start
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,18 +162,11 @@ class StartKeys(TextView):
 class StartPage(PageScreen):
     """Draws a box around the bone; ENTER searches in it."""
 
-    class Drawn(Message):
-        """The box in which the bone is to be searched for."""
-
-        def __init__(self, box: StartBox) -> None:
-            super().__init__()
-            self.box = box
-
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("b", "dismiss", "back", show=False),
         Binding("enter", "search", "search", show=False),
-        *(Binding(key, f"move('{key}')", "move", show=False) for key in _ARROWS),
-        *(Binding(f"shift+{key}", f"resize('{key}')", "size", show=False) for key in _ARROWS),
+        *(Binding(key, f"move('{key}')", "move", show=False) for key in ARROWS),
+        *(Binding(f"shift+{key}", f"resize('{key}')", "size", show=False) for key in ARROWS),
     ]
 
     page_title, keys = "where is the bone?", " back  ENTER search in the box"
@@ -186,11 +188,11 @@ class StartPage(PageScreen):
 
     def action_move(self, arrow: str) -> None:
         """Move the box."""
-        self._take(self._box.moved(_ARROWS[arrow], self.view.snapshot.picture_size_px))
+        self._take(self._box.moved(ARROWS[arrow], self.view.snapshot.picture_size_px))
 
     def action_resize(self, arrow: str) -> None:
         """Wider or narrower, higher (up) or lower."""
-        right, down = _ARROWS[arrow]
+        right, down = ARROWS[arrow]
         self._take(self._box.resized((right, -down), self.view.snapshot.picture_size_px))
 
     def on_box_picture_dragged(self, message: BoxPicture.Dragged) -> None:
@@ -200,7 +202,9 @@ class StartPage(PageScreen):
 
     def action_search(self) -> None:
         """Begin, and leave."""
-        self.app.post_message(self.Drawn(self._box))
+        box = self._box
+        start = Prior(box=(box.x, box.y, box.width, box.height))
+        self.app.post_message(StartChosen(start))
         self.dismiss()
 
     def _take(self, box: StartBox) -> None:

@@ -26,6 +26,8 @@ T = TypeVar("T", bound=_OfBone)
 
 # Three points tell a pose.
 FEWEST_PICKS = 3
+# A landmark of a bone lies no further outside of the box around it.
+_BESIDE_MM = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,6 +142,20 @@ class Plan:
             name: one
             for name, one in known.items()
             if one.bone == stage.bone and (name in named or not named)
+        }
+
+    def landmarks_of(self, bone: str) -> dict[str, FloatArray]:
+        """Points on a bone that have a name, (3,) mm: its landmarks and targets."""
+        if bone not in self.bones:
+            return {}
+        vertices_mm = self.bones[bone].mesh.vertices_mm
+        low, high = vertices_mm.min(axis=0) - _BESIDE_MM, vertices_mm.max(axis=0) + _BESIDE_MM
+        named = {name: one.point_mm for name, one in self.content.landmarks.items()}
+        return {
+            name: point_mm
+            for name, point_mm in {**self.targets, **named}.items()
+            # The hip's centre, too, is called the femur's.
+            if name.startswith(f"{bone}/") and bool(((low <= point_mm) & (point_mm <= high)).all())
         }
 
     def stage(self, spec: StageSpec) -> StageSpec:

@@ -1,6 +1,7 @@
 """A registration from where the operator has drawn the bone."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.commands import EnterStage, Register
 from navapp.errors import SequenceError
 from navapp.values import Prior
-from tests.control.fakes import Bench, a_pose
+from tests.control.fakes import Bench, a_plan, a_pose
 
 BOX = (300, 120, 400, 380)
 AXIS = np.array([0.0, 0.6, 0.8])
@@ -51,6 +52,17 @@ def test_without_anything_to_start_from_the_operator_is_asked_for_a_box() -> Non
     bench.do(Register())
     bench.frames()
     assert "draw a box around it" in bench.events[-1].text
+
+
+def test_the_screen_has_the_whole_picture_and_what_can_be_picked_in_it() -> None:
+    targets = {"femur/notch": np.zeros(3), "femur/hip": np.full(3, 400.0), "tibia/a": np.zeros(3)}
+    bench = Bench(plan=replace(a_plan(), targets=targets))
+    bench.frames()
+    snapshot = bench.snapshot
+    assert list(snapshot.landmarks) == ["femur/notch"]
+    assert snapshot.left_picture is not None
+    height, width = snapshot.left_picture.shape[:2]
+    assert (width, height) == snapshot.picture_size_px
 
 
 def test_what_was_drawn_is_recorded() -> None:

@@ -1,0 +1,267 @@
+"""The page on which landmarks of the plan are picked in the picture, to the pixel."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from textual import events
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+from textual.message import Message
+
+from navapp.ui.halfblocks import find_place
+from navapp.ui.picture_view import HalfBlocks
+from navapp.ui.screens import PageScreen
+from navapp.ui.start_page import ARROWS, StartChosen
+from navapp.ui.text_view import TextView
+from navapp.ui.view import View
+from navapp.values import FEWEST_PICKS, Pick, Prior
+
+Place = tuple[int, int]  # column and row in the left picture, px
+_YELLOW, _GREEN = (0, 255, 255), (0, 255, 0)
+# What an arrow moves the cursor by, alone and with SHIFT.
+_STEP_PX, _LARGE_STEP_PX = 1, 20
+# Half length of the cross in the magnifier, and of the gap that leaves its pixel visible.
+_ARM_PX, _GAP_PX = 6, 2
+
+
+def draw_places(
+    preview: NDArray[np.uint8], size_px: Place, cursor: Place, picks: Mapping[str, Place]
+) -> NDArray[np.uint8]:
+    """A copy of a preview (h, w, 3) of the left picture: picks green, the cursor's lines yellow."""
+    drawn = preview.copy()
+    height, width = preview.shape[:2]
+
+    def find(place: Place) -> Place:
+        return place[0] * width // size_px[0], place[1] * height // size_px[1]
+
+    x, y = find(cursor)
+    drawn[y, :], drawn[:, x] = _YELLOW, _YELLOW
+    drawn[y, x] = preview[y, x]
+    for u, v in map(find, picks.values()):
+        drawn[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2] = _GREEN
+    return drawn
+
+
+def magnify(
+    picture: NDArray[np.uint8], centre: Place, shape: Place, picks: Mapping[str, Place]
+) -> NDArray[np.uint8]:
+    """(h, w, 3) pixels around a place as they are, with a cross; black beyond the picture.
+
+    Args:
+        picture: (H, W, 3) or grey.
+        centre: of what is shown.
+        shape: its width and height.
+        picks: that are marked.
+    """
+    width, height = shape
+    left, top = centre[0] - width // 2, centre[1] - height // 2
+    shown = np.zeros((height, width, 3), dtype=np.uint8)
+    inside = picture[max(top, 0) : top + height, max(left, 0) : left + width]
+    y, x = max(-top, 0), max(-left, 0)
+    colour = inside if inside.ndim == 3 else inside[:, :, None]
+    shown[y : y + inside.shape[0], x : x + inside.shape[1]] = colour
+    for u, v in picks.values():
+        if 0 <= v - top < height and 0 <= u - left < width:
+            shown[v - top, u - left] = _GREEN
+    y, x = height // 2, width // 2
+    for k in range(_GAP_PX, _ARM_PX + 1):
+        for dy, dx in ((0, k), (0, -k), (k, 0), (-k, 0)):
+            if 0 <= y + dy < height and 0 <= x + dx < width:
+                shown[y + dy, x + dx] = _YELLOW
+    return shown
+
+
+class PlacePicture(HalfBlocks):
+    """A picture in which the mouse points at a place."""
+
+    class Pointed(Message):
+        """A place, as parts of the shown picture's width and height."""
+
+        def __init__(self, picture: "PlacePicture", across: float, down: float) -> None:
+            super().__init__()
+            self.picture, self.across, self.down = picture, across, down
+
+    def __init__(self, widget_id: str) -> None:
+        super().__init__(widget_id)
+        self._shape: tuple[int, ...] = (0, 0)
+
+    def show_shaped(self, picture: NDArray[np.uint8], ramp: str) -> None:
+        """Take over a picture (h, w, 3) BGR."""
+        self._shape = picture.shape
+        self.show_picture(picture, ramp)
+
+    def on_click(self, event: events.Click) -> None:
+        """Tell where."""
+        at = event.get_content_offset(self)
+        if at is not None and 0 not in self._shape[:2]:
+            self.post_message(
+                self.Pointed(self, *find_place(self._shape, *self.content_size, at.x, at.y))
+            )
+
+
+class PickList(TextView):
+    """The landmarks of the bone: where they were picked, and which is next."""
+
+    def __init__(self) -> None:
+        super().__init__("pick-list")
+        self.names: list[str] = []
+        self.picks: dict[str, Place] = {}
+        self.selected, self.cursor = 0, (0, 0)
+
+    def build(self, view: View, width: int, height: int) -> list[Content]:
+        """As many as there is room for, around the selected one."""
+        if not self.names:
+            return [Content(" the plan has no landmark of this bone: draw a box (b)")]
+        heading = Content.styled(f" {len(self.picks)} picked; cursor {_tell(self.cursor)}", "bold")
+        room = max(height - 1, 1)
+        first = min(max(self.selected - room // 2, 0), max(len(self.names) - room, 0))
+        lines = [heading]
+        for number, name in enumerate(self.names[first : first + room], first):
+            sign, place = (">" if number == self.selected else " "), self.picks.get(name)
+            text = f" {sign} {name.partition('/')[2]:<24} {'' if place is None else _tell(place)}"
+            style = "bold $primary" if number == self.selected else "$foreground"
+            lines.append(Content.styled(text[:width], style))
+        return lines
+
+
+def _tell(place: Place) -> str:
+    return f"{place[0]}, {place[1]}"
+
+
+class PicksPage(PageScreen):
+    """Picks landmarks in the live picture; `g` searches from three or more.
+
+    Args:
+        view: to begin with.
+        picks: made before, by name.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("p", "dismiss", "back", show=False),
+        Binding("enter", "pick", "pick", show=False),
+        Binding("n,tab", "select(1)", "next", show=False),
+        Binding("shift+tab", "select(-1)", "previous", show=False),
+        Binding("x", "forget", "forget", show=False),
+        Binding("g", "search", "search", show=False),
+        *(Binding(key, f"move('{key}', {_STEP_PX})", "move", show=False) for key in ARROWS),
+        *(
+            Binding(f"shift+{key}", f"move('{key}', {_LARGE_STEP_PX})", "move", show=False)
+            for key in ARROWS
+        ),
+    ]
+
+    page_title = "where are the landmarks?"
+    keys = " back  arrows, click  ENTER pick  n next  x forget  g search"
+
+    def __init__(self, view: View, picks: dict[str, Place]) -> None:
+        super().__init__(view)
+        self._picks = picks
+        width, height = view.snapshot.picture_size_px
+        self._cursor = (width // 2, height // 2)
+        self._selected = 0
+
+    def compose_page(self) -> ComposeResult:
+        """The whole picture, a part of it enlarged, the landmarks."""
+        with Horizontal(id="picking"):
+            yield PlacePicture("whole")
+            with Vertical(id="picking-side"):
+                yield PlacePicture("magnifier")
+                yield PickList()
+
+    @property
+    def _names(self) -> list[str]:
+        return list(self.view.snapshot.landmarks)
+
+    def show(self, view: View, *, is_text_due: bool) -> None:
+        """Take over the newest picture."""
+        self.view = view
+        snapshot, listed = view.snapshot, self.query_one(PickList)
+        listed.names, listed.picks = self._names, self._of_bone()
+        listed.selected, listed.cursor = self._selected, self._cursor
+        super().show(view, is_text_due=is_text_due)
+        preview = snapshot.preview if snapshot.plain_preview is None else snapshot.plain_preview
+        picture, ramp = snapshot.left_picture, view.symbols.ramp
+        if preview is None or picture is None or snapshot.shows_eye:
+            return
+        whole, magnifier = (self.query_one(f"#{name}", PlacePicture) for name in _PICTURES)
+        size_px = snapshot.picture_size_px
+        whole.show_shaped(draw_places(preview, size_px, self._cursor, listed.picks), ramp)
+        columns, rows = magnifier.content_size
+        if columns and rows:
+            shape = columns, 2 * rows
+            magnifier.show_shaped(magnify(picture, self._cursor, shape, listed.picks), ramp)
+
+    def _of_bone(self) -> dict[str, Place]:
+        return {name: self._picks[name] for name in self._names if name in self._picks}
+
+    def on_resize(self, _event: events.Resize) -> None:
+        """The magnifier shows as many pixels as it has room for."""
+        self.call_after_refresh(self._redraw)
+
+    def on_place_picture_pointed(self, message: PlacePicture.Pointed) -> None:
+        """The cursor goes there."""
+        width, height = self.view.snapshot.picture_size_px
+        if message.picture.id == "whole":
+            self._move_to(int(message.across * width), int(message.down * height))
+            return
+        columns, rows = message.picture.content_size
+        x, y = int(message.across * columns), int(message.down * 2 * rows)
+        self._move_to(self._cursor[0] - columns // 2 + x, self._cursor[1] - rows + y)
+
+    def action_move(self, arrow: str, step_px: int) -> None:
+        """Move the cursor."""
+        right, down = ARROWS[arrow]
+        self._move_to(self._cursor[0] + right * step_px, self._cursor[1] + down * step_px)
+
+    def action_select(self, step: int) -> None:
+        """Another landmark."""
+        if self._names:
+            self._selected = (self._selected + step) % len(self._names)
+        self._redraw()
+
+    def action_pick(self) -> None:
+        """The selected landmark is where the cursor is; go on to the next that has no place."""
+        if not self._names:
+            return
+        self._picks[self._names[self._selected]] = self._cursor
+        for step in range(1, len(self._names)):
+            number = (self._selected + step) % len(self._names)
+            if self._names[number] not in self._picks:
+                self._selected = number
+                break
+        self._redraw()
+
+    def action_forget(self) -> None:
+        """The selected landmark has no place any more."""
+        if self._names:
+            self._picks.pop(self._names[self._selected], None)
+        self._redraw()
+
+    def action_search(self) -> None:
+        """Begin, and leave; refused with fewer than three."""
+        known, bone = self.view.snapshot.landmarks, self.view.snapshot.stage.bone
+        picks = tuple(
+            Pick(name, bone, (float(u), float(v)), known[name])
+            for name, (u, v) in self._of_bone().items()
+        )
+        if len(picks) < FEWEST_PICKS:
+            self.app.bell()
+            self.notify(f"{FEWEST_PICKS} landmarks are needed", severity="warning")
+            return
+        self.app.post_message(StartChosen(Prior(picks=picks)))
+        self.dismiss()
+
+    def _move_to(self, x: int, y: int) -> None:
+        width, height = self.view.snapshot.picture_size_px
+        self._cursor = (min(max(x, 0), width - 1), min(max(y, 0), height - 1))
+        self._redraw()
+
+    def _redraw(self) -> None:
+        self.show(self.view, is_text_due=True)
+
+
+_PICTURES = ("whole", "magnifier")
