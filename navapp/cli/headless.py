@@ -82,7 +82,9 @@ def check_start(prior: Prior, bone: str) -> None:
     if not prior.has_start(bone):
         raise PriorError(
             f"nothing is known of where the {bone} is",
-            remedy="give --prior FILE (`navapp prior` makes one from a box in the picture)",
+            remedy="give --prior FILE with camera_from_model"
+            + ("" if bone == "femur" else f"_{bone}")
+            + ", or with the box that `navapp prior` takes",
         )
 
 

@@ -1,9 +1,12 @@
 """The argument parser, and the conversion of errors to exit codes."""
 
 import argparse
+import difflib
 import importlib
 import os
+import re
 from collections.abc import Sequence
+from typing import NoReturn
 
 from navapp import __version__
 from navapp.cli.diagnostics import Diagnostics, report
@@ -59,8 +62,21 @@ def run(arguments: Sequence[str]) -> int:
         return 1
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says which of its words may have been meant."""
+
+    def error(self, message: str) -> NoReturn:
+        """Add what is near to a word that is none of the choices."""
+        told = re.search(r"invalid choice: '(.+?)' \(choose from (.+)\)", message)
+        if told is not None:
+            known = [word.strip("' ") for word in told[2].split(",")]
+            near = difflib.get_close_matches(told[1], known, 1)
+            message += f"; did you mean '{near[0]}'?" if near else ""
+        super().error(message)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="navapp",
         description="Markerless navigation for knee replacement. Research software, not for "
         "clinical use.",

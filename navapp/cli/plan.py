@@ -60,6 +60,7 @@ def add_parser(subparsers: Any) -> None:
         help="write --side, although the bones are certainly of the other one",
     )
     parser.add_argument("--out", metavar="P", help="plan folder to write")
+    parser.add_argument("--replace", action="store_true", help="replace the plan that is there")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
 
@@ -133,7 +134,7 @@ def _make_plan(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[
         )
     if options.out is None:
         raise UsageError("--out is missing", remedy="name the plan folder to write")
-    check_place(options.out)
+    check_place(options.out, may_replace=options.replace)
     draft = with_cartilage(make_draft(options, diagnostics), options.cartilage)
     bones, about_side = with_side(
         draft.bones, draft.side, draft.fibula, is_sure=options.side_anyway

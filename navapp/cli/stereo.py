@@ -75,6 +75,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             f"matched, {100 * content['density_filled']:.1f} % with the fill, "
             f"{answer.timings.total_ms:.0f} ms"
         )
+    files = (options.out, options.sigma, options.origin, options.picture, options.cloud)
+    if not any((*files, options.json)):
+        diagnostics.warn("nothing is saved: name a file with --out, --picture or --cloud")
     for reason in answer.reasons:
         diagnostics.warn(reason)
     if content["density_matched"] == 0.0:

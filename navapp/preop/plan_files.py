@@ -52,7 +52,7 @@ def write_plan(
     folder = Path(folder)
     if not plan.bones:
         raise PlanError("a plan needs at least one bone", remedy="give --surface femur=FILE")
-    check_place(folder)
+    check_place(folder, may_replace=True)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
@@ -68,13 +68,20 @@ def write_plan(
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def check_place(folder: str | Path) -> None:
-    """Refuse a place that is taken by something else, before the work begins.
+def check_place(folder: str | Path, *, may_replace: bool = False) -> None:
+    """Refuse a place that is taken, before the work begins.
 
     Raises:
-        PlanError: there is something at that place that is not a plan.
+        PlanError: there is something at that place that is not a plan, or a plan that may not be
+            replaced.
     """
     folder = Path(folder)
+    if (folder / _FILE).is_file() and not may_replace:
+        raise PlanError(
+            f"{folder} holds a plan",
+            subject=str(folder),
+            remedy="choose a new folder for --out, or add --replace",
+        )
     if folder.exists() and not (folder / _FILE).is_file() and any(_entries(folder)):
         raise PlanError(
             f"{folder} exists and is not a plan",

@@ -45,6 +45,19 @@ def bones_in(file: Path) -> dict:
     return json.loads(file.read_text(encoding="utf-8"))["bones"]
 
 
+def test_a_plan_that_is_there_is_replaced_only_when_told_so(folder, capsys) -> None:
+    assert made(folder) == 0
+    before = (folder / "plan" / "plan.json").read_bytes()
+    cartilage = ("--cartilage", f"femur={folder / 'cartilage.ply'}")
+    assert made(folder, *cartilage) == 3
+    assert "holds a plan: choose a new folder for --out, or add --replace" in (
+        capsys.readouterr().err
+    )
+    assert (folder / "plan" / "plan.json").read_bytes() == before
+    assert made(folder, *cartilage, "--replace") == 0
+    assert (folder / "plan" / "plan.json").read_bytes() != before
+
+
 def test_a_cartilage_surface_is_held_per_vertex_and_shown(folder, capsys) -> None:
     assert made(folder, "--cartilage", f"femur={folder / 'cartilage.ply'}") == 0
     bone = read_plan(folder / "plan").bones["femur"]
@@ -71,7 +84,7 @@ def test_one_mean_is_held_for_the_bone_that_it_is_given_for(folder) -> None:
 def test_a_plan_with_cartilage_has_another_hash(folder) -> None:
     hashes = []
     for arguments in ([], ["--cartilage", "femur=2:0.6"], ["--cartilage", "femur=2:0.5"]):
-        assert made(folder, *arguments) == 0
+        assert made(folder, "--replace", *arguments) == 0
         hashes.append(json.loads((folder / "made.json").read_text())["hash"])
     assert len(set(hashes)) == 3
 

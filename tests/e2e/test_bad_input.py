@@ -277,8 +277,15 @@ def test_wrong_usage_is_exit_code_2(capsys) -> None:
     assert run(["run", "--headless", "--stage", "sewing"]) == 2
 
 
+def test_a_word_that_is_nearly_a_verb_is_told(capsys) -> None:
+    assert run(["replya", "x"]) == 2
+    assert "did you mean 'replay'?" in capsys.readouterr().err
+    assert run(["zzz"]) == 2
+    assert "did you mean" not in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
-    "verb", ["run", "replay", "plan", "stereo", "register", "devices", "doctor", "config"]
+    "verb", ["run", "replay", "plan", "prior", "stereo", "register", "devices", "doctor", "config"]
 )
 def test_every_verb_has_help_with_an_example(verb: str, capsys) -> None:
     assert run([verb, "--help"]) == 0

@@ -118,6 +118,14 @@ def small(tmp_path: Path) -> tuple[str, str]:
     return paths[0], paths[1]
 
 
+def test_a_pair_of_which_nothing_is_kept_says_so(small, tmp_path: Path, capsys) -> None:
+    assert run(["stereo", *small, "--disparities", "16"]) == 0
+    assert "nothing is saved: name a file" in capsys.readouterr().err
+    out = str(tmp_path / "d.npy")
+    assert run(["stereo", *small, "--disparities", "16", "--out", out]) == 0
+    assert "nothing is saved" not in capsys.readouterr().err
+
+
 def test_a_rectified_pair_needs_no_rig(small, tmp_path: Path) -> None:
     out = tmp_path / "d.npy"
     assert run(["--quiet", "stereo", *small, "--disparities", "16", "--out", str(out)]) == 0
