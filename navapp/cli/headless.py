@@ -13,6 +13,7 @@ from navapp.cli.diagnostics import Diagnostics, write_json
 from navapp.cli.operation_table import StepResult, format_steps, steps_to_json
 from navapp.cli.results import (
     frame_text,
+    reasons_text,
     summarise,
     summarise_gaps,
     summarise_measured,
@@ -73,6 +74,15 @@ def check_not_expired(rig: StereoRig, today: date) -> None:
     )
 
 
+# Option -> what it has written.
+_FILES = {
+    "record": "recorded session",
+    "json": "frames and summary",
+    "overlay": "overlay pictures",
+    "video": "video",
+}
+
+
 def check_start(prior: Prior, bone: str) -> None:
     """Refuse a session in which nothing could ever be found.
 
@@ -124,6 +134,14 @@ def run_session(controller: SessionController, operator: Operator, log: FrameLog
     return time.perf_counter() - started
 
 
+def _say_what_was_written(options: argparse.Namespace, diagnostics: Diagnostics) -> None:
+    """Where the options had files of a session put."""
+    for name, what in _FILES.items():
+        path = getattr(options, name, None)
+        if path not in (None, "-"):
+            diagnostics.say(f"{what}: {path}")
+
+
 def report_result(
     frames: Sequence[dict[str, Any]],
     seconds: float,
@@ -161,8 +179,11 @@ def report_result(
     write_json(options.json, options.verb, {"frames": frames, "summary": summary, **told})
     if options.json != "-":
         diagnostics.say(summary_text(summary))
+        if why := reasons_text(frames):
+            diagnostics.say(why)
         if table := format_steps(steps):
             diagnostics.say(table)
+        _say_what_was_written(options, diagnostics)
     if failure is not None:
         raise failure
     if summary["ok"] == 0:

@@ -1,6 +1,7 @@
 """What `run` and `replay` answer: frames, their summary, and both for people."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -227,6 +228,20 @@ def _measured_text(name: str, face: Mapping[str, float]) -> str:
         f"{face['offset_mm']:+.2f} mm (+- {face['bound_mm']:.2f}) from its plan, "
         f"{100.0 * face['seen_share']:.0f} % of it seen"
     )
+
+
+# So many reasons are told after a session; the others stand in its JSON.
+_MOST_REASONS = 4
+
+
+def reasons_text(frames: Sequence[Mapping[str, Any]]) -> str:
+    """Why frames were not OK, the most frequent reason first; empty when all were."""
+    missed = [frame for frame in frames if frame["status"] != "OK"]
+    counts = Counter(reason for frame in missed for reason in frame["reasons"])
+    words = [f"{reason} ({n})" for reason, n in counts.most_common(_MOST_REASONS)]
+    more = len(counts) - len(words)
+    words += [f"{more} more in --json"] if more > 0 else []
+    return f"not OK, and in how many frames: {'; '.join(words)}" if words else ""
 
 
 def summary_text(summary: dict[str, Any]) -> str:

@@ -198,6 +198,9 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
         code = run_app(runner, log_folder() / "navapp.log")
     if runner.error is not None:
         raise runner.error
+    folder = session.configuration.recording.folder
+    if folder is not None:
+        diagnostics.say(f"recorded session: {folder}")
     return code
 
 

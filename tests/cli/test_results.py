@@ -9,6 +9,7 @@ from navapp.cli.results import (
     frame_text,
     frame_to_json,
     limb_to_json,
+    reasons_text,
     rig_alarm_to_json,
     summarise,
     summarise_gaps,
@@ -141,3 +142,15 @@ def test_gaps_in_extension_and_flexion_are_those_of_the_nearest_frames() -> None
     summary = summarise_gaps(limbs)
     assert summary["at_90_deg"]["gap_medial_mm"] == 2.0
     assert summary["at_0_deg"] is None
+
+
+def test_why_frames_were_not_ok_is_told_most_frequent_first() -> None:
+    frames = [
+        {"status": "OK", "reasons": []},
+        {"status": "LOST", "reasons": ["a"]},
+        *({"status": "DEGRADED", "reasons": ["b", "c"]} for _ in range(2)),
+    ]
+    assert reasons_text(frames) == "not OK, and in how many frames: b (2); c (2); a (1)"
+    assert reasons_text(frames[:1]) == ""
+    many = [{"status": "LOST", "reasons": list("abcdef")}]
+    assert reasons_text(many).endswith("d (1); 2 more in --json")
