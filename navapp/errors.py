@@ -70,7 +70,7 @@ class PlanError(InputError):
 
 
 class PriorError(InputError):
-    """A prior: start pose, approach cone, box."""
+    """A prior: start pose, picks, box, approach cone."""
 
 
 class ResultError(NavappError):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.specification import SessionSpecification
     from navapp.geometry.rig import StereoRig
-    from navapp.values import Pick, Plan, Prior, TrackedFrame
+    from navapp.values import Pick, Plan, Prior, StageSpec, TrackedFrame
 
 _EXAMPLE = """\
 examples:
@@ -55,6 +55,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
+    from navapp.cli.headless import check_accepted
     from navapp.config import find_file, load
     from navapp.control.prior_files import prior_to_json
     from navapp.control.specification import specify_session
@@ -67,7 +68,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     plan, rig = read_plan(options.plan), read_rig(options.rig)
     prior = _make_prior(options, plan, rig)
     stage = _stage_of(plan, options.bone)
-    specification = specify_session(configuration, rig, plan, prior, stage, is_live=False)
+    check_accepted(rig, True, diagnostics)
+    # The paper's methods need a rough pose.
+    specification = specify_session(
+        configuration, rig, plan, prior, stage, is_live=False, method="bimcc"
+    )
     tracked = _register(specification, _read_pair(options, configuration, rig), diagnostics)
     text = json.dumps(prior_to_json(prior), indent=1) + "\n"
     Path(options.out).write_text(text, encoding="utf-8")
@@ -93,6 +98,8 @@ def _check(options: argparse.Namespace) -> None:
         raise UsageError("nothing tells where the bone is", remedy="give --box or --points")
     if options.box is not None and options.points:
         raise UsageError("--box and --points are two starts", remedy="give one of them")
+    if options.sequence == "-" and options.start:
+        raise UsageError("--start is of a recording", remedy="leave it away with -")
     for path in (options.out, options.json):
         check_writable(path)
     if Path(options.out).exists() and not options.replace:
@@ -109,7 +116,7 @@ def _make_prior(options: argparse.Namespace, plan: "Plan", rig: "StereoRig") -> 
     Raises:
         UsageError: it cannot be meant.
     """
-    from navapp.values import FEWEST_PICKS, Prior
+    from navapp.values import FEWEST_PICKS, Prior, find_crowded
 
     size = f"{rig.width}x{rig.height}"
     if options.box is not None:
@@ -127,13 +134,20 @@ def _make_prior(options: argparse.Namespace, plan: "Plan", rig: "StereoRig") -> 
             f"{len(picks)} points do not tell a pose",
             remedy=f"give {FEWEST_PICKS} or more, each landmark once",
         )
+    if (crowded := find_crowded(picks)) is not None:
+        raise UsageError(
+            f"{' and '.join(crowded)} are at one place of the picture",
+            remedy="give landmarks that lie apart",
+        )
     return Prior(picks=picks)
 
 
 def _pick(text: str, bone: str, plan: "Plan", rig: "StereoRig") -> "Pick":
     from navapp.values import Pick
 
-    name, _, place = text.partition("=")
+    name, equals, place = text.partition("=")
+    if not equals:
+        raise UsageError(f"--points takes NAME=U,V, not '{text}'")
     u, v = _numbers("--points", place, 2)
     if not (0 <= u < rig.width and 0 <= v < rig.height):
         raise UsageError(
@@ -159,7 +173,7 @@ def _numbers(option: str, text: str, n: int) -> list[float]:
     return values
 
 
-def _stage_of(plan: "Plan", bone: str) -> Any:
+def _stage_of(plan: "Plan", bone: str) -> "StageSpec":
     """The first stage that shows a bone."""
     from navapp.control.stages import STAGES
 
@@ -176,10 +190,13 @@ def _read_pair(
 ) -> "StereoFrame":
     """The first pair of the recording, or one of the camera."""
     from drivers.replay_camera import ReplaySettings
+    from navapp.config import Configuration
     from navapp.devices import open_live, open_recording
 
     if options.sequence == "-":
-        opened = open_live(configuration, is_headless=True)
+        # Of all devices only the cameras are asked.
+        camera = configuration.camera.model_copy(update={"rig": options.rig})
+        opened = open_live(Configuration(camera=camera), is_headless=True)
     else:
         settings = ReplaySettings(n_frames=1, start=options.start)
         opened = open_recording(options.sequence, settings, rig, configuration)

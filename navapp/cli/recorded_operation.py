@@ -8,10 +8,12 @@ from navapp.control.commands import (
     Command,
     ConfirmStep,
     DistrustRig,
+    Register,
     WithdrawStep,
 )
 from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
 from navapp.control.operators import CombinedOperator, Operator, RecordedOperator, ReplayOperator
+from navapp.values import Prior
 
 # After which frame a session found its rig moved, and how.
 MovedRig = tuple[int, DistrustRig]
@@ -69,6 +71,16 @@ def _find_facts(
         ((-1 if options.start > after else after, command) for after, command in facts),
         key=lambda fact: fact[0],
     )
+
+
+def find_drawn_start(session: RecordedSession, prior: Prior, bone: str) -> Prior:
+    """Where the recorded operator has said last that a bone is; the prior when that was never."""
+    starts = [
+        command.start
+        for _, command in session.events.commands
+        if isinstance(command, Register) and command.start and command.bone in ("", bone)
+    ]
+    return prior if not starts or starts[-1].is_empty else prior.replaced_by(starts[-1])
 
 
 def list_warnings(session: RecordedSession | None, options: argparse.Namespace) -> tuple[str, ...]:

@@ -41,7 +41,9 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("sequence", metavar="SEQ", help="folder, or LEFT.mp4,RIGHT.mp4")
     parser.add_argument("--plan", metavar="P", help="plan folder (a session brings its own)")
     parser.add_argument("--rig", metavar="R", help="rig file (a session brings its own)")
-    parser.add_argument("--prior", metavar="FILE", help="rough start: pose, cone, box (JSON)")
+    parser.add_argument(
+        "--prior", metavar="FILE", help="where the bone is (JSON; `navapp prior` makes it)"
+    )
     add_method(parser)
     parser.add_argument(
         "--follow-refused",
@@ -198,7 +200,12 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
 
 def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
-    from navapp.cli.recorded_operation import choose_operator, find_moved_rig, list_warnings
+    from navapp.cli.recorded_operation import (
+        choose_operator,
+        find_drawn_start,
+        find_moved_rig,
+        list_warnings,
+    )
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.executors import InlineExecutor, RecordedExecutor
     from navapp.control.operators import RecordedOperator
@@ -248,6 +255,9 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
             check_minutes=session.check_minutes,
         )
         other_executor = RecordedExecutor(session.events.other_take_overs)
+    if session is not None and not is_as_recorded and not options.prior:
+        start = find_drawn_start(session, specification.prior, first.bone)
+        specification = replace(specification, prior=start)
     if session is None:
         # Nothing is late: every frame tells what it can.
         specification = replace(specification, frames_between_faces=1)

@@ -37,7 +37,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--plan", metavar="P", help="plan folder")
     parser.add_argument("--rig", metavar="R", help="rig file")
-    parser.add_argument("--prior", metavar="FILE", help="rough start pose (JSON)")
+    parser.add_argument(
+        "--prior", metavar="FILE", help="where the bone is (JSON; `navapp prior` makes it)"
+    )
     parser.add_argument(
         "--mirror",
         action="store_true",
@@ -76,7 +78,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     with ExitStack() as undo:
         if options.mirror:
             configuration = add_practice_mirror(configuration, undo)
-        draws_box = any(step.box is not None for step in script)
+        first = next((step for step in script if step.do == "register"), None)
+        draws_box = first is not None and first.box is not None
         session = prepare_session(
             configuration, options, diagnostics, needs_start=options.headless and not draws_box
         )

@@ -119,7 +119,7 @@ class PlanSection(Section):
     path: str | None = None
     """Plan folder; the simulated rig brings its own."""
     prior: str | None = None
-    """JSON file with the rough start pose."""
+    """JSON file that tells where the bone is (navapp prior makes it)."""
 
 
 class TrackingSection(Section):

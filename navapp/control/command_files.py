@@ -73,8 +73,10 @@ def command_to_json(command: Command) -> dict[str, Any]:
         nudge_px = [command.right_px, command.down_px]
         return {"command": "nudge_cross", "nudge_px": nudge_px}
     if isinstance(command, Register):
-        start = {} if command.start is None else {"start": prior_to_json(command.start)}
-        return {"command": "register", **start}
+        if command.start is None:
+            return {"command": "register"}
+        start = prior_to_json(command.start)
+        return {"command": "register", "start": start, "bone": command.bone}
     if isinstance(command, Propose):
         pose = command.left_from_bone
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
@@ -104,7 +106,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return NudgeCross(int(right_px), int(down_px))
         if name == "register":
             start = value.get("start")
-            return Register(None if start is None else prior_from_json(start))
+            given = None if start is None else prior_from_json(start)
+            return Register(given, str(value.get("bone", "")))
         if name == "propose":
             matrix = value["camera_from_model"]
             return Propose(RigidTransform("left", str(value["bone"]), matrix))
@@ -117,6 +120,6 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
         return command
     except (LookupError, ValueError, TypeError, AttributeError) as error:
         raise SequenceError(
-            f"the session's events hold an unknown command '{name}'",
+            f"the session's events hold a command '{name}' that is unknown or damaged",
             remedy="replay it with the version that recorded it",
         ) from error

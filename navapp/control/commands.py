@@ -11,8 +11,9 @@ class Register:
     """Start the first registration (again)."""
 
     # what the operator has just drawn or picked: later ones of the same bone begin from it too.
-    # None: what was given last, at first the session's prior.
+    # None: what was given last, at first the session's prior; an empty one: the session's prior.
     start: Prior | None = None
+    bone: str = ""  # that was drawn; empty: the stage's
 
 
 @dataclass(frozen=True, slots=True)

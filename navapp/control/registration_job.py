@@ -39,6 +39,10 @@ class RegistrationJob:
         """From now on a bone is searched for where an operator has said that it is."""
         self._trackers.set_start(bone, start)
 
+    def start_of(self, bone: str) -> Prior:
+        """Where a bone is searched for."""
+        return self._trackers.start(bone)
+
     def start(self, stage: StageSpec, frame: StereoFrame) -> bool:
         """Search for a stage's bone in a frame, unless a search runs; whether it was started."""
         if self._job is not None:

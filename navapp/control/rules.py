@@ -65,8 +65,13 @@ def _why_not_look(command: Register | Propose, snapshot: Snapshot) -> str:
         return "a registration is running; cancel it first"
     if not snapshot.is_bone_planned:
         return f"the plan has no model of the {bone}"
-    if isinstance(command, Propose) and command.left_from_bone.source != bone:
-        return f"the pose is not one of the {bone}"
+    if isinstance(command, Propose):
+        is_other = command.left_from_bone.source != bone
+        return f"the pose is not one of the {bone}" if is_other else ""
+    if command.bone not in ("", bone):
+        return f"it was drawn for the {command.bone}; the stage shows the {bone}"
+    if command.start is not None and not snapshot.can_draw_start:
+        return "this method needs a rough pose: give --prior"
     return ""
 
 

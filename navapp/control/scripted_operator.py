@@ -292,6 +292,12 @@ def read_script(content: Mapping[str, Any], name: str) -> tuple[ScriptStep, ...]
                 subject=name,
                 remedy=f"'{step.do}' needs it",
             )
+        if step.box is not None and (step.do != "register" or min(step.box[2:]) < 1):
+            raise ConfigurationError(
+                f"step {number} of {name} has a 'box' that means nothing",
+                subject=name,
+                remedy="'register' takes one: x, y, width, height in px",
+            )
         if step.do == "wait" and step.until not in waited:
             raise ConfigurationError(
                 f"step {number} of {name} waits for '{step.until}', which does not exist",

@@ -349,11 +349,11 @@ class Session:
         """
         self._stop_search()
         self._tracked = None
-        text = f"searching for the {self._stage.bone}"
+        bone = self._stage.bone
         if start is not None:
-            self._registration.set_start(self._stage.bone, start)
-            text += f" {describe_start(start)}"
-        self.change_state(SessionState.REGISTERING, text)
+            self._registration.set_start(bone, start)
+        told = describe_start(self._registration.start_of(bone), bone)
+        self.change_state(SessionState.REGISTERING, f"searching for the {bone}{told}")
 
     def cancel_registration(self) -> None:
         """Stop the search."""
@@ -478,11 +478,13 @@ def describe_moved_rig(why: str) -> str:
     return f"{Reason.RIG_MOVED.value} ({why})"
 
 
-def describe_start(start: Prior) -> str:
-    """What an operator has given, for people."""
-    if start.picks:
-        return f"from {len(start.picks)} picked landmarks"
-    return "in the box that was drawn" if start.box is not None else "from a given pose"
+def describe_start(start: Prior, bone: str) -> str:
+    """Where a bone is searched for, for people; empty when that is nothing that was drawn."""
+    if bone in start.left_from_bone:
+        return ""
+    if picks := start.picks_of(bone):
+        return f" from {len(picks)} picked landmarks"
+    return " in the box that was drawn" if start.box is not None else ""
 
 
 def add_bound(text: str, verdict: Verdict) -> str:

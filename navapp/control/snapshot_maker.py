@@ -31,7 +31,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Plan, Reason, TrackedFrame
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=3)
 def _landmarks_of(plan: Plan, bone: str) -> Mapping[str, FloatArray]:
     # Once, not with every frame.
     return MappingProxyType(plan.landmarks_of(bone))
@@ -79,6 +79,7 @@ class SnapshotMaker:
             preview=None if picture is None else picture.drawn,
             picture_size_px=(rig.width, rig.height),
             left_picture=None if picture is None else picture.left,
+            can_draw_start=self.specification.method == "bimcc",
             landmarks=_landmarks_of(plan, session.stage.bone),
             plain_preview=None if picture is None else picture.plain,
             shows_depth=session.shows_depth and not shows_eye,

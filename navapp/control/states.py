@@ -189,12 +189,13 @@ class Snapshot:
     # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
     # frame. `plain_preview` is the same without guides, None when it has none.
     preview: NDArray[np.uint8] | None = None
+    plain_preview: NDArray[np.uint8] | None = None
     picture_size_px: tuple[int, int] = (0, 0)  # width and height of the left picture
     # (H, W, 3) BGR or (H, W) grey: the newest left picture as it came; None before the first.
     left_picture: NDArray[np.uint8] | None = None
     # of the stage's bone: what can be picked in that picture, (3,) mm in bone coordinates.
     landmarks: Mapping[str, FloatArray] = field(default_factory=dict)
-    plain_preview: NDArray[np.uint8] | None = None
+    can_draw_start: bool = True  # the method finds a bone in a box, or from picked landmarks
     shows_depth: bool = False  # it is coloured by what is known of the depth
     has_eye: bool = False  # what an eye sees in a simulated mirror can be shown instead
     shows_eye: bool = False  # it is shown

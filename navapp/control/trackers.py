@@ -72,17 +72,13 @@ class Trackers:
     def set_start(self, bone: str, start: Prior) -> None:
         """From now on a bone is searched for where an operator has said that it is.
 
-        The prior's approach cone stays: it tells from which side the patient is seen.
+        An empty start: from the prior again. The prior's approach cone stays: it tells from which
+        side the patient is seen.
         """
-        prior = self._prior
-        if start.approach_axis is None and prior.approach_axis is not None:
-            start = replace(
-                start,
-                approach_axis=prior.approach_axis,
-                approach_half_angle_deg=prior.approach_half_angle_deg,
-            )
         with self._lock:
-            self._starts[bone] = start
+            self._starts[bone] = self._prior.replaced_by(start)
+            if start.is_empty:
+                del self._starts[bone]
 
     def start(self, bone: str) -> Prior:
         """Where a bone is searched for."""

@@ -1,7 +1,7 @@
-"""The first registration: from a rough pose, a box or a cone to judged poses, best first."""
+"""The first registration: from a pose, picks, a box or a cone to judged poses, best first."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.picked_landmarks import find_rough_poses
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
-from navapp.values import Prior, Reason, Status, Stopwatch, TrackedFrame
+from navapp.values import Pick, Prior, Reason, Status, Stopwatch, TrackedFrame
 from navapp.values.progress import tell_part
 
 if TYPE_CHECKING:
@@ -40,7 +40,11 @@ class FirstRegistration:
         """Distinct candidates, best first; see `Tracker.register`."""
         tracker, watch = self._tracker, Stopwatch()
         bone = tracker.model.bone.name
-        start = prior.left_from_bone.get(bone) or self._start_at_picks(left, right, prior)
+        start = prior.left_from_bone.get(bone)
+        if start is None and (picks := prior.picks_of(bone)):
+            start = self._start_at_picks(left, right, picks)
+            if start is None:
+                return [tracker.judge.lost(Reason.NO_SURFACE, watch)]
         if start is not None:
             frame = replace(tracker.begin(left, right, start, watch), on_progress=on_progress)
             answers = self._register_around(frame, goal)
@@ -55,12 +59,11 @@ class FirstRegistration:
         cause = tracker.diagnosis.explain_failure(left, right, around, answers[0], on_progress)
         return [answer.with_cause(cause) for answer in answers]
 
-    def _start_at_picks(self, left: Image, right: Image, prior: Prior) -> RigidTransform | None:
-        """The pose that an operator's picked landmarks tell; None without any."""
+    def _start_at_picks(
+        self, left: Image, right: Image, picks: Sequence[Pick]
+    ) -> RigidTransform | None:
+        """The pose that picked landmarks tell; None when too few of them are matched."""
         tracker = self._tracker
-        picks = prior.picks_of(tracker.model.bone.name)
-        if not picks:
-            return None
         poses = find_rough_poses(left, right, picks, tracker.meter)
         if len(poses) < 2:
             return poses[0] if poses else None

@@ -97,8 +97,8 @@ class Tracker(ABC):
     ) -> list[TrackedFrame]:
         """Find the bone: distinct candidates, best first.
 
-        From the prior's pose of this bone; without one from its box, its cone, or both. Progress is
-        a fraction; what it raises stops the search.
+        From the prior's pose of this bone; without one from its picks, its box, its cone, or both
+        of these. Progress is a fraction; what it raises stops the search.
         """
 
     @abstractmethod

@@ -42,7 +42,7 @@ _KEY_LABELS = {
 _HEEDLESS = ("blank", "quit")
 # A step of a cross in the check of the mirror, and one with the shift key.
 _STEPS_PX = (("", 1), ("shift+", 10))
-_ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
+ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def _to_neighbour(step: int) -> Callable[[Snapshot], Command]:
 
 
 def _nudge_action(shift: str, arrow: str, step_px: int) -> Action:
-    right, down = _ARROWS[arrow]
+    right, down = ARROWS[arrow]
     return Action(
         f"nudge-{shift}{arrow}",
         f"{shift}{arrow}",
@@ -231,7 +231,7 @@ ACTIONS: tuple[Action, ...] = (
         "begin the check of the mirror, or give it up",
         lambda _: CheckMirror(),
     ),
-    *(_nudge_action(shift, arrow, step_px) for shift, step_px in _STEPS_PX for arrow in _ARROWS),
+    *(_nudge_action(shift, arrow, step_px) for shift, step_px in _STEPS_PX for arrow in ARROWS),
     Action(
         "confirm-cross",
         "enter",

@@ -177,7 +177,7 @@ class NavigationApp(QuietApp):
         if self._view.is_silent:
             self._say_silent("register")
         else:
-            self._session.submit(Register(message.start))
+            self._session.submit(Register(message.start, message.bone))
 
     def action_confirm_condition(self, key: str) -> None:
         """Say that a condition is met: from the gates' page."""

@@ -42,18 +42,7 @@ def _stage_and_state(view: View) -> str:
 
 
 class MainScreen(ViewScreen[None]):
-    """Laid out for 80 x 24 and for wide terminals by the style sheet."""
-
-    HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012 (as the base class has it)
-        (0, "-narrow"),
-        (80, "-enough"),
-        (140, "-wide"),
-    ]
-    VERTICAL_BREAKPOINTS = [  # noqa: RUF012
-        (0, "-low"),
-        (24, "-even"),
-        (40, "-tall"),
-    ]
+    """What the operator sees most of the time."""
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""

@@ -12,16 +12,17 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.message import Message
 
+from navapp.ui.actions import ARROWS
 from navapp.ui.halfblocks import find_place
 from navapp.ui.picture_view import HalfBlocks
 from navapp.ui.screens import PageScreen
-from navapp.ui.start_page import ARROWS, StartChosen
+from navapp.ui.start_page import StartChosen, why_no_picture
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
-from navapp.values import FEWEST_PICKS, Pick, Prior
+from navapp.values import FEWEST_PICKS, Pick, Prior, find_crowded
 
 Place = tuple[int, int]  # column and row in the left picture, px
-_YELLOW, _GREEN = (0, 255, 255), (0, 255, 0)
+_YELLOW, _GREEN, _BLACK = (0, 255, 255), (0, 255, 0), (0, 0, 0)
 # What an arrow moves the cursor by, alone and with SHIFT.
 _STEP_PX, _LARGE_STEP_PX = 1, 20
 # Half length of the cross in the magnifier, and of the gap that leaves its pixel visible.
@@ -39,9 +40,12 @@ def draw_places(
         return place[0] * width // size_px[0], place[1] * height // size_px[1]
 
     x, y = find(cursor)
-    drawn[y, :], drawn[:, x] = _YELLOW, _YELLOW
+    # Beside each line a black one: on bright bone it is the one that is seen.
+    for colour, k in ((_BLACK, 1), (_YELLOW, 0)):
+        drawn[min(y + k, height - 1), :], drawn[:, min(x + k, width - 1)] = colour, colour
     drawn[y, x] = preview[y, x]
     for u, v in map(find, picks.values()):
+        drawn[max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = _BLACK
         drawn[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2] = _GREEN
     return drawn
 
@@ -66,7 +70,9 @@ def magnify(
     shown[y : y + inside.shape[0], x : x + inside.shape[1]] = colour
     for u, v in picks.values():
         if 0 <= v - top < height and 0 <= u - left < width:
-            shown[v - top, u - left] = _GREEN
+            row, column = v - top, u - left
+            shown[row, max(column - 1, 0) : column + 2] = _BLACK
+            shown[row, column] = _GREEN
     y, x = height // 2, width // 2
     for k in range(_GAP_PX, _ARM_PX + 1):
         for dy, dx in ((0, k), (0, -k), (k, 0), (-k, 0)):
@@ -114,8 +120,15 @@ class PickList(TextView):
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """As many as there is room for, around the selected one."""
-        if not self.names:
-            return [Content(" the plan has no landmark of this bone: draw a box (b)")]
+        if view.plain_preview is None:
+            return [Content(f" {why_no_picture(view)}")]
+        if (n := len(self.names)) < FEWEST_PICKS:
+            return [
+                Content(f" the plan has {n} landmarks"),
+                Content(f" of the {view.snapshot.stage.bone}, {FEWEST_PICKS}"),
+                Content(" are needed: leave, and"),
+                Content(" draw a box (b)"),
+            ]
         heading = Content.styled(f" {len(self.picks)} picked; cursor {_tell(self.cursor)}", "bold")
         room = max(height - 1, 1)
         first = min(max(self.selected - room // 2, 0), max(len(self.names) - room, 0))
@@ -155,14 +168,14 @@ class PicksPage(PageScreen):
     ]
 
     page_title = "where are the landmarks?"
-    keys = " back  arrows, click  ENTER pick  n next  x forget  g search"
+    keys = " back  click, SHIFT arrows, arrows  ENTER pick  n next  x forget  g search"
 
     def __init__(self, view: View, picks: dict[str, Place]) -> None:
         super().__init__(view)
         self._picks = picks
         width, height = view.snapshot.picture_size_px
         self._cursor = (width // 2, height // 2)
-        self._selected = 0
+        self._number = 0
 
     def compose_page(self) -> ComposeResult:
         """The whole picture, a part of it enlarged, the landmarks."""
@@ -176,6 +189,11 @@ class PicksPage(PageScreen):
     def _names(self) -> list[str]:
         return list(self.view.snapshot.landmarks)
 
+    @property
+    def _selected(self) -> int:
+        """Of the names; the stage may have another bone by now."""
+        return min(self._number, max(len(self._names) - 1, 0))
+
     def show(self, view: View, *, is_text_due: bool) -> None:
         """Take over the newest picture."""
         self.view = view
@@ -183,9 +201,8 @@ class PicksPage(PageScreen):
         listed.names, listed.picks = self._names, self._of_bone()
         listed.selected, listed.cursor = self._selected, self._cursor
         super().show(view, is_text_due=is_text_due)
-        preview = snapshot.preview if snapshot.plain_preview is None else snapshot.plain_preview
-        picture, ramp = snapshot.left_picture, view.symbols.ramp
-        if preview is None or picture is None or snapshot.shows_eye:
+        preview, picture, ramp = view.plain_preview, snapshot.left_picture, view.symbols.ramp
+        if preview is None or picture is None:
             return
         whole, magnifier = (self.query_one(f"#{name}", PlacePicture) for name in _PICTURES)
         size_px = snapshot.picture_size_px
@@ -220,18 +237,18 @@ class PicksPage(PageScreen):
     def action_select(self, step: int) -> None:
         """Another landmark."""
         if self._names:
-            self._selected = (self._selected + step) % len(self._names)
+            self._number = (self._selected + step) % len(self._names)
         self._redraw()
 
     def action_pick(self) -> None:
         """The selected landmark is where the cursor is; go on to the next that has no place."""
-        if not self._names:
+        if len(self._names) < FEWEST_PICKS or self.view.plain_preview is None:
             return
         self._picks[self._names[self._selected]] = self._cursor
         for step in range(1, len(self._names)):
             number = (self._selected + step) % len(self._names)
             if self._names[number] not in self._picks:
-                self._selected = number
+                self._number = number
                 break
         self._redraw()
 
@@ -242,17 +259,22 @@ class PicksPage(PageScreen):
         self._redraw()
 
     def action_search(self) -> None:
-        """Begin, and leave; refused with fewer than three."""
+        """Begin, and leave; refused with fewer than three, or two at one place."""
         known, bone = self.view.snapshot.landmarks, self.view.snapshot.stage.bone
         picks = tuple(
             Pick(name, bone, (float(u), float(v)), known[name])
             for name, (u, v) in self._of_bone().items()
         )
+        why = ""
         if len(picks) < FEWEST_PICKS:
+            why = f"{FEWEST_PICKS} landmarks are needed"
+        elif (crowded := find_crowded(picks)) is not None:
+            why = f"{' and '.join(crowded)} are at one place: pick them again"
+        if why:
             self.app.bell()
-            self.notify(f"{FEWEST_PICKS} landmarks are needed", severity="warning")
+            self.notify(why, severity="warning")
             return
-        self.app.post_message(StartChosen(Prior(picks=picks)))
+        self.app.post_message(StartChosen(Prior(picks=picks), bone))
         self.dismiss()
 
     def _move_to(self, x: int, y: int) -> None:

@@ -17,7 +17,21 @@ ResultT = TypeVar("ResultT")
 
 
 class ViewScreen(Screen[ResultT], Generic[ResultT]):
-    """A screen that shows views; the first at once when it appears."""
+    """A screen that shows views; the first at once when it appears.
+
+    Laid out for 80 x 24 and for wide terminals by the style sheet.
+    """
+
+    HORIZONTAL_BREAKPOINTS = [  # noqa: RUF012 (as the base class has it)
+        (0, "-narrow"),
+        (80, "-enough"),
+        (140, "-wide"),
+    ]
+    VERTICAL_BREAKPOINTS = [  # noqa: RUF012
+        (0, "-low"),
+        (24, "-even"),
+        (40, "-tall"),
+    ]
 
     def __init__(self, view: View) -> None:
         super().__init__()

@@ -11,6 +11,9 @@ from textual.binding import Binding, BindingType
 from textual.content import Content
 from textual.message import Message
 
+from navapp.control.commands import Register
+from navapp.control.rules import why_refused
+from navapp.ui.actions import ARROWS
 from navapp.ui.halfblocks import find_place
 from navapp.ui.picture_view import HalfBlocks
 from navapp.ui.screens import PageScreen
@@ -18,18 +21,17 @@ from navapp.ui.text_view import TextView
 from navapp.ui.view import View
 from navapp.values import Prior
 
-_YELLOW = (0, 255, 255)
+_YELLOW, _BLACK = (0, 255, 255), (0, 0, 0)
 # A press of an arrow, and the smallest box, as parts of the picture's width.
 _STEP, _LEAST = 1 / 80, 1 / 16
-ARROWS = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
 
 
 class StartChosen(Message):
-    """Where the bone is to be searched for."""
+    """Where a bone is to be searched for; an empty start: from where the session began."""
 
-    def __init__(self, start: Prior) -> None:
+    def __init__(self, start: Prior, bone: str) -> None:
         super().__init__()
-        self.start = start
+        self.start, self.bone = start, bone
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +84,12 @@ class StartBox:
         height, width = preview.shape[:2]
         left, right = ((x * width) // size_px[0] for x in (self.x, self.x + self.width - 1))
         top, bottom = ((y * height) // size_px[1] for y in (self.y, self.y + self.height - 1))
-        drawn[top : bottom + 1, [left, right]] = _YELLOW
-        drawn[[top, bottom], left : right + 1] = _YELLOW
+        # Yellow within black: one of them is seen on whatever lies below.
+        for grow, colour in ((2, _BLACK), (1, _BLACK), (0, _YELLOW), (-1, _YELLOW)):
+            rows = np.clip([top - grow, bottom + grow], 0, height - 1)
+            columns = np.clip([left - grow, right + grow], 0, width - 1)
+            drawn[rows[0] : rows[1] + 1, columns] = colour
+            drawn[rows, columns[0] : columns[1] + 1] = colour
         return drawn
 
 
@@ -104,18 +110,16 @@ class BoxPicture(HalfBlocks):
 
     def show_box(self, view: View, box: StartBox) -> None:
         """Take over the newest picture."""
-        snapshot = view.snapshot
-        preview = snapshot.preview if snapshot.plain_preview is None else snapshot.plain_preview
-        if preview is None or snapshot.shows_eye:
+        if (preview := view.plain_preview) is None:
             return
-        self._shape, self._size_px = preview.shape[:2], snapshot.picture_size_px
+        self._shape, self._size_px = preview.shape[:2], view.snapshot.picture_size_px
         self.show_picture(box.draw(preview, self._size_px), view.symbols.ramp)
 
     def _place(self, event: events.MouseEvent) -> tuple[float, float] | None:
-        at = event.get_content_offset(self)
-        if at is None or 0 in self._shape:
+        if 0 in self._shape:
             return None
-        across, down = find_place(self._shape, *self.content_size, at.x, at.y)
+        # A drag may leave the picture: its edge is meant then.
+        across, down = find_place(self._shape, *self.content_size, event.x, event.y)
         return across * self._size_px[0], down * self._size_px[1]
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
@@ -145,18 +149,27 @@ class StartKeys(TextView):
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """Two lines."""
         bone, box = view.snapshot.stage.bone, self.box
-        if view.snapshot.shows_eye:
-            said = "the video is not shown: leave, and press y"
+        if view.plain_preview is None:
+            said = why_no_picture(view)
+        elif why := why_refused(Register(Prior()), view.snapshot):
+            said = f"nothing can be searched now: {why}"
         else:
             said = "" if box is None else f"{box.width} x {box.height} px at {box.x}, {box.y}"
         return [
             Content.assemble(
-                f" Draw the box around the {bone} that is seen: with the mouse, or ",
+                f" Around the {bone}: drag the mouse; or ",
                 ("arrows", "bold $primary"), " move, ",
-                ("SHIFT arrows", "bold $primary"), " size.",
+                ("SHIFT arrows", "bold $primary"), " size",
             ),
             Content.styled(f" {said}", "$text-muted"),
         ]  # fmt: skip
+
+
+def why_no_picture(view: View) -> str:
+    """Why there is nothing to draw on."""
+    if view.snapshot.shows_eye:
+        return "the video is not shown: leave, and press y"
+    return "there is no picture yet"
 
 
 class StartPage(PageScreen):
@@ -165,11 +178,13 @@ class StartPage(PageScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("b", "dismiss", "back", show=False),
         Binding("enter", "search", "search", show=False),
+        Binding("x", "reset", "as the session began", show=False),
         *(Binding(key, f"move('{key}')", "move", show=False) for key in ARROWS),
         *(Binding(f"shift+{key}", f"resize('{key}')", "size", show=False) for key in ARROWS),
     ]
 
-    page_title, keys = "where is the bone?", " back  ENTER search in the box"
+    page_title = "where is the bone?"
+    keys = " back  ENTER search in the box  x search as the session began"
 
     def __init__(self, view: View, box: StartBox | None = None) -> None:
         super().__init__(view)
@@ -202,9 +217,19 @@ class StartPage(PageScreen):
 
     def action_search(self) -> None:
         """Begin, and leave."""
+        if self.view.plain_preview is None:
+            self.app.bell()
+            self.notify(why_no_picture(self.view), severity="warning")
+            return
         box = self._box
-        start = Prior(box=(box.x, box.y, box.width, box.height))
-        self.app.post_message(StartChosen(start))
+        self._leave(Prior(box=(box.x, box.y, box.width, box.height)))
+
+    def action_reset(self) -> None:
+        """Forget what was drawn and picked, and search."""
+        self._leave(Prior())
+
+    def _leave(self, start: Prior) -> None:
+        self.app.post_message(StartChosen(start, self.view.snapshot.stage.bone))
         self.dismiss()
 
     def _take(self, box: StartBox) -> None:

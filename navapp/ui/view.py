@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from navapp.control.states import (
     DeviceHealth,
     EventLevel,
@@ -140,6 +143,14 @@ class View:
         first = self.snapshot.reasons[0]
         is_waiting = first is Reason.NOT_NAVIGATING and self.snapshot.state in _WAITING
         return first.value, _WAITING[self.snapshot.state] if is_waiting else first.remedy
+
+    @property
+    def plain_preview(self) -> NDArray[np.uint8] | None:
+        """The small picture of the left camera without guides; None when another one is shown."""
+        snapshot = self.snapshot
+        if snapshot.shows_eye or snapshot.left_picture is None:
+            return None
+        return snapshot.preview if snapshot.plain_preview is None else snapshot.plain_preview
 
     @property
     def picture_title(self) -> str:

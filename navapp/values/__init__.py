@@ -41,7 +41,7 @@ from navapp.values.measured import (
     Surroundings,
 )
 from navapp.values.pictures import DEPTH_COLOURS, OverlayMode, OverlayPicture
-from navapp.values.plans import FEWEST_PICKS, Pick, Plan, Prior, StageSpec
+from navapp.values.plans import FEWEST_PICKS, Pick, Plan, Prior, StageSpec, find_crowded
 from navapp.values.timings import FrameTimings, Stopwatch
 from navapp.values.verdicts import (
     PoseEstimate,
@@ -99,6 +99,7 @@ __all__ = [
     "Surroundings",
     "TrackedFrame",
     "Verdict",
+    "find_crowded",
     "join_faces",
     "join_measured",
     "kind_of",

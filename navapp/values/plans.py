@@ -1,7 +1,9 @@
 """A pre-operative plan, a surgical stage, and where a first registration may start."""
 
 import hashlib
-from collections.abc import Mapping
+import itertools
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Protocol, TypeVar
@@ -26,7 +28,9 @@ T = TypeVar("T", bound=_OfBone)
 
 # Three points tell a pose.
 FEWEST_PICKS = 3
-# A landmark of a bone lies no further outside of the box around it.
+# Picks that are nearer to each other in the picture tell no turn.
+_LEAST_APART_PX = 10.0
+# A landmark that can be seen on a bone lies no further from its surface.
 _BESIDE_MM = 5.0
 
 
@@ -51,6 +55,26 @@ class Prior:
     approach_half_angle_deg: float = 180.0  # of the cone around it
     box: tuple[int, int, int, int] | None = None  # x, y, width, height in the left picture, px
     picks: tuple[Pick, ...] = ()  # of any bones
+
+    def __post_init__(self) -> None:
+        if self.box is not None and min(self.box[2:]) < 1:
+            raise ValueError("a box is at least 1 px wide and high")
+
+    @property
+    def is_empty(self) -> bool:
+        """It says nothing at all."""
+        known = self.left_from_bone, self.picks
+        return not any(known) and self.box is None and self.approach_axis is None
+
+    def replaced_by(self, start: "Prior") -> "Prior":
+        """What an operator has given instead, seen from the side that was known."""
+        if start.approach_axis is not None or self.approach_axis is None:
+            return start
+        return replace(
+            start,
+            approach_axis=self.approach_axis,
+            approach_half_angle_deg=self.approach_half_angle_deg,
+        )
 
     def picks_of(self, bone: str) -> tuple[Pick, ...]:
         """Those of a bone; none when they are too few for a pose."""
@@ -145,17 +169,18 @@ class Plan:
         }
 
     def landmarks_of(self, bone: str) -> dict[str, FloatArray]:
-        """Points on a bone that have a name, (3,) mm: its landmarks and targets."""
+        """Points on a bone that have a name, (3,) mm: its landmarks, and targets of one point."""
         if bone not in self.bones:
             return {}
         vertices_mm = self.bones[bone].mesh.vertices_mm
-        low, high = vertices_mm.min(axis=0) - _BESIDE_MM, vertices_mm.max(axis=0) + _BESIDE_MM
-        named = {name: one.point_mm for name, one in self.content.landmarks.items()}
+        known = {name: np.reshape(points, (-1, 3)) for name, points in self.targets.items()}
+        named = {name: points_mm[0] for name, points_mm in known.items() if len(points_mm) == 1}
+        named |= {name: one.point_mm for name, one in self.content.landmarks.items()}
         return {
             name: point_mm
-            for name, point_mm in {**self.targets, **named}.items()
+            for name, point_mm in named.items()
             # The hip's centre, too, is called the femur's.
-            if name.startswith(f"{bone}/") and bool(((low <= point_mm) & (point_mm <= high)).all())
+            if name.startswith(f"{bone}/") and _is_beside(vertices_mm, point_mm)
         }
 
     def stage(self, spec: StageSpec) -> StageSpec:
@@ -164,6 +189,18 @@ class Plan:
         if planned is None:
             return spec
         return replace(spec, bone=planned.bone, targets=planned.targets or spec.targets)
+
+
+def find_crowded(picks: Sequence[Pick]) -> tuple[str, str] | None:
+    """Names of two picks that lie at one place of the picture; None when all lie apart."""
+    for a, b in itertools.combinations(picks, 2):
+        if math.dist(a.left_px, b.left_px) < _LEAST_APART_PX:
+            return a.name, b.name
+    return None
+
+
+def _is_beside(vertices_mm: FloatArray, point_mm: FloatArray) -> bool:
+    return bool(np.linalg.norm(vertices_mm - point_mm, axis=1).min() <= _BESIDE_MM)
 
 
 def _check_content(plan: Plan) -> None:

@@ -66,6 +66,36 @@ def test_a_box_where_no_bone_is_makes_a_file_and_says_so(files, tmp_path, capsys
     assert read_prior(out).box == (5, 5, 90, 90)
 
 
+def test_a_box_makes_a_prior_that_finds_the_bone(files, tmp_path) -> None:
+    out = tmp_path / "prior.json"
+    out.write_text("old")
+    a = room()
+    pixels = a.rig.left.project(a.truth(a.frames[0]).apply(bare_mm()))
+    (x, y), (width, height) = pixels.min(axis=0), np.ptp(pixels, axis=0)
+    box = f"{x - 6:.0f},{y + 6:.0f},{width + 6:.0f},{height - 6:.0f}"
+    assert make(files, out, "--box", box, "--replace") == 0
+    assert read_prior(out).box is not None
+
+
+def bare_mm() -> np.ndarray:
+    a = room()
+    mesh = a.tracker.model.bone.mesh
+    seen = mesh.vertices_mm[mesh.visible_vertices(a.truth(a.frames[0]))]
+    return seen[seen[:, 2] < mesh.vertices_mm[:, 2].min() + 60.0]
+
+
+def test_the_camera_gives_a_pair_as_a_recording_does(files, tmp_path, capsys) -> None:
+    out, config = tmp_path / "prior.json", tmp_path / "c.toml"
+    rest = ["--box", "5,5,90,90", "--out", str(out)]
+    assert run(["--quiet", "prior", "-", *files[1:], *rest]) == 4
+    assert read_prior(out).box == (5, 5, 90, 90)
+    config.write_text("[camera.simulated]\nscale = 0.5\n")
+    out.unlink()
+    assert run(["--quiet", "--config", str(config), "prior", "-", *files[1:], *rest]) == 3
+    assert "640x360" in capsys.readouterr().err
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ("more", "code", "words"),
     [
@@ -79,6 +109,8 @@ def test_a_box_where_no_bone_is_makes_a_file_and_says_so(files, tmp_path, capsys
         (["--points", "femur/nose=1,2"], 2, "choose of femur/0, femur/1, femur/2"),
         (["--points", "femur/0=9000,2"], 2, "is not in a picture of 1280x720"),
         (["--points", "femur/0=1,2", "--box", BOX], 2, "are two starts"),
+        (["--points", "femur/0"], 2, "takes NAME=U,V, not 'femur/0'"),
+        (["--points", "femur/0=1,2", "femur/1=3,4", "femur/2=90,4"], 2, "femur/0 and femur/1 are"),
         (["--box", BOX, "--bone", "tibia"], 2, "no model of the tibia"),
         (["--box", BOX, "--json", "/nowhere/x.json"], 3, "does not exist"),
     ],

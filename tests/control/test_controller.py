@@ -182,7 +182,7 @@ def test_without_a_prior_the_failure_says_what_is_missing() -> None:
     bench.frames(1)
     bench.do(Register())
     bench.frames(1)
-    assert "no start pose is known for the femur" in bench.events[-1].text
+    assert "nothing tells where the femur is: draw a box" in bench.events[-1].text
 
 
 # -- the end ------------------------------------------------------------------------------------

@@ -223,6 +223,13 @@ def test_a_word_that_is_refused_ends_a_script_that_does_not_expect_it(expects: b
     assert ("nobody is asked for 'gapz'" in operator.failure) == (not expects)
 
 
+@pytest.mark.parametrize("step", [{"do": "show", "box": [1, 2, 3, 4]},
+                                  {"do": "register", "box": [1, 2, 0, 4]}])  # fmt: skip
+def test_a_box_that_means_nothing_is_refused(step) -> None:
+    with pytest.raises(ConfigurationError, match="'box' that means nothing"):
+        read_script({"step": [step]}, "script")
+
+
 def test_nothing_made_is_not_measured() -> None:
     bench = navigating(Bench(camera=FakeCamera(None, n_frames=40), has_gates=True))
     operator = ScriptedOperator((ScriptStep(do="wait", until="measured", frames=3),))

@@ -260,6 +260,11 @@ def test_a_drawn_box_is_all_that_a_registration_needs_and_it_replays(
     assert run(["--quiet", "replay", str(session), "--json", str(out)]) == 0
     for a, b in zip(frames, result(out)["frames"], strict=True):
         assert a["camera_from_model"] == b["camera_from_model"]
+    # Whatever is changed, the bone is looked for where it was drawn: the prior knows nothing.
+    (session / "prior.json").write_text("{}", encoding="utf-8")
+    given = ["--quiet", "replay", str(session), "--start", "2", "--json", str(out)]
+    assert run(given) == 0
+    assert result(out)["frames"][0]["camera_from_model"] is not None
 
 
 def test_a_session_is_never_recorded_over_another(

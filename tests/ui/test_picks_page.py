@@ -43,14 +43,57 @@ def test_landmarks_are_picked_by_keys_and_searched_from(size: tuple[int, int]) -
         # Two are too few.
         assert isinstance(app.screen, PicksPage)
         assert app.n_bells == 1
-        await pilot.press("up", "enter", "x", "shift+up", "enter", "n", "x", "shift+tab")
-        await pilot.press("n", "n", "n", "enter", "g")
+        await pilot.press("shift+up", "enter", "g")
         await pilot.pause()
         assert not isinstance(app.screen, PicksPage)
 
     picks = given_picks(play(ready(), script, size))
-    assert len(picks) >= 3
-    assert picks["femur/a"] == (621.0, 362.0)
+    expected = [(641.0, 362.0), (621.0, 362.0), (621.0, 342.0)]
+    assert picks == dict(zip(MARKS, expected, strict=False))
+
+
+def test_a_pick_can_be_forgotten_and_the_selection_walks_both_ways() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("p", "enter", "shift+tab", "x", "n", "n", "enter")
+        await pilot.press("shift+left", "enter", "shift+left", "n", "enter", "g")
+        await pilot.pause()
+
+    picks = given_picks(play(ready(), script))
+    assert set(picks) == {"femur/notch", "femur/b", "femur/c"} or len(picks) == 3
+
+
+def test_landmarks_at_one_place_are_refused_by_name() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("p", "enter", "right", "enter", "shift+left", "enter", "g")
+        await pilot.pause()
+        assert isinstance(app.screen, PicksPage)
+        assert app.n_bells == 1
+
+    assert play(ready(), script).session.commands == []
+
+
+def test_another_bone_with_fewer_landmarks_may_come_meanwhile() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("p", "n", "n", "n")
+        app.session.current = ready(landmarks={"patella/centre": np.zeros(3)})
+        app.poll()
+        app.poll()
+        await pilot.press("enter", "x", "n", "g")
+        await pilot.pause()
+        assert "the plan has 1 landmarks" in app.text_of(PickList)
+
+    assert play(ready(), script).session.commands == []
+
+
+@pytest.mark.parametrize("changes", [{"shows_eye": True, "has_eye": True}, {"left_picture": None}])
+def test_without_the_video_nothing_is_picked(changes: dict[str, Any]) -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("p", "enter", "shift+left", "enter", "shift+up", "enter", "g")
+        await pilot.pause()
+        text = app.text_of(PickList)
+        assert "press y" in text or "no picture yet" in text
+
+    assert play(ready(**changes), script).session.commands == []
 
 
 @SIZES
@@ -105,6 +148,7 @@ def test_the_magnifier_shows_the_pixels_as_they_are() -> None:
     assert shown[15, 20].tolist() == [picture[50, 100]] * 3
     assert shown[0, 0].tolist() == [picture[50 - 15, 100 - 20]] * 3
     assert shown[16, 21].tolist() == [0, 255, 0]
+    assert not shown[16, 20].any()
     corner = magnify(picture, (0, 0), (41, 31), {})
     assert not corner[:15, :14].any()
     assert corner[15, 20].tolist() == [picture[0, 0]] * 3
@@ -119,4 +163,5 @@ def test_places_are_drawn_where_they_are() -> None:
     assert drawn[45, 10].tolist() == drawn[10, 80].tolist() == [0, 255, 255]
     assert not drawn[45, 80].any()
     assert drawn[10, 10].tolist() == [0, 255, 0]
+    assert drawn[46, 10].tolist() == drawn[10, 8].tolist() == [0, 0, 0]
     assert not preview.any()
