@@ -15,7 +15,7 @@ from tests.ui import snapshots
 from tests.ui.test_app import BellCounter, play
 
 SIZE_PX = (1280, 720)
-SIZES = pytest.mark.parametrize("size", [(80, 24), (160, 48), (200, 60)])
+SIZES = pytest.mark.parametrize("size", [(80, 24), (160, 48)])
 
 
 def ready(**changes: Any) -> Any:
