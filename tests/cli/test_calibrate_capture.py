@@ -114,6 +114,7 @@ def test_a_camera_that_is_unplugged_for_a_while_costs_no_pair(board, tmp_path):
     assert len(list(out.glob("left_*.png"))) == len(list(out.glob("right_*.png"))) == 5
 
 
+@pytest.mark.release
 def test_a_camera_that_stays_away_ends_the_capture_and_keeps_its_pairs(board, tmp_path, capsys):
     config, out = tmp_path / "navapp.toml", tmp_path / "out"
     fault = '{kind = "unplug", start_s = 4.0, duration_s = inf}'

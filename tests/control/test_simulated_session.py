@@ -97,6 +97,7 @@ def is_confirmed(command) -> bool:
 
 
 @pytest.mark.slow
+@pytest.mark.release
 def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right_one(undo) -> None:
     room = SimulatedRoom(undo, n_frames=11)
     run_headless(room.controller, ScriptedOperator())

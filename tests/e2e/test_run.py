@@ -403,6 +403,7 @@ def test_a_board_in_view_checks_the_rig(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.release
 def test_a_board_in_view_finds_a_camera_that_turned_sideways_and_so_does_the_replay(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

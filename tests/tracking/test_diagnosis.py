@@ -131,6 +131,7 @@ def test_the_other_knees_plan_is_called_so_and_stays_so() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.release
 def test_another_persons_bone_of_the_same_side_is_not_called_the_other_side() -> None:
     found = registered("other person")
     assert all(one.verdict.status is not Status.OK for one in found)

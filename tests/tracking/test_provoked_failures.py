@@ -35,7 +35,7 @@ def frames_of(event: Event, until_s: float) -> list[Shown]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", few_of(EVENTS, 2))
+@pytest.mark.parametrize("name", few_of(EVENTS))
 def test_what_goes_wrong_shows_no_wrong_pose_and_is_over_soon(name: str) -> None:
     event = EVENTS[name]
     frames = frames_of(event, event.end_s + 0.2)

@@ -11,6 +11,7 @@ from navapp.stereo.occlusion.classify import classify, mirrored
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls, support_radius_px
 from navapp.values import DisparityMap, Origin
 from tests.bench.stereo_pairs import ALOE, CONES, Known, added_by_fill, matched
+from tests.many import few_of
 from tests.reference.wls_fill_reference import SlowFill, calmed_slowly
 from tests.stereo.occlusion.test_classify import (
     HEIGHT,
@@ -272,7 +273,7 @@ def test_the_result_is_that_of_the_slow_reference(seed: int) -> None:
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("known", [CONES, ALOE], ids=lambda known: known.name)
+@pytest.mark.parametrize("known", few_of((CONES, ALOE)))
 def test_the_fill_leaves_recorded_matches_alone(data: Path, known: Known) -> None:
     answer = matched(data / "stereo", known)
     assert added_by_fill(data / "stereo", known, answer) <= 0.002
