@@ -59,7 +59,7 @@ checked-kernels: setup bytecode
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
 
-# With +, line by line as they come. More workers than cores: some tests wait in real time.
+# With +, line by line as they come. More workers than cores: one runs the tests that wait.
 tests: check bytecode
 	+$(PYTEST) -n 3 --dist loadgroup
 

@@ -146,7 +146,7 @@ class NormalEquations:
         self._shared_normal = np.zeros((model.n_shared, model.n_shared))
         self._shared_right = np.zeros(model.n_shared)
         self._view_normals: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        # What a picture says of a mark's place, of it together with the rig, and of it alone.
+        # What the pictures say of a mark's place alone, and of it together with the rig.
         self._of_marks = np.zeros((model.n_marks, 3, 3))
         self._with_rig = np.zeros((model.n_marks, 3, model.n_rig))
         for view in linear.pictures:

@@ -76,9 +76,10 @@ class Trackers:
         side the patient is seen.
         """
         with self._lock:
-            self._starts[bone] = self._prior.replaced_by(start)
             if start.is_empty:
-                del self._starts[bone]
+                self._starts.pop(bone, None)
+            else:
+                self._starts[bone] = self._prior.replaced_by(start)
 
     def start(self, bone: str) -> Prior:
         """Where a bone is searched for."""

@@ -229,7 +229,7 @@ class Rectifier:
 
 @lru_cache(maxsize=2)
 def rectifier_of(rig: StereoRig) -> Rectifier:
-    """The rectifier of a rig, for all who rectify its pictures: its maps take a tenth of a second.
+    """The rectifier of a rig, for all who rectify its pictures: its maps are made once.
 
     Raises:
         RigError: the right camera does not stand to the right of the left one.

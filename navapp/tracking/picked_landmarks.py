@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Image, luma
+from navapp.geometry.rectification import Image
 from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
 from navapp.stereo import match_surface
 from navapp.tracking.surface_meter import SurfaceMeter
@@ -50,13 +50,11 @@ def measure_picks_mm(
     around = Box.around(at_px)
     if around is None:
         return np.full((len(picks), 3), np.nan)
-    near_mm, far_mm = meter.depth_mm
-    band_px = (geometry.disparity_px(far_mm), geometry.disparity_px(near_mm))
     box = around.grow(_AROUND_PX + _SPARE_PX)
-    pair = meter.rectifier.rectify(luma(left), luma(right), box, band_px)
+    pair = meter.rectifier.rectify(left, right, box, meter.band_px, is_grey=True)
     if pair.box.is_empty:
         return np.full((len(picks), 3), np.nan)
-    found = match_surface(pair, band_px, fills=False).disparity
+    found = match_surface(pair, meter.band_px, fills=False).disparity
     disparity_px = np.array([_disparity_around(found, place) for place in at_px])
     depth_mm = geometry.focal_px * geometry.baseline_mm / disparity_px
     points_mm: FloatArray = geometry.rectified_from_left.inverse().apply(

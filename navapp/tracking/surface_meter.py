@@ -125,16 +125,20 @@ class SurfaceMeter:
     def make_nearer_search(self, left: Image, right: Image) -> NearerSearch:
         """How to look for what stands before the depths that were rectified, up to the nearest."""
         rectify = {n: partial(one.rectify, left, right) for n, one in self._reduced.items()}
-        return NearerSearch(self.geometry.disparity_px(self.depth_mm[0]), rectify)
+        return NearerSearch(self.band_px[1], rectify)
+
+    @property
+    def band_px(self) -> tuple[float, float]:
+        """Smallest and largest disparity that the rig is used for."""
+        near_mm, far_mm = self.depth_mm
+        return self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm)
 
     def rectify_surroundings(
         self, left: Image, right: Image, around: RigidTransform | None
     ) -> tuple[RectifiedPair, tuple[float, float]]:
         """Both pictures around a pose, and the disparities there; the whole view without one."""
         region = None if around is None else self.find_region(around, _AROUND)
-        near_mm, far_mm = self.depth_mm
-        everything = None, (self.geometry.disparity_px(far_mm), self.geometry.disparity_px(near_mm))
-        box, band_px = region or everything
+        box, band_px = region or (None, self.band_px)
         return self.rectifier.rectify(left, right, box, band_px, is_grey=True), band_px
 
     def find_region(

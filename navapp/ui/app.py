@@ -32,6 +32,7 @@ from navapp.control.states import (
     Snapshot,
 )
 from navapp.errors import DeviceError, NavappError, RigError
+from navapp.geometry.box import Box
 from navapp.ui.actions import (
     ACTION_OF_KEY_EVERYWHERE,
     ACTION_OF_NAME,
@@ -47,7 +48,7 @@ from navapp.ui.picks_page import PicksPage, Place
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
-from navapp.ui.start_page import StartBox, StartChosen, StartPage
+from navapp.ui.start_page import StartChosen, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
@@ -111,7 +112,7 @@ class NavigationApp(QuietApp):
         start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
         self._view = View(snapshot, symbols, start_ns, title=title)
         self._known_events: frozenset[Event] = frozenset()
-        self._start_box: StartBox | None = None  # as it was drawn last
+        self._start_box: Box | None = None  # as it was drawn last
         self._picks: dict[str, Place] = {}  # as they were picked last
 
     def get_default_screen(self) -> Screen[None]:
@@ -173,7 +174,7 @@ class NavigationApp(QuietApp):
     def on_start_chosen(self, message: StartChosen) -> None:
         """Search for the bone where an operator has drawn or picked it."""
         if message.start.box is not None:
-            self._start_box = StartBox(*message.start.box)
+            self._start_box = Box(*message.start.box)
         if self._view.is_silent:
             self._say_silent("register")
         else:

@@ -21,6 +21,7 @@ from navapp.ui.text_view import TextView
 from navapp.ui.view import View
 from navapp.values import FEWEST_PICKS, Pick, Prior, find_crowded
 
+_PICTURES = ("whole", "magnifier")
 Place = tuple[int, int]  # column and row in the left picture, px
 _YELLOW, _GREEN, _BLACK = (0, 255, 255), (0, 255, 0), (0, 0, 0)
 # What an arrow moves the cursor by, alone and with SHIFT.
@@ -284,6 +285,3 @@ class PicksPage(PageScreen):
 
     def _redraw(self) -> None:
         self.show(self.view, is_text_due=True)
-
-
-_PICTURES = ("whole", "magnifier")

@@ -1,6 +1,6 @@
 """The page on which a box is drawn around the bone, by keys or by mouse, and searched in."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,6 +13,7 @@ from textual.message import Message
 
 from navapp.control.commands import Register
 from navapp.control.rules import why_refused
+from navapp.geometry.box import Box
 from navapp.ui.actions import ARROWS
 from navapp.ui.halfblocks import find_place
 from navapp.ui.picture_view import HalfBlocks
@@ -34,63 +35,55 @@ class StartChosen(Message):
         self.start, self.bone = start, bone
 
 
-@dataclass(frozen=True, slots=True)
-class StartBox:
-    """A box in the left picture, px."""
+def middle_box(size_px: tuple[int, int]) -> Box:
+    """Half as wide and as high as the picture."""
+    width, height = size_px
+    return Box(width // 4, height // 4, width // 2, height // 2)
 
-    x: int
-    y: int
-    width: int
-    height: int
 
-    @classmethod
-    def in_the_middle(cls, size_px: tuple[int, int]) -> "StartBox":
-        """Half as wide and as high as the picture."""
-        width, height = size_px
-        return cls(width // 4, height // 4, width // 2, height // 2)
+def box_between(a: tuple[float, float], b: tuple[float, float], size_px: tuple[int, int]) -> Box:
+    """With two places (x, y) px as opposite corners; never smaller than the smallest box."""
+    (x0, x1), (y0, y1) = (sorted((round(p), round(q))) for p, q in zip(a, b, strict=True))
+    return fit_into(Box(x0, y0, x1 - x0, y1 - y0), size_px)
 
-    @classmethod
-    def between(
-        cls, a: tuple[float, float], b: tuple[float, float], size_px: tuple[int, int]
-    ) -> "StartBox":
-        """With two places (x, y) px as opposite corners; never smaller than the smallest box."""
-        (x0, x1), (y0, y1) = (sorted((round(p), round(q))) for p, q in zip(a, b, strict=True))
-        return cls(x0, y0, x1 - x0, y1 - y0).within(size_px)
 
-    def moved(self, steps: tuple[int, int], size_px: tuple[int, int]) -> "StartBox":
-        """So many steps to the right and down."""
-        right, down = (round(n * _STEP * size_px[0]) for n in steps)
-        return StartBox(self.x + right, self.y + down, self.width, self.height).within(size_px)
+def move_box(box: Box, steps: tuple[int, int], size_px: tuple[int, int]) -> Box:
+    """So many steps to the right and down."""
+    right, down = (round(n * _STEP * size_px[0]) for n in steps)
+    return fit_into(replace(box, x=box.x + right, y=box.y + down), size_px)
 
-    def resized(self, steps: tuple[int, int], size_px: tuple[int, int]) -> "StartBox":
-        """So many steps wider and higher, about its middle."""
-        wider, higher = (round(n * _STEP * size_px[0]) for n in steps)
-        return StartBox(
-            self.x - wider, self.y - higher, self.width + 2 * wider, self.height + 2 * higher
-        ).within(size_px)
 
-    def within(self, size_px: tuple[int, int]) -> "StartBox":
-        """The nearest box that lies in the picture and is not too small."""
-        least = round(_LEAST * size_px[0])
-        width = min(max(self.width, least), size_px[0])
-        height = min(max(self.height, least), size_px[1])
-        x = min(max(self.x, 0), size_px[0] - width)
-        y = min(max(self.y, 0), size_px[1] - height)
-        return StartBox(x, y, width, height)
+def resize_box(box: Box, steps: tuple[int, int], size_px: tuple[int, int]) -> Box:
+    """So many steps wider and higher, about its middle."""
+    wider, higher = (round(n * _STEP * size_px[0]) for n in steps)
+    x, y = box.x - wider, box.y - higher
+    return fit_into(Box(x, y, box.width + 2 * wider, box.height + 2 * higher), size_px)
 
-    def draw(self, preview: NDArray[np.uint8], size_px: tuple[int, int]) -> NDArray[np.uint8]:
-        """A copy of a preview (h, w, 3) of the left picture, with the box."""
-        drawn = preview.copy()
-        height, width = preview.shape[:2]
-        left, right = ((x * width) // size_px[0] for x in (self.x, self.x + self.width - 1))
-        top, bottom = ((y * height) // size_px[1] for y in (self.y, self.y + self.height - 1))
-        # Yellow within black: one of them is seen on whatever lies below.
-        for grow, colour in ((2, _BLACK), (1, _BLACK), (0, _YELLOW), (-1, _YELLOW)):
-            rows = np.clip([top - grow, bottom + grow], 0, height - 1)
-            columns = np.clip([left - grow, right + grow], 0, width - 1)
-            drawn[rows[0] : rows[1] + 1, columns] = colour
-            drawn[rows, columns[0] : columns[1] + 1] = colour
-        return drawn
+
+def fit_into(box: Box, size_px: tuple[int, int]) -> Box:
+    """The nearest box that lies in the picture and is not too small."""
+    least = round(_LEAST * size_px[0])
+    width, height = (
+        min(max(own, least), most)
+        for own, most in zip((box.width, box.height), size_px, strict=True)
+    )
+    x, y = min(max(box.x, 0), size_px[0] - width), min(max(box.y, 0), size_px[1] - height)
+    return Box(x, y, width, height)
+
+
+def draw_box(preview: NDArray[np.uint8], box: Box, size_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """A copy of a preview (h, w, 3) of the left picture, with the box."""
+    drawn = preview.copy()
+    height, width = preview.shape[:2]
+    left, right = ((x * width) // size_px[0] for x in (box.x, box.x + box.width - 1))
+    top, bottom = ((y * height) // size_px[1] for y in (box.y, box.y + box.height - 1))
+    # Yellow within black: one of them is seen on whatever lies below.
+    for grow, colour in ((2, _BLACK), (1, _BLACK), (0, _YELLOW), (-1, _YELLOW)):
+        rows = np.clip([top - grow, bottom + grow], 0, height - 1)
+        columns = np.clip([left - grow, right + grow], 0, width - 1)
+        drawn[rows[0] : rows[1] + 1, columns] = colour
+        drawn[rows, columns[0] : columns[1] + 1] = colour
+    return drawn
 
 
 class BoxPicture(HalfBlocks):
@@ -108,12 +101,12 @@ class BoxPicture(HalfBlocks):
         self._shape, self._size_px = (0, 0), (0, 0)
         self._begin: tuple[float, float] | None = None
 
-    def show_box(self, view: View, box: StartBox) -> None:
+    def show_box(self, view: View, box: Box) -> None:
         """Take over the newest picture."""
         if (preview := view.plain_preview) is None:
             return
         self._shape, self._size_px = preview.shape[:2], view.snapshot.picture_size_px
-        self.show_picture(box.draw(preview, self._size_px), view.symbols.ramp)
+        self.show_picture(draw_box(preview, box, self._size_px), view.symbols.ramp)
 
     def _place(self, event: events.MouseEvent) -> tuple[float, float] | None:
         if 0 in self._shape:
@@ -144,7 +137,7 @@ class StartKeys(TextView):
 
     def __init__(self) -> None:
         super().__init__("start-keys")
-        self.box: StartBox | None = None
+        self.box: Box | None = None
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """Two lines."""
@@ -186,9 +179,9 @@ class StartPage(PageScreen):
     page_title = "where is the bone?"
     keys = " back  ENTER search in the box  x search as the session began"
 
-    def __init__(self, view: View, box: StartBox | None = None) -> None:
+    def __init__(self, view: View, box: Box | None = None) -> None:
         super().__init__(view)
-        self._box = box or StartBox.in_the_middle(view.snapshot.picture_size_px)
+        self._box = box or middle_box(view.snapshot.picture_size_px)
 
     def compose_page(self) -> ComposeResult:
         """Picture and words."""
@@ -203,17 +196,17 @@ class StartPage(PageScreen):
 
     def action_move(self, arrow: str) -> None:
         """Move the box."""
-        self._take(self._box.moved(ARROWS[arrow], self.view.snapshot.picture_size_px))
+        self._take(move_box(self._box, ARROWS[arrow], self.view.snapshot.picture_size_px))
 
     def action_resize(self, arrow: str) -> None:
         """Wider or narrower, higher (up) or lower."""
         right, down = ARROWS[arrow]
-        self._take(self._box.resized((right, -down), self.view.snapshot.picture_size_px))
+        self._take(resize_box(self._box, (right, -down), self.view.snapshot.picture_size_px))
 
     def on_box_picture_dragged(self, message: BoxPicture.Dragged) -> None:
         """Another box."""
         size_px = self.view.snapshot.picture_size_px
-        self._take(StartBox.between(message.begin, message.end, size_px))
+        self._take(box_between(message.begin, message.end, size_px))
 
     def action_search(self) -> None:
         """Begin, and leave."""
@@ -232,6 +225,6 @@ class StartPage(PageScreen):
         self.app.post_message(StartChosen(start, self.view.snapshot.stage.bone))
         self.dismiss()
 
-    def _take(self, box: StartBox) -> None:
+    def _take(self, box: Box) -> None:
         self._box = box
         self.show(self.view, is_text_due=True)

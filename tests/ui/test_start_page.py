@@ -9,8 +9,9 @@ from textual.pilot import Pilot
 from textual.strip import Strip
 
 from navapp.control.commands import Register
+from navapp.geometry.box import Box
 from navapp.ui.halfblocks import compute_cell_codes, find_place, make_row_strip
-from navapp.ui.start_page import BoxPicture, StartBox, StartKeys, StartPage
+from navapp.ui.start_page import BoxPicture, StartKeys, StartPage, draw_box, fit_into
 from tests.ui import snapshots
 from tests.ui.test_app import BellCounter, play
 
@@ -157,10 +158,10 @@ def test_x_searches_as_the_session_began() -> None:
 @pytest.mark.parametrize("grey", [0, 90, 170, 255])
 def test_the_box_is_seen_on_any_bone(grey: int, ramp: str) -> None:
     preview = np.full((90, 160, 3), grey, dtype=np.uint8)
-    box = StartBox(320, 180, 640, 360)
+    box = Box(320, 180, 640, 360)
     rows = [
         [make_row_strip(row, ramp) for row in compute_cell_codes(picture, 76, 18)]
-        for picture in (preview, box.draw(preview, SIZE_PX))
+        for picture in (preview, draw_box(preview, box, SIZE_PX))
     ]
     plain, drawn = ([cell_signs(strip) for strip in picture] for picture in rows)
     different = np.array(
@@ -185,19 +186,19 @@ def cell_signs(strip: Strip) -> list[tuple[str, object]]:
 @pytest.mark.parametrize(
     ("box", "expected"),
     [
-        (StartBox(-50, -50, 300, 300), StartBox(0, 0, 300, 300)),
-        (StartBox(1200, 700, 300, 300), StartBox(980, 420, 300, 300)),
-        (StartBox(100, 100, 3, 3), StartBox(100, 100, 80, 80)),
-        (StartBox(0, 0, 5000, 5000), StartBox(0, 0, 1280, 720)),
+        (Box(-50, -50, 300, 300), Box(0, 0, 300, 300)),
+        (Box(1200, 700, 300, 300), Box(980, 420, 300, 300)),
+        (Box(100, 100, 3, 3), Box(100, 100, 80, 80)),
+        (Box(0, 0, 5000, 5000), Box(0, 0, 1280, 720)),
     ],
 )
-def test_a_box_stays_in_the_picture_and_is_never_too_small(box: StartBox, expected: Any) -> None:
-    assert box.within(SIZE_PX) == expected
+def test_a_box_stays_in_the_picture_and_is_never_too_small(box: Box, expected: Any) -> None:
+    assert fit_into(box, SIZE_PX) == expected
 
 
 def test_a_box_is_drawn_where_it_is() -> None:
     preview = np.zeros((90, 160, 3), dtype=np.uint8)
-    drawn = StartBox(320, 180, 640, 360).draw(preview, SIZE_PX)
+    drawn = draw_box(preview, Box(320, 180, 640, 360), SIZE_PX)
     ys, xs = np.nonzero(drawn.any(axis=2))
     # A line of two pixels about the box's edge.
     assert (xs.min(), xs.max(), ys.min(), ys.max()) == (40, 119, 22, 67)

@@ -43,9 +43,7 @@ class WholeViewSearch:
         if pair.box.is_empty:
             return []
         geometry, model = self._meter.geometry, self._meter.model
-        near_mm, far_mm = self._meter.depth_mm
-        band_px = (geometry.disparity_px(far_mm), geometry.disparity_px(near_mm))
-        found = match_surface(pair, band_px, fills=False).disparity
+        found = match_surface(pair, self._meter.band_px, fills=False).disparity
         stride_px = max(1, int(np.ceil((found.n_matched / _MOST_POINTS) ** 0.5)))
         scene = Scene.from_stereo(found.reproject(geometry, stride_px), FREE_CORRELATION_PX)
         axis = prior.axis_for(model.bone.name)
