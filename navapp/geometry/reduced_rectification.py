@@ -11,13 +11,13 @@ from navapp.geometry.bilinear import lens_maps
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.rectification import (
-    TAPS_PX,
     Image,
     RectifiedPair,
     Rectifier,
     find_reached,
     luma,
 )
+from navapp.geometry.resampling import TAPS_PX
 from navapp.geometry.transform import FloatArray
 
 

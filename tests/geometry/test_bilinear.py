@@ -9,7 +9,8 @@ import pytest
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
-from navapp.geometry.rectification import Rectifier, find_places, resample
+from navapp.geometry.rectification import Rectifier
+from navapp.geometry.resampling import find_places, resample
 from navapp.geometry.rig_files import read_rig
 from tests.geometry.shapes import STRONG, camera, toed_in_rig
 

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import TAPS_PX, Rectifier
+from navapp.geometry.rectification import Rectifier
 from navapp.geometry.reduced_rectification import ReducedRectifier
+from navapp.geometry.resampling import TAPS_PX
 from tests.geometry.shapes import toed_in_rig
 
 

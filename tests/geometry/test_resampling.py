@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import find_places, resample
+from navapp.geometry.resampling import find_places, resample
 from tests.reference.resample_reference import resample_slowly
 
 
