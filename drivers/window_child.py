@@ -1,9 +1,10 @@
 """The process that owns the window; shows black unless the application confirms the picture.
 
 Started by `drivers.window_display` as `python -m drivers.window_child MEMORY WAKE OUTPUT WIDTH
-HEIGHT`: the descriptor of the shared memory, that of a pipe of which every byte means "look again"
-and whose end means that the application is gone, and the output wanted. It says in one line of JSON
-on its standard output that the window stands, or why not.
+HEIGHT [framed]`: the descriptor of the shared memory, that of a pipe of which every byte means
+"look again" and whose end means that the application is gone, the output wanted, the size of the
+pictures, and whether the window has a frame: it can then be moved, resized and closed. It says in
+one line of JSON on its standard output that the window stands, or why not.
 """
 
 import json
@@ -21,6 +22,9 @@ from navapp.errors import DeviceError
 
 # What X11 takes for a window manager to put the window where it belongs.
 _PLACING_S = 2.0
+# Of a framed window: how much of the desktop it takes at most, and its title.
+_ROOM = 0.9
+_CAPTION = "navapp: what the display shows (research, not for clinical use)"
 
 
 class Window:
@@ -100,10 +104,68 @@ class Window:
             time.sleep(0.01)
 
 
+class FramedWindow:
+    """A window of the desktop with a frame; pictures are scaled to it, black beside them.
+
+    Raises:
+        DeviceNotFound: no visible screen.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        # The operator's keys go to the terminal.
+        os.environ.setdefault("SDL_WINDOW_NO_ACTIVATION_WHEN_SHOWN", "1")
+        self._pygame = pygame = start_sdl()
+        self._size = width, height
+        self.output: Output = list_outputs()[0]
+        room = _ROOM * self.output.width, _ROOM * self.output.height
+        scale = min(1.0, room[0] / width, room[1] / height)
+        window = round(scale * width), round(scale * height)
+        self._screen = pygame.display.set_mode(window, pygame.RESIZABLE, 32)
+        pygame.display.set_caption(_CAPTION)
+        self._is_closed = False
+        self.draw(None)
+        self.flip()
+
+    def draw(self, pixels: memoryview | None) -> None:
+        """Prepare these pixels, or black; `flip` makes them visible."""
+        self._screen = self._pygame.display.get_surface()
+        self._screen.fill((0, 0, 0))
+        if pixels is None:
+            return
+        picture = self._pygame.image.frombuffer(pixels, self._size, "BGRA")
+        width, height = self._screen.get_size()
+        scale = min(width / self._size[0], height / self._size[1])
+        size = max(1, round(scale * self._size[0])), max(1, round(scale * self._size[1]))
+        if size != self._size:
+            picture = self._pygame.transform.smoothscale(picture, size)
+        self._screen.blit(picture, ((width - size[0]) // 2, (height - size[1]) // 2))
+
+    def flip(self) -> None:
+        """Show what was drawn."""
+        self._pygame.display.flip()
+
+    def was_disturbed(self) -> bool:
+        """Whether it must be shown again: a part was lost, or it has another size."""
+        game, is_disturbed = self._pygame, False
+        losses = (game.VIDEOEXPOSE, game.WINDOWEXPOSED, game.WINDOWSHOWN, game.WINDOWRESTORED)
+        for event in game.event.get():
+            self._is_closed |= event.type in (game.QUIT, game.WINDOWCLOSE)
+            is_disturbed |= event.type in (*losses, game.VIDEORESIZE, game.WINDOWRESIZED)
+        return is_disturbed
+
+    def is_in_place(self) -> bool:
+        """Whether it is there: its frame has a button that closes it."""
+        return not self._is_closed
+
+    def close(self) -> None:
+        """Gone when this returns."""
+        self._pygame.display.quit()
+
+
 class Keeper:
     """Decides which picture the window shows, and waits for changes."""
 
-    def __init__(self, window: Window, memory: WindowMemory, wake: int) -> None:
+    def __init__(self, window: "Window | FramedWindow", memory: WindowMemory, wake: int) -> None:
         self._window = window
         self._memory = memory
         self._wake = wake
@@ -163,7 +225,8 @@ def main(arguments: Sequence[str]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     memory_descriptor, wake, width, height = (int(arguments[k]) for k in (0, 1, 3, 4))
     try:
-        window = Window(arguments[2], width, height)
+        is_framed = arguments[5:] == ["framed"]
+        window = FramedWindow(width, height) if is_framed else Window(arguments[2], width, height)
     except DeviceError as error:
         _tell({"error": type(error).__name__, "problem": error.problem, "remedy": error.remedy})
         return

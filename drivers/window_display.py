@@ -1,4 +1,4 @@
-"""A window that covers one output of the computer, in a process of its own.
+"""A window in a process of its own: it covers one output, or lies framed on the desktop.
 
 Dark without the application's help: when a picture expires, when the application hangs or is gone.
 """
@@ -22,7 +22,7 @@ _FLIP_CODES = {(True, False): 1, (False, True): 0, (True, True): -1}
 
 
 class WindowDisplay:
-    """Full-screen borderless window, pixel for pixel.
+    """Full-screen borderless window, pixel for pixel; or a framed one that scales.
 
     Expiries are times of the given clock; how far away they are is measured on the host's, so a
     clock that stands does not keep a picture alive.
@@ -33,7 +33,7 @@ class WindowDisplay:
         self._settings = settings
         self._info = DisplayInfo(
             settings.output or "window",
-            "window",
+            "window on the desktop" if settings.is_framed else "window",
             False,
             settings.width,
             settings.height,

@@ -22,15 +22,16 @@ _ERRORS = {kind.__name__: kind for kind in (DeviceError, DeviceNotFound, WrongDe
 
 @dataclass(frozen=True, slots=True)
 class WindowSettings:
-    """Output, size and flips of a window."""
+    """Output, size, flips and kind of a window."""
 
     output: str  # name of the monitor or projector as SDL tells it; empty: the only one
-    # width, height: of the output, px.
+    # width, height: of the output, or of a framed window's pictures, px.
     width: int
     height: int
     # flips_horizontally, flips_vertically: what the window does to every picture.
     flips_horizontally: bool = False
     flips_vertically: bool = False
+    is_framed: bool = False  # can be moved and resized, on any output
 
 
 class WindowProcess:
@@ -111,7 +112,11 @@ def _start(settings: WindowSettings, descriptor: int, woken: int) -> "subprocess
     command = [sys.executable, "-P", "-m", "drivers.window_child"]
     numbers = (settings.width, settings.height)
     return subprocess.Popen(
-        [*command, str(descriptor), str(woken), settings.output, *map(str, numbers)],
+        [
+            *command,
+            *(str(descriptor), str(woken), settings.output, *map(str, numbers)),
+            *(["framed"] if settings.is_framed else []),
+        ],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

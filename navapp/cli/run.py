@@ -1,6 +1,7 @@
 """`navapp run`: the application on the configured devices."""
 
 import argparse
+import os
 import tempfile
 import tomllib
 from contextlib import ExitStack
@@ -53,6 +54,16 @@ def add_parser(subparsers: Any) -> None:
         help="another bone, found from the accepted one and followed in turns: the tibia",
     )
     parser.add_argument("--headless", action="store_true", help="no screen; a scripted operator")
+    parser.add_argument(
+        "--window",
+        action="store_true",
+        help="show the display's picture at full resolution in a window of the desktop",
+    )
+    parser.add_argument(
+        "--pictures",
+        choices=("auto", "kitty", "sixel", "blocks"),
+        help="how the terminal gets pictures; auto: the best that it answers for",
+    )
     parser.add_argument("--frames", type=int, metavar="N", help="end after N frames")
     parser.add_argument("--stage", metavar="S", help="stage to start in, name or number")
     add_method(parser)
@@ -72,6 +83,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         raise UsageError("--frames must be at least 1")
     if options.operator and not options.headless:
         raise UsageError("--operator needs --headless", remedy="add --headless")
+    if options.window and options.mirror:
+        raise UsageError(
+            "the simulated mirror has a simulated display",
+            remedy="leave out --window, and press y to see what the eye sees",
+        )
     check_writable(options.json)
     configuration = _with_options(load(find_file(options.config)), options)
     script = _script(options.operator)
@@ -91,7 +107,11 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 def _with_options(configuration: "Configuration", options: argparse.Namespace) -> "Configuration":
     """The configuration with the command line's words in it."""
     camera, plan, recording = configuration.camera, configuration.plan, configuration.recording
-    tracking = configuration.tracking
+    tracking, display, ui = configuration.tracking, configuration.display, configuration.ui
+    if options.window:
+        display = display.model_copy(update={"backend": "desktop"})
+    if options.pictures:
+        ui = ui.model_copy(update={"pictures": options.pictures})
     if options.rig:
         camera = camera.model_copy(update={"rig": options.rig})
     if options.plan:
@@ -103,7 +123,14 @@ def _with_options(configuration: "Configuration", options: argparse.Namespace) -
     if options.method:
         tracking = tracking.model_copy(update={"method": options.method})
     return configuration.model_copy(
-        update={"camera": camera, "plan": plan, "recording": recording, "tracking": tracking}
+        update={
+            "camera": camera,
+            "display": display,
+            "plan": plan,
+            "recording": recording,
+            "tracking": tracking,
+            "ui": ui,
+        }
     )
 
 
@@ -198,13 +225,26 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()
-        code = run_app(runner, log_folder() / "navapp.log")
+        code = run_app(
+            runner,
+            log_folder() / "navapp.log",
+            pictures=session.configuration.ui.pictures,
+            hints=_hints(session, options),
+        )
     if runner.error is not None:
         raise runner.error
     folder = session.configuration.recording.folder
     if folder is not None:
         diagnostics.say(f"recorded session: {folder}")
     return code
+
+
+def _hints(session: LiveSession, options: argparse.Namespace) -> list[str]:
+    """What an operator should know of who has a desktop and looks at a terminal only."""
+    has_desktop = bool(os.environ.get("DISPLAY")) and not options.mirror
+    if has_desktop and session.configuration.display.backend == "simulated":
+        return ["navapp run --window shows the picture at full resolution on this desktop"]
+    return []
 
 
 def log_folder() -> Path:

@@ -43,7 +43,7 @@ _PACKAGES = (
     _Package("pydicom", "pydicom", "reading a CT from DICOM", lambda c: False),
     _Package("depthai", "depthai", "OAK cameras", lambda c: c.camera.backend == "depthai"),
     _Package("pyserial", "serial", "projector and mirror lines", _has_a_line),
-    _Package("pygame-ce", "pygame", "window", lambda c: c.display.backend == "window"),
+    _Package("pygame-ce", "pygame", "window", lambda c: c.display.backend != "simulated"),
 )
 
 

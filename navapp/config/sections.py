@@ -28,12 +28,12 @@ class DisplaySimulationSection(Section):
 class DisplaySection(Section):
     """Where the overlay is shown."""
 
-    backend: Literal["simulated", "window"] = "simulated"
-    """simulated, or window: a monitor or projector of this computer, covered from edge to edge."""
+    backend: Literal["simulated", "window", "desktop"] = "simulated"
+    """simulated; window: covers a monitor or projector; desktop: can be moved (run --window)."""
     output: str = ""
     """Name of the window's monitor or projector; empty: the only one."""
     size_px: tuple[Pixels, Pixels] | None = None
-    """Width and height of that output, or of the simulated one; a window needs it."""
+    """Width and height of that output, or of the other displays' pictures; a window needs it."""
     flip_horizontally: bool = False
     """The window shows every picture with left and right exchanged."""
     flip_vertically: bool = False
@@ -53,6 +53,8 @@ class DisplaySection(Section):
     def _is_possible(self) -> Self:
         if self.backend == "window" and self.size_px is None:
             raise ValueError("a window needs size_px")
+        if self.model is not None and self.backend == "desktop":
+            raise ValueError("a display with a model covers an output from edge to edge")
         if self.model is not None and (self.flip_horizontally or self.flip_vertically):
             raise ValueError("a display with a model is not flipped: the model knows its flips")
         if self.delay_ms >= self.valid_ms:
@@ -176,6 +178,13 @@ class EmptySection(Section):
     """A table without keys."""
 
 
+class UiSection(Section):
+    """The operator's screen."""
+
+    pictures: Literal["auto", "kitty", "sixel", "blocks"] = "auto"
+    """How the terminal gets pictures; auto: the best that it answers for; blocks: half blocks."""
+
+
 class Configuration(Section):
     """The whole configuration file."""
 
@@ -192,4 +201,4 @@ class Configuration(Section):
     stages: StagesSection = StagesSection()
     recording: RecordingSection = RecordingSection()
     link: EmptySection = EmptySection()
-    ui: EmptySection = EmptySection()
+    ui: UiSection = UiSection()

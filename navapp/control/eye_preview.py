@@ -1,10 +1,9 @@
-"""The operator's small picture of what an eye sees in a simulated mirror, for showing only."""
+"""The operator's picture of what an eye sees in a simulated mirror, for showing only."""
 
 from dataclasses import dataclass
 
 from drivers.frames import Image
 from navapp.control.executors import Executor, Job
-from navapp.overlay import make_preview
 from navapp.values.pictures import Look
 
 # From one look to the next, at least; a look that was begun longer ago is not shown.
@@ -14,7 +13,7 @@ _VALID_NS = 4 * _PERIOD_NS
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """Small pictures of one look."""
+    """Pictures of one look."""
 
     picture: Image
     plain: Image  # without the display's light
@@ -55,7 +54,7 @@ class EyePreview:
     def update(
         self, now_ns: int, *, has_guides: bool, is_hidden: bool = False
     ) -> tuple[Image, Image | None] | None:
-        """The newest small pictures (h, w, 3), with guides and without; None without any.
+        """The newest pictures (H, W, 3), with guides and without; None without any.
 
         None as well when the newest look was begun too long ago. A bug in the look is not hidden:
         it is raised.
@@ -72,7 +71,7 @@ class EyePreview:
         if self._job is None and now_ns >= self._due_ns:
             self._begun_ns, self._due_ns = now_ns, now_ns + _PERIOD_NS
             self._had_guides, self._is_wanted = False, True
-            self._job = Job(lambda report: _look_through(look))
+            self._job = Job(lambda report: look())
             self._executor.start(self._job)
         self._had_guides |= has_guides
         self._take_over()
@@ -100,8 +99,3 @@ class EyePreview:
             raise job.error
         if self._is_wanted and job.result is not None:
             self._seen = _Seen(*job.result, self._begun_ns, self._had_guides)
-
-
-def _look_through(look: Look) -> tuple[Image, Image]:
-    picture, plain = look()
-    return make_preview(picture), make_preview(plain)

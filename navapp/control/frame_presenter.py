@@ -1,4 +1,4 @@
-"""Shows what a frame has brought: on the display, and small for the operator's screen."""
+"""Shows what a frame has brought: on the display, and on the operator's screen."""
 
 import time
 from dataclasses import replace
@@ -14,7 +14,7 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
-from navapp.overlay import DepthMarks, make_preview
+from navapp.overlay import DepthMarks
 from navapp.values import Foreground, OverlayMode, OverlayPicture, Reason
 
 
@@ -47,7 +47,7 @@ class FramePresenter:
         self._is_late = False
 
     def show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
-        """Compose, show until it expires, keep a preview; also how long composing took."""
+        """Compose, show until it expires, keep it for the screen; also how long composing took."""
         started_ns = time.perf_counter_ns()
         mark = "SIMULATED" if snapshot.is_simulated else ""
         tracked = self._session.tracked
@@ -78,7 +78,7 @@ class FramePresenter:
         is_seen = not (self._display.is_blanked or self._display.trouble)
         if is_shown and has_cross and is_seen and age_ns / 1e6 < self._valid_ms:
             self._mirror_checking.note_shown()
-        self._keep_preview(frame, video, snapshot, foreground)
+        self._keep_picture(frame, video, snapshot, foreground)
         self._tell_late(age_ns / 1e6, is_lit)
         return OverlayPicture(image, valid_until_ns, self._composer.mode, age_ns), overlay_ms
 
@@ -90,7 +90,7 @@ class FramePresenter:
         if not is_same_cross and self._display.withdraw_guides():
             self._tell_withdrawn(after)
 
-    def _keep_preview(
+    def _keep_picture(
         self, frame: StereoFrame, video: Image, snapshot: Snapshot, foreground: Foreground | None
     ) -> None:
         """The operator's picture; a candidate is judged over the video, whatever is switched on."""
@@ -102,11 +102,9 @@ class FramePresenter:
             session.keep_picture(OperatorPicture(*seen, is_of_eye=True, left=frame.left))
             return
         has_guides = snapshot.is_navigable or snapshot.is_candidate
-        preview = make_preview(video)
-        if session.shows_depth:
-            preview = self._depth_marks.draw(preview, foreground)
-        plain = make_preview(frame.left) if has_guides else None
-        session.keep_picture(OperatorPicture(preview, plain, left=frame.left))
+        drawn = self._depth_marks.draw(video, foreground) if session.shows_depth else video
+        plain = frame.left if has_guides else None
+        session.keep_picture(OperatorPicture(drawn, plain, left=frame.left))
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
         """Guides where the bone will be when their light is seen."""

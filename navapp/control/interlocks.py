@@ -16,13 +16,13 @@ MAX_POSE_AGE_MS = 500.0
 
 
 def judge(draft: Snapshot) -> Snapshot:
-    """A snapshot with the interlocks' answer; without guides its preview shows none either."""
+    """A snapshot with the interlocks' answer; without guides its picture shows none either."""
     judged = replace(draft, reasons=check_interlocks(draft))
     is_young = judged.pose_age_ms is not None and judged.pose_age_ms <= _longest_ms(judged)
     is_reviewed = judged.is_candidate and is_young and not judged.is_blanked
-    if judged.is_navigable or is_reviewed or draft.plain_preview is None:
+    if judged.is_navigable or is_reviewed or draft.plain_picture is None:
         return judged
-    return replace(judged, preview=draft.plain_preview)
+    return replace(judged, picture=draft.plain_picture)
 
 
 def grow_older(snapshot: Snapshot, now_ns: int) -> Snapshot:

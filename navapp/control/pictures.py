@@ -18,9 +18,9 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatorPicture:
-    """The small picture for the operator's screen: of the left camera, or of a simulated eye."""
+    """The picture for the operator's screen: of the left camera, or of a simulated eye."""
 
-    drawn: Image  # (h, w, 3) uint8 BGR, with what was drawn over it
+    drawn: Image  # (H, W, 3) uint8 BGR, with what was drawn over it
     plain: Image | None = None  # the same without guides; None when it has none
     is_of_eye: bool = False  # what an eye sees in a simulated mirror
     left: Image | None = None  # the left picture that came with it, as it is

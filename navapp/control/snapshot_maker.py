@@ -6,6 +6,8 @@ from datetime import date
 from functools import lru_cache
 from types import MappingProxyType
 
+import numpy as np
+
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_handlers import DeviceReport
 from navapp.control.device_lines import camera_line, display_line, rig_line
@@ -27,8 +29,12 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
+from navapp.geometry.box import Box
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Plan, Reason, TrackedFrame
+
+# That tell where a bone lies in the picture.
+_N_POINTS_OF_BOX = 300
 
 
 @lru_cache(maxsize=3)
@@ -76,12 +82,13 @@ class SnapshotMaker:
             limb=session.limb(now_ns),
             valid_ms=self.specification.overlay_valid_ms,
             pose_at_light=self._predict_pose(now_ns),
-            preview=None if picture is None else picture.drawn,
+            picture=None if picture is None else picture.drawn,
+            bone_box=self._find_bone(tracked),
             picture_size_px=(rig.width, rig.height),
             left_picture=None if picture is None else picture.left,
             can_draw_start=self.specification.method == "bimcc",
             landmarks=_landmarks_of(plan, session.stage.bone),
-            plain_preview=None if picture is None else picture.plain,
+            plain_picture=None if picture is None else picture.plain,
             shows_depth=session.shows_depth and not shows_eye,
             has_eye=self.eye.is_possible,
             shows_eye=shows_eye,
@@ -131,6 +138,23 @@ class SnapshotMaker:
             return None
         delay_ns = round(self.specification.display_delay_ms * 1e6)
         return self.session.predict_pose(now_ns + delay_ns)
+
+    def _find_bone(self, tracked: TrackedFrame | None) -> Box | None:
+        """Where the stage's bone lies in the left picture, as far as it is in it."""
+        bone = self.specification.plan.bones.get(self.session.stage.bone)
+        if bone is None or tracked is None or tracked.left_from_bone is None:
+            return None
+        vertices_mm = bone.mesh.vertices_mm
+        some_mm = vertices_mm[:: max(1, len(vertices_mm) // _N_POINTS_OF_BOX)]
+        camera = self.specification.rig.left
+        pixels = camera.project(tracked.left_from_bone.apply(some_mm))
+        pixels = pixels[np.isfinite(pixels).all(axis=1)]
+        if not len(pixels):
+            return None
+        low, high = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0))
+        box = Box(*low.astype(int).tolist(), *(high - low).astype(int).tolist())
+        box = box.clip(camera.width, camera.height)
+        return None if box.is_empty else box
 
     def _judge_mirror(self, tracked: TrackedFrame | None, now_ns: int) -> MirrorError | None:
         if self.mirror_judge is None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.control.length_check import LengthCheck
 from navapp.control.mirror_error import MirrorError
+from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.limb import LimbMeasurement
@@ -186,13 +187,14 @@ class Snapshot:
     pose_at_light: RigidTransform | None = None
     others: tuple[OtherBone, ...] = ()  # the other bones that are followed
     limb: LimbLine | None = None  # None while femur and tibia are not both followed
-    # (h, w, 3) uint8 BGR, at most 160 wide and 96 high, overlay drawn in; None before the first
-    # frame. `plain_preview` is the same without guides, None when it has none.
-    preview: NDArray[np.uint8] | None = None
-    plain_preview: NDArray[np.uint8] | None = None
+    # for the operator, uint8, (H, W, 3) BGR or (H, W) grey, overlay drawn in; None before the first
+    # frame. `plain_picture` is the same without guides, None when it has none.
+    picture: NDArray[np.uint8] | None = None
+    plain_picture: NDArray[np.uint8] | None = None
     picture_size_px: tuple[int, int] = (0, 0)  # width and height of the left picture
-    # (H, W, 3) BGR or (H, W) grey: the newest left picture as it came; None before the first.
-    left_picture: NDArray[np.uint8] | None = None
+    left_picture: NDArray[np.uint8] | None = None  # the newest one as it came
+    # where the stage's bone lies in the left picture, at the newest pose; None without one.
+    bone_box: Box | None = None
     # of the stage's bone: what can be picked in that picture, (3,) mm in bone coordinates.
     landmarks: Mapping[str, FloatArray] = field(default_factory=dict)
     can_draw_start: bool = True  # the method finds a bone in a box, or from picked landmarks

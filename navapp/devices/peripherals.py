@@ -46,10 +46,14 @@ def make_device_set(
     """
     projector: ProjectorControl = NoProjector()
     mirror: MirrorMount = FixedMirror(configuration.mirror.calibrated_deg)
-    display: Display = SimulatedDisplay(clock, rig.width, rig.height)
+    rig_px = rig.width, rig.height
+    display: Display = SimulatedDisplay(clock, *rig_px)
     if is_live:
         projector, mirror = _projector(configuration.projector), _mirror(configuration.mirror)
-        display = _display(configuration.display, clock, rig)
+        settings = configuration.display
+        display = make_window_display(settings, clock, rig_px) or SimulatedDisplay(
+            clock, *(settings.size_px or rig_px)
+        )
     devices = DeviceSet(camera, display, projector, mirror, clock)
     with ExitStack() as undo:
         undo.callback(devices.close)
@@ -59,18 +63,22 @@ def make_device_set(
     return devices
 
 
-def _display(settings: DisplaySection, clock: Clock, rig: StereoRig) -> Display:
-    window = make_window_display(settings, clock)
-    size_px = settings.size_px or (rig.width, rig.height)
-    return SimulatedDisplay(clock, *size_px) if window is None else window
+def make_window_display(
+    settings: DisplaySection, clock: Clock, picture_px: tuple[int, int] | None = None
+) -> WindowDisplay | None:
+    """The configured window, not opened yet; None when the display is a simulated one.
 
-
-def make_window_display(settings: DisplaySection, clock: Clock) -> WindowDisplay | None:
-    """The configured window, not opened yet; None when the display is a simulated one."""
-    if settings.backend != "window" or settings.size_px is None:
+    Args:
+        settings: of the display.
+        clock: of the session.
+        picture_px: width and height of a window on the desktop that has none configured.
+    """
+    size_px = settings.size_px or picture_px
+    if settings.backend == "simulated" or size_px is None:
         return None
     flips = (settings.flip_horizontally, settings.flip_vertically)
-    return WindowDisplay(clock, WindowSettings(settings.output, *settings.size_px, *flips))
+    is_framed = settings.backend == "desktop"
+    return WindowDisplay(clock, WindowSettings(settings.output, *size_px, *flips, is_framed))
 
 
 def read_projector(settings: ProjectorSection) -> ProjectorStatus | None:

@@ -36,7 +36,7 @@ def check_system(configuration: Configuration, found: Inventory) -> list[Finding
     is_usb = configuration.camera.backend == "opencv"
     cameras = [camera.node for camera in found.usb_cameras.found]
     ports = [Path(port.device) for port in found.serial_ports.found]
-    is_window = configuration.display.backend == "window"
+    is_window = configuration.display.backend != "simulated"
     return [
         *_group("video", "USB cameras", cameras, is_usb),
         *_group("dialout", "serial ports", ports, _has_local_port(configuration)),

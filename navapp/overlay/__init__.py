@@ -1,6 +1,6 @@
 """Draws guides: video, poses and a plan become the picture that is shown."""
 
-from navapp.overlay.composition import compose_mirror, compose_video, make_preview, put_mark
+from navapp.overlay.composition import compose_mirror, compose_video, put_mark
 from navapp.overlay.depth_marks import DepthMarks
 from navapp.overlay.guide_points import sample_guides
 from navapp.overlay.layers import LAYERS
@@ -16,7 +16,6 @@ __all__ = [
     "Viewpoint",
     "compose_mirror",
     "compose_video",
-    "make_preview",
     "put_mark",
     "sample_guides",
 ]

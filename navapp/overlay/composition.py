@@ -16,8 +16,6 @@ from navapp.overlay.strokes import draw_cross_px
 
 Image = NDArray[np.uint8]
 
-PREVIEW_WIDTH, PREVIEW_HEIGHT = 160, 96
-
 _MARK = "research - not for clinical use"
 # In the mirror letters are 18 px high on a display of 1080 rows.
 _MIRROR_TEXT_SIZE, _STRIP_SHARE = 0.85, 0.04
@@ -128,17 +126,3 @@ def put_mark(image: Image, text: str) -> Image:
     at = image.shape[1] - width - _RIM_PX, 10 + height
     put_text(marked, text, at, size, (230, 230, 230))
     return marked
-
-
-def make_preview(image: Image) -> Image:
-    """The picture for the terminal: at most 160x96, area mean, aspect ratio kept."""
-    import cv2
-
-    height, width = image.shape[:2]
-    factor = min(PREVIEW_WIDTH / width, PREVIEW_HEIGHT / height, 1.0)
-    size = (max(1, round(width * factor)), max(1, round(height * factor)))
-    small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    if small.ndim == 2:
-        small = np.repeat(small[:, :, None], 3, axis=2)
-    small.setflags(write=False)
-    return small

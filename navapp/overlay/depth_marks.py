@@ -1,4 +1,4 @@
-"""The classes of the depth around a bone, as colours in the operator's small picture."""
+"""The classes of the depth around a bone, as colours in the operator's picture."""
 
 from functools import lru_cache, partial
 
@@ -14,22 +14,31 @@ from navapp.values import DEPTH_COLOURS, Foreground, Origin
 Image = NDArray[np.uint8]
 
 # Share of the colour over the picture: what stands in front of the bone is nearly covered.
+_WIDTH = 640
 _SHARE, _SHARE_IN_FRONT = 0.45, 0.85
 
 
 class DepthMarks:
-    """Colours small pictures of a rig's left camera by the classes of the depth around the bone."""
+    """Colours pictures of a rig's left camera by the classes of the depth around the bone.
+
+    Depth is known to some pixels only: what is marked is a picture of at most half the size.
+    """
 
     def __init__(self, rig: StereoRig) -> None:
         # No method: it would keep the marks alive.
         find = partial(_find_places, rig.left, rectifier_of(rig).geometry)
         self._places = lru_cache(1)(find)
 
-    def draw(self, preview: Image, foreground: Foreground | None) -> Image:
-        """A preview (h, w, 3) with marks; as it is without a foreground."""
+    def draw(self, picture: Image, foreground: Foreground | None) -> Image:
+        """A reduced picture with marks (h, w, 3); the picture (H, W, 3) without a foreground."""
         if foreground is None:
-            return preview
-        columns, rows = self._places(preview.shape[:2])
+            return picture
+        import cv2
+
+        scale = min(1.0, _WIDTH / picture.shape[1])
+        size = round(scale * picture.shape[1]), round(scale * picture.shape[0])
+        small = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        columns, rows = self._places(small.shape[:2])
         columns, rows = columns - foreground.box.x, rows - foreground.box.y
         _, origin = foreground.depth
         height, width = origin.shape
@@ -37,18 +46,16 @@ class DepthMarks:
         inside = rows[is_inside], columns[is_inside]
         colours = np.array([DEPTH_COLOURS[origin] for origin in Origin], dtype=np.float32)
         share = np.where(foreground.is_in_front[inside], _SHARE_IN_FRONT, _SHARE)[:, None]
-        marked = preview.copy()
-        below = preview[is_inside].astype(np.float32)
+        below = small[is_inside].astype(np.float32)
         colour = colours[origin[inside]]
-        marked[is_inside] = np.round(below + share * (colour - below)).astype(np.uint8)
-        marked.setflags(write=False)
-        return marked
+        small[is_inside] = np.round(below + share * (colour - below)).astype(np.uint8)
+        return small
 
 
 def _find_places(
     camera: Camera, geometry: RectifiedGeometry, shape: tuple[int, int]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Columns and rows (h, w) in the rectified left view of a small picture's pixels."""
+    """Columns and rows (h, w) in the rectified left view of a reduced picture's pixels."""
     height, width = shape
     rows, columns = np.mgrid[:height, :width]
     x = (columns.ravel() + 0.5) * camera.width / width - 0.5

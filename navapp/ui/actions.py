@@ -202,6 +202,12 @@ ACTIONS: tuple[Action, ...] = (
         needs_width=True,
     ),
     Action(
+        "near",
+        "w",
+        "whole",
+        "see the region around the bone, or the whole picture",
+    ),
+    Action(
         "eye",
         "y",
         "eye",

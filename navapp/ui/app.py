@@ -4,7 +4,8 @@ import asyncio
 import os
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -45,24 +46,27 @@ from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
 from navapp.ui.picks_page import PicksPage, Place
+from navapp.ui.pictures.graphics import Graphics, Wish, find_graphics
+from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
 from navapp.ui.start_page import StartChosen, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
-from navapp.ui.terminal import own_terminal
+from navapp.ui.terminal import check_terminal, own_terminal
 from navapp.ui.theme import NAVAPP_THEME
 from navapp.ui.view import View
 from navapp.values import Reason
 
-POLLS_PER_S = 8
+POLLS_PER_S = 10
 # Numbers that change faster than four times a second cannot be read.
-_POLLS_PER_TEXT = 2
+POLLS_PER_TEXT = 3
 # Two seconds without a new snapshot: the screen no longer believes the old one.
-_SILENT_AFTER_POLLS = 16
+SILENT_AFTER_POLLS = 2 * POLLS_PER_S
 # Kernels that compile at the first start may keep a session busy.
 _SILENT_AFTER_POLLS_AT_START = 60 * POLLS_PER_S
+_HINT_S = 8.0
 _START_STATES = (SessionState.OFFLINE, SessionState.STARTING)
 _ASKING_STATES = (SessionState.NAVIGATING, SessionState.SUSPENDED)
 _PAGES = {
@@ -83,6 +87,8 @@ class NavigationApp(QuietApp):
         title: first word of the title line.
         symbols: that the terminal can draw.
         polls_per_s: how often the newest snapshot is taken; 0 means only when `poll` is called.
+        graphics: that the terminal draws; None: half blocks.
+        hints: told when it starts.
     """
 
     CSS_PATH = Path(__file__).with_name("navapp.tcss")
@@ -98,14 +104,19 @@ class NavigationApp(QuietApp):
         *,
         symbols: Symbols = UNICODE,
         polls_per_s: int = POLLS_PER_S,
+        graphics: Graphics | None = None,
+        hints: Sequence[str] = (),
     ) -> None:
         super().__init__()
+        if graphics is not None:
+            self.use_graphics(graphics)
         self.register_theme(NAVAPP_THEME)
         self.theme = NAVAPP_THEME.name
         self.title = title
         self._session = session
         self._symbols = symbols
         self._polls_per_s = polls_per_s
+        self._hints = tuple(hints)
         self._n_polls = 0
         self._n_unchanged = 0
         snapshot = session.snapshot()
@@ -122,6 +133,8 @@ class NavigationApp(QuietApp):
     def on_mount(self) -> None:
         """Begin to look."""
         self._ring(self._view.snapshot)
+        for hint in self._hints:
+            self.notify(hint, timeout=_HINT_S)
         if self._polls_per_s > 0:
             self.set_interval(1 / self._polls_per_s, self.poll)
 
@@ -131,11 +144,11 @@ class NavigationApp(QuietApp):
         is_same = snapshot.time_ns == old.snapshot.time_ns
         self._n_unchanged = self._n_unchanged + 1 if is_same else 0
         is_start = snapshot.state in _START_STATES
-        limit = _SILENT_AFTER_POLLS_AT_START if is_start else _SILENT_AFTER_POLLS
+        limit = _SILENT_AFTER_POLLS_AT_START if is_start else SILENT_AFTER_POLLS
         is_silent = self._n_unchanged >= limit
-        self._view = View(snapshot, self._symbols, old.start_ns, is_silent, self.title)
+        self._view = replace(old, snapshot=snapshot, is_silent=is_silent)
         self._n_polls += 1
-        is_text_due = self._n_polls % _POLLS_PER_TEXT == 0 or _status(self._view) != _status(old)
+        is_text_due = self._n_polls % POLLS_PER_TEXT == 0 or _status(self._view) != _status(old)
         for screen in self.screen_stack:
             if isinstance(screen, ViewScreen):
                 screen.show(self._view, is_text_due=is_text_due)
@@ -164,12 +177,20 @@ class NavigationApp(QuietApp):
             self.push_screen(StartPage(view, self._start_box))
         elif name == "picks":
             self.push_screen(PicksPage(view, self._picks))
+        elif name == "near":
+            self._toggle_near()
         elif name in _PAGES:
             self.push_screen(_PAGES[name](view))
         elif view.is_silent and not is_possible(action, view.snapshot, is_silent=True):
             self._say_silent(action.label)
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
+
+    def _toggle_near(self) -> None:
+        """The region around the bone, or the whole picture."""
+        is_near = self.painter is None if self._view.is_near is None else self._view.is_near
+        self._view = replace(self._view, is_near=not is_near)
+        self.screen_stack[0].query_one(PictureView).show(self._view)
 
     def on_start_chosen(self, message: StartChosen) -> None:
         """Search for the bone where an operator has drawn or picked it."""
@@ -270,13 +291,22 @@ def _status(view: View) -> tuple[object, ...]:
     )
 
 
-def run_app(session: Session, log_path: Path, title: str = "navapp") -> int:
+def run_app(
+    session: Session,
+    log_path: Path,
+    title: str = "navapp",
+    *,
+    pictures: Wish = "blocks",
+    hints: Sequence[str] = (),
+) -> int:
     """Run the screen until it ends, then stop the session, whatever happened.
 
     Args:
         session: that runs already.
         log_path: takes what libraries print meanwhile, and the traceback of a failure.
         title: first word of the title line.
+        pictures: how the terminal gets them.
+        hints: told when it starts.
 
     Returns:
         Exit code; 128 and the number of the signal that ended it. After a failure one sentence is
@@ -284,9 +314,12 @@ def run_app(session: Session, log_path: Path, title: str = "navapp") -> int:
     """
     failure: Exception | None = None
     try:
+        check_terminal()
+        graphics = find_graphics(pictures, os.environ)
         with own_terminal(log_path):
             symbols = choose_symbols(getattr(sys.__stdout__, "encoding", None), os.environ)
-            app = NavigationApp(session, title, symbols=symbols)
+            told = (*hints, *([] if graphics.encoder else [f"pictures: {graphics.words}"]))
+            app = NavigationApp(session, title, symbols=symbols, graphics=graphics, hints=told)
             code = asyncio.run(drive(app))
             failure = app.failure
             if failure is not None:

@@ -15,7 +15,7 @@ from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
 from navapp.ui.devices_panel import format_device_line
 from navapp.ui.event_list import format_event_line
 from navapp.ui.layers_page import OverlayLegend
-from navapp.ui.picture_view import NOTICE
+from navapp.ui.pictures.picture_view import NOTICE
 from navapp.ui.screens import PageScreen, ViewScreen
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View

@@ -13,8 +13,8 @@ from textual.content import Content
 from textual.message import Message
 
 from navapp.ui.actions import ARROWS
-from navapp.ui.halfblocks import find_place
-from navapp.ui.picture_view import HalfBlocks
+from navapp.ui.pictures.fitting import in_colour
+from navapp.ui.pictures.picture import Picture
 from navapp.ui.screens import PageScreen
 from navapp.ui.start_page import StartChosen, why_no_picture
 from navapp.ui.text_view import TextView
@@ -28,14 +28,17 @@ _YELLOW, _GREEN, _BLACK = (0, 255, 255), (0, 255, 0), (0, 0, 0)
 _STEP_PX, _LARGE_STEP_PX = 1, 20
 # Half length of the cross in the magnifier, and of the gap that leaves its pixel visible.
 _ARM_PX, _GAP_PX = 6, 2
+# Pixels of the screen for each of the picture, where the terminal paints it.
+_ENLARGED = 6
 
 
 def draw_places(
-    preview: NDArray[np.uint8], size_px: Place, cursor: Place, picks: Mapping[str, Place]
+    shrunk: NDArray[np.uint8], size_px: Place, cursor: Place, picks: Mapping[str, Place]
 ) -> NDArray[np.uint8]:
-    """A copy of a preview (h, w, 3) of the left picture: picks green, the cursor's lines yellow."""
-    drawn = preview.copy()
-    height, width = preview.shape[:2]
+    """A copy (h, w, 3) of the left picture, smaller: picks green, the cursor's lines yellow."""
+    plain = in_colour(shrunk)
+    drawn = plain.copy()
+    height, width = drawn.shape[:2]
 
     def find(place: Place) -> Place:
         return place[0] * width // size_px[0], place[1] * height // size_px[1]
@@ -44,7 +47,7 @@ def draw_places(
     # Beside each line a black one: on bright bone it is the one that is seen.
     for colour, k in ((_BLACK, 1), (_YELLOW, 0)):
         drawn[min(y + k, height - 1), :], drawn[:, min(x + k, width - 1)] = colour, colour
-    drawn[y, x] = preview[y, x]
+    drawn[y, x] = plain[y, x]
     for u, v in map(find, picks.values()):
         drawn[max(v - 2, 0) : v + 3, max(u - 2, 0) : u + 3] = _BLACK
         drawn[max(v - 1, 0) : v + 2, max(u - 1, 0) : u + 2] = _GREEN
@@ -82,7 +85,7 @@ def magnify(
     return shown
 
 
-class PlacePicture(HalfBlocks):
+class PlacePicture(Picture):
     """A picture in which the mouse points at a place."""
 
     class Pointed(Message):
@@ -92,22 +95,11 @@ class PlacePicture(HalfBlocks):
             super().__init__()
             self.picture, self.across, self.down = picture, across, down
 
-    def __init__(self, widget_id: str) -> None:
-        super().__init__(widget_id)
-        self._shape: tuple[int, ...] = (0, 0)
-
-    def show_shaped(self, picture: NDArray[np.uint8], ramp: str) -> None:
-        """Take over a picture (h, w, 3) BGR."""
-        self._shape = picture.shape
-        self.show_picture(picture, ramp)
-
     def on_click(self, event: events.Click) -> None:
         """Tell where."""
         at = event.get_content_offset(self)
-        if at is not None and 0 not in self._shape[:2]:
-            self.post_message(
-                self.Pointed(self, *find_place(self._shape, *self.content_size, at.x, at.y))
-            )
+        if at is not None:
+            self.post_message(self.Pointed(self, *self.find_point(at.x, at.y)))
 
 
 class PickList(TextView):
@@ -121,7 +113,7 @@ class PickList(TextView):
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """As many as there is room for, around the selected one."""
-        if view.plain_preview is None:
+        if view.left_picture is None:
             return [Content(f" {why_no_picture(view)}")]
         if (n := len(self.names)) < FEWEST_PICKS:
             return [
@@ -202,16 +194,27 @@ class PicksPage(PageScreen):
         listed.names, listed.picks = self._names, self._of_bone()
         listed.selected, listed.cursor = self._selected, self._cursor
         super().show(view, is_text_due=is_text_due)
-        preview, picture, ramp = view.plain_preview, snapshot.left_picture, view.symbols.ramp
-        if preview is None or picture is None:
+        picture, ramp = view.left_picture, view.symbols.ramp
+        if picture is None:
             return
         whole, magnifier = (self.query_one(f"#{name}", PlacePicture) for name in _PICTURES)
         size_px = snapshot.picture_size_px
-        whole.show_shaped(draw_places(preview, size_px, self._cursor, listed.picks), ramp)
-        columns, rows = magnifier.content_size
-        if columns and rows:
-            shape = columns, 2 * rows
-            magnifier.show_shaped(magnify(picture, self._cursor, shape, listed.picks), ramp)
+        shrunk = whole.as_seen(picture)
+        whole.show_picture(draw_places(shrunk, size_px, self._cursor, listed.picks), ramp)
+        if 0 not in magnifier.room:
+            shape = self._magnified(magnifier)
+            magnified = magnify(picture, self._cursor, shape, listed.picks)
+            if magnifier.is_painted:
+                magnified = magnified.repeat(_ENLARGED, axis=0).repeat(_ENLARGED, axis=1)
+            magnifier.show_picture(magnified, ramp)
+
+    @staticmethod
+    def _magnified(magnifier: Picture) -> Place:
+        """Width and height, px, of what the magnifier shows: a half block or a square for each."""
+        width, height = magnifier.room
+        if not magnifier.is_painted:
+            return width, height
+        return max(1, width // _ENLARGED), max(1, height // _ENLARGED)
 
     def _of_bone(self) -> dict[str, Place]:
         return {name: self._picks[name] for name in self._names if name in self._picks}
@@ -226,9 +229,9 @@ class PicksPage(PageScreen):
         if message.picture.id == "whole":
             self._move_to(int(message.across * width), int(message.down * height))
             return
-        columns, rows = message.picture.content_size
-        x, y = int(message.across * columns), int(message.down * 2 * rows)
-        self._move_to(self._cursor[0] - columns // 2 + x, self._cursor[1] - rows + y)
+        columns, rows = self._magnified(message.picture)
+        x, y = int(message.across * columns), int(message.down * rows)
+        self._move_to(self._cursor[0] - columns // 2 + x, self._cursor[1] - rows // 2 + y)
 
     def action_move(self, arrow: str, step_px: int) -> None:
         """Move the cursor."""
@@ -243,7 +246,7 @@ class PicksPage(PageScreen):
 
     def action_pick(self) -> None:
         """The selected landmark is where the cursor is; go on to the next that has no place."""
-        if len(self._names) < FEWEST_PICKS or self.view.plain_preview is None:
+        if len(self._names) < FEWEST_PICKS or self.view.left_picture is None:
             return
         self._picks[self._names[self._selected]] = self._cursor
         for step in range(1, len(self._names)):

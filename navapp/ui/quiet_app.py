@@ -8,6 +8,8 @@ from pathlib import Path
 from textual.app import App
 
 from navapp.errors import NavappError
+from navapp.ui.pictures.graphics import Graphics
+from navapp.ui.pictures.painter import Painter
 from navapp.ui.terminal import is_terminal_lost
 
 _S_PER_LOOK = 0.5
@@ -18,9 +20,21 @@ class QuietApp(App[int]):
 
     Attributes:
         failure: what ended it, or None.
+        painter: of pictures; None: they are half blocks.
     """
 
     failure: Exception | None = None
+    painter: Painter | None = None
+
+    def use_graphics(self, graphics: Graphics) -> None:
+        """Have the terminal paint pictures, where it can; before the application runs."""
+        if graphics.encoder is not None:
+            self.painter = Painter(graphics, self._write_to_terminal)
+
+    def _write_to_terminal(self, text: str) -> None:
+        """Behind what the screen has written so far; Textual has no public way to do so."""
+        if self._driver is not None:
+            self._driver.write(text)
 
     def _handle_exception(self, error: Exception) -> None:
         """Keep what ends the application, for the sentence afterwards."""
@@ -45,8 +59,10 @@ async def drive(app: QuietApp) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
         loop.add_signal_handler(number, app.exit, 128 + number)
     watch = asyncio.create_task(_end_without_terminal(app))
-    result = await app.run_async(mouse=False)
+    result = await app.run_async()
     watch.cancel()
+    if app.painter is not None:
+        app.painter.close()
     return 1 if result is None else result
 
 

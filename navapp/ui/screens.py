@@ -8,7 +8,7 @@ from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen, Screen
 
 from navapp.ui.page_keys import PageKeys
-from navapp.ui.picture_view import PictureView
+from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View

@@ -15,8 +15,8 @@ from navapp.control.commands import Register
 from navapp.control.rules import why_refused
 from navapp.geometry.box import Box
 from navapp.ui.actions import ARROWS
-from navapp.ui.halfblocks import find_place
-from navapp.ui.picture_view import HalfBlocks
+from navapp.ui.pictures.fitting import in_colour
+from navapp.ui.pictures.picture import Picture
 from navapp.ui.screens import PageScreen
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
@@ -71,10 +71,10 @@ def fit_into(box: Box, size_px: tuple[int, int]) -> Box:
     return Box(x, y, width, height)
 
 
-def draw_box(preview: NDArray[np.uint8], box: Box, size_px: tuple[int, int]) -> NDArray[np.uint8]:
-    """A copy of a preview (h, w, 3) of the left picture, with the box."""
-    drawn = preview.copy()
-    height, width = preview.shape[:2]
+def draw_box(shrunk: NDArray[np.uint8], box: Box, size_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """A copy (h, w, 3) of the left picture at another size, with the box."""
+    drawn = np.array(in_colour(shrunk))
+    height, width = drawn.shape[:2]
     left, right = ((x * width) // size_px[0] for x in (box.x, box.x + box.width - 1))
     top, bottom = ((y * height) // size_px[1] for y in (box.y, box.y + box.height - 1))
     # Yellow within black: one of them is seen on whatever lies below.
@@ -86,7 +86,7 @@ def draw_box(preview: NDArray[np.uint8], box: Box, size_px: tuple[int, int]) -> 
     return drawn
 
 
-class BoxPicture(HalfBlocks):
+class BoxPicture(Picture):
     """The live picture with the box; a drag of the mouse draws another one."""
 
     class Dragged(Message):
@@ -98,31 +98,32 @@ class BoxPicture(HalfBlocks):
 
     def __init__(self) -> None:
         super().__init__("start-picture")
-        self._shape, self._size_px = (0, 0), (0, 0)
+        self._size_px = (0, 0)
         self._begin: tuple[float, float] | None = None
 
     def show_box(self, view: View, box: Box) -> None:
         """Take over the newest picture."""
-        if (preview := view.plain_preview) is None:
+        if (picture := view.left_picture) is None:
             return
-        self._shape, self._size_px = preview.shape[:2], view.snapshot.picture_size_px
-        self.show_picture(draw_box(preview, box, self._size_px), view.symbols.ramp)
+        self._size_px = view.snapshot.picture_size_px
+        drawn = draw_box(self.as_seen(picture), box, self._size_px)
+        self.show_picture(drawn, view.symbols.ramp)
 
-    def _place(self, event: events.MouseEvent) -> tuple[float, float] | None:
-        if 0 in self._shape:
+    def _point(self, event: events.MouseEvent) -> tuple[float, float] | None:
+        if 0 in self._size_px:
             return None
         # A drag may leave the picture: its edge is meant then.
-        across, down = find_place(self._shape, *self.content_size, event.x, event.y)
+        across, down = self.find_point(event.x, event.y)
         return across * self._size_px[0], down * self._size_px[1]
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
         """A corner."""
-        self._begin = self._place(event)
+        self._begin = self._point(event)
         self.capture_mouse()
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
         """The opposite one, while the button is down."""
-        place = self._place(event)
+        place = self._point(event)
         if self._begin is not None and place is not None:
             self.post_message(self.Dragged(self._begin, place))
 
@@ -142,7 +143,7 @@ class StartKeys(TextView):
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """Two lines."""
         bone, box = view.snapshot.stage.bone, self.box
-        if view.plain_preview is None:
+        if view.left_picture is None:
             said = why_no_picture(view)
         elif why := why_refused(Register(Prior()), view.snapshot):
             said = f"nothing can be searched now: {why}"
@@ -210,7 +211,7 @@ class StartPage(PageScreen):
 
     def action_search(self) -> None:
         """Begin, and leave."""
-        if self.view.plain_preview is None:
+        if self.view.left_picture is None:
             self.app.bell()
             self.notify(why_no_picture(self.view), severity="warning")
             return

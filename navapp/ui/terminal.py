@@ -5,10 +5,12 @@ import io
 import os
 import select
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from navapp.errors import InputError, UsageError
+from navapp.ui.pictures.painter import PictureText
 
 
 @contextlib.contextmanager
@@ -79,6 +81,8 @@ class _LosableTerminal(io.TextIOWrapper):
         """Write what can be written; the length of the text."""
         with contextlib.suppress(OSError):
             super().write(text)
+        if isinstance(text, PictureText):
+            text.sent_s = time.monotonic()
         return len(text)
 
     def flush(self) -> None:

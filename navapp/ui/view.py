@@ -88,6 +88,8 @@ class View:
     # the session has given nothing new for too long; nothing in the snapshot is believed any more.
     is_silent: bool = False
     title: str = "navapp"  # of the application
+    # the picture shows the region around the bone; None: as suits how it is drawn.
+    is_near: bool | None = None
 
     @property
     def is_navigable(self) -> bool:
@@ -96,11 +98,11 @@ class View:
 
     @property
     def is_picture_old(self) -> bool:
-        """The preview is the last one before the camera fell silent."""
+        """The picture is the last one before the camera fell silent."""
         is_fault = self.snapshot.state is SessionState.FAULT and not self.snapshot.rig_alarm
         # A rig that has moved goes on showing pictures, until its camera is lost as well.
         is_stopped = self.snapshot.is_camera_silent or is_fault or self._is_camera_lost
-        return is_stopped and self.snapshot.preview is not None
+        return is_stopped and self.snapshot.picture is not None
 
     @property
     def _is_camera_lost(self) -> bool:
@@ -145,12 +147,9 @@ class View:
         return first.value, _WAITING[self.snapshot.state] if is_waiting else first.remedy
 
     @property
-    def plain_preview(self) -> NDArray[np.uint8] | None:
-        """The small picture of the left camera without guides; None when another one is shown."""
-        snapshot = self.snapshot
-        if snapshot.shows_eye or snapshot.left_picture is None:
-            return None
-        return snapshot.preview if snapshot.plain_preview is None else snapshot.plain_preview
+    def left_picture(self) -> NDArray[np.uint8] | None:
+        """The newest of the left camera as it came; None while another picture is shown."""
+        return None if self.snapshot.shows_eye else self.snapshot.left_picture
 
     @property
     def picture_title(self) -> str:

@@ -105,7 +105,7 @@ CHANGED: dict[str, Any] = {
     "stages": {"first": "3", "check_minutes": 12.5},
     "recording": {"folder": "sessions/1", "pictures": False},
     "link": {},
-    "ui": {},
+    "ui": {"pictures": "sixel"},
 }
 
 
@@ -257,7 +257,7 @@ def test_an_unknown_key_like_no_other_names_what_is_known():
     with pytest.raises(ConfigurationError, match=r"known here: backend, output, .*simulated$"):
         parse({"display": {"xyzzy": 1}}, "x")
     with pytest.raises(ConfigurationError, match=r"known here: nothing$"):
-        parse({"ui": {"xyzzy": 1}}, "x")
+        parse({"link": {"xyzzy": 1}}, "x")
 
 
 @pytest.mark.parametrize(

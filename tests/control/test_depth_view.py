@@ -25,17 +25,17 @@ def with_foreground() -> Foreground:
 def test_the_key_marks_the_depth_and_a_second_time_no_longer() -> None:
     bench = navigating(Bench())
     bench.script.tracked = replace(answer(), foreground=with_foreground())
-    plain = bench.frames().preview
+    plain = bench.frames().picture
     shown = bench.results[-1].picture.image.copy()
     assert not bench.snapshot.shows_depth
     bench.do(ToggleDepth())
     marked = bench.frames()
     assert marked.shows_depth
-    assert (marked.preview != plain).any(axis=2).mean() > 0.5
+    assert (marked.picture != plain).any(axis=2).mean() > 0.5
     np.testing.assert_array_equal(bench.results[-1].picture.image, shown)
     bench.do(ToggleDepth())
     assert not bench.frames().shows_depth
-    np.testing.assert_array_equal(bench.snapshot.preview, plain)
+    np.testing.assert_array_equal(bench.snapshot.picture, plain)
     assert [event.text for event in bench.events if event.kind == "depth"] == [
         "depth marked",
         "depth no longer marked",
@@ -44,9 +44,9 @@ def test_the_key_marks_the_depth_and_a_second_time_no_longer() -> None:
 
 def test_without_a_pose_nothing_is_marked() -> None:
     bench = Bench()
-    plain = bench.frames().preview
+    plain = bench.frames().picture
     bench.do(ToggleDepth())
-    np.testing.assert_array_equal(bench.frames().preview, plain)
+    np.testing.assert_array_equal(bench.frames().picture, plain)
 
 
 def test_it_is_recorded_as_a_command() -> None:

@@ -56,7 +56,7 @@ class Eye:
 
 def level(bench: Bench) -> int:
     """Grey in the middle of the operator's picture."""
-    preview = bench.snapshot.preview
+    preview = bench.snapshot.picture
     assert preview is not None
     return int(preview[2, 2, 0])
 
@@ -65,16 +65,16 @@ def test_the_key_shows_what_the_eye_sees_and_a_second_time_the_video() -> None:
     bench = navigating(Bench(look=Eye()))
     assert bench.snapshot.has_eye
     assert not bench.snapshot.shows_eye
-    video = bench.snapshot.preview
+    video = bench.snapshot.picture
     bench.do(ToggleEye())
     assert bench.frames().shows_eye
     assert level(bench) == LIT
-    assert bench.snapshot.preview.shape == (96, 154, 3)
+    assert bench.snapshot.picture.shape == (300, 480, 3)
     # The display and the pipeline get what they always get.
     assert bench.results[-1].picture.image.shape == (240, 320, 3)
     bench.do(ToggleEye())
     assert not bench.frames().shows_eye
-    np.testing.assert_array_equal(bench.snapshot.preview, video)
+    np.testing.assert_array_equal(bench.snapshot.picture, video)
     assert [event.text for event in bench.events if event.kind == "eye"] == [
         "the screen shows what the eye sees in the mirror",
         "the screen shows the video",
@@ -114,7 +114,7 @@ def test_guides_that_grow_old_are_not_seen_either() -> None:
     bench.clock.advance_ns(600_000_000)
     aged = bench.controller.snapshot_now()
     assert not aged.is_navigable
-    assert aged.preview[2, 2, 0] == SITE
+    assert aged.picture[2, 2, 0] == SITE
 
 
 def test_a_look_that_hangs_shows_no_old_guides() -> None:

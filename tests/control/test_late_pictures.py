@@ -19,8 +19,8 @@ def lit(bench: Bench) -> bool:
 
 def shows_guides(snapshot: Snapshot) -> bool:
     """On black pictures nothing else lies in the middle."""
-    assert snapshot.preview is not None
-    return bool(snapshot.preview[24:72].any())
+    assert snapshot.picture is not None
+    return bool(snapshot.picture[24:72].any())
 
 
 def told(bench: Bench) -> list[str]:

@@ -160,8 +160,8 @@ def test_the_cross_is_shown_where_its_point_is_seen_and_moves_with_the_keys() ->
     bench.frames()
     assert bench.snapshot.cross_check is not None
     # The operator's screen marks the point as well: on black video nothing else is there.
-    assert bench.snapshot.preview is not None
-    assert bench.snapshot.preview[24:72].any()
+    assert bench.snapshot.picture is not None
+    assert bench.snapshot.picture[24:72].any()
     before = np.argwhere(guides(bench)).mean(axis=0)
     bench.do(NudgeCross(10, 4))
     bench.frames()

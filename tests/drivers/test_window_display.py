@@ -226,3 +226,25 @@ def test_two_monitors(tmp_path, monkeypatch) -> None:
             first.blank()
             seconds_until(eye, is_black, 5.0, on_first)
             assert np.array_equal(look(eye, on_second), small)
+
+
+def test_a_framed_window_scales_the_picture_and_is_dark_without_one(screen) -> None:
+    image = np.zeros((4 * HEIGHT, 4 * WIDTH, 3), np.uint8)
+    image[: 2 * HEIGHT] = (10, 200, 90)
+
+    def is_lit(seen: np.ndarray) -> np.ndarray:
+        # Scaling rounds by some levels.
+        return (np.abs(seen.astype(int) - (10, 200, 90)) < 12).all(axis=2)
+
+    with window(width=4 * WIDTH, height=4 * HEIGHT, is_framed=True) as display:
+        display.show(image, SystemClock().now_ns() + MINUTE_NS)
+        seconds_until(screen, lambda seen: bool(is_lit(seen).any()), 5.0)
+        rows, columns = np.nonzero(is_lit(look(screen)))
+        width, height = columns.max() + 1 - columns.min(), 2 * (rows.max() + 1 - rows.min())
+        assert width / height == pytest.approx(WIDTH / HEIGHT, rel=0.03)
+        assert 0.8 * WIDTH < width <= 0.91 * WIDTH
+        display.blank()
+        seconds_until(screen, is_black, 2.0)
+        display.show(image, SystemClock().now_ns() + 200_000_000)
+        seconds_until(screen, lambda seen: bool(is_lit(seen).any()), 5.0)
+        seconds_until(screen, is_black, 2.0)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.rig import StereoRig
-from navapp.overlay import LAYERS, LeftView, compose_video, labels, make_preview, put_mark
+from navapp.overlay import LAYERS, LeftView, compose_video, labels, put_mark
 from navapp.overlay.colours import CANDIDATE, GUIDE
 from navapp.overlay.composition import text_boxes
 from navapp.overlay.labels import LabelBoard
@@ -134,25 +134,3 @@ def test_a_mark_is_put_into_the_upper_right_corner_of_a_copy() -> None:
     assert columns.max() > WIDTH - 20
     width, _ = labels.text_size("not for clinical use", 0.45)
     assert columns.max() - columns.min() > 0.9 * width
-
-
-@pytest.mark.parametrize(
-    ("shape", "expected"),
-    [
-        ((720, 1280), (90, 160)),
-        ((480, 640), (96, 128)),
-        ((2000, 100), (96, 5)),
-        ((3, 4000), (1, 160)),
-        ((40, 50), (40, 50)),
-    ],
-)
-def test_a_preview_fits_and_keeps_its_shape(shape, expected) -> None:
-    preview = make_preview(np.zeros((*shape, 3), dtype=np.uint8))
-    assert preview.shape == (*expected, 3)
-    assert not preview.flags.writeable
-
-
-def test_a_preview_is_the_mean_of_what_it_covers() -> None:
-    image = np.zeros((192, 320, 3), dtype=np.uint8)
-    image[:, ::2] = 100
-    assert (make_preview(image) == 50).all()

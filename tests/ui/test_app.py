@@ -32,11 +32,11 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
-from navapp.ui.app import NavigationApp
+from navapp.ui.app import POLLS_PER_S, POLLS_PER_TEXT, SILENT_AFTER_POLLS, NavigationApp
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen, SmallNotice
 from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
-from navapp.ui.picture_view import PictureView
+from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.pose_panel import PosePanel
 from tests.ui import snapshots
 
@@ -53,6 +53,11 @@ class BellCounter(NavigationApp):
 
     def bell(self) -> None:
         self.n_bells += 1
+
+    def poll_until_text(self) -> None:
+        """Until text that has changed is shown for sure."""
+        for _ in range(POLLS_PER_TEXT):
+            self.poll()
 
     def text_of(self, selector: type[Any]) -> str:
         return str(self.screen.query_one(selector).render())
@@ -235,7 +240,7 @@ class TestPolling:
         async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
             await pilot.pause()
             for preview in (snapshots.picture(1.0), None, snapshots.picture(2.0, 96, 40)):
-                app.session.current = snapshots.navigating(preview=preview)
+                app.session.current = snapshots.navigating(picture=preview)
                 app.poll()
                 await pilot.pause()
                 view = app.screen.query_one(PictureView)
@@ -271,12 +276,13 @@ class TestPolling:
 
         assert play(snapshots.suspended(), script).n_bells == 1
 
-    def test_numbers_wait_for_every_second_poll_but_the_status_does_not(self) -> None:
+    def test_numbers_wait_for_their_poll_but_the_status_does_not(self) -> None:
         async def script(app: BellCounter, _pilot: Pilot[Any]) -> None:
             assert "18 ms" in app.text_of(PosePanel)
             app.session.current = snapshots.navigating(pose_age_ms=31.0)
-            app.poll()
-            assert "18 ms" in app.text_of(PosePanel)
+            for _ in range(POLLS_PER_TEXT - 1):
+                app.poll()
+                assert "18 ms" in app.text_of(PosePanel)
             app.poll()
             assert "31 ms" in app.text_of(PosePanel)
             app.session.current = snapshots.suspended()
@@ -287,7 +293,7 @@ class TestPolling:
 
     def test_a_session_that_falls_silent_is_not_believed(self) -> None:
         async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
-            for _ in range(15):
+            for _ in range(SILENT_AFTER_POLLS - 1):
                 app.poll()
             assert "NAVIGABLE  yes" in app.text_of(PosePanel)
             app.poll()
@@ -306,7 +312,7 @@ class TestPolling:
             for _ in range(100):
                 app.poll()
             assert "no registration" in app.text_of(PosePanel)
-            for _ in range(400):
+            for _ in range(60 * POLLS_PER_S):
                 app.poll()
             assert "gives no" in app.text_of(PosePanel)
 
@@ -362,8 +368,7 @@ def test_resizing_is_survived() -> None:
         ]:
             await pilot.resize_terminal(*size)
             await pilot.pause()
-            app.poll()
-            app.poll()
+            app.poll_until_text()
             await pilot.pause()
             assert screen.query_one(SmallNotice).display is is_small
             assert screen.query_one("#body").display is not is_small

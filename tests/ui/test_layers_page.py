@@ -36,8 +36,7 @@ def test_layers_are_switched_by_their_letters(size: tuple[int, int]) -> None:
             assert len(line) <= size[0] - 4
         # What the session says is shown, not what was asked for.
         app.session.current = snapshots.navigating(layers=("scale",))
-        app.poll()
-        app.poll()
+        app.poll_until_text()
         await pilot.pause()
         shown = app.text_of(LayerTable).splitlines()
         assert [line.split()[1] for line in shown[: len(LAYER_KEYS)]].count("on") == 1

@@ -79,8 +79,7 @@ def test_another_bone_with_fewer_landmarks_may_come_meanwhile() -> None:
     async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press("p", "n", "n", "n")
         app.session.current = ready(landmarks={"patella/centre": np.zeros(3)})
-        app.poll()
-        app.poll()
+        app.poll_until_text()
         await pilot.press("enter", "x", "n", "g")
         await pilot.pause()
         assert "the plan has 1 landmarks" in app.text_of(PickList)

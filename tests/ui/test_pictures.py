@@ -11,7 +11,7 @@ from textual.pilot import Pilot
 
 from navapp.control.states import Snapshot
 from navapp.ui.app import NavigationApp
-from navapp.ui.picture_view import PictureView
+from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.pose_panel import PosePanel
 from navapp.ui.symbols import ASCII
 from tests.ui import snapshots

@@ -10,7 +10,8 @@ from textual.strip import Strip
 
 from navapp.control.commands import Register
 from navapp.geometry.box import Box
-from navapp.ui.halfblocks import compute_cell_codes, find_place, make_row_strip
+from navapp.ui.pictures.fitting import find_point
+from navapp.ui.pictures.halfblocks import compute_cell_codes, make_row_strip
 from navapp.ui.start_page import BoxPicture, StartKeys, StartPage, draw_box, fit_into
 from tests.ui import snapshots
 from tests.ui.test_app import BellCounter, play
@@ -53,6 +54,7 @@ def test_the_mouse_draws_the_box_that_it_spans(size: tuple[int, int]) -> None:
 
     async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press("b")
+        app.poll()
         picture = app.screen.query_one(BoxPicture)
         columns, rows = picture.content_size
         begin, end = (columns // 3, rows // 4), (2 * columns // 3, 3 * rows // 4)
@@ -60,7 +62,9 @@ def test_the_mouse_draws_the_box_that_it_spans(size: tuple[int, int]) -> None:
         await pilot.hover(picture, offset=(columns // 2, rows // 2))
         await pilot.hover(picture, offset=end)
         await pilot.mouse_up(picture, offset=end)
-        places = [find_place((90, 160), columns, rows, *offset) for offset in (begin, end)]
+        seen = picture.as_seen(np.zeros((720, 1280), np.uint8)).shape
+        room = columns, 2 * rows
+        places = [find_point(seen, room, (x + 0.5, 2 * y + 1)) for x, y in (begin, end)]
         corners.extend((np.array(places) * SIZE_PX).ravel().tolist())
         await pilot.press("enter")
 

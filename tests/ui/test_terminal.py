@@ -106,6 +106,16 @@ def test_keys_end_it_and_native_noise_stays_out_of_the_picture(tmp_path: Path) -
         screen.close()
 
 
+def test_the_mouse_is_asked_for(tmp_path: Path) -> None:
+    screen = Screen(tmp_path, "run")
+    try:
+        screen.read_until(b"\x1b[?1000h")
+        os.write(screen.master, b"q")
+        assert screen.finish() == (0, "")
+    finally:
+        screen.close()
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     screen = Screen(tmp_path, "run")

@@ -25,7 +25,7 @@ from navapp.ui.guided_app import (
     GuidedSession,
     run_guided_app,
 )
-from navapp.ui.picture_view import HalfBlocks
+from navapp.ui.pictures.picture import Picture
 from navapp.ui.symbols import UNICODE, Symbols
 from navapp.ui.text_view import Lines
 
@@ -42,8 +42,8 @@ class CaptureScreen(GuidedScreen[CaptureSnapshot]):
         with Vertical(id="body"):
             yield CaptureTitle("title")
             with Horizontal(id="pictures"):
-                yield HalfBlocks("left")
-                yield HalfBlocks("right")
+                yield Picture("left")
+                yield Picture("right")
             yield InstructionLines("wish")
             yield CheckLine("checks")
             yield GaugeLine("gauge")
@@ -61,7 +61,7 @@ class CaptureScreen(GuidedScreen[CaptureSnapshot]):
         """Pass a snapshot on."""
         pictures = snapshot.pictures or (None, None)
         for side, picture in zip(("left", "right"), pictures, strict=True):
-            self.query_one(f"#{side}", HalfBlocks).show_picture(picture, symbols.ramp)
+            self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
         view = CaptureView(snapshot, symbols)
         for lines in self.query(Lines):
             lines.show(view)

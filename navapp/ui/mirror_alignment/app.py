@@ -25,7 +25,7 @@ from navapp.ui.mirror_alignment.panels import (
     SmallAlignment,
     UsedMap,
 )
-from navapp.ui.picture_view import HalfBlocks
+from navapp.ui.pictures.picture import Picture
 from navapp.ui.symbols import UNICODE, Symbols
 from navapp.ui.text_view import Lines
 
@@ -42,8 +42,8 @@ class AlignmentScreen(GuidedScreen[AlignmentSnapshot]):
         with Vertical(id="body"):
             yield AlignmentTitle("title")
             with Horizontal(id="pictures"):
-                yield HalfBlocks("first")
-                yield HalfBlocks("second")
+                yield Picture("first")
+                yield Picture("second")
             yield InstructionLines("next")
             yield CrossLine("cross")
             yield ErrorLine("error")
@@ -54,7 +54,7 @@ class AlignmentScreen(GuidedScreen[AlignmentSnapshot]):
 
     def show(self, snapshot: AlignmentSnapshot, symbols: Symbols) -> None:
         """Pass a snapshot on."""
-        first, second = (self.query_one(f"#{name}", HalfBlocks) for name in ("first", "second"))
+        first, second = (self.query_one(f"#{name}", Picture) for name in ("first", "second"))
         row, column = snapshot.row_column
         corner = "no corner" if snapshot.corner is None else f"row {row}, column {column}"
         first.border_title = f"left camera: {corner}"

@@ -1,0 +1,168 @@
+"""Which pictures a terminal draws: asked of the terminal itself, before the screen starts."""
+
+import fcntl
+import os
+import re
+import select
+import struct
+import termios
+import time
+import tty
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.ui.pictures.kitty import KittyEncoder, ask_whether_drawn
+from navapp.ui.pictures.sixel import SixelEncoder
+from navapp.ui.pictures.sixel_kernels import N_COLOURS
+
+_PATIENCE_S = 1.0
+# Numbers of the two pictures of one pixel that kitty's protocol is asked about.
+_LOCAL, _COMPRESSED = 31, 32
+_CELL = re.compile(rb"\x1b\[6;(\d+);(\d+)t")
+_ATTRIBUTES = re.compile(rb"\x1b\[\?([\d;]+)c")
+_REGISTERS = re.compile(rb"\x1b\[\?1;0;(\d+)S")
+_SIXEL = b"4"
+_REGISTERS_WANTED = 256
+# They print what they do not understand.
+_SIMPLE_TERMINALS = ("linux", "dumb", "vt100", "vt102")
+
+
+Wish = Literal["auto", "kitty", "sixel", "blocks"]
+
+
+class Encoder(Protocol):
+    """Turns pictures into what makes the terminal draw them at the cursor."""
+
+    @property
+    def is_scaled_by_terminal(self) -> bool:
+        """A smaller picture still fills its cells."""
+        ...
+
+    @property
+    def is_busy(self) -> bool:
+        """The terminal has not taken the last picture yet."""
+        ...
+
+    def encode(self, number: int, picture: NDArray[np.uint8], columns: int, rows: int) -> str:
+        """Of (h, w, 3) BGR, over so many cells; what had that number before is replaced."""
+        ...
+
+    def erase(self, number: int) -> str:
+        """What removes a picture where text alone does not."""
+        ...
+
+    def close(self) -> None:
+        """Remove what is left outside of the terminal."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Graphics:
+    """How pictures come to the screen."""
+
+    encoder: Encoder | None = None  # None: as half blocks
+    cell_px: tuple[int, int] = (0, 0)  # width and height of a character
+    words: str = "half blocks"  # for people; with the reason where they are half blocks
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What a terminal says of itself."""
+
+    has_local_kitty: bool = False  # and it reads this computer's shared memory
+    has_kitty: bool = False
+    has_sixel: bool = False
+    n_registers: int | None = None  # colours of a sixel picture; None: not told
+    cell_px: tuple[int, int] | None = None  # None: not told
+
+
+def find_graphics(wish: Wish, environment: Mapping[str, str]) -> Graphics:
+    """Ask the terminal at the standard input and output; at most a second.
+
+    Args:
+        wish: what may be used; "auto" is the best that the terminal answers for.
+        environment: variables of the process.
+    """
+    if wish == "blocks":
+        return Graphics(words="half blocks, as configured")
+    if environment.get("TERM", "dumb") in _SIMPLE_TERMINALS:
+        return Graphics(words="half blocks: this terminal draws no pictures")
+    return choose_graphics(wish, ask_terminal(), is_in_tmux="TMUX" in environment)
+
+
+def choose_graphics(wish: Wish, answers: Answers, *, is_in_tmux: bool) -> Graphics:
+    """The best way that was wished and answered for."""
+    cell_px = answers.cell_px
+    if cell_px is not None and wish in ("auto", "kitty"):
+        if answers.has_local_kitty:
+            return Graphics(KittyEncoder(is_local=True), cell_px, "kitty, shared memory")
+        if answers.has_kitty:
+            return Graphics(KittyEncoder(is_local=False), cell_px, "kitty, compressed")
+    n_registers = N_COLOURS if answers.n_registers is None else answers.n_registers
+    has_colours = n_registers >= N_COLOURS
+    if cell_px is not None and wish in ("auto", "sixel") and answers.has_sixel and has_colours:
+        return Graphics(SixelEncoder(), cell_px, "sixel")
+    if answers.has_sixel and not has_colours:
+        why = f"the terminal has {n_registers} colours for sixel, {N_COLOURS} are needed"
+    elif is_in_tmux:
+        why = "tmux passes no pictures on"
+    else:
+        why = "this terminal draws no pictures"
+    return Graphics(words=f"half blocks: {why}")
+
+
+def ask_terminal() -> Answers:
+    """Write the questions, read until the last is answered; what is typed meanwhile is lost."""
+    settings = termios.tcgetattr(0)
+    try:
+        tty.setcbreak(0)
+        with ask_whether_drawn(_LOCAL, _COMPRESSED) as questions:
+            told = _ask(f"{questions}\x1b[16t")
+        if parse_answers(told).has_sixel:
+            told += _ask(f"\x1b[?1;3;{_REGISTERS_WANTED}S")
+    finally:
+        termios.tcsetattr(0, termios.TCSADRAIN, settings)
+    answers = parse_answers(told)
+    return answers if answers.cell_px else replace(answers, cell_px=_measure_cell())
+
+
+def parse_answers(told: bytes) -> Answers:
+    """Of what a terminal has sent."""
+    cell, registers = _CELL.search(told), _REGISTERS.search(told)
+    attributes = {one for found in _ATTRIBUTES.findall(told) for one in found.split(b";")[1:]}
+    return Answers(
+        has_local_kitty=b"\x1b_Gi=%d;OK" % _LOCAL in told,
+        has_kitty=b"\x1b_Gi=%d;OK" % _COMPRESSED in told,
+        has_sixel=_SIXEL in attributes,
+        n_registers=None if registers is None else int(registers[1]),
+        cell_px=None if cell is None else (int(cell[2]), int(cell[1])),
+    )
+
+
+def _ask(questions: str) -> bytes:
+    """What is answered, up to the attributes that every terminal tells when it is asked."""
+    os.write(1, f"{questions}\x1b[c".encode())
+    told, end_s = b"", time.monotonic() + _PATIENCE_S
+    while _ATTRIBUTES.search(told) is None:
+        ready, _, _ = select.select([0], [], [], max(0.0, end_s - time.monotonic()))
+        if not ready:
+            break
+        more = os.read(0, 4096)
+        if not more:
+            break
+        told += more
+    return told
+
+
+def _measure_cell() -> tuple[int, int] | None:
+    """From the size of the window in cells and pixels, where the terminal tells both."""
+    rows, columns, width, height = struct.unpack(
+        "4H", fcntl.ioctl(1, termios.TIOCGWINSZ, struct.pack("4H", 0, 0, 0, 0))
+    )
+    if 0 in (rows, columns, width, height):
+        return None
+    return width // columns, height // rows

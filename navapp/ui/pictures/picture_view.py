@@ -1,0 +1,69 @@
+"""The picture with the overlay, in a frame that says what it is."""
+
+from navapp.geometry.box import Box
+from navapp.ui.pictures.fitting import choose_part
+from navapp.ui.pictures.picture import Picture
+from navapp.ui.view import Level, View
+from navapp.values import DEPTH_COLOURS, Origin
+
+NOTICE = "research, not for clinical use"
+_EYE_HINT = "y: video, or what the eye sees in the mirror"
+_DEPTH_WORDS = {
+    Origin.MATCHED: "matched",
+    Origin.FILLED_BORDER: "border",
+    Origin.FILLED_INTERIOR: "interior",
+    Origin.MISMATCH_FILLED: "mismatch",
+    Origin.UNKNOWN: "unknown",
+}
+
+
+def _tell_depth_key() -> str:
+    """What the colours of the depth mean, as markup."""
+    words = []
+    for origin, word in _DEPTH_WORDS.items():
+        blue, green, red = DEPTH_COLOURS[origin]
+        words.append(f"[#{red:02x}{green:02x}{blue:02x}]{word}[/]")
+    return " · " + " ".join(words)
+
+
+_DEPTH_KEY = _tell_depth_key()
+
+
+class PictureView(Picture):
+    """The newest picture of a session, in a frame that says how it stands."""
+
+    def __init__(self) -> None:
+        super().__init__("picture")
+        self.border_subtitle = NOTICE
+        self._title, self._has_eye = "", False
+        self._bone_part: Box | None = None
+
+    def show(self, view: View) -> None:
+        """Take over the newest picture and say how it stands."""
+        key = _DEPTH_KEY if view.snapshot.shows_depth else ""
+        part = self._choose_part(view)
+        near = "" if part is None else f" {view.symbols.dot} around the bone, w: all of it"
+        title = view.picture_title + (key or near)
+        if self._title != title:
+            self._title = title
+            self.border_title = self._title
+        if self._has_eye != view.snapshot.has_eye:
+            self._has_eye = view.snapshot.has_eye
+            hint = f"{_EYE_HINT} {view.symbols.dot} " if self._has_eye else ""
+            self.border_subtitle = hint + NOTICE
+        for level in Level:
+            self.set_class(level is view.level, f"-{level.name.lower()}")
+        self.show_picture(view.snapshot.picture, view.symbols.ramp, part)
+
+    def _choose_part(self, view: View) -> Box | None:
+        """Half blocks show the region around the bone, pictures the whole, unless a key says so."""
+        snapshot, (width, height) = view.snapshot, self.room
+        is_near = not self.is_painted if view.is_near is None else view.is_near
+        bone, picture = snapshot.bone_box, snapshot.picture
+        if not is_near or bone is None or picture is None or snapshot.shows_eye or not height:
+            return None
+        size_px = snapshot.picture_size_px
+        if picture.shape[1::-1] != size_px:
+            return None
+        self._bone_part = choose_part(bone, size_px, width / height, self._bone_part)
+        return self._bone_part
