@@ -81,7 +81,7 @@ def prepare_session(
             prior = prior or make_nominal_prior(opened.simulation)
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
-        prior = prior or Prior()
+        prior = (prior or Prior()).with_cones(plan.approaches)
         stage = plan.stage(stage)
         if needs_start:
             check_start(prior, stage.bone)

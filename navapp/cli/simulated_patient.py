@@ -2,6 +2,7 @@
 
 from navapp.cli.simulated_content import make_built_in_content
 from navapp.devices import Simulation
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh
 from navapp.values import BoneModel, Plan, Prior
 
@@ -26,6 +27,5 @@ def make_nominal_prior(simulation: Simulation) -> Prior:
     """How the simulated knee was meant to lie on the table."""
     return Prior(
         simulation.nominal_left_from_bone,
-        simulation.approach_axis,
-        simulation.approach_half_angle_deg,
+        {"femur": ViewCone(simulation.approach_axis, simulation.approach_half_angle_deg)},
     )

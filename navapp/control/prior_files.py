@@ -1,17 +1,18 @@
 """Where a bone is searched for first, as JSON: of a file, and of a recorded command."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from navapp.errors import PriorError
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.directions import ViewCone
+from navapp.geometry.transform import RigidTransform
 from navapp.values import Pick, Prior
 
-_POSE_KEY = "camera_from_model"
+_POSE_KEY, _CONE_KEY = "camera_from_model", "approach_cone"
 
 
 def read_prior(path: str | Path) -> Prior:
@@ -48,13 +49,15 @@ def prior_from_json(content: Mapping[str, Any]) -> Prior:
         for key, value in content.items()
         if key == _POSE_KEY or key.startswith(f"{_POSE_KEY}_")
     }
-    cone = content.get("approach_cone") or {}
-    axis = cone.get("axis")
+    cones = {
+        key.removeprefix(_CONE_KEY).lstrip("_") or "femur": ViewCone.from_json(value)
+        for key, value in content.items()
+        if key == _CONE_KEY or key.startswith(f"{_CONE_KEY}_")
+    }
     box = content.get("box")
     return Prior(
         {bone: RigidTransform("left", bone, value) for bone, value in poses.items()},
-        None if axis is None else _unit(axis),
-        float(cone.get("half_angle_deg", 180.0)),
+        cones,
         None if box is None else (int(box[0]), int(box[1]), int(box[2]), int(box[3])),
         tuple(_read_pick(pick) for pick in content.get("picks", ())),
     )
@@ -71,11 +74,8 @@ def prior_to_json(prior: Prior) -> dict[str, Any]:
     content: dict[str, Any] = {}
     for bone, pose in prior.left_from_bone.items():
         content[_POSE_KEY if bone == "femur" else f"{_POSE_KEY}_{bone}"] = pose.to_list()
-    if prior.approach_axis is not None:
-        content["approach_cone"] = {
-            "axis": prior.approach_axis.tolist(),
-            "half_angle_deg": prior.approach_half_angle_deg,
-        }
+    for bone, cone in prior.cones.items():
+        content[_CONE_KEY if bone == "femur" else f"{_CONE_KEY}_{bone}"] = cone.to_json()
     if prior.box is not None:
         content["box"] = list(prior.box)
     if prior.picks:
@@ -89,12 +89,3 @@ def prior_to_json(prior: Prior) -> dict[str, Any]:
             for pick in prior.picks
         ]
     return content
-
-
-def _unit(axis: Sequence[float]) -> FloatArray:
-    values = np.asarray(axis, dtype=np.float64).reshape(3)
-    length = float(np.linalg.norm(values))
-    if not length > 0.0:
-        raise ValueError("the cone's axis has no length")
-    unit: FloatArray = values / length
-    return unit

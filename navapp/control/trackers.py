@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from drivers.frames import StereoFrame
-from navapp.geometry.directions import ViewCone
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.preop import build_aspects
@@ -213,8 +212,8 @@ class Trackers:
 
     def _searching_tracker(self, bone: str, start: Prior) -> Tracker:
         """The bone's tracker, with aspects when there is no pose to start from."""
-        axis = start.axis_for(bone)
-        if bone in start.left_from_bone or axis is None:
+        cone = start.cones.get(bone)
+        if bone in start.left_from_bone or cone is None or cone.axis is None:
             return self.tracker(bone)
         with self._lock:
             now = self._bones[bone]
@@ -222,12 +221,12 @@ class Trackers:
             known = self._with_aspects.get(key)
         if known is not None:
             return known
-        half_angle_deg, built = start.approach_half_angle_deg, self._plan.aspects.get(bone)
+        built = self._plan.aspects.get(bone)
         # What was built beforehand has the edges of the whole bone.
         if built is None or now.made:
-            aspects = build_aspects(now.model, axis, half_angle_deg)
+            aspects = build_aspects(now.model, cone.axis, cone.half_angle_deg)
         else:
-            aspects = built.within(ViewCone(axis, half_angle_deg))
+            aspects = built.within(cone)
         made = self._make(now.model, aspects)
         with self._lock:
             self._trackers.pop(key, None)

@@ -1,6 +1,8 @@
 """Directions that a camera may look from, and how a body is turned to be seen from one."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +28,26 @@ class ViewCone:
         if not 0.0 < length < np.inf:
             raise ValueError("the axis of a view cone must have a length")
         object.__setattr__(self, "axis", read_only(np.asarray(self.axis) / length))
+
+    def to_json(self) -> dict[str, Any]:
+        """As it stands in files.
+
+        Raises:
+            ValueError: it has no axis, and says nothing.
+        """
+        if self.axis is None:
+            raise ValueError("a view cone without an axis is not written")
+        return {"axis": self.axis.tolist(), "half_angle_deg": self.half_angle_deg}
+
+    @classmethod
+    def from_json(cls, entry: Mapping[str, Any]) -> "ViewCone":
+        """What `to_json` gives; without a half angle all directions are inside.
+
+        Raises:
+            ValueError, TypeError, KeyError: it is none.
+        """
+        axis = np.asarray(entry["axis"], dtype=np.float64).reshape(3)
+        return cls(axis, float(entry.get("half_angle_deg", 180.0)))
 
     def off_axis_deg(self, directions: FloatArray) -> FloatArray:
         """(N,) angle of unit vectors (N, 3) from the axis; 0 without one."""

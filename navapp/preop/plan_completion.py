@@ -1,4 +1,4 @@
-"""Completes a plan: side, landmarks and targets from the surfaces where files give none."""
+"""Completes a plan: side, landmarks, targets and approaches where files give none."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,6 +12,7 @@ from navapp.preop.default_targets import with_defaults
 from navapp.preop.landmarks import estimate_landmarks
 from navapp.preop.planned_content import PlannedContent
 from navapp.preop.side_estimate import SideEstimate, estimate_side
+from navapp.preop.usual_approaches import usual_approaches
 from navapp.values import ANKLE_CENTRE, HIP_CENTRE, BoneModel, Plan, Side
 
 # A planned point of a bone lies on it or beside it, but for the centres of the other joints.
@@ -83,7 +84,8 @@ def complete(plan: Plan, planned: PlannedContent) -> tuple[Plan, list[str]]:
                 f"(give it in --contents, or mark it absent)"
             )
     try:
-        return whole.put_into(plan), warnings
+        completed = replace(whole.put_into(plan), approaches=usual_approaches(plan.bones))
+        return completed, warnings
     except ValueError as error:
         raise PlanError(str(error), remedy="give it, or leave its name out") from error
 

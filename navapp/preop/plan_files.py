@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from navapp.errors import InputError, PlanError
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.transform import FloatArray
 from navapp.preop.aspect_files import read_aspects, write_aspects
 from navapp.preop.bone_files import read_bone, write_bone
@@ -118,6 +119,10 @@ def read_plan(folder: str | Path) -> Plan:
             name=folder.name,
             content=_surgical(content, folder),
             aspects=_read_aspects(folder, content["bones"]),
+            approaches={
+                name: ViewCone.from_json(entry)
+                for name, entry in content.get("approaches", {}).items()
+            },
         )
     except (
         OSError,
@@ -207,6 +212,7 @@ def _write_content(
         "bones": bones,
         "targets": {name: points.tolist() for name, points in plan.targets.items()},
         "curves": {name: points.tolist() for name, points in plan.curves.items()},
+        "approaches": {name: cone.to_json() for name, cone in plan.approaches.items()},
         "content": content_to_json(plan.content, folder),
         "origin": origin_to_json(origin),
         "hash": plan.digest,

@@ -11,6 +11,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values.bones import AspectGraph, BoneModel
 from navapp.values.conditions import Condition
@@ -50,9 +51,8 @@ class Prior:
 
     # bone name -> rough pose.
     left_from_bone: Mapping[str, RigidTransform] = field(default_factory=dict)
-    # unit vector in femur coordinates from the bone towards the cameras.
-    approach_axis: FloatArray | None = None
-    approach_half_angle_deg: float = 180.0  # of the cone around it
+    # bone name -> from where the cameras see it, in its coordinates.
+    cones: Mapping[str, ViewCone] = field(default_factory=dict)
     box: tuple[int, int, int, int] | None = None  # x, y, width, height in the left picture, px
     picks: tuple[Pick, ...] = ()  # of any bones
 
@@ -63,18 +63,16 @@ class Prior:
     @property
     def is_empty(self) -> bool:
         """It says nothing at all."""
-        known = self.left_from_bone, self.picks
-        return not any(known) and self.box is None and self.approach_axis is None
+        return not any((self.left_from_bone, self.cones, self.picks)) and self.box is None
 
     def replaced_by(self, start: "Prior") -> "Prior":
         """What an operator has given instead, seen from the side that was known."""
-        if start.approach_axis is not None or self.approach_axis is None:
-            return start
-        return replace(
-            start,
-            approach_axis=self.approach_axis,
-            approach_half_angle_deg=self.approach_half_angle_deg,
-        )
+        return start.with_cones(self.cones)
+
+    def with_cones(self, usual: Mapping[str, ViewCone]) -> "Prior":
+        """With these cones for bones of which it knows neither a cone nor a pose."""
+        new = {bone: cone for bone, cone in usual.items() if bone not in self.left_from_bone}
+        return replace(self, cones={**new, **self.cones})
 
     def picks_of(self, bone: str) -> tuple[Pick, ...]:
         """Those of a bone; none when they are too few for a pose."""
@@ -86,13 +84,9 @@ class Prior:
         return (
             bone in self.left_from_bone
             or self.box is not None
-            or self.axis_for(bone) is not None
+            or bone in self.cones
             or bool(self.picks_of(bone))
         )
-
-    def axis_for(self, bone: str) -> FloatArray | None:
-        """The approach axis in a bone's coordinates: known for the femur only."""
-        return self.approach_axis if bone == "femur" else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,12 +126,16 @@ class Plan:
     # bone -> its edges from all around, where they were built beforehand; not in the digest,
     # because they follow from the bones.
     aspects: Mapping[str, AspectGraph] = field(default_factory=dict)
+    # bone -> from where the cameras usually see it; not in the digest, because a first registration
+    # starts there and its answer is judged like every other.
+    approaches: Mapping[str, ViewCone] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
         object.__setattr__(self, "targets", MappingProxyType(dict(self.targets)))
         object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
         object.__setattr__(self, "aspects", MappingProxyType(dict(self.aspects)))
+        object.__setattr__(self, "approaches", MappingProxyType(dict(self.approaches)))
         _check_content(self)
         if not self.digest:
             object.__setattr__(self, "digest", _digest(self))

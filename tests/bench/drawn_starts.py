@@ -5,7 +5,7 @@ usage: python -m tests.bench.drawn_starts [FOLDER] [--seeds N] [--first SEED] [-
 One frame of each of N simulated knees, and every frame of the recorded sequences in FOLDER
 (default: NAVAPP_DATA), registered on its own from a box around what is seen of the femur and from
 three picked landmarks. Sides of the box and picks are off by 6 px, landmarks in the plan by 3 mm
-(one standard deviation each). No approach cone is given but where the row says so. Recorded bones
+(one standard deviation each). The cone is the one that `navapp plan` writes. Recorded bones
 have no landmarks: three vertices that are seen, far from each other, stand for them.
 """
 
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from navapp.preop import build_aspects
+from navapp.preop.usual_approaches import usual_approaches
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import Pick, Prior
 from tests.bench.first_registration import Answer, Case, Frame, cases, registered, row
@@ -38,7 +39,9 @@ def main() -> int:
     found: dict[tuple[str, str], list[Answer]] = {}
     rng = np.random.default_rng(91)
     for case in cases(Path(options.folder), options.first, options.seeds):
-        aspects = build_aspects(case.bone, case.axis, case.half_angle_deg)
+        cone = usual_approaches([case.bone.name])[case.bone.name]
+        assert cone.axis is not None
+        aspects = build_aspects(case.bone, cone.axis, cone.half_angle_deg)
         plain = BimccTracker(case.rig, case.bone)
         with_cone = BimccTracker(case.rig, case.bone, aspects=aspects)
         for tracker in (plain, with_cone):
@@ -63,7 +66,9 @@ def ways(case: Case, frame: Frame, rng: np.random.Generator) -> Iterator[tuple[s
     """Name and prior of each way to start."""
     box = drawn_box(frame.visible, rng)
     yield "box", Prior(box=box)
-    yield "box, cone", Prior({}, case.axis, case.half_angle_deg, box)
+    cones = usual_approaches([case.bone.name])
+    yield "box, usual cone", Prior(cones=cones, box=box)
+    yield "usual cone", Prior(cones=cones)
     picks = pick(case, frame, rng)
     if picks:
         yield "three picks", Prior(picks=picks)

@@ -29,6 +29,7 @@ import numpy as np
 
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry import RigidTransform, read_rig
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.preop import build_aspects
@@ -148,7 +149,7 @@ def ways(case: Case, frame: Frame, number: int) -> Iterator[tuple[str, Prior]]:
     """Name and prior of each way to start."""
     box = drawn_box(frame.visible, number)
     for place, box_or_none in (("box", box), ("view", None)):
-        prior = Prior({}, case.axis, case.half_angle_deg, box_or_none)
+        prior = Prior({}, {"femur": ViewCone(case.axis, case.half_angle_deg)}, box_or_none)
         yield f"{place} + aspects", prior
         yield f"{place}", prior
     yield "from the true pose", Prior({"femur": frame.true})

@@ -10,12 +10,13 @@ from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.commands import EnterStage, Register
 from navapp.control.rules import why_refused
 from navapp.errors import SequenceError
+from navapp.geometry.directions import ViewCone
 from navapp.values import Pick, Prior
 from tests.control.fakes import Bench, a_plan, a_pose
 
 BOX = (300, 120, 400, 380)
 AXIS = np.array([0.0, 0.6, 0.8])
-KNOWN = Prior({"femur": a_pose(), "tibia": a_pose("tibia")}, AXIS, 25.0)
+KNOWN = Prior({"femur": a_pose(), "tibia": a_pose("tibia")}, {"femur": ViewCone(AXIS, 25.0)})
 
 
 def test_the_bone_is_searched_for_in_the_box_and_seen_from_the_known_side() -> None:
@@ -26,8 +27,8 @@ def test_the_bone_is_searched_for_in_the_box_and_seen_from_the_known_side() -> N
     (start,) = bench.script.priors
     assert start.box == BOX
     assert not start.left_from_bone
-    np.testing.assert_array_equal(start.approach_axis, AXIS)
-    assert start.approach_half_angle_deg == 25.0
+    np.testing.assert_array_equal(start.cones["femur"].axis, AXIS)
+    assert start.cones["femur"].half_angle_deg == 25.0
     assert any("in the box that was drawn" in event.text for event in bench.events)
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from navapp.control.stages import STAGES
 from navapp.control.trackers import Trackers
+from navapp.geometry.directions import ViewCone
 from navapp.resection import FaceMeter
 from navapp.tracking import TrackerSettings
 from navapp.values import (
@@ -31,7 +32,7 @@ from tests.control.fakes import (
 )
 
 OPENING = STAGES[0]
-FROM_ABOVE = Prior(approach_axis=(0.0, 0.0, 1.0), approach_half_angle_deg=30.0)
+FROM_ABOVE = Prior(cones={"femur": ViewCone(np.array([0.0, 0.0, 1.0]), 30.0)})
 
 
 class Maker:

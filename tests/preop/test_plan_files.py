@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.errors import PlanError
+from navapp.geometry.directions import ViewCone
 from navapp.geometry.ply import read_ply
 from navapp.preop import PlanOrigin, plan_files, read_origin, read_plan, write_plan
 from navapp.values import BoneModel, Plan
@@ -359,3 +360,13 @@ def test_a_plan_of_another_format_is_refused(written, change):
     edit(written, change)
     with pytest.raises(PlanError, match="another format"):
         read_plan(written)
+
+
+def test_usual_approaches_come_back_and_do_not_change_what_a_plan_is(tmp_path) -> None:
+    cone = ViewCone(np.array([0.0, -0.5, -0.87]), 40.0)
+    plan = make_plan(approaches={"femur": cone})
+    assert plan.digest == make_plan().digest
+    write_plan(tmp_path / "plan", plan)
+    again = read_plan(tmp_path / "plan").approaches
+    np.testing.assert_allclose(again["femur"].axis, cone.axis, atol=1e-15)
+    assert again["femur"].half_angle_deg == 40.0

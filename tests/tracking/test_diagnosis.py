@@ -89,7 +89,7 @@ def test_swapped_pictures_are_called_so_at_the_first_registration() -> None:
 
 
 def test_swapped_pictures_are_called_so_without_a_pose_to_start_from() -> None:
-    found = registered(is_swapped=True, prior=Prior({}, None, 180.0, (500, 200, 300, 300)))
+    found = registered(is_swapped=True, prior=Prior(box=(500, 200, 300, 300)))
     assert found[0].verdict.reasons[0] is Reason.PICTURES_SWAPPED
 
 

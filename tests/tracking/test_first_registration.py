@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from navapp.geometry.directions import ViewCone
 from navapp.preop import build_aspects
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import Prior, Status
@@ -68,7 +69,9 @@ def test_the_first_registration_finds_the_bone_without_a_pose(is_in_box: bool) -
     a = room()
     axis, half_angle_deg = cone()
     frame, told = a.frames[0], []
-    prior = Prior({}, axis, half_angle_deg, drawn_box(a) if is_in_box else None)
+    prior = Prior(
+        {}, {"femur": ViewCone(axis, half_angle_deg)}, drawn_box(a) if is_in_box else None
+    )
     found = tracker_with_aspects().register(frame.left, frame.right, prior, GOAL, told.append)
     assert a.error_mm(found[0].left_from_bone, frame) < 1.0
     assert found[0].verdict.status is Status.OK
@@ -81,7 +84,7 @@ def test_the_first_registration_finds_the_bone_without_a_pose(is_in_box: bool) -
 def test_a_box_alone_will_do_on_grey_pictures_and_without_aspects() -> None:
     a = room(is_grey=True, n_frames=2)
     frame = a.frames[0]
-    prior = Prior({}, None, 180.0, drawn_box(a))
+    prior = Prior(box=drawn_box(a))
     found = a.tracker.register(frame.left, frame.right, prior, GOAL)
     assert a.error_mm(found[0].left_from_bone, frame) < 1.0
 
@@ -91,7 +94,7 @@ def test_a_box_beside_the_bone_gives_no_ok(box: tuple[int, int, int, int]) -> No
     a = room()
     frame = a.frames[0]
     axis, half_angle_deg = cone()
-    prior = Prior({}, axis, half_angle_deg, box)
+    prior = Prior({}, {"femur": ViewCone(axis, half_angle_deg)}, box)
     found = tracker_with_aspects().register(frame.left, frame.right, prior, GOAL)
     assert found
     assert all(one.verdict.status is not Status.OK for one in found)

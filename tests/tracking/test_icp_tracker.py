@@ -137,7 +137,7 @@ def test_out_of_view_it_is_lost_and_said_so(n_lost: int) -> None:
 
 def test_a_first_registration_needs_a_pose() -> None:
     frame = room().frames[0]
-    prior = Prior({}, None, 180.0, (500, 200, 300, 300))
+    prior = Prior(box=(500, 200, 300, 300))
     assert tracker().register(frame.left, frame.right, prior, GOAL) == []
 
 

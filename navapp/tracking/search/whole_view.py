@@ -46,8 +46,7 @@ class WholeViewSearch:
         found = match_surface(pair, self._meter.band_px, fills=False).disparity
         stride_px = max(1, int(np.ceil((found.n_matched / _MOST_POINTS) ** 0.5)))
         scene = Scene.from_stereo(found.reproject(geometry, stride_px), FREE_CORRELATION_PX)
-        axis = prior.axis_for(model.bone.name)
-        cone = ViewCone() if axis is None else ViewCone(axis, prior.approach_half_angle_deg)
+        cone = prior.cones.get(model.bone.name, ViewCone())
         return find_initial(pair, scene, model, cone, self._aspects, on_progress=on_progress)
 
     def _box(self, prior: Prior) -> Box | None:
