@@ -84,7 +84,7 @@ def compute_information(
     seen_mm, lever_mm = find_weighted_centre(pairs, n)
     H, g = sum_plane_system(pairs, n, seen_mm, lever_mm)
     eigenvalues, vectors = np.linalg.eigh(H)
-    is_free = eigenvalues < FREE_FRACTION * eigenvalues[-1]
+    is_free = _are_free(eigenvalues)
     # (rotation x lever, translation) of the points become (translation, rotation) of the pose.
     turned = np.zeros((6, 6))
     turned[:3, 3:] = turned[3:, :3] = pose.rotation
@@ -104,6 +104,32 @@ def compute_information(
     covariance = n_sharing_errors * change @ np.linalg.inv(H) @ change.T
     size_sigma_mm = math.sqrt(n_sharing_errors * size_variance)
     return Information(0.5 * (covariance + covariance.T), free, size_mm, size_sigma_mm)
+
+
+def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:
+    """(n,) directions that are not fixed, of the ascending eigenvalues of an information."""
+    is_free: NDArray[np.bool_] = eigenvalues < FREE_FRACTION * eigenvalues[-1]
+    return is_free
+
+
+def leaves_direction_free(
+    covariance: FloatArray, centre_mm: FloatArray, seen_mm: FloatArray
+) -> bool:
+    """Whether some direction of a pose is not fixed, as `compute_information` judges it.
+
+    Args:
+        covariance: (6, 6) of the public twist about `centre_mm`.
+        centre_mm: (3,) the model's centre.
+        seen_mm: (N, 3) the seen surface, in the same frame.
+    """
+    middle_mm = seen_mm.mean(axis=0)
+    lever_mm = math.sqrt(((seen_mm - middle_mm) ** 2).sum(axis=1).mean())
+    x, y, z = middle_mm - centre_mm
+    about_seen = np.eye(6)
+    about_seen[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    about_seen[3:] *= lever_mm
+    spread = np.linalg.eigvalsh(about_seen @ covariance @ about_seen.T)
+    return bool(_are_free(1.0 / np.maximum(spread[::-1], np.finfo(float).tiny)).any())
 
 
 def _name_axis(vector: FloatArray) -> str:
@@ -139,6 +165,7 @@ def join(
     kernel_sigmas: float,
     block: ResidualBlock,
     centre_mm: FloatArray,
+    seen_mm: FloatArray,
     noise_variance_ratio: float = 1.0,
 ) -> PoseEstimate:
     """A pose that was fitted to a surface, moved to what it and a further block say together.
@@ -148,11 +175,13 @@ def join(
         kernel_sigmas: width of the kernel it was fitted with, in sigma.
         block: linearised at that pose.
         centre_mm: (3,) the model's centre at that pose, in the camera's frame.
+        seen_mm: (N, 3) the surface that it was fitted to, in that frame.
         noise_variance_ratio: variance that the surface's noise has, over the one that it claims.
 
     Returns:
         The surface's pose when the block says too little or pulls too far away; with the reason
         that the cues disagree when too much of the block is further off than the estimate allows.
+        A direction that the surface leaves free and the block fixes is no longer told as free.
 
     Both blocks claim a noise and show one in their residuals. The pose is found with the noise they
     show, so that a block that claims too much of itself does not outweigh one that claims too
@@ -178,7 +207,10 @@ def join(
     if step @ surface @ step > _APART:
         return alone
     pose = estimate.camera_from_bone.move(step[:6], centre_mm)
-    return replace(estimate, camera_from_bone=pose, covariance=0.5 * (covariance + covariance.T))
+    covariance, reasons = 0.5 * (covariance + covariance.T), estimate.reasons
+    if Reason.DEGENERATE in reasons and not leaves_direction_free(covariance, centre_mm, seen_mm):
+        reasons = tuple(reason for reason in reasons if reason is not Reason.DEGENERATE)
+    return replace(estimate, camera_from_bone=pose, covariance=covariance, reasons=reasons)
 
 
 def _solve_joined(

@@ -68,7 +68,10 @@ class OutlineMeter:
             return fit
         block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
-        joined = join(estimate, MODEL_SETTINGS.n_sigmas, block, centre_mm, noise_variance_ratio)
+        seen_mm = fit.measured.cloud.points_mm
+        joined = join(
+            estimate, MODEL_SETTINGS.n_sigmas, block, centre_mm, seen_mm, noise_variance_ratio
+        )
         return replace(fit, estimate=joined)
 
     def block(

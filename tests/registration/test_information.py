@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from navapp.registration import RegistrationModel, Scene, fit_bimcc
-from navapp.registration.information import compute_information
+from navapp.registration.information import compute_information, leaves_direction_free
 from navapp.registration.pairing_kernels import Pairs, make_pairs
 from navapp.registration.step_kernels import weigh
 from tests.reference import bimcc_reference as reference
@@ -98,6 +98,23 @@ def test_a_bone_and_a_bowl_leave_nothing_free_or_a_turn() -> None:
     free = compute_information(*pairs_on(bowl.vertices_mm, bowl.normals), POSE, CENTRE, 1.0).free
     assert len(free) == 1
     np.testing.assert_allclose(np.abs(free[0, 3:] @ AXES[2]), 1.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("mesh", [blob_mesh(), grid_mesh(lambda x, y: 0.02 * (x * x + y * y), 30)])
+def test_a_covariance_leaves_free_what_the_pairs_leave_free(mesh) -> None:
+    # So that the inverse exists whatever the surface leaves free.
+    normals = mesh.normals + np.random.default_rng(2).normal(0.0, 0.03, mesh.normals.shape)
+    found = compute_information(*pairs_on(mesh.vertices_mm, normals), POSE, CENTRE, 1.0)
+    seen_mm = POSE.rotation @ mesh.vertices_mm.T
+    centre_mm = POSE.rotation @ CENTRE
+    covariance = found.covariance
+    assert leaves_direction_free(covariance, centre_mm, seen_mm.T) == found.is_degenerate
+    # The turn about its own axis that a bowl leaves free is fixed by whatever knows of it.
+    information = np.linalg.inv(covariance)
+    axis = POSE.rotation[:, 2]
+    turn = np.concatenate([np.zeros(3), axis])
+    fixed = information + 0.05 * np.trace(information[3:, 3:]) * np.outer(turn, turn)
+    assert not leaves_direction_free(np.linalg.inv(fixed), centre_mm, seen_mm.T)
 
 
 def test_a_single_point_fixes_one_direction_of_six() -> None:

@@ -14,7 +14,7 @@ from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.frame import Fit
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import Measurement
-from navapp.values import DisparityMap, Origin, PoseEstimate, SurfaceCloud
+from navapp.values import DisparityMap, Origin, PoseEstimate, Reason, SurfaceCloud
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
 from tests.views import project_box
 
@@ -103,6 +103,20 @@ def test_joined_with_a_vague_surface_the_pose_is_drawn_to_the_truth() -> None:
     assert error_mm(joined.pose) < 0.5 * error_mm(OFF)
     assert np.trace(joined.estimate.covariance) < np.trace(fit.estimate.covariance)
     assert joined.measured is fit.measured
+
+
+def test_a_direction_that_the_surface_leaves_free_and_the_outline_fixes_is_not_free() -> None:
+    fit = fit_at(OFF)
+    seen = SurfaceCloud(
+        OFF.apply(femur_for_registration().points_mm), np.empty(0), np.empty(0), np.empty((0, 3))
+    )
+    # Along the bone the surface says a fiftieth of what it says across.
+    sigmas = SIGMAS * [1.0, 50.0, 1.0, 1.0, 1.0, 1.0]
+    estimate = replace(fit.estimate, covariance=np.diag(sigmas**2)).with_reason(Reason.DEGENERATE)
+    free = Fit(estimate, replace(fit.measured, cloud=seen))
+    assert meter().join(pair(), free, None).estimate.reasons == ()
+    dark = replace(pair(), left=0 * pair().left, right=0 * pair().right)
+    assert meter().join(dark, free, None).estimate.reasons == (Reason.DEGENERATE,)
 
 
 def test_without_bone_inside_or_with_something_nearer_beside_nothing_counts() -> None:
