@@ -89,6 +89,7 @@ endif
 	@# Until the bone is followed: what is compiled later stops the first session for seconds.
 	@$(BIN)/navapp --quiet --config $(VENV)/empty.toml run --headless --frames 14
 	@$(BIN)/navapp --quiet --config $(VENV)/empty.toml run --headless --mirror --frames 14
+	@$(BIN)/python -c 'from navapp.ui.pictures.graphics import compile_encoders as c; c()'
 	@rm -f $(VENV)/.stamp-* && touch $@
 
 bench: setup    ## accuracy on recorded operations (data in NAVAPP_DATA)

@@ -41,9 +41,10 @@ from navapp.ui.actions import (
     is_possible,
 )
 from navapp.ui.gates_page import REASONS, GatesPage, condition_of_key
+from navapp.ui.help_page import HelpPage
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
-from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
+from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
 from navapp.ui.picks_page import PicksPage, Place
 from navapp.ui.pictures.graphics import Graphics, Wish, find_graphics
@@ -188,9 +189,10 @@ class NavigationApp(QuietApp):
 
     def _toggle_near(self) -> None:
         """The region around the bone, or the whole picture."""
-        is_near = self.painter is None if self._view.is_near is None else self._view.is_near
+        picture, is_near = self.screen_stack[0].query_one(PictureView), self._view.is_near
+        is_near = not picture.has_pixels if is_near is None else is_near
         self._view = replace(self._view, is_near=not is_near)
-        self.screen_stack[0].query_one(PictureView).show(self._view)
+        picture.show(self._view)
 
     def on_start_chosen(self, message: StartChosen) -> None:
         """Search for the bone where an operator has drawn or picked it."""
@@ -318,7 +320,9 @@ def run_app(
         graphics = find_graphics(pictures, os.environ)
         with own_terminal(log_path):
             symbols = choose_symbols(getattr(sys.__stdout__, "encoding", None), os.environ)
-            told = (*hints, *([] if graphics.encoder else [f"pictures: {graphics.words}"]))
+            if symbols.is_ascii and not graphics.has_pixels:
+                graphics = Graphics(words=graphics.words)
+            told = (*hints, *(() if graphics.has_pixels else (f"pictures are {graphics.words}",)))
             app = NavigationApp(session, title, symbols=symbols, graphics=graphics, hints=told)
             code = asyncio.run(drive(app))
             failure = app.failure

@@ -1,4 +1,4 @@
-"""Pages over the main screen: help, devices, events, and the question before quitting."""
+"""Pages over the main screen: devices, events, and the question before quitting."""
 
 import dataclasses
 import textwrap
@@ -11,59 +11,12 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from navapp.ui.actions import ACTION_OF_NAME, ACTIONS, is_possible
+from navapp.ui.actions import ACTION_OF_NAME
 from navapp.ui.devices_panel import format_device_line
 from navapp.ui.event_list import format_event_line
-from navapp.ui.layers_page import OverlayLegend
-from navapp.ui.pictures.picture_view import NOTICE
 from navapp.ui.screens import PageScreen, ViewScreen
 from navapp.ui.text_view import TextView
 from navapp.ui.view import View
-
-# The first of several actions -> their keys and what they do, in one line.
-_SHARED = {
-    "stage-1": ("1 - 5", "go to that stage"),
-    "nudge-left": ("arrows", "check of the mirror: move the cross; SHIFT: faster"),
-}
-
-
-class KeyTable(TextView):
-    """All actions with their keys."""
-
-    def build(self, view: View, width: int, height: int) -> list[Content]:
-        """A line an action; the five stages share one, and so do the arrows."""
-        lines = []
-        for action in ACTIONS:
-            key, text = action.key_label, action.description
-            is_now = is_possible(action, view.snapshot, view.is_silent)
-            if action.name in _SHARED:
-                key, text = _SHARED[action.name]
-                is_now = is_now or action.name == "stage-1"
-            elif action.name.startswith(("stage-", "nudge-")):
-                continue
-            text_style = "$foreground" if is_now else "$text-muted"
-            note = "" if is_now else "  (not now)"
-            lines.append(
-                Content.assemble((f" {key:>7}  ", "bold $primary"), (text + note, text_style))
-            )
-        lines.append(Content.assemble((f" {'ctrl+p':>7}  ", "bold $primary"), "find a command"))
-        return [*lines, Content(""), Content.styled(f" {view.title}: {NOTICE}", "$text-muted")]
-
-
-class HelpPage(PageScreen):
-    """All keys, from the action table, and the legend of the overlay."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("question_mark", "dismiss", "back", show=False)
-    ]
-
-    page_title, keys = "keys", " back  arrows, PgDn: the legend of the overlay"
-    container = VerticalScroll
-
-    def compose_page(self) -> ComposeResult:
-        """Keys and legend."""
-        yield KeyTable("keys")
-        yield OverlayLegend("legend")
 
 
 class DeviceDetails(TextView):

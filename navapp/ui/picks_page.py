@@ -204,7 +204,7 @@ class PicksPage(PageScreen):
         if 0 not in magnifier.room:
             shape = self._magnified(magnifier)
             magnified = magnify(picture, self._cursor, shape, listed.picks)
-            if magnifier.is_painted:
+            if magnifier.has_pixels:
                 magnified = magnified.repeat(_ENLARGED, axis=0).repeat(_ENLARGED, axis=1)
             magnifier.show_picture(magnified, ramp)
 
@@ -212,7 +212,7 @@ class PicksPage(PageScreen):
     def _magnified(magnifier: Picture) -> Place:
         """Width and height, px, of what the magnifier shows: a half block or a square for each."""
         width, height = magnifier.room
-        if not magnifier.is_painted:
+        if not magnifier.has_pixels:
             return width, height
         return max(1, width // _ENLARGED), max(1, height // _ENLARGED)
 

@@ -1,7 +1,7 @@
 """Pictures a second, and processor time of each, that this terminal takes.
 
 usage, in the terminal that is to be measured: python -m tests.bench.terminal_pictures FILE
-    [--pictures auto|kitty|sixel|blocks] [--size 960x540] [--seconds S]
+    [--pictures auto|kitty|sixel|blocks] [--compressed] [--size 960x540] [--seconds S]
 
 Simulated pictures of the moving leg, with noise, are painted as the operator's screen paints them,
 one as soon as the terminal has taken the last. FILE gets one line.
@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 import time
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from navapp.devices import open_live
 from navapp.ui.pictures.fitting import put_on_canvas
 from navapp.ui.pictures.graphics import find_graphics
 from navapp.ui.pictures.halfblocks import compute_cell_codes, make_row_strip
+from navapp.ui.pictures.kitty import KittyEncoder
 from navapp.ui.pictures.painter import Painter, PictureText
 
 _N_PICTURES, _WARM = 8, 5
@@ -58,9 +60,15 @@ def main() -> None:
     parser.add_argument("--pictures", default="auto")
     parser.add_argument("--size", default="960x540")
     parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument(
+        "--compressed", action="store_true", help="kitty as through ssh, without shared memory"
+    )
     options = parser.parse_args()
     pictures = record_pictures()
     graphics, terminal = find_graphics(options.pictures, os.environ), Terminal()
+    if options.compressed:
+        encoder = KittyEncoder(is_local=False)
+        graphics = replace(graphics, encoder=encoder, words="kitty, compressed")
     width, height = map(int, options.size.split("x"))
     if graphics.encoder is None:
         told = measure_blocks(pictures, options.seconds)

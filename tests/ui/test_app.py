@@ -33,9 +33,10 @@ from navapp.control.states import (
     Snapshot,
 )
 from navapp.ui.app import POLLS_PER_S, POLLS_PER_TEXT, SILENT_AFTER_POLLS, NavigationApp
+from navapp.ui.help_page import HelpPage
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen, SmallNotice
-from navapp.ui.pages import DevicesPage, EventsPage, HelpPage, QuitQuestion
+from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
 from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.pose_panel import PosePanel
 from tests.ui import snapshots

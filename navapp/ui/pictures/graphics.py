@@ -15,6 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.ui.pictures.blocks import CELL_PX, BlockEncoder
 from navapp.ui.pictures.kitty import KittyEncoder, ask_whether_drawn
 from navapp.ui.pictures.sixel import SixelEncoder
 from navapp.ui.pictures.sixel_kernels import N_COLOURS
@@ -43,6 +44,11 @@ class Encoder(Protocol):
         ...
 
     @property
+    def has_pixels(self) -> bool:
+        """It draws pixels, not half blocks."""
+        ...
+
+    @property
     def is_busy(self) -> bool:
         """The terminal has not taken the last picture yet."""
         ...
@@ -64,9 +70,14 @@ class Encoder(Protocol):
 class Graphics:
     """How pictures come to the screen."""
 
-    encoder: Encoder | None = None  # None: as half blocks
+    encoder: Encoder | None = None  # None: half blocks that Textual writes
     cell_px: tuple[int, int] = (0, 0)  # width and height of a character
     words: str = "half blocks"  # for people; with the reason where they are half blocks
+
+    @property
+    def has_pixels(self) -> bool:
+        """They are drawn in pixels."""
+        return self.encoder is not None and self.encoder.has_pixels
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +91,13 @@ class Answers:
     cell_px: tuple[int, int] | None = None  # None: not told
 
 
+def compile_encoders() -> None:
+    """Compile what pictures take, so that nobody waits for it at the first one."""
+    picture = np.zeros((2, 1, 3), np.uint8)
+    for encoder in (BlockEncoder(is_true_colour=True), SixelEncoder()):
+        encoder.encode(0, picture, 1, 1)
+
+
 def find_graphics(wish: Wish, environment: Mapping[str, str]) -> Graphics:
     """Ask the terminal at the standard input and output; at most a second.
 
@@ -88,13 +106,13 @@ def find_graphics(wish: Wish, environment: Mapping[str, str]) -> Graphics:
         environment: variables of the process.
     """
     if wish == "blocks":
-        return Graphics(words="half blocks, as configured")
+        return _choose_blocks("as configured", environment)
     if environment.get("TERM", "dumb") in _SIMPLE_TERMINALS:
-        return Graphics(words="half blocks: this terminal draws no pictures")
-    return choose_graphics(wish, ask_terminal(), is_in_tmux="TMUX" in environment)
+        return _choose_blocks("this terminal draws no pictures", environment)
+    return choose_graphics(wish, ask_terminal(), environment)
 
 
-def choose_graphics(wish: Wish, answers: Answers, *, is_in_tmux: bool) -> Graphics:
+def choose_graphics(wish: Wish, answers: Answers, environment: Mapping[str, str]) -> Graphics:
     """The best way that was wished and answered for."""
     cell_px = answers.cell_px
     if cell_px is not None and wish in ("auto", "kitty"):
@@ -108,11 +126,21 @@ def choose_graphics(wish: Wish, answers: Answers, *, is_in_tmux: bool) -> Graphi
         return Graphics(SixelEncoder(), cell_px, "sixel")
     if answers.has_sixel and not has_colours:
         why = f"the terminal has {n_registers} colours for sixel, {N_COLOURS} are needed"
-    elif is_in_tmux:
+    elif "TMUX" in environment:
         why = "tmux passes no pictures on"
     else:
         why = "this terminal draws no pictures"
-    return Graphics(words=f"half blocks: {why}")
+    return _choose_blocks(why, environment)
+
+
+def _choose_blocks(why: str, environment: Mapping[str, str]) -> Graphics:
+    """Half blocks, written past Textual where the terminal has enough colours."""
+    words = f"half blocks: {why}"
+    is_true_colour = environment.get("COLORTERM", "").lower() in ("truecolor", "24bit")
+    has_colours = is_true_colour or "256color" in environment.get("TERM", "")
+    if "NO_COLOR" in environment or not has_colours:
+        return Graphics(words=words)
+    return Graphics(BlockEncoder(is_true_colour=is_true_colour), CELL_PX, words)
 
 
 def ask_terminal() -> Answers:

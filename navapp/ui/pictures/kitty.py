@@ -51,6 +51,7 @@ class KittyEncoder:
         is_local: the terminal can read this computer's shared memory, and removes what it has read.
     """
 
+    has_pixels = True
     is_scaled_by_terminal = True
 
     def __init__(self, *, is_local: bool) -> None:

@@ -81,13 +81,19 @@ class Painter:
         self._sent.sent_s = 0.0
 
     @property
+    def has_pixels(self) -> bool:
+        """It draws pixels, not half blocks."""
+        return self._encoder.has_pixels
+
+    @property
     def scale(self) -> float:
         """Of pictures, as against the room there is."""
         return self._scale.value
 
     def find_place(self, region: Region) -> Region:
         """The cells that a picture takes of those there are: fewer where pixels are dear."""
-        scale = 1.0 if self._encoder.is_scaled_by_terminal else self._scale.value
+        is_kept = self._encoder.is_scaled_by_terminal or not self.has_pixels
+        scale = 1.0 if is_kept else self._scale.value
         width, height = max(1, int(scale * region.width)), max(1, int(scale * region.height))
         x = region.x + (region.width - width) // 2
         return Region(x, region.y + (region.height - height) // 2, width, height)

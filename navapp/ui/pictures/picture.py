@@ -51,16 +51,16 @@ class Picture(Widget):
             self._redraw()
 
     @property
-    def is_painted(self) -> bool:
-        """The terminal paints it, pixel by pixel."""
-        return self._painter is not None
+    def has_pixels(self) -> bool:
+        """It is seen pixel by pixel, not as half blocks."""
+        return self._painter is not None and self._painter.has_pixels
 
     def as_seen(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """A picture at the size at which it will be seen, so that lines can be drawn into it."""
         width, height = self.room
         if width < 1 or height < 1:
             return picture
-        finer = 1 if self.is_painted else _DRAWN_FINER
+        finer = 1 if self.has_pixels else _DRAWN_FINER
         width, height = fit_size(picture.shape, finer * width, finer * height)
         return picture if width > picture.shape[1] else resize(picture, width, height)
 

@@ -58,7 +58,7 @@ class PictureView(Picture):
     def _choose_part(self, view: View) -> Box | None:
         """Half blocks show the region around the bone, pictures the whole, unless a key says so."""
         snapshot, (width, height) = view.snapshot, self.room
-        is_near = not self.is_painted if view.is_near is None else view.is_near
+        is_near = not self.has_pixels if view.is_near is None else view.is_near
         bone, picture = snapshot.bone_box, snapshot.picture
         if not is_near or bone is None or picture is None or snapshot.shows_eye or not height:
             return None

@@ -25,6 +25,7 @@ def _define_colours() -> str:
 class SixelEncoder:
     """Writes pictures as sixels in 216 colours, dithered."""
 
+    has_pixels = True
     # The terminal draws pixel for pixel.
     is_scaled_by_terminal = False
     # What was sent is drawn when it has been read.

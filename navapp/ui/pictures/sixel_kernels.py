@@ -4,12 +4,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.ui.pictures.number_kernels import write_number
+
 # 6 x 6 x 6 colours; the registers of a VT340 are fewer, those of its emulators are more.
 N_LEVELS = 6
 N_COLOURS = N_LEVELS**3
 _STEP = 255 // (N_LEVELS - 1)
 _BAND = 6
-_RUN, _EMPTY, _COLOUR, _RETURN, _NEXT_BAND, _ZERO = (ord(one) for one in "!?#$-0")
+_RUN, _EMPTY, _COLOUR, _RETURN, _NEXT_BAND = (ord(one) for one in "!?#$-")
 # Bayer's ordered dither 4 x 4: a sixteenth of a step each.
 _DITHER = (
     np.array([[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]]) * _STEP // 16
@@ -90,7 +92,7 @@ def _write_colour(
 ) -> int:
     """One colour's sixels of one band, what lies between them empty."""
     text[n] = _COLOUR
-    n = _write_number(colour, text, n + 1)
+    n = write_number(colour, text, n + 1)
     written = 0
     k = 0
     while k < len(columns):
@@ -112,21 +114,9 @@ def _write_colour(
 def _write_run(character: int, count: int, text: NDArray[np.uint8], n: int) -> int:
     if count > 3:
         text[n] = _RUN
-        n = _write_number(count, text, n + 1)
+        n = write_number(count, text, n + 1)
         count = 1
     for _ in range(count):
         text[n] = character
         n += 1
-    return n
-
-
-@njit(cache=True, nogil=True)
-def _write_number(value: int, text: NDArray[np.uint8], n: int) -> int:
-    power = 1
-    while power * 10 <= value:
-        power *= 10
-    while power:
-        text[n] = _ZERO + value // power % 10
-        n += 1
-        power //= 10
     return n

@@ -31,11 +31,10 @@ TMUX = b"\x1b[?1;2c"
     ],
 )
 def test_the_best_is_chosen_that_was_answered_for(told: bytes, wish, words: str) -> None:
-    graphics = choose_graphics(wish, parse_answers(told), is_in_tmux=False)
+    graphics = choose_graphics(wish, parse_answers(told), {"TERM": "xterm-256color"})
     assert graphics.words == words
-    assert (graphics.encoder is None) == words.startswith("half blocks")
-    if graphics.encoder is not None:
-        assert graphics.cell_px in ((9, 18), (6, 13))
+    assert graphics.has_pixels != words.startswith("half blocks")
+    assert graphics.cell_px in (((9, 18), (6, 13)) if graphics.has_pixels else ((1, 2),))
 
 
 def test_a_terminal_of_level_4_does_not_draw_sixels_by_that() -> None:
@@ -43,7 +42,7 @@ def test_a_terminal_of_level_4_does_not_draw_sixels_by_that() -> None:
 
 
 def test_without_the_size_of_a_cell_nothing_can_be_placed() -> None:
-    graphics = choose_graphics("auto", Answers(has_kitty=True, has_sixel=True), is_in_tmux=True)
+    graphics = choose_graphics("auto", Answers(has_kitty=True, has_sixel=True), {"TMUX": "x"})
     assert graphics.encoder is None
     assert "tmux passes no pictures on" in graphics.words
 
@@ -52,3 +51,20 @@ def test_without_the_size_of_a_cell_nothing_can_be_placed() -> None:
 def test_some_terminals_are_not_asked(wish, term: str) -> None:
     # Under pytest there is no terminal that could be asked.
     assert find_graphics(wish, {"TERM": term}).encoder is None
+
+
+@pytest.mark.parametrize(
+    ("environment", "is_written_past_textual"),
+    [
+        ({"TERM": "screen-256color"}, True),
+        ({"TERM": "xterm", "COLORTERM": "truecolor"}, True),
+        ({"TERM": "xterm"}, False),
+        ({"TERM": "xterm-256color", "NO_COLOR": "1"}, False),
+    ],
+)
+def test_half_blocks_are_written_directly_where_there_are_colours(
+    environment: dict[str, str], is_written_past_textual: bool
+) -> None:
+    graphics = find_graphics("blocks", environment)
+    assert (graphics.encoder is not None) == is_written_past_textual
+    assert not graphics.has_pixels

@@ -14,6 +14,7 @@ class FakeEncoder:
 
     def __init__(self, *, is_scaled_by_terminal: bool = True) -> None:
         self.is_scaled_by_terminal, self.is_busy = is_scaled_by_terminal, False
+        self.has_pixels = True
         self.given: list[tuple[int, tuple[int, ...], int, int]] = []
 
     def encode(self, number: int, picture: np.ndarray, columns: int, rows: int) -> str:

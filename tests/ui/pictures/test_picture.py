@@ -30,6 +30,10 @@ class Canvas(Painter):
         self.shown: dict[int, tuple[np.ndarray, Region]] = {}
         self.is_full = False
 
+    @property
+    def has_pixels(self) -> bool:
+        return True
+
     def find_place(self, region: Region) -> Region:
         return region
 
