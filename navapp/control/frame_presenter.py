@@ -104,7 +104,17 @@ class FramePresenter:
         has_guides = snapshot.is_navigable or snapshot.is_candidate
         drawn = self._depth_marks.draw(video, foreground) if session.shows_depth else video
         plain = frame.left if has_guides else None
-        session.keep_picture(OperatorPicture(drawn, plain, left=frame.left))
+        residuals = self._draw_residuals(snapshot, foreground) if snapshot.is_candidate else None
+        session.keep_picture(OperatorPicture(drawn, plain, left=frame.left, residuals=residuals))
+
+    def _draw_residuals(self, snapshot: Snapshot, foreground: Foreground | None) -> Image | None:
+        """What a candidate is judged by beside its outline."""
+        pose = snapshot.left_from_bone
+        if pose is None or foreground is None:
+            return None
+        return self._composer.draw_residuals(
+            foreground, pose, snapshot.stage.bone, snapshot.bone_surface
+        )
 
     def _compose_mirror(self, snapshot: Snapshot, foreground: Foreground | None) -> Image:
         """Guides where the bone will be when their light is seen."""

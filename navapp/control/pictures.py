@@ -1,6 +1,7 @@
 """The pictures for the screen and for the display, from what the session knows."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,9 +9,12 @@ from numpy.typing import NDArray
 from navapp.control.mirror_error import MirrorError
 from navapp.control.states import SessionState, Snapshot
 from navapp.geometry.display_model_view import EyeView
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import FloatArray
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.overlay import LeftView, MirrorView, Scene, Viewpoint, compose_mirror, compose_video
+from navapp.overlay.residuals import draw_residuals, measure_residuals_mm
 from navapp.values import Foreground, OverlayMode, Plan, Reason, Status
 
 Image = NDArray[np.uint8]
@@ -24,6 +28,8 @@ class OperatorPicture:
     plain: Image | None = None  # the same without guides; None when it has none
     is_of_eye: bool = False  # what an eye sees in a simulated mirror
     left: Image | None = None  # the left picture that came with it, as it is
+    # of a candidate: how far the measured surface lies from the model.
+    residuals: Image | None = None
 
 
 class Composer:
@@ -38,6 +44,7 @@ class Composer:
     def __init__(self, rig: StereoRig, plan: Plan, eye_view: EyeView | None = None) -> None:
         self._plan = plan
         self._left_view = LeftView(rig)
+        self._geometry = rectifier_of(rig).geometry
         self._mirror_view = None if eye_view is None else MirrorView(eye_view, rig)
 
     @property
@@ -75,6 +82,26 @@ class Composer:
             cross_px = self._left_view.camera.project(point_mm[None])[0]
         return compose_video(left, scene, banner(snapshot), mark, cross_px)
 
+    def draw_residuals(
+        self,
+        foreground: Foreground,
+        left_from_bone: RigidTransform,
+        bone: str,
+        surface: TriangleMesh | None,
+    ) -> Image:
+        """How far the measured surface lies from a bone's model at a pose.
+
+        Args:
+            foreground: of that pose's frame.
+            left_from_bone: the pose.
+            bone: its name in the plan.
+            surface: what is left of it; None: all.
+        """
+        pose = self._geometry.rectified_from_left @ left_from_bone
+        seen = surface or _seen_surface(self._plan, bone)
+        residual_mm = measure_residuals_mm(foreground, pose, seen, self._geometry)
+        return draw_residuals(residual_mm, foreground.surroundings.picture)
+
     def compose_mirror(
         self, snapshot: Snapshot, foreground: Foreground | None, cross_px: FloatArray | None
     ) -> Image:
@@ -104,6 +131,12 @@ class Composer:
             is_guiding=snapshot.is_navigable,
             cross_px=cross_px if is_checkable else None,
         )
+
+
+@lru_cache(maxsize=3)
+def _seen_surface(plan: Plan, bone: str) -> TriangleMesh:
+    # Once, not with every frame.
+    return plan.bones[bone].make_seen_surface()
 
 
 def banner(snapshot: Snapshot) -> str:

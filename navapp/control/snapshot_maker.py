@@ -83,6 +83,7 @@ class SnapshotMaker:
             valid_ms=self.specification.overlay_valid_ms,
             pose_at_light=self._predict_pose(now_ns),
             picture=None if picture is None else picture.drawn,
+            residual_picture=None if picture is None else picture.residuals,
             bone_box=self._find_bone(tracked),
             picture_size_px=(rig.width, rig.height),
             left_picture=None if picture is None else picture.left,

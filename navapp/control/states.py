@@ -193,6 +193,8 @@ class Snapshot:
     plain_picture: NDArray[np.uint8] | None = None
     picture_size_px: tuple[int, int] = (0, 0)  # width and height of the left picture
     left_picture: NDArray[np.uint8] | None = None  # the newest one as it came
+    # (H, W, 3) BGR of a candidate: how far the measured surface lies from the model; None without.
+    residual_picture: NDArray[np.uint8] | None = None
     # where the stage's bone lies in the left picture, at the newest pose; None without one.
     bone_box: Box | None = None
     # of the stage's bone: what can be picked in that picture, (3,) mm in bone coordinates.

@@ -8,7 +8,7 @@ from navapp.ui.devices_panel import DevicesPanel
 from navapp.ui.event_list import EventList
 from navapp.ui.footer import KeyFooter
 from navapp.ui.line_panel import LinePanel
-from navapp.ui.pictures.picture_view import NOTICE, PictureView
+from navapp.ui.pictures.picture_view import NOTICE, PictureView, ResidualView
 from navapp.ui.pose_panel import PosePanel, format_navigable_line, format_reason_lines
 from navapp.ui.screens import ViewScreen
 from navapp.ui.stepper import StageStepper
@@ -51,6 +51,7 @@ class MainScreen(ViewScreen[None]):
             yield TitleLine()
             with Horizontal(id="middle"):
                 yield PictureView()
+                yield ResidualView()
                 with Vertical(id="panels"):
                     yield PosePanel()
                     yield LinePanel()

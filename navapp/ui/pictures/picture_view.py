@@ -56,9 +56,11 @@ class PictureView(Picture):
         self.show_picture(view.snapshot.picture, view.symbols.ramp, part)
 
     def _choose_part(self, view: View) -> Box | None:
-        """Half blocks show the region around the bone, pictures the whole, unless a key says so."""
+        """The region around the bone in half blocks and beside a candidate, unless a key says so."""
         snapshot, (width, height) = view.snapshot, self.room
-        is_near = not self.has_pixels if view.is_near is None else view.is_near
+        is_near = view.is_near
+        if is_near is None:
+            is_near = not self.has_pixels or snapshot.is_candidate
         bone, picture = snapshot.bone_box, snapshot.picture
         if not is_near or bone is None or picture is None or snapshot.shows_eye or not height:
             return None
@@ -67,3 +69,17 @@ class PictureView(Picture):
             return None
         self._bone_part = choose_part(bone, size_px, width / height, self._bone_part)
         return self._bone_part
+
+
+class ResidualView(Picture):
+    """Beside a candidate's outline: how far the measured surface lies from the model."""
+
+    def __init__(self) -> None:
+        super().__init__("residuals")
+        self.border_title = "measured: orange outside the model, blue inside"
+
+    def show(self, view: View) -> None:
+        """There is one while a candidate waits."""
+        picture = view.snapshot.residual_picture
+        self.set_class(picture is not None, "-known")
+        self.show_picture(picture, view.symbols.ramp)

@@ -192,3 +192,23 @@ def test_half_blocks_show_the_region_around_the_bone_and_say_so() -> None:
         assert "around the bone" not in str(view.border_title)
 
     play(script)
+
+
+@pytest.mark.parametrize(("size", "is_shown"), [((160, 48), True), ((80, 24), False)])
+def test_residuals_lie_beside_a_candidate_where_there_is_room(
+    size: tuple[int, int], is_shown: bool
+) -> None:
+    async def script(app: PaintedApp, pilot: Pilot[Any]) -> None:
+        app.session.current = snapshots.review(picture=LARGE, residual_picture=LARGE[:300, :300])
+        app.poll()
+        await pilot.pause()
+        app.poll()
+        await pilot.pause()
+        assert len(app.painted) == 1 + is_shown
+        app.show()
+        await pilot.pause()
+        app.show()
+        await pilot.pause()
+        assert len(app.painted) == 1
+
+    play(script, size)
