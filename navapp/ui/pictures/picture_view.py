@@ -56,7 +56,7 @@ class PictureView(Picture):
         self.show_picture(view.snapshot.picture, view.symbols.ramp, part)
 
     def _choose_part(self, view: View) -> Box | None:
-        """The region around the bone in half blocks and beside a candidate, unless a key says so."""
+        """The region around the bone in half blocks and for a candidate, unless a key says so."""
         snapshot, (width, height) = view.snapshot, self.room
         is_near = view.is_near
         if is_near is None:
