@@ -108,8 +108,14 @@ def _with_options(configuration: "Configuration", options: argparse.Namespace) -
     """The configuration with the command line's words in it."""
     camera, plan, recording = configuration.camera, configuration.plan, configuration.recording
     tracking, display, ui = configuration.tracking, configuration.display, configuration.ui
+    if options.window and display.model is not None:
+        raise UsageError(
+            "a display in the mirror covers an output from edge to edge, and is no window",
+            remedy="leave out --window, or [display] model",
+        )
     if options.window:
-        display = display.model_copy(update={"backend": "desktop"})
+        plain = {"backend": "desktop", "flip_horizontally": False, "flip_vertically": False}
+        display = display.model_copy(update=plain)
     if options.pictures:
         ui = ui.model_copy(update={"pictures": options.pictures})
     if options.rig:

@@ -110,7 +110,7 @@ class FramePresenter:
     def _draw_residuals(self, snapshot: Snapshot, foreground: Foreground | None) -> Image | None:
         """What a candidate is judged by beside its outline."""
         pose = snapshot.left_from_bone
-        if pose is None or foreground is None:
+        if pose is None or foreground is None or foreground.box.is_empty:
             return None
         return self._composer.draw_residuals(
             foreground, pose, snapshot.stage.bone, snapshot.bone_surface

@@ -18,10 +18,10 @@ MAX_POSE_AGE_MS = 500.0
 def judge(draft: Snapshot) -> Snapshot:
     """A snapshot with the interlocks' answer; without guides its picture shows none either."""
     judged = replace(draft, reasons=check_interlocks(draft))
-    if not judged.is_candidate:
-        judged = replace(judged, residual_picture=None)
     is_young = judged.pose_age_ms is not None and judged.pose_age_ms <= _longest_ms(judged)
     is_reviewed = judged.is_candidate and is_young and not judged.is_blanked
+    if not is_reviewed:
+        judged = replace(judged, residual_picture=None)
     if judged.is_navigable or is_reviewed or draft.plain_picture is None:
         return judged
     return replace(judged, picture=draft.plain_picture)

@@ -6,8 +6,6 @@ from datetime import date
 from functools import lru_cache
 from types import MappingProxyType
 
-import numpy as np
-
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_handlers import DeviceReport
 from navapp.control.device_lines import camera_line, display_line, rig_line
@@ -148,14 +146,9 @@ class SnapshotMaker:
         vertices_mm = bone.mesh.vertices_mm
         some_mm = vertices_mm[:: max(1, len(vertices_mm) // _N_POINTS_OF_BOX)]
         camera = self.specification.rig.left
-        pixels = camera.project(tracked.left_from_bone.apply(some_mm))
-        pixels = pixels[np.isfinite(pixels).all(axis=1)]
-        if not len(pixels):
-            return None
-        low, high = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0))
-        box = Box(*low.astype(int).tolist(), *(high - low).astype(int).tolist())
-        box = box.clip(camera.width, camera.height)
-        return None if box.is_empty else box
+        box = Box.around(camera.project(tracked.left_from_bone.apply(some_mm)))
+        box = None if box is None else box.clip(camera.width, camera.height)
+        return None if box is None or box.is_empty else box
 
     def _judge_mirror(self, tracked: TrackedFrame | None, now_ns: int) -> MirrorError | None:
         if self.mirror_judge is None:

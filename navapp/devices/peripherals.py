@@ -71,8 +71,18 @@ def make_window_display(
     Args:
         settings: of the display.
         clock: of the session.
-        picture_px: width and height of a window on the desktop that has none configured.
+        picture_px: width and height of a window on the desktop that has none configured; None:
+            no such window will do.
+
+    Raises:
+        ConfigurationError: a window on the desktop is configured where none will do.
     """
+    if settings.backend == "desktop" and picture_px is None:
+        raise ConfigurationError(
+            "a window of the desktop is for looking only",
+            subject="display.backend",
+            remedy='set it to "window", which covers an output',
+        )
     size_px = settings.size_px or picture_px
     if settings.backend == "simulated" or size_px is None:
         return None

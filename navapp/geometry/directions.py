@@ -14,7 +14,7 @@ class ViewCone:
     """Where the cameras may stand, seen from a body.
 
     Raises:
-        ValueError: the axis has no length.
+        ValueError: the axis has no length, or the half angle is none.
     """
 
     # (3,) unit, from the body towards the cameras, in its coordinates; None: anywhere.
@@ -22,6 +22,8 @@ class ViewCone:
     half_angle_deg: float = 180.0  # around the axis
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.half_angle_deg <= 180.0:
+            raise ValueError("the half angle of a view cone lies above 0 and up to 180 degrees")
         if self.axis is None:
             return
         length = float(np.linalg.norm(self.axis))

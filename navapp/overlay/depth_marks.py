@@ -21,7 +21,7 @@ _SHARE, _SHARE_IN_FRONT = 0.45, 0.85
 class DepthMarks:
     """Colours pictures of a rig's left camera by the classes of the depth around the bone.
 
-    Depth is known to some pixels only: what is marked is a picture of at most half the size.
+    Depth is known to some pixels only: what is marked is a picture of at most 640 columns.
     """
 
     def __init__(self, rig: StereoRig) -> None:

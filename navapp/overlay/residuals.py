@@ -78,10 +78,12 @@ def _colour(residual_mm: NDArray[np.float32]) -> Image:
 
 
 def _draw_bar(height: int, picture_width: int) -> Image:
-    """The scale: its greatest value above."""
+    """The scale: its greatest value above; nothing where there is no room for it."""
     width = max(56, round(_BAR_SHARE * picture_width))
     bar = np.zeros((height, width, 3), np.uint8)
     first, last = 24, height - 24
+    if last <= first:
+        return bar
     values = np.linspace(FULL_MM, -FULL_MM, last - first, dtype=np.float32)
     bar[first:last, 6:18] = _colour(values)[:, None]
     for text, y in (

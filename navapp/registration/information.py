@@ -108,7 +108,8 @@ def compute_information(
 
 def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:
     """(n,) directions that are not fixed, of the ascending eigenvalues of an information."""
-    is_free: NDArray[np.bool_] = eigenvalues < FREE_FRACTION * eigenvalues[-1]
+    # What is not a number fixes nothing.
+    is_free: NDArray[np.bool_] = ~(eigenvalues >= FREE_FRACTION * eigenvalues[-1])
     return is_free
 
 
@@ -117,11 +118,15 @@ def leaves_direction_free(
 ) -> bool:
     """Whether some direction of a pose is not fixed, as `compute_information` judges it.
 
+    All points of the seen surface count alike for its centre and lever. Without any all is free.
+
     Args:
         covariance: (6, 6) of the public twist about `centre_mm`.
         centre_mm: (3,) the model's centre.
         seen_mm: (N, 3) the seen surface, in the same frame.
     """
+    if len(seen_mm) == 0:
+        return True
     middle_mm = seen_mm.mean(axis=0)
     lever_mm = math.sqrt(((seen_mm - middle_mm) ** 2).sum(axis=1).mean())
     x, y, z = middle_mm - centre_mm

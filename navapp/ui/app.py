@@ -189,10 +189,11 @@ class NavigationApp(QuietApp):
 
     def _toggle_near(self) -> None:
         """The region around the bone, or the whole picture."""
-        picture, is_near = self.screen_stack[0].query_one(PictureView), self._view.is_near
-        is_near = not picture.has_pixels if is_near is None else is_near
-        self._view = replace(self._view, is_near=not is_near)
+        picture = self.screen_stack[0].query_one(PictureView)
+        self._view = replace(self._view, is_near=not picture.is_near(self._view))
         picture.show(self._view)
+        if self._view.is_near and self._view.snapshot.bone_box is None:
+            self.notify("the region around the bone is shown when the bone is found")
 
     def on_start_chosen(self, message: StartChosen) -> None:
         """Search for the bone where an operator has drawn or picked it."""

@@ -5,11 +5,13 @@ import signal
 import sys
 from pathlib import Path
 
+from textual import events
 from textual.app import App
 
 from navapp.errors import NavappError
-from navapp.ui.pictures.graphics import Graphics
+from navapp.ui.pictures.graphics import Graphics, measure_cell
 from navapp.ui.pictures.painter import Painter
+from navapp.ui.pictures.picture import Picture
 from navapp.ui.terminal import is_terminal_lost
 
 _S_PER_LOOK = 0.5
@@ -30,6 +32,22 @@ class QuietApp(App[int]):
         """Have the terminal paint pictures, where it can; before the application runs."""
         if graphics.encoder is not None:
             self.painter = Painter(graphics, self._write_to_terminal)
+
+    def stop_painting(self) -> None:
+        """Half blocks of the screen's library from now on: the terminal cannot be reached so."""
+        painter = self.painter
+        if painter is None:
+            return
+        for screen in self.screen_stack:
+            for picture in screen.query(Picture):
+                picture.leave_place()
+        self.painter = None
+        painter.close()
+
+    def on_resize(self, _event: events.Resize) -> None:
+        """Characters may have another size as well."""
+        if self.painter is not None and self.painter.has_pixels and sys.__stdout__ is not None:
+            self.painter.cell_px = measure_cell(sys.__stdout__.fileno()) or self.painter.cell_px
 
     def _write_to_terminal(self, text: str) -> None:
         """Behind what the screen has written so far; Textual has no public way to do so."""
@@ -59,10 +77,12 @@ async def drive(app: QuietApp) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
         loop.add_signal_handler(number, app.exit, 128 + number)
     watch = asyncio.create_task(_end_without_terminal(app))
-    result = await app.run_async()
-    watch.cancel()
-    if app.painter is not None:
-        app.painter.close()
+    try:
+        result = await app.run_async()
+    finally:
+        watch.cancel()
+        if app.painter is not None:
+            app.painter.close()
     return 1 if result is None else result
 
 

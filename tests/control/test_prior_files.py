@@ -30,6 +30,15 @@ def test_a_cone_without_a_direction_is_refused(axis: object, tmp_path) -> None:
         read_prior(path)
 
 
+@pytest.mark.parametrize("half_angle_deg", [-5, 0, 999, "nan"])
+def test_a_half_angle_that_is_none_is_refused(half_angle_deg: object, tmp_path) -> None:
+    path = tmp_path / "prior.json"
+    cone = {"axis": [0, 0, 1], "half_angle_deg": half_angle_deg}
+    path.write_text(json.dumps({"approach_cone": cone}))
+    with pytest.raises(PriorError, match="half angle"):
+        read_prior(path)
+
+
 def test_a_usual_cone_stands_in_where_nothing_better_is_known() -> None:
     usual = {name: ViewCone(np.array([0.0, 0.0, 1.0]), 40.0) for name in ("femur", "tibia")}
     assert Prior().with_cones(usual).cones == usual

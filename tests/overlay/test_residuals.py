@@ -57,3 +57,10 @@ def test_colours_tell_the_sign_and_unknown_pixels_show_the_picture() -> None:
     blue, green, red = drawn[35 * factor, 0].astype(int)
     assert red > green > blue
     assert (drawn[50 * factor, 0] == 50).all()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (40, 500), (47, 420), (30, 300)])
+def test_a_bone_at_the_edge_of_the_picture_is_drawn_too(shape: tuple[int, int]) -> None:
+    drawn = draw_residuals(np.zeros(shape, np.float32), np.zeros(shape, np.uint8))
+    assert drawn.shape[0] >= shape[0]
+    assert drawn.shape[1] > shape[1]

@@ -48,7 +48,8 @@ def put_on_canvas(picture: Image, width: int, height: int) -> Image:
     size = fit_size(picture.shape, width, height)
     fitted = in_colour(resize(picture, *size))
     if size == (width, height):
-        return fitted
+        # Encoders are compiled for one kind of array.
+        return np.ascontiguousarray(fitted) if fitted is not picture else picture.copy()
     canvas = np.zeros((height, width, 3), dtype=np.uint8)
     x, y = (width - size[0]) // 2, (height - size[1]) // 2
     canvas[y : y + size[1], x : x + size[0]] = fitted

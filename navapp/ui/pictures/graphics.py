@@ -20,7 +20,7 @@ from navapp.ui.pictures.kitty import KittyEncoder, ask_whether_drawn
 from navapp.ui.pictures.sixel import SixelEncoder
 from navapp.ui.pictures.sixel_kernels import N_COLOURS
 
-_PATIENCE_S = 1.0
+_PATIENCE_S = 3.0
 # Numbers of the two pictures of one pixel that kitty's protocol is asked about.
 _LOCAL, _COMPRESSED = 31, 32
 _CELL = re.compile(rb"\x1b\[6;(\d+);(\d+)t")
@@ -99,7 +99,7 @@ def compile_encoders() -> None:
 
 
 def find_graphics(wish: Wish, environment: Mapping[str, str]) -> Graphics:
-    """Ask the terminal at the standard input and output; at most a second.
+    """Ask the terminal at the standard input and output.
 
     Args:
         wish: what may be used; "auto" is the best that the terminal answers for.
@@ -109,7 +109,7 @@ def find_graphics(wish: Wish, environment: Mapping[str, str]) -> Graphics:
         return _choose_blocks("as configured", environment)
     if environment.get("TERM", "dumb") in _SIMPLE_TERMINALS:
         return _choose_blocks("this terminal draws no pictures", environment)
-    return choose_graphics(wish, ask_terminal(), environment)
+    return choose_graphics(wish, ask_terminal(environment), environment)
 
 
 def choose_graphics(wish: Wish, answers: Answers, environment: Mapping[str, str]) -> Graphics:
@@ -143,19 +143,36 @@ def _choose_blocks(why: str, environment: Mapping[str, str]) -> Graphics:
     return Graphics(BlockEncoder(is_true_colour=is_true_colour), CELL_PX, words)
 
 
-def ask_terminal() -> Answers:
-    """Write the questions, read until the last is answered; what is typed meanwhile is lost."""
+def ask_terminal(environment: Mapping[str, str]) -> Answers:
+    """Ask for what the terminal draws; nothing more once it leaves a question unanswered.
+
+    What is typed meanwhile is lost. An answer that comes later than `_PATIENCE_S` would be read as
+    keys; every terminal answers the first question, so that this means it is not there.
+
+    Args:
+        environment: variables of the process; multiplexers show kitty's question to people.
+    """
     settings = termios.tcgetattr(0)
+    told, is_local = b"", False
+    is_multiplexed = environment.get("TERM", "").startswith(("screen", "tmux")) or bool(
+        {"TMUX", "STY"} & set(environment)
+    )
     try:
         tty.setcbreak(0)
-        with ask_whether_drawn(_LOCAL, _COMPRESSED) as questions:
-            told = _ask(f"{questions}\x1b[16t")
+        told = _ask("")
+        if told and not is_multiplexed:
+            with ask_whether_drawn(_LOCAL, _COMPRESSED) as question:
+                told += _ask(question.text)
+                is_local = question.was_read
+        if told:
+            told += _ask("\x1b[16t")
         if parse_answers(told).has_sixel:
             told += _ask(f"\x1b[?1;3;{_REGISTERS_WANTED}S")
     finally:
-        termios.tcsetattr(0, termios.TCSADRAIN, settings)
+        termios.tcsetattr(0, termios.TCSAFLUSH, settings)
     answers = parse_answers(told)
-    return answers if answers.cell_px else replace(answers, cell_px=_measure_cell())
+    cell_px = answers.cell_px or measure_cell(1)
+    return replace(answers, cell_px=cell_px, has_local_kitty=answers.has_local_kitty and is_local)
 
 
 def parse_answers(told: bytes) -> Answers:
@@ -172,25 +189,25 @@ def parse_answers(told: bytes) -> Answers:
 
 
 def _ask(questions: str) -> bytes:
-    """What is answered, up to the attributes that every terminal tells when it is asked."""
+    """What is answered, up to the attributes that every terminal tells; empty without them."""
     os.write(1, f"{questions}\x1b[c".encode())
     told, end_s = b"", time.monotonic() + _PATIENCE_S
     while _ATTRIBUTES.search(told) is None:
         ready, _, _ = select.select([0], [], [], max(0.0, end_s - time.monotonic()))
-        if not ready:
-            break
-        more = os.read(0, 4096)
+        more = os.read(0, 4096) if ready else b""
         if not more:
-            break
+            return b""
         told += more
     return told
 
 
-def _measure_cell() -> tuple[int, int] | None:
-    """From the size of the window in cells and pixels, where the terminal tells both."""
-    rows, columns, width, height = struct.unpack(
-        "4H", fcntl.ioctl(1, termios.TIOCGWINSZ, struct.pack("4H", 0, 0, 0, 0))
-    )
+def measure_cell(descriptor: int) -> tuple[int, int] | None:
+    """From the size of the window in cells and pixels; None where the terminal tells not both."""
+    try:
+        told = fcntl.ioctl(descriptor, termios.TIOCGWINSZ, struct.pack("4H", 0, 0, 0, 0))
+    except OSError:
+        return None
+    rows, columns, width, height = struct.unpack("4H", told)
     if 0 in (rows, columns, width, height):
         return None
     return width // columns, height // rows

@@ -8,6 +8,7 @@ import contextlib
 import os
 import zlib
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -26,22 +27,33 @@ def write_command(keys: str, payload: str = "") -> str:
     return f"\x1b_G{keys},q=2;{payload}\x1b\\"
 
 
-@contextlib.contextmanager
-def ask_whether_drawn(local: int, compressed: int) -> Iterator[str]:
-    """What asks a terminal whether it draws a picture of one pixel, and numbers its answers.
+@dataclass(frozen=True, slots=True)
+class Question:
+    """Whether a terminal draws pictures of one pixel."""
 
-    While the context is open there is a picture in the shared memory.
-    """
-    name = f"navapp-{os.getpid()}-asked"
+    text: str  # to be sent
+    path: Path  # of the picture in the shared memory
+
+    @property
+    def was_read(self) -> bool:
+        """The terminal has read that picture, and removed it as the protocol says."""
+        return not self.path.exists()
+
+
+@contextlib.contextmanager
+def ask_whether_drawn(local: int, compressed: int) -> Iterator[Question]:
+    """Numbers of the answers: of a picture in the shared memory, and of one in the text."""
+    path = _MEMORY / f"navapp-{os.getpid()}-asked"
     keys = "a=q,s=1,v=1,f=24"
-    questions = f"\x1b_G{keys},i={compressed},t=d;{_to_text(bytes(3))}\x1b\\"
+    text = f"\x1b_G{keys},i={compressed},t=d;{_to_text(bytes(3))}\x1b\\"
     with contextlib.suppress(OSError):
-        (_MEMORY / name).write_bytes(bytes(3))
-        questions += f"\x1b_G{keys},i={local},t=s,S=3;{_to_text(f'/{name}'.encode())}\x1b\\"
+        _write_memory(path, bytes(3))
+        name = _to_text(f"/{path.name}".encode())
+        text += f"\x1b_G{keys},i={local},t=s,S=3;{name}\x1b\\"
     try:
-        yield questions
+        yield Question(text, path)
     finally:
-        (_MEMORY / name).unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
 
 
 class KittyEncoder:
@@ -76,7 +88,7 @@ class KittyEncoder:
         if self._is_local:
             self._k = 1 - self._k
             name = self._names[self._k]
-            (_MEMORY / name).write_bytes(pixels.data)
+            _write_memory(_MEMORY / name, pixels.data)
             return write_command(f"{keys},t=s,S={pixels.nbytes}", _to_text(f"/{name}".encode()))
         text = _to_text(zlib.compress((pixels & _KEPT_BITS).data, _LEVEL))
         pieces = [text[k : k + _PIECE] for k in range(0, len(text), _PIECE)]
@@ -100,3 +112,11 @@ class KittyEncoder:
 
 def _to_text(data: bytes) -> str:
     return base64.standard_b64encode(data).decode("ascii")
+
+
+def _write_memory(path: Path, data: bytes | memoryview) -> None:
+    """Readable by this user alone: it may be a patient."""
+    path.unlink(missing_ok=True)
+    descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
+    with open(descriptor, "wb") as file:
+        file.write(data)

@@ -17,6 +17,7 @@ _LONGEST_SENDING_S = 0.1
 _SMALLER, _LARGER, _LEAST_SCALE = 0.85, 1.1, 0.25
 _N_BEFORE_CHANGE = 3
 _N_BEFORE_LARGER = 30
+_PATIENCE_S = 1.0
 _BEGIN, _END = "\x1b[?2026h\x1b7", "\x1b8\x1b[?2026l"
 
 
@@ -77,6 +78,7 @@ class Painter:
         self.cell_px = graphics.cell_px
         self._write = write
         self._scale = Scale()
+        self._waiting: list[int] = []  # numbers of pictures, who waits longest first
         self._sent, self._begun_s, self.cost_s = PictureText(""), 0.0, 0.0
         self._sent.sent_s = 0.0
 
@@ -101,6 +103,8 @@ class Painter:
     def paint(self, number: int, picture: NDArray[np.uint8], place: Region) -> bool:
         """Draw a picture over these cells; False when the last one is not through yet.
 
+        Several pictures take turns: who was refused first is next.
+
         Args:
             number: of the picture; the one before of that number is replaced.
             picture: (h, w[, 3]) uint8 BGR or grey; its aspect ratio is kept.
@@ -109,10 +113,13 @@ class Painter:
         Raises:
             OSError: it cannot be handed over.
         """
-        if self._sent.sent_s is None or self._encoder.is_busy:
+        if self._is_busy or self._waiting[:1] not in ([], [number]):
+            if number not in self._waiting:
+                self._waiting.append(number)
             return False
+        self._waiting = self._waiting[1:]
         if self._begun_s:
-            self._scale.note(self.cost_s, self._sent.sent_s - self._begun_s)
+            self._scale.note(self.cost_s, (self._sent.sent_s or 0.0) - self._begun_s)
         begun_s = time.thread_time()
         width, height = place.width * self.cell_px[0], place.height * self.cell_px[1]
         if self._encoder.is_scaled_by_terminal:
@@ -129,8 +136,17 @@ class Painter:
         self.cost_s = time.thread_time() - begun_s
         return True
 
+    @property
+    def _is_busy(self) -> bool:
+        """The terminal has not taken the last picture; one that never says so is not waited for."""
+        if self._sent.sent_s is None:
+            return True
+        is_late = time.monotonic() > self._begun_s + _PATIENCE_S
+        return self._encoder.is_busy and not is_late
+
     def erase(self, number: int) -> None:
         """Remove a picture; its cells are to be written anew."""
+        self._waiting = [other for other in self._waiting if other != number]
         if text := self._encoder.erase(number):
             self._write(text)
 

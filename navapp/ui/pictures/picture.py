@@ -1,5 +1,6 @@
 """A widget that shows a picture: painted by the terminal where it can, else as half blocks."""
 
+import time
 from itertools import count
 
 import numpy as np
@@ -19,6 +20,7 @@ _WAITING = "waiting for the first picture"
 _NUMBERS = count(1)
 # Pixels of a drawing for each half block across and down: lines of one pixel stay visible.
 _DRAWN_FINER = 2
+_RETRY_S = 0.02
 
 
 class Picture(Widget):
@@ -33,6 +35,9 @@ class Picture(Widget):
         self._strips: list[Strip] = []
         self._ramp = ""
         self._place: Region | None = None  # where the terminal paints it; None: half blocks
+        # The newest picture is not on the terminal yet; a look whether it can be brought is due.
+        self._is_due = self._is_waiting = False
+        self._blocks_at_s = 0.0  # when half blocks were written last
 
     def show_picture(
         self, picture: NDArray[np.uint8] | None, ramp: str, part: Box | None = None
@@ -45,9 +50,9 @@ class Picture(Widget):
             part: that is shown; None: all.
         """
         self._ramp = ramp
-        is_same = picture is self._picture and part == self._part
+        self._is_due |= picture is not self._picture or part != self._part
         self._picture, self._part = picture, part
-        if not is_same or self._is_covered == (self._place is not None):
+        if self._is_due or self._is_covered == (self._place is not None):
             self._redraw()
 
     @property
@@ -68,14 +73,17 @@ class Picture(Widget):
         """Which point of the picture lies in the middle of a cell: parts of its width, height."""
         shape = (1, 1) if self._shown is None else self._shown.shape
         across, down = self._cell_size
-        at = (x + 0.5) * across, (y + 0.5) * down
-        return find_point(shape, self.room, at)
+        content, place = self.content_region, self._place or self.content_region
+        column, row = x + content.x - place.x, y + content.y - place.y
+        room = place.width * across, place.height * down
+        return find_point(shape, room, ((column + 0.5) * across, (row + 0.5) * down))
 
     @property
     def room(self) -> tuple[int, int]:
         """Width and height of what it has room for: pixels, or half blocks."""
-        (columns, rows), (across, down) = self.content_size, self._cell_size
-        return columns * across, rows * down
+        across, down = self._cell_size
+        place = self.content_region if self._place is None else self._place
+        return place.width * across, place.height * down
 
     @property
     def _cell_size(self) -> tuple[int, int]:
@@ -83,12 +91,12 @@ class Picture(Widget):
 
     def on_resize(self, _event: events.Resize) -> None:
         """Fit the picture into the new box."""
-        self._leave_place()
+        self.leave_place()
         self._redraw()
 
     def on_unmount(self) -> None:
         """Nothing of it stays."""
-        self._leave_place()
+        self.leave_place()
 
     @property
     def _painter(self) -> Painter | None:
@@ -104,6 +112,11 @@ class Picture(Widget):
         return any(toast.region.overlaps(region) for toast in self.screen.query("Toast"))
 
     @property
+    def _is_on_screen(self) -> bool:
+        """All of it; what is painted beyond an edge would move other text."""
+        return self.screen.region.contains_region(self.content_region)
+
+    @property
     def _shown(self) -> NDArray[np.uint8] | None:
         """The part of the picture that is shown."""
         picture = self._picture
@@ -114,13 +127,13 @@ class Picture(Widget):
     def _redraw(self) -> None:
         columns, rows = self.content_size
         if columns < 1 or rows < 1 or self._shown is None:
-            self._leave_place()
+            self.leave_place()
             self._strips, self._codes = [], np.empty((0, 0), dtype=np.int32)
             self.refresh()
-        elif self._painter is not None and not self._is_covered:
+        elif self._painter is not None and not self._is_covered and self._is_on_screen:
             self._find_place(self._painter)
         else:
-            self._leave_place()
+            self.leave_place()
             self._show_blocks(self._shown, columns, rows)
 
     def _find_place(self, painter: Painter) -> None:
@@ -128,7 +141,7 @@ class Picture(Widget):
         if place == self._place:
             self._paint()
             return
-        self._leave_place()
+        self.leave_place()
         # Blank cells first, the picture over them.
         self._place = place
         self.refresh()
@@ -139,13 +152,26 @@ class Picture(Widget):
         if painter is None or self._place is None or shown is None or self._is_covered:
             return
         try:
-            painter.paint(self._number, shown, self._place)
+            self._is_due = not painter.paint(self._number, shown, self._place)
         except OSError:
-            self.app.painter = None  # type: ignore[attr-defined]
+            self.app.stop_painting()  # type: ignore[attr-defined]
             self._redraw()
+            return
+        if self._is_due:
+            self._paint_soon()
 
-    def _leave_place(self) -> None:
-        """The terminal no longer paints it."""
+    def _paint_soon(self) -> None:
+        """As soon as the terminal has taken what it was given before."""
+        if not self._is_waiting:
+            self._is_waiting = True
+            self.set_timer(_RETRY_S, self._paint_again)
+
+    def _paint_again(self) -> None:
+        self._is_waiting = False
+        self._paint()
+
+    def leave_place(self) -> None:
+        """Have the terminal remove it; half blocks may follow."""
         if self._place is None:
             return
         self._place = None
@@ -155,6 +181,11 @@ class Picture(Widget):
         self.refresh()
 
     def _show_blocks(self, picture: NDArray[np.uint8], columns: int, rows: int) -> None:
+        now_s = time.monotonic()
+        # Below a page or a message; dear, so a picture a second has to do.
+        if self._painter is not None and self._strips and now_s < self._blocks_at_s + 1.0:
+            return
+        self._is_due, self._blocks_at_s = False, now_s
         codes = compute_cell_codes(picture, columns, rows)
         if codes.shape != self._codes.shape or not self._strips:
             self._strips = [make_row_strip(row, self._ramp) for row in codes]
@@ -167,6 +198,13 @@ class Picture(Widget):
         self._codes = codes
         if changed:
             self.refresh(*(Region(0, y, columns, 1) for y in changed))
+
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """As the base class; a painted picture has to come again over cells that are written."""
+        if self._place is not None:
+            self._is_due = True
+            self._paint_soon()
+        return super().render_lines(crop)
 
     def render_line(self, y: int) -> Strip:
         """The prepared row; blank below a painted picture."""

@@ -55,12 +55,16 @@ class PictureView(Picture):
             self.set_class(level is view.level, f"-{level.name.lower()}")
         self.show_picture(view.snapshot.picture, view.symbols.ramp, part)
 
+    def is_near(self, view: View) -> bool:
+        """The region around the bone is wanted: in half blocks and for a candidate, or by a key."""
+        if view.is_near is not None:
+            return view.is_near
+        return not self.has_pixels or view.snapshot.is_candidate
+
     def _choose_part(self, view: View) -> Box | None:
-        """The region around the bone in half blocks and for a candidate, unless a key says so."""
+        """The region around the bone; None for all of it."""
         snapshot, (width, height) = view.snapshot, self.room
-        is_near = view.is_near
-        if is_near is None:
-            is_near = not self.has_pixels or snapshot.is_candidate
+        is_near = self.is_near(view)
         bone, picture = snapshot.bone_box, snapshot.picture
         if not is_near or bone is None or picture is None or snapshot.shows_eye or not height:
             return None

@@ -61,8 +61,10 @@ def test_erasing_names_the_picture_alone(is_local: bool) -> None:
 
 def test_the_question_leaves_nothing_behind() -> None:
     before = set(Path("/dev/shm").iterdir())
-    with ask_whether_drawn(31, 32) as questions:
-        asked = commands(questions)
+    with ask_whether_drawn(31, 32) as question:
+        asked = commands(question.text)
+        assert question.path.stat().st_mode & 0o777 == 0o600
+        assert not question.was_read
         assert {keys["i"]: keys["t"] for keys, _ in asked} == {"32": "d", "31": "s"}
         assert len(set(Path("/dev/shm").iterdir()) - before) == 1
     assert not set(Path("/dev/shm").iterdir()) - before

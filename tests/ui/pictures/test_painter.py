@@ -93,3 +93,34 @@ def test_where_the_terminal_does_not_scale_a_smaller_picture_lies_in_the_middle(
     assert (place.width, place.height) == (34, 17)
     assert PLACE.contains_region(place)
     assert make()[0].find_place(PLACE) == PLACE
+
+
+def test_two_pictures_take_turns() -> None:
+    painter, encoder, written = make()
+    for _ in range(20):
+        painter.paint(1, PICTURE, PLACE)
+        painter.paint(2, PICTURE, PLACE)
+        written[-1].sent_s = 1e9  # type: ignore[attr-defined]
+    painted = [number for number, *_ in encoder.given]
+    assert painted[:6] == [1, 2, 1, 2, 1, 2]
+
+
+def test_a_picture_that_goes_away_is_not_waited_for() -> None:
+    painter, encoder, written = make()
+    painter.paint(1, PICTURE, PLACE)
+    assert not painter.paint(2, PICTURE, PLACE)
+    painter.erase(2)
+    written[0].sent_s = 1e9  # type: ignore[attr-defined]
+    assert painter.paint(1, PICTURE, PLACE)
+    assert [number for number, *_ in encoder.given] == [1, 1]
+
+
+def test_a_terminal_that_never_reads_its_memory_is_not_waited_for_for_ever(monkeypatch) -> None:
+    painter, encoder, written = make()
+    painter.paint(1, PICTURE, PLACE)
+    written[0].sent_s = 1e9  # type: ignore[attr-defined]
+    encoder.is_busy = True
+    assert not painter.paint(1, PICTURE, PLACE)
+    later_s = painter._begun_s + 1.5
+    monkeypatch.setattr("navapp.ui.pictures.painter.time.monotonic", lambda: later_s)
+    assert painter.paint(1, PICTURE, PLACE)

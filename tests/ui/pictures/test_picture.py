@@ -29,6 +29,7 @@ class Canvas(Painter):
         self.cell_px = CELL_PX
         self.shown: dict[int, tuple[np.ndarray, Region]] = {}
         self.is_full = False
+        self.n_busy = 0  # so many times the last picture is not through yet
 
     @property
     def has_pixels(self) -> bool:
@@ -40,6 +41,9 @@ class Canvas(Painter):
     def paint(self, number: int, picture: np.ndarray, place: Region) -> bool:
         if self.is_full:
             raise OSError("no room")
+        if self.n_busy:
+            self.n_busy -= 1
+            return False
         self.shown[number] = picture, place
         return True
 
@@ -212,3 +216,40 @@ def test_residuals_lie_beside_a_candidate_where_there_is_room(
         assert len(app.painted) == 1
 
     play(script, size)
+
+
+def test_what_a_busy_terminal_has_not_taken_comes_as_soon_as_it_can() -> None:
+    async def script(app: PaintedApp, pilot: Pilot[Any]) -> None:
+        app.canvas.n_busy = 3
+        plain = np.zeros_like(LARGE)
+        app.show(picture=plain)
+        np.testing.assert_array_equal(app.painted[0][0], LARGE)
+        # No further poll: what was guided must not stay.
+        await pilot.pause(0.5)
+        np.testing.assert_array_equal(app.painted[0][0], plain)
+
+    play(script)
+
+
+def test_cells_that_are_written_anew_are_painted_anew() -> None:
+    async def script(app: PaintedApp, pilot: Pilot[Any]) -> None:
+        app.canvas.shown.clear()
+        app.screen.refresh()
+        await pilot.pause(0.3)
+        assert len(app.painted) == 1
+
+    play(script)
+
+
+def test_a_place_is_told_within_a_picture_that_does_not_fill_its_room() -> None:
+    async def script(app: PaintedApp, pilot: Pilot[Any]) -> None:
+        view = app.screen.query_one(PictureView)
+        content = view.content_region
+        width, height = content.width // 2, content.height // 2
+        x, y = content.x + content.width // 4, content.y + content.height // 4
+        view._place = Region(x, y, width, height)
+        middle = view.find_point(content.width // 4 + width // 2, content.height // 4 + height // 2)
+        assert middle == pytest.approx((0.5, 0.5), abs=0.05)
+        assert view.find_point(0, 0) == (0.0, 0.0)
+
+    play(script)
