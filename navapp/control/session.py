@@ -479,12 +479,14 @@ def describe_moved_rig(why: str) -> str:
 
 
 def describe_start(start: Prior, bone: str) -> str:
-    """Where a bone is searched for, for people; empty when that is nothing that was drawn."""
+    """Where a bone is searched for, for people; empty for a rough pose."""
     if bone in start.left_from_bone:
         return ""
     if picks := start.picks_of(bone):
         return f" from {len(picks)} picked landmarks"
-    return " in the box that was drawn" if start.box is not None else ""
+    cone = start.cones.get(bone)
+    side = "" if cone is None else f" within {cone.half_angle_deg:.0f} deg of its approach"
+    return f"{' in the box that was drawn' if start.box is not None else ''}{side}"
 
 
 def add_bound(text: str, verdict: Verdict) -> str:

@@ -11,6 +11,7 @@ from tests.many import few_of
 from tests.registration.shapes import TRUE
 
 CENTRE_MM = np.array([5.0, -3.0, 470.0])
+SEEN_MM = CENTRE_MM + 20.0 * np.eye(3)
 SIGMAS = np.array([0.05, 0.05, 0.1, 0.002, 0.002, 0.001])
 # So wide that the kernel lets everything through: then the surface's residuals say what they show.
 WIDE = 100.0
@@ -50,7 +51,7 @@ def drawn(seed: int) -> np.ndarray:
 
 def test_noise_as_claimed_gives_least_squares_and_its_covariance() -> None:
     block = block_of(drawn(1), n=4000)
-    joined = join(SURFACE, WIDE, block, CENTRE_MM)
+    joined = join(SURFACE, WIDE, block, CENTRE_MM, SEEN_MM)
     rows = np.column_stack([block.jacobian, np.ones(4000)])
     prior = np.diag(np.append(1.0 / SIGMAS**2, 1.0 / COMMON_SD**2))
     normal = rows.T @ rows / SIGMA**2 + prior
@@ -70,7 +71,7 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
         twist = drawn(seed)
         common = COMMON_SD * np.random.default_rng([seed, 6]).normal()
         block = block_of(twist, n=60, seed=seed, common=common)
-        joined = join(SURFACE, WIDE, block, CENTRE_MM)
+        joined = join(SURFACE, WIDE, block, CENTRE_MM, SEEN_MM)
         off = moved_by(joined) - twist
         squares.append(off @ np.linalg.solve(joined.covariance, off))
     assert np.mean(squares) == pytest.approx(6.0, rel=0.2)
@@ -78,8 +79,8 @@ def test_the_truth_lies_where_the_covariance_says() -> None:
 
 def test_an_offset_that_all_have_in_common_moves_the_pose_little() -> None:
     still = block_of(np.zeros(6))
-    plain = moved_by(join(SURFACE, WIDE, still, CENTRE_MM))
-    offset = moved_by(join(SURFACE, WIDE, block_of(np.zeros(6), common=0.3), CENTRE_MM))
+    plain = moved_by(join(SURFACE, WIDE, still, CENTRE_MM, SEEN_MM))
+    offset = moved_by(join(SURFACE, WIDE, block_of(np.zeros(6), common=0.3), CENTRE_MM, SEEN_MM))
     assert (np.abs(offset - plain) < 0.4 * SIGMAS).all()
 
 
@@ -90,8 +91,8 @@ def test_residuals_of_something_else_are_left_out() -> None:
     residual[::8] += 6.0
     spoilt = replace(block, residual=residual)
     assert spoilt.find_near(SURFACE.covariance)[::8].mean() < 0.05
-    clean = moved_by(join(SURFACE, WIDE, block, CENTRE_MM))
-    robust = moved_by(join(SURFACE, WIDE, spoilt, CENTRE_MM))
+    clean = moved_by(join(SURFACE, WIDE, block, CENTRE_MM, SEEN_MM))
+    robust = moved_by(join(SURFACE, WIDE, spoilt, CENTRE_MM, SEEN_MM))
     assert (np.abs(robust - clean) < 0.5 * SIGMAS).all()
 
 
@@ -101,7 +102,7 @@ def test_a_block_that_contradicts_the_surface_moves_nothing_and_is_told(
     n: int, n_sigmas: float
 ) -> None:
     """However many of its residuals happen to be small."""
-    joined = join(SURFACE, WIDE, block_of(n_sigmas * SIGMAS, n=n), CENTRE_MM)
+    joined = join(SURFACE, WIDE, block_of(n_sigmas * SIGMAS, n=n), CENTRE_MM, SEEN_MM)
     assert joined.camera_from_bone is SURFACE.camera_from_bone
     np.testing.assert_array_equal(joined.covariance, SURFACE.covariance)
     assert joined.reasons == (Reason.CUES_DISAGREE,)
@@ -109,13 +110,13 @@ def test_a_block_that_contradicts_the_surface_moves_nothing_and_is_told(
 
 @pytest.mark.parametrize("seed", few_of(range(20), 3))
 def test_blocks_that_agree_are_not_doubted(seed: int) -> None:
-    joined = join(SURFACE, WIDE, block_of(drawn(seed), n=60, seed=seed), CENTRE_MM)
+    joined = join(SURFACE, WIDE, block_of(drawn(seed), n=60, seed=seed), CENTRE_MM, SEEN_MM)
     assert joined.reasons == ()
 
 
 def test_a_surface_without_residuals_is_survived() -> None:
     joined = join(
-        estimate_of(SURFACE.covariance, rms_ratio=0.0), 1.2, block_of(drawn(3)), CENTRE_MM
+        estimate_of(SURFACE.covariance, rms_ratio=0.0), 1.2, block_of(drawn(3)), CENTRE_MM, SEEN_MM
     )
     assert np.isfinite(joined.covariance).all()
 
@@ -125,7 +126,7 @@ def test_a_block_that_says_too_little_changes_nothing(noise_variance_ratio: floa
     few = block_of(drawn(1), n=5)
     sharing = replace(block_of(drawn(1), n=400), n_sharing=np.full(400, 100.0))
     for block in (few, sharing):
-        joined = join(SURFACE, WIDE, block, CENTRE_MM, noise_variance_ratio)
+        joined = join(SURFACE, WIDE, block, CENTRE_MM, SEEN_MM, noise_variance_ratio)
         assert joined.camera_from_bone is SURFACE.camera_from_bone
         np.testing.assert_allclose(joined.covariance, noise_variance_ratio * SURFACE.covariance)
 
@@ -137,7 +138,7 @@ def test_the_surfaces_noise_is_the_surfaces_alone() -> None:
     normal = rows.T @ rows + np.diag([0.0] * 6 + [COMMON_SD**-2])
     alike = estimate_of(np.linalg.inv(normal)[:6, :6])
     whole, quiet = (
-        join(alike, WIDE, block, CENTRE_MM, noise_variance_ratio)
+        join(alike, WIDE, block, CENTRE_MM, SEEN_MM, noise_variance_ratio)
         for noise_variance_ratio in (1.0, 0.4)
     )
     assert quiet.camera_from_bone.matrix == pytest.approx(whole.camera_from_bone.matrix)
@@ -146,21 +147,21 @@ def test_the_surfaces_noise_is_the_surfaces_alone() -> None:
 
 
 def test_more_noise_than_claimed_is_believed() -> None:
-    claimed = join(SURFACE, WIDE, block_of(drawn(2)), CENTRE_MM)
-    noisy = join(SURFACE, WIDE, block_of(drawn(2), noise=2.0 * SIGMA), CENTRE_MM)
+    claimed = join(SURFACE, WIDE, block_of(drawn(2)), CENTRE_MM, SEEN_MM)
+    noisy = join(SURFACE, WIDE, block_of(drawn(2), noise=2.0 * SIGMA), CENTRE_MM, SEEN_MM)
     assert np.trace(noisy.covariance) > 1.5 * np.trace(claimed.covariance)
 
 
 def test_less_noise_than_claimed_moves_the_pose_but_makes_no_claim() -> None:
     """The exact one of two blocks that claim the same is followed; the bound stays careful."""
     twist = drawn(4)
-    exact = join(SURFACE, WIDE, block_of(twist, noise=0.2 * SIGMA), CENTRE_MM)
+    exact = join(SURFACE, WIDE, block_of(twist, noise=0.2 * SIGMA), CENTRE_MM, SEEN_MM)
     modest = replace(SURFACE, rms_mm=0.2 * SURFACE.expected_rms_mm)
-    both = join(modest, WIDE, block_of(twist, noise=0.2 * SIGMA), CENTRE_MM)
+    both = join(modest, WIDE, block_of(twist, noise=0.2 * SIGMA), CENTRE_MM, SEEN_MM)
     assert np.linalg.norm((moved_by(exact) - twist) / SIGMAS) < np.linalg.norm(
         (moved_by(both) - twist) / SIGMAS
     )
-    claimed = join(SURFACE, WIDE, block_of(twist), CENTRE_MM)
+    claimed = join(SURFACE, WIDE, block_of(twist), CENTRE_MM, SEEN_MM)
     assert np.trace(exact.covariance) > 0.9 * np.trace(claimed.covariance)
 
 
@@ -169,6 +170,6 @@ def test_too_much_of_something_else_is_told() -> None:
     block = block_of(drawn(3))
     residual = block.residual.copy()
     residual[np.arange(len(residual)) % 5 < 3] += 6.0
-    joined = join(SURFACE, WIDE, replace(block, residual=residual), CENTRE_MM)
+    joined = join(SURFACE, WIDE, replace(block, residual=residual), CENTRE_MM, SEEN_MM)
     assert joined.reasons == (Reason.CUES_DISAGREE,)
     assert joined.camera_from_bone is SURFACE.camera_from_bone
