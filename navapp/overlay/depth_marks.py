@@ -13,8 +13,8 @@ from navapp.values import DEPTH_COLOURS, Foreground, Origin
 
 Image = NDArray[np.uint8]
 
-# Share of the colour over the picture: what stands in front of the bone is nearly covered.
 _WIDTH = 640
+# Share of the colour over the picture: what stands in front of the bone is nearly covered.
 _SHARE, _SHARE_IN_FRONT = 0.45, 0.85
 
 

@@ -96,6 +96,7 @@ class NavigationApp(QuietApp):
     COMMANDS = {ActionProvider}  # noqa: RUF012 (as the base class has it)
     BINDINGS: ClassVar[list[BindingType]] = bindings()
     ENABLE_COMMAND_PALETTE = True
+    uses_mouse = True
     ALLOW_SELECT = False
 
     def __init__(

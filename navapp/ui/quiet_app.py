@@ -4,6 +4,7 @@ import asyncio
 import signal
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 from textual import events
 from textual.app import App
@@ -25,6 +26,8 @@ class QuietApp(App[int]):
         painter: of pictures; None: they are half blocks.
     """
 
+    # Where it does nothing, the terminal keeps it for selecting text.
+    uses_mouse: ClassVar[bool] = False
     failure: Exception | None = None
     painter: Painter | None = None
 
@@ -78,7 +81,7 @@ async def drive(app: QuietApp) -> int:
         loop.add_signal_handler(number, app.exit, 128 + number)
     watch = asyncio.create_task(_end_without_terminal(app))
     try:
-        result = await app.run_async()
+        result = await app.run_async(mouse=app.uses_mouse)
     finally:
         watch.cancel()
         if app.painter is not None:
