@@ -81,22 +81,21 @@ def prepare_session(
             prior = prior or make_nominal_prior(opened.simulation)
         if plan is None:
             raise UsageError("no plan is given", remedy="give --plan, or [plan] path")
-        prior = (prior or Prior()).with_cones(plan.approaches)
         stage = plan.stage(stage)
+        specification = specify_session(
+            configuration,
+            opened.rig,
+            plan,
+            prior or Prior(),
+            stage,
+            is_live=True,
+            others=check_others(options.also, plan, stage, is_live=True),
+            calibrated_display=display,
+            has_gates=True,
+        )
         if needs_start:
-            check_start(prior, stage.bone)
+            check_start(specification.prior, stage.bone)
         undo.pop_all()
-    specification = specify_session(
-        configuration,
-        opened.rig,
-        plan,
-        prior,
-        stage,
-        is_live=True,
-        others=check_others(options.also, plan, stage, is_live=True),
-        calibrated_display=display,
-        has_gates=True,
-    )
     return LiveSession(configuration, opened, specification, board)
 
 

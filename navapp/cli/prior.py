@@ -66,7 +66,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     _check(options)
     configuration = load(find_file(options.config))
     plan, rig = read_plan(options.plan), read_rig(options.rig)
-    prior = _make_prior(options, plan, rig).with_cones(plan.approaches)
+    prior = _make_prior(options, plan, rig)
     stage = _stage_of(plan, options.bone)
     check_accepted(rig, True, diagnostics)
     # The paper's methods need a rough pose.

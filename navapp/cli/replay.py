@@ -232,7 +232,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         configuration,
         read_rig(rig_path),
         plan,
-        (Prior() if prior_path is None else read_prior(prior_path)).with_cones(plan.approaches),
+        Prior() if prior_path is None else read_prior(prior_path),
         first,
         is_live=False,
         method=method,

@@ -215,7 +215,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
 def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.control.commands import Quit
     from navapp.control.runner import SessionRunner
-    from navapp.ui.app import run_app
+    from navapp.ui.run_screen import run_screen
 
     n_frames = 0
 
@@ -231,7 +231,7 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()
-        code = run_app(
+        code = run_screen(
             runner,
             log_folder() / "navapp.log",
             pictures=session.configuration.ui.pictures,

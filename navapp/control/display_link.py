@@ -4,8 +4,9 @@ import threading
 
 from drivers.interfaces import Display
 from navapp.control.backoff import Backoff
-from navapp.control.pictures import Image, fit_to_display
+from navapp.control.pictures import Image
 from navapp.errors import DeviceError, DeviceLost
+from navapp.overlay.fitting import put_on_canvas
 
 _PAUSES_S = (0.5, 8.0)
 
@@ -58,7 +59,7 @@ class DisplayLink:
         self._has_guides = has_guides
         try:
             info = self._display.info
-            fitted = fit_to_display(image, info.width, info.height) if is_scaled else image
+            fitted = put_on_canvas(image, info.width, info.height) if is_scaled else image
             self._display.show(fitted, valid_until_ns)
             self.trouble = ""
             self._reopener.note_success()

@@ -208,18 +208,3 @@ def _scene(
 
 def _is_lost(snapshot: Snapshot) -> bool:
     return snapshot.verdict is None or snapshot.verdict.status is Status.LOST
-
-
-def fit_to_display(image: Image, width: int, height: int) -> Image:
-    """The picture at a display's size: scaled as a whole, black at two sides when it must be."""
-    import cv2
-
-    if image.shape[:2] == (height, width):
-        return image
-    factor = min(width / image.shape[1], height / image.shape[0])
-    size = (max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor)))
-    scaled = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    out = np.zeros((height, width, 3), dtype=np.uint8)
-    x, y = (width - size[0]) // 2, (height - size[1]) // 2
-    out[y : y + size[1], x : x + size[0]] = scaled
-    return out

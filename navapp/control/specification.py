@@ -84,7 +84,8 @@ def specify_session(
         configuration: of everything else.
         rig: of the pictures.
         plan: of the operation.
-        prior: where the bones may be before a first registration.
+        prior: where the bones may be before a first registration; the plan's usual approaches stand
+            in for cones that it does not tell.
         stage: in force at the start.
         is_live: the display shows pictures as late as it was measured, and the session may be
             recorded; neither is true of a replay.
@@ -101,7 +102,7 @@ def specify_session(
     return SessionSpecification(
         rig,
         plan,
-        prior,
+        prior.with_cones(plan.approaches),
         stage,
         method or configuration.tracking.method,
         configuration.tracking.follow_refused if follows_refused is None else follows_refused,

@@ -11,7 +11,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.overlay.labels import put_text
-from navapp.values import Foreground, Origin
+from navapp.values import Foreground
 
 Image = NDArray[np.uint8]
 
@@ -33,25 +33,18 @@ def measure_residuals_mm(
     """(h, w) over the foreground's box, mm; NaN where nothing was matched or no bone is seen."""
     box = foreground.box
     view = render_rectified(surface, rectified_from_bone, geometry, box)
-    disparity_px = np.full((box.height, box.width), np.nan, np.float32)
-    here, there = box.shared_slices(foreground.measured.box)
-    is_matched = foreground.measured.origin[there] == Origin.MATCHED
-    np.copyto(disparity_px[here], foreground.measured.disparity_px[there], where=is_matched)
-    rows, columns = np.nonzero(view.mask & np.isfinite(disparity_px) & ~foreground.is_in_front)
-    rays = np.column_stack(
-        [
-            (columns + box.x - geometry.centre_x_px) / geometry.focal_px,
-            (rows + box.y - geometry.centre_y_px) / geometry.focal_px,
-            np.ones(len(rows)),
-        ]
-    )
-    corners_mm = surface.vertices_mm[surface.faces[view.face_index[rows, columns]]]
-    normals = np.cross(corners_mm[:, 1] - corners_mm[:, 0], corners_mm[:, 2] - corners_mm[:, 0])
-    normals = rectified_from_bone.rotate(normals / np.linalg.norm(normals, axis=1)[:, None])
-    depth_mm = geometry.focal_px * geometry.baseline_mm / disparity_px[rows, columns]
-    off_mm = depth_mm - view.depth_mm[rows, columns]
-    found = np.full(disparity_px.shape, np.nan, np.float32)
-    found[rows, columns] = (normals * rays).sum(axis=1) * off_mm
+    cloud = foreground.measured.reproject(geometry)
+    columns, rows = (cloud.pixels - (box.x, box.y)).T
+    is_inside = (columns >= 0) & (columns < box.width) & (rows >= 0) & (rows < box.height)
+    points_mm, rows, columns = cloud.points_mm[is_inside], rows[is_inside], columns[is_inside]
+    is_on_bone = view.mask[rows, columns] & ~foreground.is_in_front[rows, columns]
+    points_mm, rows, columns = points_mm[is_on_bone], rows[is_on_bone], columns[is_on_bone]
+    normals = surface.normals[surface.faces[view.face_index[rows, columns]]].mean(axis=1)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-9)[:, None]
+    # The model's point on the ray through a measured one lies at another depth.
+    off_mm = points_mm * (1.0 - view.depth_mm[rows, columns] / points_mm[:, 2])[:, None]
+    found = np.full((box.height, box.width), np.nan, np.float32)
+    found[rows, columns] = (rectified_from_bone.rotate(normals) * off_mm).sum(axis=1)
     return found
 
 

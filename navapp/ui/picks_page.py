@@ -12,8 +12,8 @@ from textual.containers import Horizontal, Vertical
 from textual.content import Content
 from textual.message import Message
 
+from navapp.overlay.fitting import in_colour
 from navapp.ui.actions import ARROWS
-from navapp.ui.pictures.fitting import in_colour
 from navapp.ui.pictures.picture import Picture
 from navapp.ui.screens import PageScreen
 from navapp.ui.start_page import StartChosen, why_no_picture

@@ -14,8 +14,8 @@ from textual.message import Message
 from navapp.control.commands import Register
 from navapp.control.rules import why_refused
 from navapp.geometry.box import Box
+from navapp.overlay.fitting import in_colour
 from navapp.ui.actions import ARROWS
-from navapp.ui.pictures.fitting import in_colour
 from navapp.ui.pictures.picture import Picture
 from navapp.ui.screens import PageScreen
 from navapp.ui.text_view import TextView

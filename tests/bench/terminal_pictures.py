@@ -1,7 +1,7 @@
 """Pictures a second, and processor time of each, that this terminal takes.
 
 usage, in the terminal that is to be measured: python -m tests.bench.terminal_pictures FILE
-    [--pictures auto|kitty|sixel|blocks] [--compressed] [--size 960x540] [--seconds S]
+    [--pictures auto|kitty|sixel|blocks|textual] [--compressed] [--size 960x540] [--seconds S]
 
 Simulated pictures of the moving leg, with noise, are painted as the operator's screen paints them,
 one as soon as the terminal has taken the last. FILE gets one line.
@@ -12,21 +12,23 @@ import os
 import sys
 import time
 from dataclasses import replace
+from io import StringIO
 from itertools import cycle
 from pathlib import Path
 
 import numpy as np
+from rich.console import Console
 from textual.geometry import Region
 
 from navapp.config import load
 from navapp.devices import open_live
-from navapp.ui.pictures.fitting import put_on_canvas
 from navapp.ui.pictures.graphics import find_graphics
 from navapp.ui.pictures.halfblocks import compute_cell_codes, make_row_strip
 from navapp.ui.pictures.kitty import KittyEncoder
 from navapp.ui.pictures.painter import Painter, PictureText
 
 _N_PICTURES, _WARM = 8, 5
+_CELLS = 110, 30  # of half blocks
 
 
 def record_pictures() -> list[np.ndarray]:
@@ -65,16 +67,18 @@ def main() -> None:
     )
     options = parser.parse_args()
     pictures = record_pictures()
-    graphics, terminal = find_graphics(options.pictures, os.environ), Terminal()
+    wish = "blocks" if options.pictures == "textual" else options.pictures
+    graphics, terminal = find_graphics(wish, os.environ), Terminal()
     if options.compressed:
         encoder = KittyEncoder(is_local=False)
         graphics = replace(graphics, encoder=encoder, words="kitty, compressed")
-    width, height = map(int, options.size.split("x"))
-    if graphics.encoder is None:
-        told = measure_blocks(pictures, options.seconds)
+    if options.pictures == "textual":
+        told = measure_strips(pictures, options.seconds)
     else:
         painter = Painter(graphics, terminal.write)
-        cells = width // graphics.cell_px[0], height // graphics.cell_px[1]
+        size_px = map(int, options.size.split("x"))
+        cells = tuple(px // cell for px, cell in zip(size_px, graphics.cell_px, strict=True))
+        cells = cells if graphics.has_pixels else _CELLS
         told = measure(painter, pictures, Region(0, 0, *cells), terminal, options.seconds)
         painter.close()
     options.out.write_text(f"{graphics.words}: {told}\n")
@@ -111,17 +115,18 @@ def measure(
     )
 
 
-def measure_blocks(pictures: list[np.ndarray], seconds: float) -> str:
-    """Half blocks: what making the cells of 110 x 30 takes."""
+def measure_strips(pictures: list[np.ndarray], seconds: float) -> str:
+    """Half blocks that Textual writes: making its strips, and their text as it makes it."""
     costs_s, end_s = [], time.monotonic() + seconds
+    console = Console(color_system="truecolor", file=StringIO())
     for picture in cycle(pictures):
         begun_s = time.thread_time()
-        for row in compute_cell_codes(put_on_canvas(picture, 220, 120), 110, 30):
-            make_row_strip(row)
+        for row in compute_cell_codes(picture, *_CELLS):
+            make_row_strip(row).render(console)
         costs_s.append(time.thread_time() - begun_s)
         if time.monotonic() > end_s:
             break
-    return f"{1e3 * np.median(costs_s):.1f} ms of processor time each, 110 x 30 cells"
+    return f"{1e3 * np.median(costs_s):.1f} ms of processor time each, {_CELLS} cells"
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import ctypes, sys
 from pathlib import Path
-from navapp.ui.app import run_app
+from navapp.ui.run_screen import run_screen
 from tests.ui import snapshots
 
 class Session(snapshots.ScriptedSession):
@@ -34,7 +34,7 @@ class Session(snapshots.ScriptedSession):
     def stop(self):
         Path(sys.argv[1]).joinpath("stopped").write_text("yes")
 
-sys.exit(run_app(Session(getattr(snapshots, sys.argv[3])()), Path(sys.argv[1]) / "ui.log"))
+sys.exit(run_screen(Session(getattr(snapshots, sys.argv[3])()), Path(sys.argv[1]) / "ui.log"))
 """
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from navapp.ui.pictures.number_kernels import write_number
 
 # Of a channel in true colour: longer runs, hardly seen.
-_LEVELS = 15
+LEVELS = 15
 # Of the 256 colours: a cube of 6 levels a channel, then 24 greys.
 _CUBE = np.array([0, 95, 135, 175, 215, 255])
 _FIRST_OF_CUBE, _FIRST_GREY, _N_GREYS, _DARKEST_GREY, _GREY_STEP = 16, 232, 24, 8, 10
@@ -70,7 +70,7 @@ def _find_colour(pixel: NDArray[np.uint8], is_true_colour: bool) -> int:
     if is_true_colour:
         colour = 0
         for channel in (red, green, blue):
-            colour = (colour << 4) | (channel * _LEVELS + 127) // 255
+            colour = (colour << 4) | (channel * LEVELS + 127) // 255
         return int(colour)
     place, off = 0, 0
     for channel in (red, green, blue):

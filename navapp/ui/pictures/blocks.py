@@ -1,4 +1,4 @@
-"""Pictures as half blocks, written past Textual: it takes a tenth of a second for as many cells."""
+"""Pictures as half blocks, written past Textual, which keeps the tracker waiting for so many."""
 
 import numpy as np
 from numpy.typing import NDArray

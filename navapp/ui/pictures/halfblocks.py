@@ -9,10 +9,9 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
-from navapp.ui.pictures.fitting import put_on_canvas
+from navapp.overlay.fitting import put_on_canvas
+from navapp.ui.pictures.block_kernels import LEVELS
 
-# Sixteen levels a channel: longer runs, a third of the processor time, hardly seen.
-_LEVELS = 15
 _UPPER_HALF = "▀"
 
 
@@ -26,7 +25,7 @@ def compute_cell_codes(picture: NDArray[np.uint8], columns: int, rows: int) -> N
         rows: of cells, at least 1.
     """
     canvas = put_on_canvas(picture, columns, 2 * rows)
-    levels = np.rint(canvas * (_LEVELS / 255.0)).astype(np.int32)
+    levels = np.rint(canvas * (LEVELS / 255.0)).astype(np.int32)
     codes = (levels[:, :, 2] << 8) | (levels[:, :, 1] << 4) | levels[:, :, 0]
     return np.asarray((codes[0::2] << 12) | codes[1::2], dtype=np.int32)
 
@@ -48,7 +47,7 @@ def _ramp_cell(code: int, ramp: str) -> tuple[str, Style]:
     """One character for both halves: brightness by its ink, so that it needs no colour at all."""
     halves = (code >> 12, code & 0xFFF)
     red, green, blue = (sum(half >> shift & 15 for half in halves) / 2 for shift in (8, 4, 0))
-    brightness = (0.299 * red + 0.587 * green + 0.114 * blue) / _LEVELS
+    brightness = (0.299 * red + 0.587 * green + 0.114 * blue) / LEVELS
     colour = Color.from_rgb(red * 17, green * 17, blue * 17)
     return ramp[round(brightness * (len(ramp) - 1))], Style(color=colour, bgcolor=_colour(0))
 

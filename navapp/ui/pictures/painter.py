@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from textual.geometry import Region
 
-from navapp.ui.pictures.fitting import put_on_canvas
+from navapp.overlay.fitting import put_on_canvas
 from navapp.ui.pictures.graphics import Encoder, Graphics
 
 # Processor time of a picture: more makes it smaller, much less makes it larger again.
@@ -128,6 +128,8 @@ class Painter:
             share = min(1.0, share) * self._scale.value
             width, height = max(1, round(share * width)), max(1, round(share * height))
         canvas = put_on_canvas(picture, width, height)
+        if canvas is picture:  # encoders are compiled for arrays that may be written
+            canvas = picture.copy()
         text = self._encoder.encode(number, canvas, place.width, place.height)
         at = f"\x1b[{place.y + 1};{place.x + 1}H"
         self._sent = PictureText(f"{_BEGIN}{at}{text}{_END}")

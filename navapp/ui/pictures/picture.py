@@ -12,7 +12,8 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from navapp.geometry.box import Box
-from navapp.ui.pictures.fitting import find_point, fit_size, resize
+from navapp.overlay.fitting import fit_size, resize
+from navapp.ui.pictures.fitting import find_point
 from navapp.ui.pictures.halfblocks import compute_cell_codes, make_row_strip
 from navapp.ui.pictures.painter import Painter
 
