@@ -102,6 +102,22 @@ class SheetScene:
             self._draw(camera, rays, pose, box, picture)
         return np.repeat(picture[:, :, None], 3, axis=2)
 
+    def draw_alone(
+        self, eye: Eye, scale: float, camera_from_sheet: RigidTransform
+    ) -> tuple[tuple[slice, slice], NDArray[np.float32]] | None:
+        """Rows and columns that the sheet may touch, and its radiance there.
+
+        Not a number beside the sheet, if that is the scene's ground; None: it is not in view.
+        """
+        camera, rays = self._optics(eye, scale)
+        box = _box(camera, camera_from_sheet.apply(self._sheet.corners_mm))
+        if box is None:
+            return None
+        picture = np.full((camera.height, camera.width), self._ground, np.float32)
+        self._draw(camera, rays, camera_from_sheet, box, picture)
+        part = slice(int(box[0]), int(box[1])), slice(int(box[2]), int(box[3]))
+        return part, picture[part]
+
     def _draw(
         self,
         camera: Camera,

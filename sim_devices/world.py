@@ -175,6 +175,10 @@ class World:
             thickness = wear_patch(mesh, thickness, self._defect_mm(), _DEFECT_RADIUS_MM)
         return thickness
 
+    def surface(self, bone: str) -> TriangleMesh:
+        """A bone as a camera sees it before any cut: with its cartilage, bone coordinates."""
+        return dict(self._surfaces_mm())[bone]
+
     def render(
         self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
     ) -> NDArray[np.float32]:

@@ -15,6 +15,8 @@ import numpy as np
 
 from navapp.errors import InputError
 from navapp.geometry.transform import FloatArray
+from navapp.tools.plate import Plate
+from navapp.tools.plate_files import read_plate
 
 BoardKind = Literal["charuco", "chessboard", "circles", "circles_asymmetric"]
 
@@ -120,6 +122,20 @@ def read_board(path: str | Path) -> Board:
         raise _refusal(path, f"describes no possible board: {error}") from error
 
 
+def read_target(path: str | Path) -> Board | Plate:
+    """Read what can be printed: a target of a calibration, or a tool's plate.
+
+    Raises:
+        InputError: missing, damaged, or neither.
+    """
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        content = None
+    is_plate = isinstance(content, dict) and content.get("type") == "plate"
+    return read_plate(path) if is_plate else read_board(path)
+
+
 def parse_board(content: dict[str, Any]) -> Board:
     """A target from the keys of its file.
 
@@ -127,6 +143,8 @@ def parse_board(content: dict[str, Any]) -> Board:
         ValueError: a key that is missing, unknown or impossible; the text names it.
     """
     kind = content.get("type")
+    if kind == "plate":
+        raise ValueError("a plate marks a tool, it calibrates no camera; see `calibrate pivot`")
     if kind not in _KEYS:
         raise ValueError(f"type must be one of {', '.join(_KEYS)}, not {kind!r}")
     needed, known = _KEYS[kind], (*_KEYS[kind], *_OPTIONAL[kind], "type")

@@ -15,6 +15,8 @@ example: navapp calibrate board --board board.json --out board.pdf
 
 board.json: {"type": "charuco", "squares_x": 11, "squares_y": 8, "square_mm": 15.0,
              "marker_mm": 11.0, "dictionary": "DICT_4X4_100"}
+plate.json: {"type": "plate", "squares_x": 2, "squares_y": 2, "square_mm": 20.0,
+             "marker_mm": 16.0, "dictionary": "DICT_4X4_100"}     of a tool (docs/tools.md)
 Print it at 100 %, measure the line of 100 mm, and glue it to something flat.
 """
 
@@ -34,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Draw and write."""
-    from calibration.targets.boards import keys_of, read_board
+    from calibration.targets.boards import read_target
     from calibration.targets.printing import Sheet, render_page
     from navapp.geometry.whole_files import write_whole
 
@@ -45,15 +47,15 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         )
     for path in (options.out, options.json):
         check_writable(path)
-    sheet = Sheet(read_board(options.board))
+    sheet = Sheet(read_target(options.board))
     write_whole(options.out, render_page(sheet, "pdf" if form == "pdf" else "svg"))
     warnings = _warnings(sheet)
     for warning in warnings:
         diagnostics.warn(warning)
     content = {
         "out": options.out,
-        "board": keys_of(sheet.board),
-        "board_mm": list(sheet.board.size_mm),
+        "board": sheet.keys,
+        "board_mm": list(sheet.size_mm),
         "page_mm": [sheet.width_mm, sheet.height_mm],
         "paper": sheet.paper,
         "warnings": warnings,
@@ -80,6 +82,6 @@ def _warnings(sheet: "Sheet") -> list[str]:
             f"the page is {sheet.width_mm:.0f} x {sheet.height_mm:.0f} mm, too large for A4: it "
             f"needs {sheet.paper} paper"
         )
-    if sheet.board.spacing_mm == 1.0:
+    if getattr(sheet.board, "spacing_mm", 0.0) == 1.0:
         told.append("square_mm 1.0 means that lengths are counted in squares; these are 1 mm large")
     return told

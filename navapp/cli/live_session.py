@@ -55,6 +55,7 @@ def prepare_session(
     """
     from navapp.cli.headless import check_accepted, check_not_expired, check_start
     from navapp.cli.other_bones import check_others
+    from navapp.cli.session_tools import read_tools
     from navapp.cli.simulated_patient import make_built_in_plan, make_nominal_prior
     from navapp.control.prior_files import read_prior
     from navapp.control.specification import specify_session
@@ -92,6 +93,7 @@ def prepare_session(
             others=check_others(options.also, plan, stage, is_live=True),
             calibrated_display=display,
             has_gates=True,
+            tools=read_tools(configuration, opened.rig, diagnostics),
         )
         if needs_start:
             check_start(specification.prior, stage.bone)

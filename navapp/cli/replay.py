@@ -119,7 +119,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     _check(options)
     configuration = load(find_file(options.config))
     settings = _settings(configuration, options)
-    replay = _prepare(configuration, options)
+    replay = _prepare(configuration, options, diagnostics)
     for warning in replay.warnings:
         diagnostics.warn(warning)
     specification = replay.specification
@@ -198,7 +198,9 @@ def _settings(configuration: "Configuration", options: argparse.Namespace) -> "R
     )
 
 
-def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Replay:
+def _prepare(
+    configuration: "Configuration", options: argparse.Namespace, diagnostics: Diagnostics
+) -> _Replay:
     """Everything but the pictures: the command line's, else the session's, else configured."""
     from navapp.cli.recorded_operation import (
         choose_operator,
@@ -207,6 +209,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         list_warnings,
     )
     from navapp.cli.session_folder import is_session, read_session
+    from navapp.cli.session_tools import read_tools
     from navapp.control.executors import InlineExecutor, RecordedExecutor
     from navapp.control.operators import RecordedOperator
     from navapp.control.prior_files import read_prior
@@ -228,9 +231,10 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
     first, others = _stages(options, plan, stage)
     method = options.method or (None if session is None else session.method)
     is_recorded_so = session is not None and session.follows_refused
+    rig = read_rig(rig_path)
     specification = specify_session(
         configuration,
-        read_rig(rig_path),
+        rig,
         plan,
         Prior() if prior_path is None else read_prior(prior_path),
         first,
@@ -241,6 +245,7 @@ def _prepare(configuration: "Configuration", options: argparse.Namespace) -> _Re
         is_each=options.order == "each",
         layers=_layers(options.layers),
         made_steps=tuple(dict.fromkeys(options.cut)),
+        tools=read_tools(configuration, rig, diagnostics),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
     other_executor: Executor = InlineExecutor()

@@ -9,7 +9,7 @@ import numpy as np
 
 from navapp.control.commands import DistrustRig
 from navapp.control.frame_result import FrameResult
-from navapp.control.recorder import measured_to_json
+from navapp.control.recorder import measured_to_json, reading_to_json
 from navapp.control.session import describe_moved_rig
 from navapp.control.states import SessionState, Snapshot
 from navapp.limb import LimbMeasurement
@@ -42,6 +42,7 @@ def frame_to_json(result: FrameResult, tre_mm: Mapping[str, float | None]) -> di
         },
         "bone_version": result.bone_version,
         "measured": {name: measured_to_json(one) for name, one in result.measured.items()},
+        "tools": {kind: reading_to_json(one) for kind, one in result.tools.items()},
         **({} if result.limb is None else {"limb": limb_to_json(result.limb)}),
     }
 

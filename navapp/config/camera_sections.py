@@ -50,6 +50,8 @@ class SimulationSection(Section):
     """Of the leg."""
     instrument: Literal["none", "sweep"] = "none"
     """What passes in front of the bone."""
+    tool: Literal["none", "pointer", "drill"] = "none"
+    """Held into the view: its tip touches places on the femur, one after the other."""
     misses: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
     """By how much saw and drill miss their plan: times 1 mm and 1.5 deg (standard deviations)."""
     scale: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0

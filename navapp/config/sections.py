@@ -133,6 +133,21 @@ class TrackingSection(Section):
     """Carry on poses that the judge refuses, to measure them; they stay refused, without guides."""
 
 
+class ToolsSection(Section):
+    """Hand-held tools with a printed plate."""
+
+    pointer: str | None = None
+    """File of the pointer (calibrate pivot)."""
+    drill: str | None = None
+    """File of the drill (calibrate pivot --tool drill)."""
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Those that are named."""
+        named = {"pointer": self.pointer, "drill": self.drill}
+        return {kind: path for kind, path in named.items() if path is not None}
+
+
 class CalibrationSection(Section):
     """Calibration of the stereo rig."""
 
@@ -196,6 +211,7 @@ class Configuration(Section):
     stereo: EmptySection = EmptySection()
     registration: EmptySection = EmptySection()
     tracking: TrackingSection = TrackingSection()
+    tools: ToolsSection = ToolsSection()
     calibration: CalibrationSection = CalibrationSection()
     overlay: EmptySection = EmptySection()
     stages: StagesSection = StagesSection()

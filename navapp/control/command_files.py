@@ -13,7 +13,9 @@ from navapp.control.commands import (
     ConfirmCross,
     ConfirmStep,
     DistrustRig,
+    DropPoint,
     EnterStage,
+    ForgetPoints,
     Interrupt,
     NudgeCross,
     OverrideGate,
@@ -26,6 +28,7 @@ from navapp.control.commands import (
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
+    TouchPoint,
     WithdrawCondition,
     WithdrawStep,
 )
@@ -41,6 +44,8 @@ _PLAIN: dict[str, type] = {
     "eye": ToggleEye,
     "check_mirror": CheckMirror,
     "confirm_cross": ConfirmCross,
+    "drop_point": DropPoint,
+    "forget_points": ForgetPoints,
     "reconnect": Reconnect,
     "interrupt": Interrupt,
     "quit": Quit,
@@ -80,6 +85,8 @@ def command_to_json(command: Command) -> dict[str, Any]:
     if isinstance(command, Propose):
         pose = command.left_from_bone
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
+    if isinstance(command, TouchPoint):
+        return {"command": "touch_point", "landmark": command.landmark}
     if isinstance(command, DistrustRig):
         return {"command": "distrust_rig", "why": command.why}
     if isinstance(command, Accept | Reject):
@@ -111,6 +118,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
         if name == "propose":
             matrix = value["camera_from_model"]
             return Propose(RigidTransform("left", str(value["bone"]), matrix))
+        if name == "touch_point":
+            return TouchPoint(str(value["landmark"]))
         if name == "distrust_rig":
             return DistrustRig(str(value["why"]))
         if name in _DECISIONS:

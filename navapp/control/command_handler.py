@@ -11,7 +11,9 @@ from navapp.control.commands import (
     ConfirmCross,
     ConfirmStep,
     DistrustRig,
+    DropPoint,
     EnterStage,
+    ForgetPoints,
     Interrupt,
     NudgeCross,
     OverrideGate,
@@ -24,6 +26,7 @@ from navapp.control.commands import (
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
+    TouchPoint,
     WithdrawCondition,
     WithdrawStep,
 )
@@ -32,6 +35,7 @@ from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
 from navapp.control.gate_keeper import GateKeeper
 from navapp.control.mirror_checking import MirrorChecking
+from navapp.control.patient_checking import PatientChecking
 from navapp.control.rig_watch import RigWatch
 from navapp.control.rules import why_refused
 from navapp.control.session import Session
@@ -74,8 +78,9 @@ class CommandHandler:
         eye: EyePreview,
         plan: Plan,
         gates: GateKeeper,
+        patient: PatientChecking,
     ) -> None:
-        self._session, self._gates = session, gates
+        self._session, self._gates, self._patient = session, gates, patient
         self._camera = camera
         self._display = display
         self._rig = rig
@@ -123,6 +128,8 @@ class CommandHandler:
                 self._gates.override(self._stage(command.number), command.reason)
             case ConfirmStep() | WithdrawStep() | ConfirmCondition() | WithdrawCondition():
                 self._on_word(command)
+            case TouchPoint() | DropPoint() | ForgetPoints():
+                self._on_touch(command)
             case Reconnect():
                 session.add_event("reopen", "lost devices are opened again")
                 self._camera.retry_now()
@@ -198,6 +205,18 @@ class CommandHandler:
         except UsageError as error:
             is_step = isinstance(command, ConfirmStep | WithdrawStep)
             self._refuse("step" if is_step else "gate", str(error))
+
+    def _on_touch(self, command: TouchPoint | DropPoint | ForgetPoints) -> None:
+        """A point of the check on the patient."""
+        if isinstance(command, DropPoint):
+            self._patient.drop()
+        elif isinstance(command, ForgetPoints):
+            self._patient.forget()
+            self._session.add_event("check", "check on the patient begun anew")
+        elif why := self._patient.why_not_touch(command.landmark):
+            self._refuse("check", why)
+        else:
+            self._patient.begin_touch(command.landmark)
 
     def _on_quit(self) -> None:
         self._display.darken()

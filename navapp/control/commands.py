@@ -138,6 +138,23 @@ class WithdrawStep:
 
 
 @dataclass(frozen=True, slots=True)
+class TouchPoint:
+    """Check on the patient: the pointer's tip rests on the bone; take that point."""
+
+    landmark: str = ""  # of the plan, that it rests on; empty: anywhere on the surface
+
+
+@dataclass(frozen=True, slots=True)
+class DropPoint:
+    """Check on the patient: forget the point that was taken last."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForgetPoints:
+    """Check on the patient: begin anew."""
+
+
+@dataclass(frozen=True, slots=True)
 class Reconnect:
     """Open lost devices again and bring the mirror to its place, now."""
 
@@ -179,6 +196,9 @@ Command = (
     | WithdrawCondition
     | ConfirmStep
     | WithdrawStep
+    | TouchPoint
+    | DropPoint
+    | ForgetPoints
     | Reconnect
     | Interrupt
     | DistrustRig

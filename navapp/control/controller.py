@@ -38,6 +38,7 @@ from navapp.control.made_steps import MadeSteps
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.other_bones import AskedBones, OtherBones
+from navapp.control.patient_checking import PatientChecking
 from navapp.control.pictures import Composer
 from navapp.control.rates import RateMeter
 from navapp.control.registration_job import RegistrationJob
@@ -45,12 +46,14 @@ from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.snapshot_maker import SnapshotMaker
 from navapp.control.specification import SessionSpecification
-from navapp.control.states import Snapshot, StepLine
+from navapp.control.states import SessionState, Snapshot, StepLine, ToolReading
+from navapp.control.tool_watch import ToolWatch
 from navapp.control.trackers import MakeTracker, Trackers
 from navapp.errors import DeviceError, EndOfSequence, NavappError
 from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.overlay import DepthMarks
+from navapp.tools.tool import ToolKind
 from navapp.tracking import make_tracker
 from navapp.values import FrameTimings, StageSpec
 
@@ -106,13 +109,16 @@ class SessionController:
             devices.clock, specification, hooks, executor, other_executor or InlineExecutor(),
             make_tracker,
         )  # fmt: skip
-        gates = GateKeeper(
+        self._tools = ToolWatch(specification.tools, rig, plan)
+        self._patient = PatientChecking(self._session, self._tools, plan)
+        gates = self._gates = GateKeeper(
             self._session,
             Gates(
                 plan, self._session,
                 are_asked=specification.has_gates, check_minutes=specification.check_minutes,
                 rig_made_on=_made_on(rig),
             ),
+            self._patient,
         )  # fmt: skip
         self._rig_watch = RigWatch(self._session, self._display, BoneMotion(rig, plan), board_watch)
         self._presenter = FramePresenter(
@@ -125,12 +131,12 @@ class SessionController:
         )
         self._commands = CommandHandler(
             self._session, self._camera, self._display, self._rig_watch, self._monitored,
-            self._mirror_checking, self._eye, plan, gates,
+            self._mirror_checking, self._eye, plan, gates, self._patient,
         )  # fmt: skip
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
             _make_mirror_judge(specification, composer), self._eye, specification,
-            self._rig_watch, gates,
+            self._rig_watch, gates, self._tools, self._patient,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 
@@ -240,6 +246,7 @@ class SessionController:
         # Only now: the active bone's picture never waits for another bone.
         others = session.follow_others(frame)
         measured = session.measure_steps(frame)
+        tools = self._follow_tools(frame)
         timings = FrameTimings() if session.tracked is None else session.tracked.timings
         result = FrameResult(
             frame,
@@ -253,10 +260,24 @@ class SessionController:
             measured,
             version,
             session.measure_limb(frame, others),
+            tools,
         )
         # The age of a frame that waits to be read says when it was asked for.
         is_stepped = self._camera.camera.info.is_stepped
         session.end_frame(result, None if is_stepped else picture.pose_age_ns / 1e6)
+
+    def _follow_tools(self, frame: StereoFrame) -> dict[ToolKind, ToolReading]:
+        """Look for tools in a frame, and take the touch that the operator has asked for."""
+        session = self._session
+        is_accepted = session.state is SessionState.NAVIGATING
+        tools = self._tools.follow(
+            frame, session.tracked if is_accepted else None, session.stage,
+            session.bone_version, session.bone_surface,
+        )  # fmt: skip
+        answer = self._patient.add(tools.get("pointer"), session.stage)
+        if answer is not None:
+            self._gates.take_check(answer)
+        return tools
 
 
 def _make_mirror_judge(

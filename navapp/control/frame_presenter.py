@@ -14,6 +14,7 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.overlay import DepthMarks
 from navapp.values import Foreground, OverlayMode, OverlayPicture, Reason
 
@@ -54,6 +55,8 @@ class FramePresenter:
         foreground = None if tracked is None else tracked.foreground
         pose = snapshot.left_from_bone
         point_mm = None if pose is None else self._mirror_checking.point_mm(pose)
+        if point_mm is None and pose is not None:
+            point_mm = _find_wanted(snapshot, pose)
         video = self._composer.compose_video(frame.left, snapshot, mark, foreground, point_mm)
         image = video
         if self._composer.mode is OverlayMode.MIRROR:
@@ -146,3 +149,12 @@ class FramePresenter:
         elif self._is_late and has_guides and not is_late:
             self._session.add_event("display", "pictures are ready in time again")
         self._is_late = is_late if has_guides else self._is_late
+
+
+def _find_wanted(snapshot: Snapshot, left_from_bone: RigidTransform) -> FloatArray | None:
+    """(3,) in the left camera, where the check on the patient asks for a point; None: nowhere."""
+    check = snapshot.patient_check
+    if check is None or check.wanted_mm is None or not check.is_valid:
+        return None
+    place: FloatArray = left_from_bone.apply(check.wanted_mm)
+    return place

@@ -4,8 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
-from navapp.control.states import SessionState
+from navapp.control.states import SessionState, ToolReading
 from navapp.limb import LimbMeasurement
+from navapp.tools.tool import ToolKind
 from navapp.values import FrameTimings, Measured, OverlayPicture, StageSpec, TrackedFrame
 
 
@@ -28,6 +29,8 @@ class FrameResult:
     bone_version: int = 0  # of the stage's bone, that the pose was judged by
     # what femur and tibia say together; None unless both are OK in this very frame.
     limb: LimbMeasurement | None = None
+    # tools that were seen in this very frame.
+    tools: Mapping[ToolKind, ToolReading] = field(default_factory=dict)
 
 
 FrameListener = Callable[[FrameResult], None]

@@ -3,9 +3,12 @@
 from collections.abc import Sequence
 
 from navapp.control.gates import Gates
+from navapp.control.patient_checking import PatientChecking
 from navapp.control.session import Session
-from navapp.control.stages import STAGES
+from navapp.control.stages import CHECKED_ON_PATIENT, STAGES
 from navapp.control.states import ConditionLine, EventLevel
+from navapp.errors import UsageError
+from navapp.tools.patient_check import CheckAnswer
 from navapp.values import StageSpec
 
 
@@ -15,10 +18,11 @@ class GateKeeper:
     Args:
         session: that passes.
         gates: of its stages.
+        patient: the check on the patient, which a condition asks for.
     """
 
-    def __init__(self, session: Session, gates: Gates) -> None:
-        self._session, self._gates = session, gates
+    def __init__(self, session: Session, gates: Gates, patient: PatientChecking) -> None:
+        self._session, self._gates, self._patient = session, gates, patient
         # Which stage was refused last, from which one, and the names of what was open then.
         self._refused: tuple[int, int, frozenset[str]] | None = None
 
@@ -44,8 +48,10 @@ class GateKeeper:
         """A person says that a condition is met.
 
         Raises:
-            UsageError: no person answers for it.
+            UsageError: no person answers for it, or a measurement speaks against it.
         """
+        if name == CHECKED_ON_PATIENT and self._patient.why_unconfirmed:
+            raise UsageError(self._patient.why_unconfirmed, subject=name)
         self._gates.confirm(name)
         self._session.add_event("gate", f"confirmed: {name}")
 
@@ -57,6 +63,15 @@ class GateKeeper:
         """
         self._gates.withdraw(name)
         self._session.add_event("gate", f"withdrawn: {name}", EventLevel.WARNING)
+
+    def take_check(self, answer: CheckAnswer) -> None:
+        """A check on the patient was decided: its condition is met, or is not any more."""
+        if not self._gates.knows(CHECKED_ON_PATIENT):
+            return
+        if answer is CheckAnswer.PASSED:
+            self.confirm(CHECKED_ON_PATIENT)
+        elif self._gates.is_said(CHECKED_ON_PATIENT):
+            self.withdraw(CHECKED_ON_PATIENT)
 
     def enter(self, stage: StageSpec) -> None:
         """Enter a stage, or tell item by item why not; then its gate may be overridden."""

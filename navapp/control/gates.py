@@ -102,6 +102,14 @@ class Gates:
         if self._said.pop(key, None) is None:
             raise UsageError(f"'{name}' was not confirmed", subject=name)
 
+    def knows(self, name: str) -> bool:
+        """Whether a person is asked for a condition."""
+        return name in self._personal()
+
+    def is_said(self, name: str) -> bool:
+        """Whether a person's word for it is kept, of the present bone where it is one's."""
+        return self._find(name)[0] in self._said
+
     def _find(self, name: str) -> tuple[str, int]:
         """Under which key what a person says of a condition is kept, and for which number."""
         bone = self._known.bone

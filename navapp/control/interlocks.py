@@ -8,6 +8,7 @@ from navapp.control.states import (
     OtherBone,
     SessionState,
     Snapshot,
+    ToolLine,
 )
 from navapp.values import Reason, Status
 
@@ -38,7 +39,11 @@ def grow_older(snapshot: Snapshot, now_ns: int) -> Snapshot:
     limb = snapshot.limb
     if limb is not None and limb.age_ms is not None:
         limb = replace(limb, age_ms=limb.age_ms + passed_ms)
-    return judge(replace(snapshot, pose_age_ms=age_ms, others=others, limb=limb))
+    tools = tuple(
+        tool if tool.age_ms is None else replace(tool, age_ms=tool.age_ms + passed_ms)
+        for tool in snapshot.tools
+    )
+    return judge(replace(snapshot, pose_age_ms=age_ms, others=others, limb=limb, tools=tools))
 
 
 def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
@@ -83,6 +88,11 @@ def _of_mirror(error: MirrorError) -> list[Reason]:
 def is_limb_current(limb: LimbLine) -> bool:
     """Whether angles and gaps may be shown as those of now."""
     return limb.age_ms is not None and limb.age_ms <= MAX_POSE_AGE_MS
+
+
+def is_tool_current(tool: ToolLine) -> bool:
+    """Whether what a tool said may be shown as where it is now."""
+    return tool.age_ms is not None and tool.age_ms <= MAX_POSE_AGE_MS
 
 
 def is_current(other: OtherBone) -> bool:

@@ -15,6 +15,7 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.overlay import LeftView, MirrorView, Scene, Viewpoint, compose_mirror, compose_video
 from navapp.overlay.residuals import draw_residuals, measure_residuals_mm
+from navapp.tools.patient_check import CheckAnswer
 from navapp.values import Foreground, OverlayMode, Plan, Reason, Status
 
 Image = NDArray[np.uint8]
@@ -143,7 +144,7 @@ def banner(snapshot: Snapshot) -> str:
     """One line: what the picture is."""
     stage = f"{snapshot.stage.number} {snapshot.stage.name}"
     if snapshot.is_navigable and snapshot.verdict is not None:
-        return f"{stage} - NAVIGATING{_describe_error(snapshot)} - not verified on the patient"
+        return f"{stage} - NAVIGATING{_describe_error(snapshot)} - {_describe_check(snapshot)}"
     if snapshot.cross_check is not None and snapshot.reasons == (snapshot.mirror_reason,):
         check = snapshot.cross_check
         return f"{stage} - CHECK OF THE MIRROR: cross {check.number + 1} of {check.count}"
@@ -155,6 +156,21 @@ def banner(snapshot: Snapshot) -> str:
     if snapshot.reasons[:1] == (Reason.OTHER_EYE,) and snapshot.mirror_error is not None:
         why = f"{why}: cover it, or {_describe_shift(snapshot.mirror_error)}"
     return f"{stage} - NO GUIDES: {why}"
+
+
+def _describe_check(snapshot: Snapshot) -> str:
+    """What is known from the patient of the registration in force."""
+    check = snapshot.patient_check
+    if check is None or not check.is_valid or check.result is None:
+        return "not verified on the patient"
+    match check.answer:
+        case CheckAnswer.PASSED:
+            return f"checked on the patient: {check.result.most_mm:.1f} mm at most"
+        case CheckAnswer.FAILED:
+            return "CHECK ON THE PATIENT FAILED"
+        case CheckAnswer.CANNOT_TELL:
+            return "the check on the patient could not tell"
+    return f"check on the patient: {check.n_touches} points, more are needed"
 
 
 def _describe_error(snapshot: Snapshot) -> str:

@@ -18,7 +18,7 @@ from drivers.frames import StereoFrame
 from navapp.control.command_files import command_to_json
 from navapp.control.commands import Command
 from navapp.control.frame_result import FrameResult
-from navapp.control.states import Event
+from navapp.control.states import Event, ToolReading
 from navapp.errors import InputError, NavappError
 from navapp.values import Measured, MeasuredHole, TrackedFrame
 
@@ -112,6 +112,7 @@ class SessionRecorder:
                     name: _answer_to_json(tracked) for name, tracked in result.others.items()
                 },
                 "measured": {name: measured_to_json(one) for name, one in result.measured.items()},
+                "tools": {kind: reading_to_json(one) for kind, one in result.tools.items()},
             },
         )
 
@@ -187,6 +188,36 @@ def measured_to_json(measured: Measured) -> dict[str, Any]:
         "bound_mm": face.bound_mm,
         "seen_share": face.seen_share,
     }
+
+
+def reading_to_json(reading: ToolReading) -> dict[str, Any]:
+    """Where a tool is: in the left camera, and on the bone while that is OK."""
+    seen, placed, hole = reading.seen, reading.placed, reading.hole
+    found: dict[str, Any] = {
+        "left_from_plate": seen.left_from_plate.to_list(),
+        "tip_left_mm": seen.tip_mm.tolist(),
+        "bound_left_mm": seen.tip_bound_mm,
+        "seen_share": seen.seen_share,
+    }
+    if placed is None:
+        return found
+    found |= {
+        "bone": placed.bone,
+        "tip_mm": placed.tip_mm.tolist(),
+        "axis": None if placed.axis is None else placed.axis.tolist(),
+        "bound_mm": placed.bound_mm,
+        "axis_bound_deg": placed.axis_bound_deg,
+        "surface_mm": reading.surface_mm,
+    }
+    if hole is not None:
+        found["hole"] = {
+            "name": hole.name,
+            "off_mm": hole.off_mm,
+            "depth_mm": hole.depth_mm,
+            "angle_deg": hole.angle_deg,
+            "bound_deg": hole.bound_deg,
+        }
+    return found
 
 
 def _answer_to_json(tracked: TrackedFrame | None) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from navapp.control.interlocks import judge
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_error import MirrorError
 from navapp.control.mirror_judging import MirrorJudge
+from navapp.control.patient_checking import PatientChecking
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
@@ -27,6 +28,7 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
+from navapp.control.tool_watch import ToolWatch
 from navapp.geometry.box import Box
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Plan, Reason, TrackedFrame
@@ -55,6 +57,8 @@ class SnapshotMaker:
     specification: SessionSpecification  # of the session
     rig_watch: RigWatch  # that watches the rig
     gates: GateKeeper  # between the stages
+    tools: ToolWatch  # that follows tools
+    patient: PatientChecking  # the check on the patient
 
     def make(self) -> Snapshot:
         """As of now."""
@@ -98,6 +102,8 @@ class SnapshotMaker:
             steps=session.steps_of(session.stage),
             bone_version=session.bone_version,
             bone_surface=session.bone_surface,
+            tools=self.tools.describe(now_ns),
+            patient_check=self.patient.state,
             rates=session.rates(self.camera.n_dropped),
             devices=self._device_lines(reports),
             events=session.events,

@@ -1,12 +1,14 @@
 """What a session is about, before any device is opened."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from navapp.config import Configuration
 from navapp.control.calibrated_display import CalibratedDisplay
 from navapp.control.stages import STAGES
 from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.rig import StereoRig
+from navapp.tools.tool import Tool, ToolKind
 from navapp.tracking import Method, TrackerSettings
 from navapp.values import Plan, Prior, StageSpec
 
@@ -42,6 +44,7 @@ class SessionSpecification:
     frames_between_faces: int = 5  # faces of cuts are measured in every so many frames
     # guides wait for the time-out, and stages for what their gates ask for.
     has_gates: bool = False
+    tools: Mapping[ToolKind, Tool] = field(default_factory=dict)  # that are looked for
     check_minutes: float = 30.0  # a check on the patient counts so long
 
     @property
@@ -77,6 +80,7 @@ def specify_session(
     calibrated_display: CalibratedDisplay | None = None,
     made_steps: tuple[str, ...] = (),
     has_gates: bool = False,
+    tools: Mapping[ToolKind, Tool] | None = None,
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -97,6 +101,7 @@ def specify_session(
         calibrated_display: in the mirror; None: the display shows the video.
         made_steps: cuts, holes and parts of the plan that are made from the start.
         has_gates: guides wait for the time-out, and stages for what their gates ask for.
+        tools: that are looked for; None: none.
     """
     display = configuration.display
     return SessionSpecification(
@@ -119,5 +124,6 @@ def specify_session(
         display=calibrated_display,
         made_steps=made_steps,
         has_gates=has_gates,
+        tools=tools or {},
         check_minutes=configuration.stages.check_minutes,
     )

@@ -17,8 +17,10 @@ TIME_OUT: tuple[Condition, ...] = (
 )
 
 _BONE_OK = Condition("bone_ok", "registration accepted, pose OK", ConditionKind.BONE_OK)
+# Met by a check with the pointer that passes, or by a person's word.
+CHECKED_ON_PATIENT = "checked_on_patient"
 _CHECKED = Condition(
-    "checked_on_patient", "checked on the patient: known points lie where shown", is_repeated=True
+    CHECKED_ON_PATIENT, "checked on the patient: known points lie where shown", is_repeated=True
 )
 _STEPS = Condition("steps", "made as planned", ConditionKind.STEPS_MADE)
 

@@ -14,6 +14,9 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.limb import LimbMeasurement
 from navapp.resection import Thickness
+from navapp.tools.patient_check import CheckAnswer, CheckResult
+from navapp.tools.tool import SeenTool, ToolKind
+from navapp.tools.tool_on_bone import HoleOffset, ToolOnBone
 from navapp.values import Measured, Reason, StageSpec, StepKind, Verdict
 
 
@@ -154,6 +157,41 @@ class StepLine:
     thickness: Thickness | None = None  # of what a measured cut took off
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolReading:
+    """What a tool says in one pair of pictures."""
+
+    seen: SeenTool
+    placed: ToolOnBone | None  # in the bone's coordinates; None while that is not OK
+    surface_mm: float | None = None  # of the tip from the bone's surface, positive outside
+    # name and distance of the plan's nearest landmark, mm.
+    nearest: tuple[str, float] | None = None
+    hole: HoleOffset | None = None  # of the stage's holes the one that the tip is nearest to
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ToolLine:
+    """A tool as it was seen last."""
+
+    kind: ToolKind
+    reading: ToolReading | None  # None while it is not seen
+    missing: str = ""  # why not
+    age_ms: float | None = None  # since that pair of pictures, now
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatientCheck:
+    """The check on the patient that is under way, or was finished."""
+
+    answer: CheckAnswer
+    bone: str
+    n_touches: int
+    result: CheckResult | None  # None before the first touch
+    wanted: str  # where the next touch is asked for, in words; empty once it is decided
+    wanted_mm: FloatArray | None  # (3,) that place, bone coordinates
+    is_valid: bool  # it was made with the registration in force
+
+
 @dataclass(frozen=True, slots=True)
 class ConditionLine:
     """A condition of the time-out or of a gate, as it stands."""
@@ -211,6 +249,8 @@ class Snapshot:
     steps: tuple[StepLine, ...] = ()  # planned for the stage
     bone_version: int = 0  # of the stage's bone: counts what is confirmed, measured, withdrawn
     bone_surface: TriangleMesh | None = None  # what is left of it; None: all
+    tools: tuple[ToolLine, ...] = ()  # that are looked for
+    patient_check: PatientCheck | None = None  # None before the first touch
     rates: Rates = field(default_factory=Rates)
     devices: tuple[DeviceLine, ...] = ()
     events: tuple[Event, ...] = ()  # the newest, oldest first

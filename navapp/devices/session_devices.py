@@ -19,6 +19,7 @@ from navapp.devices.simulated_room import (
     scenario_of,
     simulation_of,
     with_board,
+    with_tool,
 )
 from navapp.errors import DeviceError
 from navapp.geometry import StereoRig
@@ -83,7 +84,7 @@ def _open_simulated(
 ) -> tuple[OpenedDevices, World, SimulatedCamera]:
     settings = configuration.camera.simulated
     world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=is_headless)
-    scene = with_board(world, board, settings)
+    scene = with_board(with_tool(world, settings), board, settings)
     camera = make_simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
     if configuration.camera.rig is not None:
         rig = read_configured_rig(configuration)

@@ -11,6 +11,7 @@ from calibration.targets.boards import Board
 from drivers.clock import Clock, ManualClock, SystemClock
 from navapp.config import FaultSection, SimulationSection
 from navapp.devices.simulated_board import make_hand, print_board
+from navapp.devices.simulated_tool import SIMULATED_PLATES, make_touching
 from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
 from sim_devices.camera import Scene, SimulatedCamera
@@ -97,14 +98,22 @@ def _fault(section: FaultSection) -> Fault:
     return Fault(kind, section.start_s, section.duration_s, section.delay_s, section.turn_deg)
 
 
-def with_board(world: World, board: Board | None, settings: SimulationSection) -> Scene:
+def with_tool(world: World, settings: SimulationSection) -> Scene:
+    """The room, with a tool that touches the femur when there is one to be held."""
+    if settings.tool == "none":
+        return world
+    plate = SIMULATED_PLATES[settings.tool]
+    return make_touching(settings.tool, plate, world, settings.seed)[0]
+
+
+def with_board(room: Scene, board: Board | None, settings: SimulationSection) -> Scene:
     """The room, with a board held into the view when there is one to be shown."""
     if board is None or settings.board_s is None:
-        return world
+        return room
     hand = make_hand(board, settings.seed)
     from_s, to_s = settings.board_s
     shown_ns = (round(from_s * 1e9), round(to_s * 1e9))
-    return SheetInView(world, print_board(board), hand.left_from_body, shown_ns)
+    return SheetInView(room, print_board(board), hand.left_from_body, shown_ns)
 
 
 def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:

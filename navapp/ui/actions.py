@@ -198,8 +198,6 @@ ACTIONS: tuple[Action, ...] = (
         "depth",
         "colour the picture by its depth: matched, or guessed",
         lambda _: ToggleDepth(),
-        slot="depth",
-        needs_width=True,
     ),
     Action(
         "near",
@@ -228,6 +226,14 @@ ACTIONS: tuple[Action, ...] = (
         "steps",
         "see and confirm the stage's cuts, holes and parts",
         slot="steps",
+        needs_width=True,
+    ),
+    Action(
+        "tools",
+        "u",
+        "tools",
+        "see pointer and drill, and check the bone with the pointer",
+        slot="tools",
         needs_width=True,
     ),
     Action(

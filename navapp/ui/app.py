@@ -13,11 +13,14 @@ from navapp.control.commands import (
     Command,
     ConfirmCondition,
     ConfirmStep,
+    DropPoint,
     EnterStage,
+    ForgetPoints,
     OverrideGate,
     Quit,
     Register,
     ToggleLayer,
+    TouchPoint,
     WithdrawCondition,
     WithdrawStep,
 )
@@ -50,6 +53,7 @@ from navapp.ui.start_page import StartChosen, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols
 from navapp.ui.theme import NAVAPP_THEME
+from navapp.ui.tools_page import ToolsPage, landmark_of_key
 from navapp.ui.view import View
 
 POLLS_PER_S = 10
@@ -67,6 +71,7 @@ _PAGES = {
     "layers": LayersPage,
     "steps": StepsPage,
     "gates": GatesPage,
+    "tools": ToolsPage,
     "devices": DevicesPage,
     "events": EventsPage,
 }
@@ -225,6 +230,25 @@ class NavigationApp(QuietApp):
     def action_withdraw_step(self, key: str) -> None:
         """Say that a step has not been made after all."""
         self._say_of(step_of_key(self._view.snapshot, key), WithdrawStep)
+
+    def action_touch_point(self, landmark: str) -> None:
+        """Take a point of the check on the patient: from the tools' page."""
+        if self._view.is_silent:
+            self._say_silent("a point")
+        else:
+            self._session.submit(TouchPoint(landmark))
+
+    def action_touch_landmark(self, key: str) -> None:
+        """Take a point on the landmark that a letter means."""
+        self._say_of(landmark_of_key(self._view.snapshot, key), TouchPoint)
+
+    def action_drop_point(self) -> None:
+        """Forget the point that was taken last."""
+        self._session.submit(DropPoint())
+
+    def action_forget_points(self) -> None:
+        """Begin the check anew."""
+        self._session.submit(ForgetPoints())
 
     def _say_of(self, name: str | None, word: Callable[[str], Command]) -> None:
         """A person's word for what a letter of a page means; nothing where it means nothing."""

@@ -1,0 +1,241 @@
+"""The check on the patient: takes touched points, asks for more, and tells what they say."""
+
+from collections import deque
+
+import numpy as np
+
+from navapp.control.session import Session
+from navapp.control.states import EventLevel, PatientCheck, ToolReading
+from navapp.control.tool_watch import ToolWatch
+from navapp.geometry.transform import FloatArray
+from navapp.tools.patient_check import (
+    CheckAnswer,
+    CheckResult,
+    Touched,
+    find_next_place,
+    judge_touches,
+)
+from navapp.tools.tool_on_bone import ToolOnBone
+from navapp.values import Plan, StageSpec
+
+# A tip rests when so many readings lie within so much of each other.
+_N_RESTING, _REST_MM = 5, 0.3
+# It is waited for so many frames that the tip rests.
+_PATIENCE = 45
+# A registration is good for no more than this, whatever the stage allows.
+_MOST_MM = 1.0
+# What pressing on tissue, and a model's own error, add to a touch.
+_TOUCH_SIGMA_MM = 0.15
+# Of a landmark of which the plan does not say how well it is known.
+_LANDMARK_SIGMA_MM = 0.5
+# A touch further off is on something else.
+_FARTHEST_MM = 10.0
+# Places that the next touch is chosen from; those that face the camera so much can be reached.
+_N_PLACES, _LEAST_FACING = 300, 0.35
+
+
+class PatientChecking:
+    """The check of a session; changed by commands and frames of its loop alone.
+
+    Args:
+        session: that is checked.
+        tools: that touch.
+        plan: of the operation.
+    """
+
+    def __init__(self, session: Session, tools: ToolWatch, plan: Plan) -> None:
+        self._session, self._tools, self._plan = session, tools, plan
+        self._touches: list[Touched] = []
+        self._readings: deque[FloatArray] = deque(maxlen=_N_RESTING)
+        self._waiting: tuple[int, str] | None = None  # frames left, landmark
+        self._of: tuple[str, int] = ("", 0)  # bone and registration of the touches
+        self._result: CheckResult | None = None
+        self._wanted: tuple[str, FloatArray] | None = None
+
+    @property
+    def state(self) -> PatientCheck | None:
+        """As the operator sees it."""
+        if not self._touches and self._waiting is None:
+            return None
+        answer = CheckAnswer.OPEN if self._result is None else self._result.answer
+        wanted, wanted_mm = self._wanted or ("", None)
+        n = len(self._touches)
+        return PatientCheck(
+            answer, self._of[0], n, self._result, wanted, wanted_mm, self._is_of_now()
+        )
+
+    @property
+    def why_unconfirmed(self) -> str:
+        """Why nobody may say that the bone was checked: a check that failed; empty: they may."""
+        result = self._result
+        if result is None or result.answer is not CheckAnswer.FAILED or not self._is_of_now():
+            return ""
+        return "the check on the patient failed: register again, or check again"
+
+    def why_not_touch(self, landmark: str) -> str:
+        """Why no point can be taken now; empty: it can."""
+        if "pointer" not in self._tools.kinds:
+            return "no pointer is known: name its file in [tools] pointer"
+        if not self._session.is_bone_ok(self._session.stage):
+            return "the check needs an accepted bone whose pose is OK"
+        if landmark and landmark not in self._plan.landmarks_of(self._session.bone):
+            return f"the plan has no landmark '{landmark}' of the {self._session.bone}"
+        return ""
+
+    def begin_touch(self, landmark: str) -> None:
+        """Take a point as soon as the tip rests."""
+        if not self._is_of_now():
+            self.forget()
+        bone = self._session.bone
+        self._of = bone, self._session.registration_of(bone)
+        self._waiting = _PATIENCE, landmark
+        self._readings.clear()
+
+    def drop(self) -> None:
+        """Forget the last touch."""
+        if self._touches:
+            self._touches.pop()
+            self._decide(self._session.stage, None, is_told=False)
+        self._waiting = None
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._touches, self._result, self._wanted, self._waiting = [], None, None, None
+
+    def add(self, reading: ToolReading | None, stage: StageSpec) -> CheckAnswer | None:
+        """A pointer's reading in the newest frame; the answer, once it is decided."""
+        if self._waiting is None:
+            return None
+        left, landmark = self._waiting
+        placed = None if reading is None else reading.placed
+        if placed is not None:
+            self._readings.append(placed.tip_mm)
+        if placed is not None and self._is_resting():
+            self._waiting = None
+            return self._take(placed, landmark, stage)
+        if left <= 1:
+            self._waiting = None
+            why = "the pointer was not seen" if not self._readings else "the tip did not rest"
+            self._session.add_event("check", f"no point was taken: {why}", EventLevel.WARNING)
+            return None
+        self._waiting = left - 1, landmark
+        return None
+
+    def _is_resting(self) -> bool:
+        tips = np.array(self._readings)
+        return len(tips) == _N_RESTING and float(np.ptp(tips, axis=0).max()) <= _REST_MM
+
+    def _is_of_now(self) -> bool:
+        bone = self._session.bone
+        return self._of == (bone, self._session.registration_of(bone))
+
+    def _take(self, placed: ToolOnBone, landmark: str, stage: StageSpec) -> CheckAnswer | None:
+        tip_mm = np.mean(self._readings, axis=0)
+        session = self._session
+        surface = self._tools.find_surface(placed.bone, session.bone_version, session.bone_surface)
+        if landmark:
+            touched = self._touch_landmark(placed, tip_mm, landmark)
+        else:
+            distance_mm, foot_mm, normal = surface.find(tip_mm)
+            sigma_mm = float(np.sqrt(normal @ placed.covariance_mm2 @ normal))
+            touched = Touched(foot_mm, normal[None], np.array([distance_mm]), _with_touch(sigma_mm))
+        off_mm = float(np.linalg.norm(touched.off_mm))
+        if off_mm > _FARTHEST_MM:
+            text = f"no point was taken: the tip is {off_mm:.0f} mm away"
+            session.add_event("check", text, EventLevel.WARNING)
+            return None
+        self._touches.append(touched)
+        where = landmark or "surface"
+        session.add_event("check", f"point {len(self._touches)}, {where}: {off_mm:.2f} mm off")
+        return self._decide(stage, placed, is_told=True)
+
+    def _touch_landmark(self, placed: ToolOnBone, tip_mm: FloatArray, landmark: str) -> Touched:
+        point_mm = self._plan.landmarks_of(placed.bone)[landmark]
+        planned = self._plan.content.landmarks.get(landmark)
+        known_mm = None if planned is None else planned.sd_mm
+        sigma_mm = float(np.sqrt(np.trace(placed.covariance_mm2) / 3.0))
+        sigma_mm = float(np.hypot(sigma_mm, _LANDMARK_SIGMA_MM if known_mm is None else known_mm))
+        return Touched(point_mm, np.eye(3), tip_mm - point_mm, _with_touch(sigma_mm))
+
+    def _decide(
+        self, stage: StageSpec, placed: ToolOnBone | None, *, is_told: bool
+    ) -> CheckAnswer | None:
+        """What the touches say now; told when it is decided."""
+        self._result, self._wanted = None, None
+        if not self._touches:
+            return None
+        targets_mm = self._find_targets(stage)
+        limit_mm = min(stage.tolerance_mm, _MOST_MM)
+        self._result = result = judge_touches(self._touches, targets_mm, limit_mm)
+        if result.answer is CheckAnswer.OPEN:
+            self._wanted = self._choose_next(stage, targets_mm)
+            return None
+        if is_told:
+            level = EventLevel.INFO if result.answer is CheckAnswer.PASSED else EventLevel.ALARM
+            self._session.add_event("check", tell_result(result, stage.bone), level)
+        return result.answer
+
+    def _find_targets(self, stage: StageSpec) -> FloatArray:
+        """Of the stage; of a plan without any, the landmarks of its bone, or its middle."""
+        targets_mm: FloatArray = self._plan.targets_of(stage.targets)
+        if len(targets_mm):
+            return targets_mm
+        landmarks = self._plan.landmarks_of(stage.bone)
+        if landmarks:
+            return np.array(list(landmarks.values()))
+        middle_mm: FloatArray = self._plan.bones[stage.bone].mesh.vertices_mm.mean(axis=0)
+        return middle_mm[None]
+
+    def _choose_next(
+        self, stage: StageSpec, targets_mm: FloatArray
+    ) -> tuple[str, FloatArray] | None:
+        """Where the next touch tells most, among what faces the cameras."""
+        tracked = self._session.tracked
+        pose = None if tracked is None else tracked.left_from_bone
+        if pose is None:
+            return None
+        mesh = self._session.bone_surface or self._plan.bones[stage.bone].make_seen_surface()
+        used = np.unique(mesh.faces)
+        some = used[:: max(1, len(used) // (4 * _N_PLACES))]
+        places, normals = mesh.vertices_mm[some], mesh.normals[some]
+        in_left = pose.apply(places)
+        facing = -np.einsum("nj,nj->n", pose.rotate(normals), in_left)
+        is_seen = facing > _LEAST_FACING * np.linalg.norm(in_left, axis=1)
+        box = self._seen_box(targets_mm)
+        is_seen &= ((places >= box[0]) & (places <= box[1])).all(axis=1)
+        if not is_seen.any():
+            return None
+        places, normals = places[is_seen], normals[is_seen]
+        best = find_next_place(self._touches, targets_mm, places, normals, _with_touch(0.1))
+        return self._name_place(places[best], stage), places[best]
+
+    def _seen_box(self, targets_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is laid bare: around the targets and what was touched."""
+        points = np.concatenate([targets_mm, [one.point_mm for one in self._touches]])
+        return points.min(axis=0) - 15.0, points.max(axis=0) + 15.0
+
+    def _name_place(self, place_mm: FloatArray, stage: StageSpec) -> str:
+        landmarks = self._plan.landmarks_of(stage.bone)
+        if not landmarks:
+            return "at the cross in the picture"
+        name = min(landmarks, key=lambda one: float(np.linalg.norm(landmarks[one] - place_mm)))
+        away_mm = float(np.linalg.norm(landmarks[name] - place_mm))
+        return f"at the cross, {away_mm:.0f} mm from {name.split('/')[-1].replace('_', ' ')}"
+
+
+def _with_touch(sigma_mm: float) -> float:
+    return float(np.hypot(sigma_mm, _TOUCH_SIGMA_MM))
+
+
+def tell_result(result: CheckResult, bone: str) -> str:
+    """One sentence for people."""
+    figures = f"{result.measured_mm:.2f} mm off, {result.most_mm:.2f} at most"
+    limit = f"{result.limit_mm:.1f} mm are allowed"
+    match result.answer:
+        case CheckAnswer.PASSED:
+            return f"{bone} checked on the patient: {figures}; {limit}"
+        case CheckAnswer.FAILED:
+            return f"{bone}: the check on the patient FAILED: {result.reason} ({figures}; {limit})"
+        case CheckAnswer.CANNOT_TELL:
+            return f"{bone}: the check cannot tell: {result.reason} ({figures}; {limit})"
+    return f"{bone}: {figures}; {limit}; more points are needed"

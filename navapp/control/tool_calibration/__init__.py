@@ -1,0 +1,1 @@
+"""Guided calibration of a hand-held tool: its paper, its tip, its axis."""
