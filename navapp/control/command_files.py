@@ -8,6 +8,7 @@ from navapp.control.commands import (
     Blank,
     Cancel,
     CheckMirror,
+    CheckPicks,
     Command,
     ConfirmCondition,
     ConfirmCross,
@@ -35,6 +36,7 @@ from navapp.control.commands import (
 from navapp.control.prior_files import prior_from_json, prior_to_json
 from navapp.errors import SequenceError
 from navapp.geometry.transform import RigidTransform
+from navapp.values import Prior
 
 _PLAIN: dict[str, type] = {
     "cancel": Cancel,
@@ -87,6 +89,8 @@ def command_to_json(command: Command) -> dict[str, Any]:
         return {"command": "propose", "bone": pose.source, "camera_from_model": pose.to_list()}
     if isinstance(command, TouchPoint):
         return {"command": "touch_point", "landmark": command.landmark}
+    if isinstance(command, CheckPicks):
+        return {"command": "check_picks", "start": prior_to_json(Prior(picks=command.picks))}
     if isinstance(command, DistrustRig):
         return {"command": "distrust_rig", "why": command.why}
     if isinstance(command, Accept | Reject):
@@ -120,6 +124,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return Propose(RigidTransform("left", str(value["bone"]), matrix))
         if name == "touch_point":
             return TouchPoint(str(value["landmark"]))
+        if name == "check_picks":
+            return CheckPicks(prior_from_json(value["start"]).picks)
         if name == "distrust_rig":
             return DistrustRig(str(value["why"]))
         if name in _DECISIONS:

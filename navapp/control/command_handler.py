@@ -6,6 +6,7 @@ from navapp.control.commands import (
     Blank,
     Cancel,
     CheckMirror,
+    CheckPicks,
     Command,
     ConfirmCondition,
     ConfirmCross,
@@ -128,7 +129,7 @@ class CommandHandler:
                 self._gates.override(self._stage(command.number), command.reason)
             case ConfirmStep() | WithdrawStep() | ConfirmCondition() | WithdrawCondition():
                 self._on_word(command)
-            case TouchPoint() | DropPoint() | ForgetPoints():
+            case TouchPoint() | CheckPicks() | DropPoint() | ForgetPoints():
                 self._on_touch(command)
             case Reconnect():
                 session.add_event("reopen", "lost devices are opened again")
@@ -206,15 +207,19 @@ class CommandHandler:
             is_step = isinstance(command, ConfirmStep | WithdrawStep)
             self._refuse("step" if is_step else "gate", str(error))
 
-    def _on_touch(self, command: TouchPoint | DropPoint | ForgetPoints) -> None:
+    def _on_touch(self, command: TouchPoint | CheckPicks | DropPoint | ForgetPoints) -> None:
         """A point of the check on the patient."""
         if isinstance(command, DropPoint):
             self._patient.drop()
         elif isinstance(command, ForgetPoints):
             self._patient.forget()
             self._session.add_event("check", "check on the patient begun anew")
-        elif why := self._patient.why_not_touch(command.landmark):
+        elif why := self._patient.why_not(command):
             self._refuse("check", why)
+        elif isinstance(command, CheckPicks):
+            answer = self._patient.add_picks(command.picks, self._session.stage)
+            if answer is not None:
+                self._gates.take_check(answer)
         else:
             self._patient.begin_touch(command.landmark)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
-from navapp.values import Prior
+from navapp.values import Pick, Prior
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +145,13 @@ class TouchPoint:
 
 
 @dataclass(frozen=True, slots=True)
+class CheckPicks:
+    """Check on the patient: landmarks of the stage's bone, picked in the left picture."""
+
+    picks: tuple[Pick, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class DropPoint:
     """Check on the patient: forget the point that was taken last."""
 
@@ -197,6 +204,7 @@ Command = (
     | ConfirmStep
     | WithdrawStep
     | TouchPoint
+    | CheckPicks
     | DropPoint
     | ForgetPoints
     | Reconnect

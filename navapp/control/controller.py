@@ -110,7 +110,7 @@ class SessionController:
             make_tracker,
         )  # fmt: skip
         self._tools = ToolWatch(specification.tools, rig, plan)
-        self._patient = PatientChecking(self._session, self._tools, plan)
+        self._patient = PatientChecking(self._session, self._tools, plan, rig)
         gates = self._gates = GateKeeper(
             self._session,
             Gates(

@@ -1,13 +1,16 @@
 """The check on the patient: takes touched points, asks for more, and tells what they say."""
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
+from navapp.control.commands import CheckPicks, TouchPoint
 from navapp.control.session import Session
 from navapp.control.states import EventLevel, PatientCheck, ToolReading
 from navapp.control.tool_watch import ToolWatch
-from navapp.geometry.transform import FloatArray
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tools.patient_check import (
     CheckAnswer,
     CheckResult,
@@ -16,7 +19,7 @@ from navapp.tools.patient_check import (
     judge_touches,
 )
 from navapp.tools.tool_on_bone import ToolOnBone
-from navapp.values import Plan, StageSpec
+from navapp.values import Pick, Plan, StageSpec
 
 # A tip rests when so many readings lie within so much of each other.
 _N_RESTING, _REST_MM = 5, 0.3
@@ -26,6 +29,8 @@ _PATIENCE = 45
 _MOST_MM = 1.0
 # What pressing on tissue, and a model's own error, add to a touch.
 _TOUCH_SIGMA_MM = 0.15
+# Of a pick in the picture, with the magnifier.
+_PICK_SIGMA_PX = 2.0
 # Of a landmark of which the plan does not say how well it is known.
 _LANDMARK_SIGMA_MM = 0.5
 # A touch further off is on something else.
@@ -41,10 +46,11 @@ class PatientChecking:
         session: that is checked.
         tools: that touch.
         plan: of the operation.
+        rig: in whose left picture landmarks are picked.
     """
 
-    def __init__(self, session: Session, tools: ToolWatch, plan: Plan) -> None:
-        self._session, self._tools, self._plan = session, tools, plan
+    def __init__(self, session: Session, tools: ToolWatch, plan: Plan, rig: StereoRig) -> None:
+        self._session, self._tools, self._plan, self._rig = session, tools, plan, rig
         self._touches: list[Touched] = []
         self._readings: deque[FloatArray] = deque(maxlen=_N_RESTING)
         self._waiting: tuple[int, str] | None = None  # frames left, landmark
@@ -72,14 +78,17 @@ class PatientChecking:
             return ""
         return "the check on the patient failed: register again, or check again"
 
-    def why_not_touch(self, landmark: str) -> str:
+    def why_not(self, command: TouchPoint | CheckPicks) -> str:
         """Why no point can be taken now; empty: it can."""
-        if "pointer" not in self._tools.kinds:
+        if isinstance(command, TouchPoint) and "pointer" not in self._tools.kinds:
             return "no pointer is known: name its file in [tools] pointer"
         if not self._session.is_bone_ok(self._session.stage):
             return "the check needs an accepted bone whose pose is OK"
-        if landmark and landmark not in self._plan.landmarks_of(self._session.bone):
-            return f"the plan has no landmark '{landmark}' of the {self._session.bone}"
+        known = self._plan.landmarks_of(self._session.bone)
+        named = [command.landmark] if isinstance(command, TouchPoint) else _names(command.picks)
+        missing = [name for name in named if name and name not in known]
+        if missing:
+            return f"the plan has no landmark '{missing[0]}' of the {self._session.bone}"
         return ""
 
     def begin_touch(self, landmark: str) -> None:
@@ -91,11 +100,45 @@ class PatientChecking:
         self._waiting = _PATIENCE, landmark
         self._readings.clear()
 
+    def add_picks(self, picks: Sequence[Pick], stage: StageSpec) -> CheckAnswer | None:
+        """Landmarks picked in the left picture; the answer, once it is decided.
+
+        A pick says where its landmark is across the line of sight, and nothing along it.
+        """
+        tracked = self._session.tracked
+        pose = None if tracked is None else tracked.left_from_bone
+        if pose is None:
+            return None
+        if not self._is_of_now():
+            self.forget()
+        self._of = stage.bone, self._session.registration_of(stage.bone)
+        for pick in picks:
+            self._touches.append(self._see_pick(pick, pose))
+        self._session.add_event("check", f"{len(picks)} picked landmarks are compared")
+        return self._decide(stage, is_told=True)
+
+    def _see_pick(self, pick: Pick, left_from_bone: RigidTransform) -> Touched:
+        ray = self._rig.left.rays(np.array([pick.left_px]))[0]
+        sight = ray / np.linalg.norm(ray)
+        place = left_from_bone.apply(pick.model_mm)
+        across = np.linalg.svd(sight[None])[2][1:]
+        depth_mm = float(place @ sight)
+        off_mm = across @ (depth_mm * sight - place)
+        sigma_mm = _PICK_SIGMA_PX * depth_mm / self._rig.left.focal_px
+        directions = across @ left_from_bone.rotation
+        known_mm = self._landmark_sigma_mm(pick.name)
+        return Touched(pick.model_mm, directions, off_mm, float(np.hypot(sigma_mm, known_mm)))
+
+    def _landmark_sigma_mm(self, landmark: str) -> float:
+        planned = self._plan.content.landmarks.get(landmark)
+        known_mm = None if planned is None else planned.sd_mm
+        return _LANDMARK_SIGMA_MM if known_mm is None else known_mm
+
     def drop(self) -> None:
         """Forget the last touch."""
         if self._touches:
             self._touches.pop()
-            self._decide(self._session.stage, None, is_told=False)
+            self._decide(self._session.stage, is_told=False)
         self._waiting = None
 
     def forget(self) -> None:
@@ -147,19 +190,15 @@ class PatientChecking:
         self._touches.append(touched)
         where = landmark or "surface"
         session.add_event("check", f"point {len(self._touches)}, {where}: {off_mm:.2f} mm off")
-        return self._decide(stage, placed, is_told=True)
+        return self._decide(stage, is_told=True)
 
     def _touch_landmark(self, placed: ToolOnBone, tip_mm: FloatArray, landmark: str) -> Touched:
         point_mm = self._plan.landmarks_of(placed.bone)[landmark]
-        planned = self._plan.content.landmarks.get(landmark)
-        known_mm = None if planned is None else planned.sd_mm
         sigma_mm = float(np.sqrt(np.trace(placed.covariance_mm2) / 3.0))
-        sigma_mm = float(np.hypot(sigma_mm, _LANDMARK_SIGMA_MM if known_mm is None else known_mm))
+        sigma_mm = float(np.hypot(sigma_mm, self._landmark_sigma_mm(landmark)))
         return Touched(point_mm, np.eye(3), tip_mm - point_mm, _with_touch(sigma_mm))
 
-    def _decide(
-        self, stage: StageSpec, placed: ToolOnBone | None, *, is_told: bool
-    ) -> CheckAnswer | None:
+    def _decide(self, stage: StageSpec, *, is_told: bool) -> CheckAnswer | None:
         """What the touches say now; told when it is decided."""
         self._result, self._wanted = None, None
         if not self._touches:
@@ -221,6 +260,10 @@ class PatientChecking:
         name = min(landmarks, key=lambda one: float(np.linalg.norm(landmarks[one] - place_mm)))
         away_mm = float(np.linalg.norm(landmarks[name] - place_mm))
         return f"at the cross, {away_mm:.0f} mm from {name.split('/')[-1].replace('_', ' ')}"
+
+
+def _names(picks: Sequence[Pick]) -> list[str]:
+    return [pick.name for pick in picks]
 
 
 def _with_touch(sigma_mm: float) -> float:

@@ -10,6 +10,7 @@ from textual.binding import BindingType
 from textual.screen import Screen
 
 from navapp.control.commands import (
+    CheckPicks,
     Command,
     ConfirmCondition,
     ConfirmStep,
@@ -43,7 +44,7 @@ from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
 from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
-from navapp.ui.picks_page import PicksPage, Place
+from navapp.ui.picks_page import PicksChecked, PicksPage, Place
 from navapp.ui.pictures.graphics import Graphics
 from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.quiet_app import QuietApp
@@ -201,6 +202,13 @@ class NavigationApp(QuietApp):
             self._say_silent("register")
         else:
             self._session.submit(Register(message.start, message.bone))
+
+    def on_picks_checked(self, message: PicksChecked) -> None:
+        """Compare picked landmarks with the accepted registration."""
+        if self._view.is_silent:
+            self._say_silent("the check")
+        else:
+            self._session.submit(CheckPicks(message.picks))
 
     def action_confirm_condition(self, key: str) -> None:
         """Say that a condition is met: from the gates' page."""

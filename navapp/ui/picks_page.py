@@ -85,6 +85,14 @@ def magnify(
     return shown
 
 
+class PicksChecked(Message):
+    """Landmarks that are to be compared with the accepted registration."""
+
+    def __init__(self, picks: tuple[Pick, ...]) -> None:
+        super().__init__()
+        self.picks = picks
+
+
 class PlacePicture(Picture):
     """A picture in which the mouse points at a place."""
 
@@ -153,6 +161,7 @@ class PicksPage(PageScreen):
         Binding("shift+tab", "select(-1)", "previous", show=False),
         Binding("x", "forget", "forget", show=False),
         Binding("g", "search", "search", show=False),
+        Binding("k", "check", "check", show=False),
         *(Binding(key, f"move('{key}', {_STEP_PX})", "move", show=False) for key in ARROWS),
         *(
             Binding(f"shift+{key}", f"move('{key}', {_LARGE_STEP_PX})", "move", show=False)
@@ -161,7 +170,7 @@ class PicksPage(PageScreen):
     ]
 
     page_title = "where are the landmarks?"
-    keys = " back  click, SHIFT arrows, arrows  ENTER pick  n next  x forget  g search"
+    keys = " back  click, SHIFT arrows, arrows  ENTER pick  n next  x forget  g search  k check"
 
     def __init__(self, view: View, picks: dict[str, Place]) -> None:
         super().__init__(view)
@@ -263,7 +272,22 @@ class PicksPage(PageScreen):
         self._redraw()
 
     def action_search(self) -> None:
-        """Begin, and leave; refused with fewer than three, or two at one place."""
+        """Search from the picks, and leave."""
+        picks = self._take()
+        if picks:
+            bone = self.view.snapshot.stage.bone
+            self.app.post_message(StartChosen(Prior(picks=picks), bone))
+            self.dismiss()
+
+    def action_check(self) -> None:
+        """Compare the picks with the accepted registration, and leave."""
+        picks = self._take()
+        if picks:
+            self.app.post_message(PicksChecked(picks))
+            self.dismiss()
+
+    def _take(self) -> tuple[Pick, ...]:
+        """The picks; none, and a word, when they are fewer than three, or two at one place."""
         known, bone = self.view.snapshot.landmarks, self.view.snapshot.stage.bone
         picks = tuple(
             Pick(name, bone, (float(u), float(v)), known[name])
@@ -277,9 +301,8 @@ class PicksPage(PageScreen):
         if why:
             self.app.bell()
             self.notify(why, severity="warning")
-            return
-        self.app.post_message(StartChosen(Prior(picks=picks), bone))
-        self.dismiss()
+            return ()
+        return picks
 
     def _move_to(self, x: int, y: int) -> None:
         width, height = self.view.snapshot.picture_size_px

@@ -46,5 +46,11 @@ WORDS: tuple[tuple[str, str], ...] = (
     ("frames", "pictures handled since the start"),
     ("limits", "how much error the stage allows, in mm and degrees"),
     ("before the next stage", "its gate: what must be so before; t shows it"),
+    ("plate seen", "u: how much of a tool's printed plate both cameras see"),
+    ("surface", "u: the tip's distance from the bone's surface, minus is inside; with its bound"),
+    (
+        "check on the patient",
+        "u: what touched places say: passed, failed, more points, cannot tell",
+    ),
     ("measured here", "cuts, holes and parts of this stage that are made, against the plan"),
 )

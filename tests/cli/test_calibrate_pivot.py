@@ -8,7 +8,10 @@ import pytest
 
 from navapp.cli.main import run
 from navapp.cli.tool_poses import read_tool_poses
+from navapp.devices.simulated_tool import SIMULATED_PLATES, make_shape
 from navapp.errors import InputError
+from navapp.geometry.transform import rotation_from_vector
+from navapp.tools.tool_files import read_tool
 from tests.calibration.test_pivot import TIP_MM, poses
 
 HEADER = "time_ns," + ",".join(f"m{row}{column}" for row in range(4) for column in range(4))
@@ -100,3 +103,60 @@ def test_the_published_solution_is_found_again(data: Path, tmp_path: Path, capsy
     assert content["rms_mm"] < linear["rms_mm"]
     for one in content["outliers"]:
         assert f"pose {one['index']} is left out" in told
+
+
+SMALL = "[camera.simulated]\nscale = 0.6\n"
+
+
+def test_a_simulated_pointer_is_calibrated_live(tmp_path, capsys) -> None:
+    """Its tip is where the simulated maker has put it, with paper that a printer has stretched."""
+    (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
+    out = tmp_path / "pointer.json"
+    config = ["--config", str(tmp_path / "small.toml")]
+    assert run([*config, "calibrate", "pivot", "--headless", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "name it in [tools] pointer" in told
+    tool = read_tool(out)
+    made = make_shape("pointer", SIMULATED_PLATES["pointer"], 1)
+    assert np.linalg.norm(tool.tip_mm - made.tip_mm) < 0.15
+    designed = np.array([2.0, 78.0, 112.0])
+    assert np.linalg.norm(tool.tip_mm - designed) > 0.5  # which no drawing tells
+    assert tool.axis is None
+    assert tool.made_on is not None
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["poses.csv", "--out", "tool.json"], "recorded poses say nothing of a plate"),
+        (["poses.csv", "--headless"], "recorded poses say nothing of a plate"),
+        (["--turns", "poses.csv"], "--turns needs POSES"),
+    ],
+)
+def test_options_that_contradict_are_refused(options, words, capsys) -> None:
+    assert run(["calibrate", "pivot", *options]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_real_camera_needs_the_plate(tmp_path, capsys) -> None:
+    (tmp_path / "real.toml").write_text('[camera]\nbackend = "opencv"\n', encoding="utf-8")
+    config = ["--config", str(tmp_path / "real.toml")]
+    assert run([*config, "calibrate", "pivot", "--out", str(tmp_path / "t.json")]) == 2
+    assert "--board PLATE.json" in capsys.readouterr().err
+    assert run([*config, "calibrate", "pivot", "--headless"]) == 2
+    assert "nobody else leans the tool" in capsys.readouterr().err
+
+
+def test_recorded_turns_give_the_axis(given, tmp_path, capsys) -> None:
+    axis = np.array([0.0, 0.6, 0.8])
+    turn = np.tile(np.eye(4), (40, 1, 1))
+    turn[:, :3, :3] = [rotation_from_vector(a * axis) for a in np.linspace(-1.0, 1.0, 40)]
+    for name, content in (("p.csv", given), ("t.csv", turn)):
+        (tmp_path / name).write_text("\n".join(csv_lines(content)), encoding="utf-8")
+    out = tmp_path / "o.json"
+    paths = [str(tmp_path / "p.csv"), "--turns", str(tmp_path / "t.csv"), "--json", str(out)]
+    assert run(["calibrate", "pivot", *paths]) == 0
+    content = json.loads(out.read_text(encoding="utf-8"))
+    assert abs(np.array(content["axis"]) @ axis) > 0.9999
+    assert content["swept_deg"] == [pytest.approx(114.6, abs=0.5)]
+    assert "turned by 115 deg" in capsys.readouterr().out

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -44,6 +44,7 @@ from navapp.errors import DeviceLost, DeviceTimeout, EndOfSequence
 from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
+from navapp.tools.tool import Tool, ToolKind
 from navapp.tracking import Goal, TrackState
 from navapp.values import (
     BoneModel,
@@ -231,6 +232,7 @@ class Bench:
         layers: tuple[str, ...] | None = None,
         made_steps: tuple[str, ...] = (),
         has_gates: bool = False,
+        tools: Mapping[ToolKind, Tool] | None = None,
         can_reopen: bool = True,
         camera: StereoCamera | None = None,
         clock: Clock | None = None,
@@ -273,6 +275,7 @@ class Bench:
                 layers=layers,
                 made_steps=made_steps,
                 has_gates=has_gates,
+                tools=tools or {},
             ),
             executor=executor or InlineExecutor(),
             board_watch=board_watch,

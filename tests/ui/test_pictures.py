@@ -25,7 +25,12 @@ STATES: dict[str, tuple[Callable[[], Snapshot], str, str]] = {
 }
 
 
-@pytest.mark.parametrize("size", [(80, 24), (160, 48)], ids=["80x24", "160x48"])
+SIZES = pytest.mark.parametrize(
+    "size", [(80, 24), (160, 48), (200, 60)], ids=["80x24", "160x48", "200x60"]
+)
+
+
+@SIZES
 @pytest.mark.parametrize("state", list(STATES))
 def test_screen(state: str, size: tuple[int, int], snap_compare: Callable[..., bool]) -> None:
     make, words, title = STATES[state]

@@ -10,7 +10,7 @@ from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines
 from navapp.ui.view import Level
 
-_GAUGE_WIDTH = 26
+_GAUGE_WIDTH = 22
 KEYS = (("f", "finish"), ("n", "begin anew"), ("q", "leave"))
 
 
@@ -94,7 +94,7 @@ class TipLine(Lines[ToolView]):
         is_good = snapshot.bound_mm is not None and snapshot.bound_mm <= snapshot.stop_mm
         level = Level.OK if is_good else Level.ATTENTION
         lean = snapshot.half_angle_deg
-        leaned = "" if lean is None else f"; leaned by {lean:.0f} deg, 20 are needed"
+        leaned = "" if lean is None else f"; leaned {lean:.0f} of 20 deg"
         tip = Content.assemble(
             (" tip     ", "$text-muted"),
             (draw_bar(snapshot.bound_mm, snapshot.stop_mm, _GAUGE_WIDTH, symbols), level.value),
