@@ -158,3 +158,51 @@ class TouchingHand:
                 return number, left_s / goes_s
             left_s -= goes_s
         return 0, 0.0
+
+
+class ReachingHand:
+    """Goes where it is told, stands there with the tip in a divot, and leans the tool if asked.
+
+    Args:
+        shape: of the tool.
+        place_mm: (3,) of the tip at first, in the left camera.
+        held: (3, 3) left camera from plate at first.
+        seed: of how far the tip slips.
+    """
+
+    def __init__(self, shape: ToolShape, place_mm: FloatArray, held: FloatArray, seed: int) -> None:
+        self._shape = shape
+        self._from = self._to = (np.asarray(place_mm, dtype=np.float64), held)
+        self._axis: int | None = None
+        self._begin_ns, self._goes_s, self._now_ns = 0, 0.0, 0
+        self._rng = np.random.default_rng([seed, 95])
+        self._slip_mm = np.zeros(3)
+
+    def go(self, place_mm: FloatArray, held: FloatArray, axis: int | None) -> None:
+        """To a place of the tip, held so; then lean about x, y or the shaft (axis 0 to 2)."""
+        self._from, self._to, self._axis = self._to, (np.asarray(place_mm), held), axis
+        way_mm = float(np.linalg.norm(self._to[0] - self._from[0]))
+        turn_rad = float(np.linalg.norm(vector_from_rotation(held @ self._from[1].T)))
+        self._goes_s = max(0.3, 1.9 * way_mm / _SPEED_MM_S, 1.9 * turn_rad / 0.5)
+        self._begin_ns = self._now_ns
+        self._slip_mm = _SLIP_MM * self._rng.standard_normal(3)
+
+    @property
+    def is_there(self) -> bool:
+        """At the newest time that was asked for."""
+        return (self._now_ns - self._begin_ns) / 1e9 >= self._goes_s
+
+    def left_from_tool(self, time_ns: int) -> RigidTransform:
+        """Where the plate is at a world time."""
+        self._now_ns = max(self._now_ns, time_ns)
+        seconds = (time_ns - self._begin_ns) / 1e9
+        done = smooth_step(seconds / self._goes_s) if self._goes_s > 0.0 else 1.0
+        place = self._from[0] + done * (self._to[0] - self._from[0])
+        turn = vector_from_rotation(self._to[1] @ self._from[1].T)
+        held = rotation_from_vector(done * turn) @ self._from[1]
+        if self._axis is not None and done >= 1.0:
+            around = (np.eye(3)[0], np.eye(3)[1], held @ self._shape.axis)[self._axis]
+            lean = 0.35 * np.sin(2.0 * np.pi * (seconds - self._goes_s) / 6.0)
+            held = rotation_from_vector(lean * around) @ held
+        tip = place + (self._slip_mm if done >= 1.0 else 0.0)
+        return RigidTransform.from_parts("left", "tool", held, tip - held @ self._shape.tip_mm)

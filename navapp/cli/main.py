@@ -6,7 +6,7 @@ import importlib
 import os
 import re
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from navapp import __version__
 from navapp.cli.diagnostics import Diagnostics, report
@@ -21,6 +21,7 @@ _VERBS = (
     "stereo",
     "register",
     "calibrate",
+    "accuracy-test",
     "rig",
     "devices",
     "doctor",
@@ -40,7 +41,7 @@ def run(arguments: Sequence[str]) -> int:
         # The screen's toolkit asks for it, as many programs do.
         os.environ["NO_COLOR"] = "1"
     diagnostics = Diagnostics(is_verbose=options.verbose, is_quiet=options.quiet)
-    module = importlib.import_module(f"navapp.cli.{options.verb}")
+    module = _module_of(options.verb)
     try:
         return int(module.run(options, diagnostics))
     except KeyboardInterrupt:
@@ -75,6 +76,10 @@ class _Parser(argparse.ArgumentParser):
         super().error(message)
 
 
+def _module_of(verb: str) -> Any:
+    return importlib.import_module(f"navapp.cli.{verb.replace('-', '_')}")
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="navapp",
@@ -90,5 +95,5 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"navapp {__version__}")
     subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     for verb in _VERBS:
-        importlib.import_module(f"navapp.cli.{verb}").add_parser(subparsers)
+        _module_of(verb).add_parser(subparsers)
     return parser

@@ -20,7 +20,7 @@ SIMULATED_PLATES: dict[ToolKind, Plate] = {"pointer": Plate(first_id=0), "drill"
 _TABLE = 0.08
 _HOLE_MM = (-20.0, 20.0, 460.0)
 # The plate's x points up in the picture: the tool is held from the right, its plate to the cameras.
-_HELD = rotation_from_vector((0.0, 0.0, np.radians(-80.0)))
+HELD = rotation_from_vector((0.0, 0.0, np.radians(-80.0)))
 # How it is tilted from place to place: about the picture's x, y and the line of sight, in turn.
 _TILTS_DEG = (
     (0.0, 0.0, 0.0),
@@ -48,7 +48,7 @@ def make_shape(kind: ToolKind, plate: Plate, seed: int) -> ToolShape:
     return make_tool(kind, layouts, plate.plate_from_faces, seed)
 
 
-class _Table:
+class Table:
     """An empty table in front of the cameras."""
 
     def __init__(self, rig: StereoRig) -> None:
@@ -67,8 +67,8 @@ def make_pivoting(
 ) -> tuple[ToolInView, PivotingHand]:
     """A tool above an empty table, and the hand that pivots it."""
     shape = make_shape(kind, plate, seed)
-    hand = PivotingHand(shape, np.array(_HOLE_MM), _HELD, seed)
-    return ToolInView(_Table(rig), shape, hand.left_from_tool), hand
+    hand = PivotingHand(shape, np.array(_HOLE_MM), HELD, seed)
+    return ToolInView(Table(rig), shape, hand.left_from_tool), hand
 
 
 def make_touching(
@@ -95,7 +95,7 @@ def make_touching(
     def left_from_femur(time_ns: int) -> RigidTransform:
         return world.left_from_body("femur", time_ns)
 
-    held = [rotation_from_vector(np.radians(tilt)) @ _HELD for tilt in _TILTS_DEG]
+    held = [rotation_from_vector(np.radians(tilt)) @ HELD for tilt in _TILTS_DEG]
     hand = TouchingHand(shape, touches, left_from_femur, held, seed)
     return ToolInView(world, shape, hand.left_from_tool, cover), hand
 

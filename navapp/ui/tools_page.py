@@ -1,5 +1,6 @@
 """The page of the tools: how they stand to bone and plan, and the check on the patient."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -166,6 +167,10 @@ class ToolsPage(PageScreen):
         "tools, and the check on the patient",
         " back  ENTER take a point  a letter: on that landmark  x forget the last  n begin anew",
     )
+
+    def show(self, view: View, *, is_text_due: bool) -> None:
+        """Around the bone: there the cross is."""
+        super().show(replace(view, is_near=True), is_text_due=is_text_due)
 
     def compose_page(self) -> ComposeResult:
         """Picture and table."""

@@ -1,0 +1,1 @@
+"""The localisation and tracking test of a pointer, step by step."""

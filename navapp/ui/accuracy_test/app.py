@@ -1,0 +1,164 @@
+"""The application of an accuracy test."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from textual.app import ComposeResult
+from textual.containers import Horizontal, Vertical
+from textual.content import Content
+
+from navapp.control.accuracy_test.states import Back, Leave, Take, TestCommand, TestSnapshot
+from navapp.ui.gauges import cut, draw_fraction_bar
+from navapp.ui.guided_app import (
+    POLLS_PER_S,
+    GuidedApp,
+    GuidedScreen,
+    GuidedSession,
+    run_guided_app,
+)
+from navapp.ui.pictures.picture import Picture
+from navapp.ui.symbols import UNICODE, Symbols
+from navapp.ui.text_view import Lines
+from navapp.ui.view import Level
+
+_COMMANDS: dict[str, TestCommand] = {"enter": Take(), "x": Back(), "q": Leave()}
+_KEYS = (("ENTER", "take"), ("x", "the last one again"), ("q", "leave"))
+_BAR_WIDTH = 22
+TestSession = GuidedSession[TestSnapshot, TestCommand]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TestView:
+    """What is shown: a snapshot and the characters for it."""
+
+    snapshot: TestSnapshot
+    symbols: Symbols
+
+
+class TestTitle(Lines[TestView]):
+    """Camera at the left, tasks at the right."""
+
+    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+        """One line."""
+        snapshot = view.snapshot
+        right = Content.styled(f"{snapshot.n_kept} of {snapshot.n_tasks} ", "bold $foreground")
+        left = Content.assemble(
+            (" navapp accuracy-test ", "bold $primary"),
+            (" sim " if snapshot.camera.startswith("sim:") else "", "bold $background on $warning"),
+            " ", snapshot.camera.removeprefix("sim:"),
+        )  # fmt: skip
+        room = max(width - right.cell_length, 0)
+        left = left.truncate(room).pad_right(max(room - left.cell_length, 0))
+        return [Content.assemble(left, right)]
+
+
+class TaskLines(Lines[TestView]):
+    """What to do, how far it is, and how the tool is seen."""
+
+    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+        """Three lines."""
+        snapshot, symbols = view.snapshot, view.symbols
+        text = "all tasks are done" if snapshot.task is None else snapshot.task.instruction
+        told = cut(text, max(width - 10, 0), symbols)
+        word = "taking" if snapshot.is_taking else "press ENTER when it is so"
+        seen, level = snapshot.missing, Level.ATTENTION
+        if not seen and snapshot.bound_mm is not None:
+            seen, level = f"tip {symbols.at_most}{snapshot.bound_mm:.2f} mm", Level.OK
+        return [
+            Content.assemble((" to do   ", "$text-muted"), (told, Level.ATTENTION.value)),
+            Content.assemble(
+                (" taken   ", "$text-muted"),
+                (draw_fraction_bar(snapshot.share, _BAR_WIDTH, symbols), "$primary"),
+                f" {word}",
+            ),
+            Content.assemble(
+                (" pointer ", "$text-muted"), (f"{level.mark(symbols)} {seen}", level.value)
+            ).truncate(width),
+        ]
+
+
+class TestEvents(Lines[TestView]):
+    """What happened, newest first."""
+
+    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+        """As many lines as there is room for."""
+        newest = list(reversed(view.snapshot.events))[:height]
+        told = [cut(f" {one}", width, view.symbols) for one in newest]
+        return [Content.styled(one, "$text-muted") for one in told]
+
+
+class TestFooter(Lines[TestView]):
+    """The keys."""
+
+    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+        """One line."""
+        parts: list[str | Content | tuple[str, str]] = []
+        for key, label in _KEYS:
+            parts += [(f" {key} ", "bold $primary"), (f"{label} ", "$foreground")]
+        return [Content.assemble(*parts).truncate(width)]
+
+
+class SmallTest(Lines[TestView]):
+    """Stands in for everything on a terminal that is too small."""
+
+    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+        """Most important line first."""
+        task = view.snapshot.task
+        return [
+            Content("all tasks are done" if task is None else task.instruction),
+            Content.styled("make the terminal 80 x 24", "$text-muted"),
+        ]
+
+
+class TestScreen(GuidedScreen[TestSnapshot]):
+    """Both pictures, what to do, what is done."""
+
+    def compose(self) -> ComposeResult:
+        """From top to bottom."""
+        yield SmallTest("small")
+        with Vertical(id="body"):
+            yield TestTitle("title")
+            with Horizontal(id="pictures"):
+                yield Picture("left")
+                yield Picture("right")
+            yield TaskLines("task")
+            yield TestEvents("events")
+            yield TestFooter("footer")
+
+    def on_mount(self) -> None:
+        """Name the pictures."""
+        for side in ("left", "right"):
+            self.query_one(f"#{side}").border_title = side
+
+    def show(self, snapshot: TestSnapshot, symbols: Symbols) -> None:
+        """Pass a snapshot on."""
+        pictures = snapshot.pictures or (None, None)
+        for side, picture in zip(("left", "right"), pictures, strict=True):
+            self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
+        view = TestView(snapshot, symbols)
+        for lines in self.query(Lines):
+            lines.show(view)
+
+
+class TestApp(GuidedApp[TestSnapshot, TestCommand]):
+    """The operator's screen for one accuracy test."""
+
+    CSS_PATH = Path(__file__).with_name("accuracy_test.tcss")
+
+    def __init__(
+        self,
+        session: TestSession,
+        *,
+        symbols: Symbols = UNICODE,
+        polls_per_s: int = POLLS_PER_S,
+    ) -> None:
+        super().__init__(session, TestScreen(), symbols=symbols, polls_per_s=polls_per_s)
+
+    def find_command(self, key: str, snapshot: TestSnapshot) -> TestCommand | None:
+        """What a key means."""
+        return _COMMANDS.get(key)
+
+
+def run_test_app(session: TestSession, log_path: Path) -> int:
+    """Run the screen until it ends; see `run_guided_app`."""
+    return run_guided_app(lambda symbols: TestApp(session, symbols=symbols), log_path)
