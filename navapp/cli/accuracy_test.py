@@ -148,12 +148,12 @@ def _on_screen(testing: "AccuracyTesting") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
     from navapp.cli.run import log_folder
     from navapp.control.guided_runner import GuidedRunner
-    from navapp.ui.accuracy_test.app import run_test_app
+    from navapp.ui.accuracy_test.app import run_accuracy_app
 
     runner = GuidedRunner(testing, "accuracy test")
     runner.start()
     try:
-        code = run_test_app(runner, log_folder() / "navapp.log")
+        code = run_accuracy_app(runner, log_folder() / "navapp.log")
     finally:
         runner.stop()
     if runner.error is not None:

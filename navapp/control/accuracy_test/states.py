@@ -34,11 +34,11 @@ class Leave:
     """End; what was taken is kept."""
 
 
-TestCommand = Take | Back | Leave
+AccuracyCommand = Take | Back | Leave
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TestSnapshot:
+class AccuracySnapshot:
     """An accuracy test at one moment."""
 
     time_ns: int

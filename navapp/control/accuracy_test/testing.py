@@ -11,12 +11,12 @@ from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
 from navapp.control.accuracy_test.states import (
+    AccuracyCommand,
+    AccuracySnapshot,
     Back,
     Leave,
     Take,
     TakenTip,
-    TestCommand,
-    TestSnapshot,
 )
 from navapp.control.recent_events import RecentEvents
 from navapp.errors import DeviceTimeout
@@ -72,7 +72,7 @@ class AccuracyTesting:
     ) -> None:
         self._camera, self._clock, self._tasks, self._hand = camera, clock, tuple(tasks), hand
         self._tracker = ToolTracker(tool, rig)
-        self._queue: deque[TestCommand] = deque()
+        self._queue: deque[AccuracyCommand] = deque()
         self._lock = threading.Lock()
         self._events = RecentEvents()
         self._number, self._is_taking, self._was_left = 0, False, False
@@ -85,12 +85,12 @@ class AccuracyTesting:
         self._begin_task()
         self.snapshot = self._make_snapshot()
 
-    def submit(self, command: TestCommand) -> None:
+    def submit(self, command: AccuracyCommand) -> None:
         """Hand a command over; called from any thread."""
         with self._lock:
             self._queue.append(command)
 
-    def step(self) -> TestSnapshot:
+    def step(self) -> AccuracySnapshot:
         """Handle a command, or take a frame."""
         with self._lock:
             command = self._queue.popleft() if self._queue else None
@@ -110,7 +110,7 @@ class AccuracyTesting:
         if self._hand is not None and self._task is not None:
             self._hand.begin(self._task)
 
-    def _handle(self, command: TestCommand) -> None:
+    def _handle(self, command: AccuracyCommand) -> None:
         match command:
             case Take():
                 self._begin_task()
@@ -168,10 +168,10 @@ class AccuracyTesting:
         self._number += 1
         self._begin_task()
 
-    def _make_snapshot(self) -> TestSnapshot:
+    def _make_snapshot(self) -> AccuracySnapshot:
         frame, task = self._frame, self._task
         share = 0.0 if task is None else len(self._task_tips) / self._needed(task)
-        return TestSnapshot(
+        return AccuracySnapshot(
             time_ns=self._clock.now_ns() if frame is None else frame.captured_ns,
             camera=self._camera.info.name,
             pictures=None if frame is None else (frame.left, frame.right),

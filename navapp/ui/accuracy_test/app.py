@@ -7,7 +7,7 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.content import Content
 
-from navapp.control.accuracy_test.states import Back, Leave, Take, TestCommand, TestSnapshot
+from navapp.control.accuracy_test.states import AccuracyCommand, AccuracySnapshot, Back, Leave, Take
 from navapp.ui.gauges import cut, draw_fraction_bar
 from navapp.ui.guided_app import (
     POLLS_PER_S,
@@ -21,24 +21,24 @@ from navapp.ui.symbols import UNICODE, Symbols
 from navapp.ui.text_view import Lines
 from navapp.ui.view import Level
 
-_COMMANDS: dict[str, TestCommand] = {"enter": Take(), "x": Back(), "q": Leave()}
+_COMMANDS: dict[str, AccuracyCommand] = {"enter": Take(), "x": Back(), "q": Leave()}
 _KEYS = (("ENTER", "take"), ("x", "the last one again"), ("q", "leave"))
 _BAR_WIDTH = 22
-TestSession = GuidedSession[TestSnapshot, TestCommand]
+AccuracySession = GuidedSession[AccuracySnapshot, AccuracyCommand]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TestView:
+class AccuracyView:
     """What is shown: a snapshot and the characters for it."""
 
-    snapshot: TestSnapshot
+    snapshot: AccuracySnapshot
     symbols: Symbols
 
 
-class TestTitle(Lines[TestView]):
+class AccuracyTitle(Lines[AccuracyView]):
     """Camera at the left, tasks at the right."""
 
-    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+    def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """One line."""
         snapshot = view.snapshot
         right = Content.styled(f"{snapshot.n_kept} of {snapshot.n_tasks} ", "bold $foreground")
@@ -52,10 +52,10 @@ class TestTitle(Lines[TestView]):
         return [Content.assemble(left, right)]
 
 
-class TaskLines(Lines[TestView]):
+class TaskLines(Lines[AccuracyView]):
     """What to do, how far it is, and how the tool is seen."""
 
-    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+    def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """Three lines."""
         snapshot, symbols = view.snapshot, view.symbols
         text = "all tasks are done" if snapshot.task is None else snapshot.task.instruction
@@ -77,20 +77,20 @@ class TaskLines(Lines[TestView]):
         ]
 
 
-class TestEvents(Lines[TestView]):
+class AccuracyEvents(Lines[AccuracyView]):
     """What happened, newest first."""
 
-    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+    def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """As many lines as there is room for."""
         newest = list(reversed(view.snapshot.events))[:height]
         told = [cut(f" {one}", width, view.symbols) for one in newest]
         return [Content.styled(one, "$text-muted") for one in told]
 
 
-class TestFooter(Lines[TestView]):
+class AccuracyFooter(Lines[AccuracyView]):
     """The keys."""
 
-    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+    def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """One line."""
         parts: list[str | Content | tuple[str, str]] = []
         for key, label in _KEYS:
@@ -98,10 +98,10 @@ class TestFooter(Lines[TestView]):
         return [Content.assemble(*parts).truncate(width)]
 
 
-class SmallTest(Lines[TestView]):
+class SmallAccuracy(Lines[AccuracyView]):
     """Stands in for everything on a terminal that is too small."""
 
-    def build(self, view: TestView, width: int, height: int) -> list[Content]:
+    def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """Most important line first."""
         task = view.snapshot.task
         return [
@@ -110,55 +110,55 @@ class SmallTest(Lines[TestView]):
         ]
 
 
-class TestScreen(GuidedScreen[TestSnapshot]):
+class AccuracyScreen(GuidedScreen[AccuracySnapshot]):
     """Both pictures, what to do, what is done."""
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
-        yield SmallTest("small")
+        yield SmallAccuracy("small")
         with Vertical(id="body"):
-            yield TestTitle("title")
+            yield AccuracyTitle("title")
             with Horizontal(id="pictures"):
                 yield Picture("left")
                 yield Picture("right")
             yield TaskLines("task")
-            yield TestEvents("events")
-            yield TestFooter("footer")
+            yield AccuracyEvents("events")
+            yield AccuracyFooter("footer")
 
     def on_mount(self) -> None:
         """Name the pictures."""
         for side in ("left", "right"):
             self.query_one(f"#{side}").border_title = side
 
-    def show(self, snapshot: TestSnapshot, symbols: Symbols) -> None:
+    def show(self, snapshot: AccuracySnapshot, symbols: Symbols) -> None:
         """Pass a snapshot on."""
         pictures = snapshot.pictures or (None, None)
         for side, picture in zip(("left", "right"), pictures, strict=True):
             self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
-        view = TestView(snapshot, symbols)
+        view = AccuracyView(snapshot, symbols)
         for lines in self.query(Lines):
             lines.show(view)
 
 
-class TestApp(GuidedApp[TestSnapshot, TestCommand]):
+class AccuracyApp(GuidedApp[AccuracySnapshot, AccuracyCommand]):
     """The operator's screen for one accuracy test."""
 
     CSS_PATH = Path(__file__).with_name("accuracy_test.tcss")
 
     def __init__(
         self,
-        session: TestSession,
+        session: AccuracySession,
         *,
         symbols: Symbols = UNICODE,
         polls_per_s: int = POLLS_PER_S,
     ) -> None:
-        super().__init__(session, TestScreen(), symbols=symbols, polls_per_s=polls_per_s)
+        super().__init__(session, AccuracyScreen(), symbols=symbols, polls_per_s=polls_per_s)
 
-    def find_command(self, key: str, snapshot: TestSnapshot) -> TestCommand | None:
+    def find_command(self, key: str, snapshot: AccuracySnapshot) -> AccuracyCommand | None:
         """What a key means."""
         return _COMMANDS.get(key)
 
 
-def run_test_app(session: TestSession, log_path: Path) -> int:
+def run_accuracy_app(session: AccuracySession, log_path: Path) -> int:
     """Run the screen until it ends; see `run_guided_app`."""
-    return run_guided_app(lambda symbols: TestApp(session, symbols=symbols), log_path)
+    return run_guided_app(lambda symbols: AccuracyApp(session, symbols=symbols), log_path)
