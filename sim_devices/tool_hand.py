@@ -18,12 +18,12 @@ from sim_devices.tool_shapes import ToolShape
 ToolDeed = Literal["pivot", "turn"]
 
 # The tip stands in a small hole and slips a little; the plate moves by at most 100 mm/s.
-_LEAN_RAD, _LEAN_PERIOD_S, _SPIN_RAD, _SPIN_PERIOD_S = 0.6, 5.5, 0.5, 3.7
+_LEAN_RAD, _LEAN_PERIOD_S, _SPIN_RAD, _SPIN_PERIOD_S = 0.6, 6.0, 0.5, 3.7
 _SLIP_MM, _SLIP_HZ = 0.03, (0.7, 1.1, 1.7)
 # A turn about itself goes to and fro; the axis wobbles meanwhile.
 _TURN_RAD, _TURN_PERIOD_S, _WOBBLE_RAD = 1.0, 8.0, 0.004
 # Going from one place to the next, and resting there; no faster than this.
-_SPEED_MM_S, _REST_S, _LIFT_MM = 60.0, 1.6, 12.0
+_SPEED_MM_S, _PLATE_SPEED_MM_S, _REST_S, _LIFT_MM = 60.0, 100.0, 1.6, 12.0
 # A held tip trembles by this (standard deviation along each axis).
 _TREMOR_MM, _TREMOR_HZ = 0.05, (1.3, 2.1, 3.3)
 
@@ -114,8 +114,14 @@ class TouchingHand:
         ways = [
             float(np.linalg.norm(b - a)) for a, b in zip(ends, ends[1:] + ends[:1], strict=True)
         ]
-        # Half again as long on the way: smooth starts and stops are faster in their middle.
-        self._goes_s = [1.9 * (way + 2.0 * _LIFT_MM) / _SPEED_MM_S for way in ways]
+        turns = [
+            float(np.linalg.norm(vector_from_rotation(self._hold(k + 1) @ self._hold(k).T)))
+            for k in range(len(ways))
+        ]
+        self._goes_s = [
+            _find_duration_s(way + 2.0 * _LIFT_MM, turn, shape)
+            for way, turn in zip(ways, turns, strict=True)
+        ]
         self._round_s = sum(self._goes_s) + _REST_S * len(ways)
 
     def touched(self, time_ns: int) -> int | None:
@@ -142,10 +148,12 @@ class TouchingHand:
         return RigidTransform.from_parts("left", "tool", held, tip - held @ self._shape.tip_mm)
 
     def _between(self, number: int, done: float) -> FloatArray:
-        a = self._held[number % len(self._held)]
-        b = self._held[(number + 1) % len(self._touches) % len(self._held)]
+        a, b = self._hold(number), self._hold(number + 1)
         turn: FloatArray = rotation_from_vector(done * vector_from_rotation(b @ a.T)) @ a
         return turn
+
+    def _hold(self, number: int) -> FloatArray:
+        return self._held[number % len(self._touches) % len(self._held)]
 
     def _find(self, time_ns: int) -> tuple[int, float]:
         """Which place was touched last, and how far it is gone to the next one."""
@@ -183,7 +191,7 @@ class ReachingHand:
         self._from, self._to, self._axis = self._to, (np.asarray(place_mm), held), axis
         way_mm = float(np.linalg.norm(self._to[0] - self._from[0]))
         turn_rad = float(np.linalg.norm(vector_from_rotation(held @ self._from[1].T)))
-        self._goes_s = max(0.3, 1.9 * way_mm / _SPEED_MM_S, 1.9 * turn_rad / 0.5)
+        self._goes_s = max(0.3, _find_duration_s(way_mm, turn_rad, self._shape))
         self._begin_ns = self._now_ns
         self._slip_mm = _SLIP_MM * self._rng.standard_normal(3)
 
@@ -206,3 +214,12 @@ class ReachingHand:
             held = rotation_from_vector(lean * around) @ held
         tip = place + (self._slip_mm if done >= 1.0 else 0.0)
         return RigidTransform.from_parts("left", "tool", held, tip - held @ self._shape.tip_mm)
+
+
+def _find_duration_s(way_mm: float, turn_rad: float, shape: ToolShape) -> float:
+    """For a way of the tip and a turn about it: neither tip nor plate is too fast.
+
+    Nearly twice as long as at an even speed: smooth starts and stops are faster in their middle.
+    """
+    of_plate_mm = way_mm + turn_rad * float(np.linalg.norm(shape.tip_mm))
+    return 1.9 * max(way_mm / _SPEED_MM_S, of_plate_mm / _PLATE_SPEED_MM_S)

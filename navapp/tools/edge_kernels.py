@@ -42,12 +42,12 @@ def fit_edge(greys: NDArray[np.float64], told: NDArray[np.float64]) -> None:
     n = len(greys)
     m = greys.mean()
     a = 0.5 * (greys[-1] - greys[0])
-    c, squares = 0.0, 0.0
+    c = 0.0
     half = 0.5 * (n - 1) * STEP_PX
     for _ in range(_ROUNDS):
         # Normal equations of dm, da, dc.
         s_bb, s_bd, s_dd, s_b, s_d = 0.0, 0.0, 0.0, 0.0, 0.0
-        r_1, r_b, r_d, squares = 0.0, 0.0, 0.0, 0.0
+        r_1, r_b, r_d = 0.0, 0.0, 0.0
         for k in range(n):
             t = (k * STEP_PX - half - c) / BLUR_PX
             b = math.erf(t / math.sqrt(2.0))
@@ -61,7 +61,6 @@ def fit_edge(greys: NDArray[np.float64], told: NDArray[np.float64]) -> None:
             r_1 += r
             r_b += r * b
             r_d += r * d
-            squares += r * r
         # The mean is solved for first.
         bb, bd, dd = s_bb - s_b * s_b / n, s_bd - s_b * s_d / n, s_dd - s_d * s_d / n
         rb, rd = r_b - r_1 * s_b / n, r_d - r_1 * s_d / n
@@ -77,6 +76,10 @@ def fit_edge(greys: NDArray[np.float64], told: NDArray[np.float64]) -> None:
             return
         if abs(dc) < _LEAST_CHANGE_PX:
             break
+    squares = 0.0
+    for k in range(n):
+        t = (k * STEP_PX - half - c) / BLUR_PX
+        squares += (greys[k] - m - a * math.erf(t / math.sqrt(2.0))) ** 2
     told[0], told[1], told[2] = c, a, math.sqrt(squares / n)
 
 

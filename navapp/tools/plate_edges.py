@@ -95,7 +95,7 @@ def _place_edge(
 
 def _places(length_mm: float) -> FloatArray:
     """From an edge's beginning, mm."""
-    n = max(1, int(length_mm / _SPACING_MM))
+    n = int(np.ceil(length_mm / _SPACING_MM))
     places: FloatArray = (np.arange(n) + 0.5) / n * length_mm
     return places
 

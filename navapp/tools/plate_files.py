@@ -21,10 +21,7 @@ def read_plate(path: str | Path) -> Plate:
     """
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(content, dict):
-            raise ValueError("it is not one JSON object")
-        return parse_plate(content)
+        return parse_plate(json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         problem = "does not exist"
     except (OSError, ValueError) as error:
@@ -37,12 +34,14 @@ def read_plate(path: str | Path) -> Plate:
     )
 
 
-def parse_plate(content: dict[str, Any]) -> Plate:
+def parse_plate(content: Any) -> Plate:
     """A plate from the keys of its file.
 
     Raises:
         ValueError: a key that is missing, unknown or impossible; the text names it.
     """
+    if not isinstance(content, dict):
+        raise ValueError("it is not one JSON object")
     if content.get("type") != "plate":
         raise ValueError(f'type must be "plate", not {content.get("type")!r}')
     if missing := [key for key in _NEEDED if key not in content]:
