@@ -8,7 +8,7 @@ import numpy as np
 from navapp.errors import ResultError
 from navapp.geometry.transform import FloatArray
 
-_FEWEST_POSES, _LEAST_SWEPT_DEG = 10, 40.0
+_FEWEST_POSES, _LEAST_SWEPT_DEG, _MOST_RMS_DEG = 10, 40.0, 1.5
 _ROUNDS, _RARE = 30, 4.0
 
 
@@ -50,12 +50,20 @@ def solve_axis(turns: Sequence[FloatArray], towards: FloatArray) -> ToolAxis:
             f"a turn has turned the tool by {min(swept_deg):.0f} deg only",
             remedy=f"turn it by {_LEAST_SWEPT_DEG:.0f} degrees or more about itself",
         )
+    rms_deg = float(
+        np.degrees(np.sqrt(np.mean([np.mean(_off(one, axis) ** 2) for one in rotations])))
+    )
+    if rms_deg > _MOST_RMS_DEG:
+        raise ResultError(
+            f"the axis wandered by {rms_deg:.1f} deg while the tool was turned",
+            remedy="turn it in a guide, or more slowly",
+        )
     variance = float(np.mean([np.mean(_off(one, axis) ** 2) for one in rotations])) / 2.0
     information = sum(len(one) * (np.eye(3) - _mean(one).T @ _mean(one)) for one in rotations)
     weakest = float(np.linalg.eigvalsh(information)[1])
     # Poses of one turn follow each other: a tenth of them stands for itself.
     sigma_rad = float(np.sqrt(10.0 * variance / weakest))
-    return ToolAxis(axis, sigma_rad, swept_deg, float(np.degrees(np.sqrt(2.0 * variance))))
+    return ToolAxis(axis, sigma_rad, swept_deg, rms_deg)
 
 
 def _settle(rotations: list[FloatArray], start: FloatArray) -> FloatArray:

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     check_writable(options.json)
     if not 1 <= options.places <= len(PLACES):
         raise UsageError(f"--places must be from 1 to {len(PLACES)}")
-    folder = _new_folder(options.out)
+    folder = _check_folder(options.out)
     configuration = load(find_file(options.config))
     is_simulated = configuration.camera.backend == "simulated"
     if is_simulated and options.divots is not None:
@@ -93,13 +93,12 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def _new_folder(out: str | None) -> Path | None:
+def _check_folder(out: str | None) -> Path | None:
     if out is None:
         return None
     folder = Path(out)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{out} exists and is not an empty folder", remedy="name a new one")
-    folder.mkdir(parents=True, exist_ok=True)
     return folder
 
 
@@ -113,20 +112,21 @@ def _find_tool(configuration: "Configuration", diagnostics: Diagnostics) -> "Too
     path = configuration.tools.pointer
     if path is not None:
         return read_tool(path)
+    from navapp.cli.calibrate_pivot import follow
+
     if configuration.camera.backend != "simulated":
         raise UsageError(
             "no pointer is known", remedy="calibrate one, and name it in [tools] pointer"
         )
     plate = SIMULATED_PLATES["pointer"]
-    opened = open_tool_calibration(configuration, "pointer", plate, is_headless=True)
-    settings = ToolSettings(has_axis=False)
-    calibrating = ToolCalibrating(
-        opened.camera, opened.clock, opened.rig, plate, settings, opened.hand
-    )
-    while not calibrating.step().is_over:
-        diagnostics.progress("pivot", min(calibrating.snapshot.n_poses / 61.0, 0.99))
-    diagnostics.progress("pivot", 1.0)
-    opened.camera.close()
+    with ExitStack() as undo:
+        opened = open_tool_calibration(configuration, "pointer", plate, is_headless=True)
+        undo.callback(opened.camera.close)
+        settings = ToolSettings(has_axis=False)
+        calibrating = ToolCalibrating(
+            opened.camera, opened.clock, opened.rig, plate, settings, opened.hand
+        )
+        follow(calibrating, diagnostics)
     tool, _, _ = calibrating.collected.solve(date.today(), opened.rig.rig_id)
     return tool
 
@@ -193,13 +193,14 @@ def _report(
         "tasks": testing.snapshot.n_tasks,
         "simulated": opened.hand is not None,
     }
-    write_json(options.json, "accuracy-test", content)
     if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
         write_json(str(folder / "accuracy.json"), "accuracy-test", content)
         write_whole(folder / "points.csv", _points_csv(testing).encode("utf-8"))
         write_localisation_report(
             folder / "report.html", testing.taken, figures, distances, divots_mm, about, truth
         )
+    write_json(options.json, "accuracy-test", content)
     if options.json != "-":
         _tell(content, folder, diagnostics.say)
 

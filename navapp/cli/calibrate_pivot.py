@@ -2,6 +2,7 @@
 
 import argparse
 from contextlib import ExitStack
+from dataclasses import replace
 from datetime import date
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +33,7 @@ plate's paper is measured on the way: nobody prints without an error.
 Recorded: CSV lines hold time_ns and the 16 numbers of tracker_from_tool row by row (mm); JSON is
 {"poses": [{"matrix": [[4x4]]}]}.
 """
-# Without a screen: as many frames as a patient hand needs.
+# Without a screen: far more frames than a calibration takes.
 _MOST_FRAMES = 3000
 
 
@@ -102,12 +103,14 @@ def _run_live(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         undo.callback(opened.camera.close)
         calibrating = _make_calibrating(opened, plate, options)
         if options.headless:
-            _follow(calibrating, diagnostics)
+            follow(calibrating, diagnostics)
         elif (code := _on_screen(calibrating)) != 0:
             return code
     if calibrating.snapshot.phase.value == "over":
         raise ResultError("the calibration was left: no tool is written")
     tool, found, axis = calibrating.collected.solve(date.today(), opened.rig.rig_id)
+    # What is told is what is written, with what no residual shows.
+    found = replace(found, covariance_mm2=tool.tip_covariance_mm2)
     if options.out is not None:
         write_tool(options.out, tool)
     _report(found, axis, options, diagnostics)
@@ -143,7 +146,7 @@ def _make_calibrating(
     return ToolCalibrating(opened.camera, opened.clock, opened.rig, plate, settings, opened.hand)
 
 
-def _follow(calibrating: "ToolCalibrating", diagnostics: Diagnostics) -> None:
+def follow(calibrating: "ToolCalibrating", diagnostics: Diagnostics) -> None:
     """Without a screen: until it is done."""
     from navapp.control.recent_events import list_new_events
 
@@ -154,6 +157,7 @@ def _follow(calibrating: "ToolCalibrating", diagnostics: Diagnostics) -> None:
             diagnostics.detail(text)
         told = snapshot.n_events
         if snapshot.is_over:
+            diagnostics.progress("done", 1.0)
             return
         done = min(snapshot.n_poses / 60.0, 1.0) if snapshot.n_kept == 0 else 0.99
         diagnostics.progress(snapshot.phase.value, done)

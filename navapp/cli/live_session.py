@@ -93,7 +93,7 @@ def prepare_session(
             others=check_others(options.also, plan, stage, is_live=True),
             calibrated_display=display,
             has_gates=True,
-            tools=read_tools(configuration, opened.rig, diagnostics),
+            tools=read_tools(configuration.tools.files, opened.rig, diagnostics),
         )
         if needs_start:
             check_start(specification.prior, stage.bone)

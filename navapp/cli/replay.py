@@ -232,6 +232,7 @@ def _prepare(
     method = options.method or (None if session is None else session.method)
     is_recorded_so = session is not None and session.follows_refused
     rig = read_rig(rig_path)
+    tool_files = configuration.tools.files if session is None else session.tool_files
     specification = specify_session(
         configuration,
         rig,
@@ -245,7 +246,7 @@ def _prepare(
         is_each=options.order == "each",
         layers=_layers(options.layers),
         made_steps=tuple(dict.fromkeys(options.cut)),
-        tools=read_tools(configuration, rig, diagnostics),
+        tools=read_tools(tool_files, rig, diagnostics),
     )
     operator, executor = choose_operator(session, options, specification.follows_refused)
     other_executor: Executor = InlineExecutor()

@@ -2,7 +2,8 @@
 
 import json
 import shutil
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import get_args
 
@@ -18,6 +19,7 @@ from navapp.geometry.display_model_files import write_display_model
 from navapp.geometry.rig_files import write_rig
 from navapp.geometry.whole_files import write_whole
 from navapp.preop import write_plan
+from navapp.tools.tool_files import write_tool
 from navapp.tracking import Method
 
 _FILE = "session.json"
@@ -39,6 +41,8 @@ class RecordedSession:
     check_minutes: float  # a check on the patient counted so long
     events: RecordedEvents
     others: tuple[str, ...] = ()  # bones that were looked for unasked
+    # kind -> file of each tool that was looked for.
+    tool_files: Mapping[str, str] = field(default_factory=dict)
 
 
 def start_recording(
@@ -62,6 +66,13 @@ def start_recording(
         write_display_model(path, specification.display.model)
         kept = configuration.display.model_copy(update={"model": str(path)})
         configuration = configuration.model_copy(update={"display": kept})
+    files: dict[str, str] = {}
+    for kind, tool in specification.tools.items():
+        files[kind] = str(folder.resolve() / f"{kind}.json")
+        write_tool(files[kind], tool)
+    if files:
+        tools = configuration.tools.model_copy(update=files)
+        configuration = configuration.model_copy(update={"tools": tools})
     write_whole(folder / "configuration.toml", format_toml(configuration, False).encode())
     content = {
         "navapp": __version__,
@@ -73,6 +84,7 @@ def start_recording(
         "gates": specification.has_gates,
         "check_minutes": specification.check_minutes,
         "others": list(specification.others),
+        "tools": list(specification.tools),
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
     return SessionRecorder(
@@ -133,6 +145,7 @@ def read_session(folder: str | Path) -> RecordedSession:
         check_minutes,
         read_events(events_path),
         tuple(str(name) for name in content.get("others", ())),
+        {str(kind): str(folder / f"{kind}.json") for kind in content.get("tools", ())},
     )
 
 

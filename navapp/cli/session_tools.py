@@ -1,20 +1,20 @@
-"""The tools that a session looks for: those that the configuration names."""
+"""The tools that a session looks for."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from navapp.cli.diagnostics import Diagnostics
 from navapp.errors import ConfigurationError
 
 if TYPE_CHECKING:
-    from navapp.config import Configuration
     from navapp.geometry.rig import StereoRig
     from navapp.tools.tool import Tool, ToolKind
 
 
 def read_tools(
-    configuration: "Configuration", rig: "StereoRig", diagnostics: Diagnostics
+    files: Mapping[str, str], rig: "StereoRig", diagnostics: Diagnostics
 ) -> "dict[ToolKind, Tool]":
-    """Read their files.
+    """Read the files of tools, by their kind.
 
     Raises:
         InputError: a file; ConfigurationError: two tools with the same markers, or a drill of which
@@ -23,7 +23,6 @@ def read_tools(
     from navapp.tools.tool import TOOL_KINDS
     from navapp.tools.tool_files import read_tool
 
-    files = configuration.tools.files
     tools = {kind: read_tool(files[kind]) for kind in TOOL_KINDS if kind in files}
     if "drill" in tools and tools["drill"].axis is None:
         raise ConfigurationError(

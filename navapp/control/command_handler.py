@@ -210,7 +210,9 @@ class CommandHandler:
     def _on_touch(self, command: TouchPoint | CheckPicks | DropPoint | ForgetPoints) -> None:
         """A point of the check on the patient."""
         if isinstance(command, DropPoint):
-            self._patient.drop()
+            answer = self._patient.drop()
+            if answer is not None:
+                self._gates.take_check(answer)
         elif isinstance(command, ForgetPoints):
             self._patient.forget()
             self._session.add_event("check", "check on the patient begun anew")

@@ -110,7 +110,9 @@ class SessionController:
             make_tracker,
         )  # fmt: skip
         self._tools = ToolWatch(specification.tools, rig, plan)
-        self._patient = PatientChecking(self._session, self._tools, plan, rig)
+        self._patient = PatientChecking(
+            self._session, self._tools, plan, rig, specification.check_minutes
+        )
         gates = self._gates = GateKeeper(
             self._session,
             Gates(

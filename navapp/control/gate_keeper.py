@@ -70,7 +70,7 @@ class GateKeeper:
             return
         if answer is CheckAnswer.PASSED:
             self.confirm(CHECKED_ON_PATIENT)
-        elif self._gates.is_said(CHECKED_ON_PATIENT):
+        elif answer is CheckAnswer.FAILED and self._gates.is_said(CHECKED_ON_PATIENT):
             self.withdraw(CHECKED_ON_PATIENT)
 
     def enter(self, stage: StageSpec) -> None:

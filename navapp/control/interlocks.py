@@ -73,6 +73,9 @@ def check_interlocks(snapshot: Snapshot) -> tuple[Reason, ...]:
         reasons.append(Reason.NOT_NAVIGATING)
     if snapshot.state in (SessionState.NAVIGATING, SessionState.SUSPENDED):
         reasons += _of_pose(snapshot)
+    check = snapshot.patient_check
+    if check is not None and check.has_failed:
+        reasons.append(Reason.CHECK_FAILED)
     if not all(line.is_met for line in snapshot.time_out):
         reasons.append(Reason.TIME_OUT_OPEN)
     return tuple(reasons)

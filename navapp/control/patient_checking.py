@@ -2,11 +2,13 @@
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from navapp.control.commands import CheckPicks, TouchPoint
 from navapp.control.session import Session
+from navapp.control.stages import STAGES
 from navapp.control.states import EventLevel, PatientCheck, ToolReading
 from navapp.control.tool_watch import ToolWatch
 from navapp.geometry.rig import StereoRig
@@ -24,7 +26,7 @@ from navapp.values import Pick, Plan, StageSpec
 # A tip rests when so many readings lie within so much of each other.
 _N_RESTING, _REST_MM = 5, 0.3
 # It is waited for so many frames that the tip rests.
-_PATIENCE = 45
+_MOST_WAITED_FRAMES = 45
 # A registration is good for no more than this, whatever the stage allows.
 _MOST_MM = 1.0
 # What pressing on tissue, and a model's own error, add to a touch.
@@ -47,34 +49,60 @@ class PatientChecking:
         tools: that touch.
         plan: of the operation.
         rig: in whose left picture landmarks are picked.
+        valid_minutes: a decided check counts so long.
     """
 
-    def __init__(self, session: Session, tools: ToolWatch, plan: Plan, rig: StereoRig) -> None:
+    def __init__(
+        self,
+        session: Session,
+        tools: ToolWatch,
+        plan: Plan,
+        rig: StereoRig,
+        valid_minutes: float,
+    ) -> None:
         self._session, self._tools, self._plan, self._rig = session, tools, plan, rig
+        self._valid_ns = round(valid_minutes * 60e9)
+        self._stages = tuple(plan.stage(stage) for stage in STAGES)
         self._touches: list[Touched] = []
         self._readings: deque[FloatArray] = deque(maxlen=_N_RESTING)
         self._waiting: tuple[int, str] | None = None  # frames left, landmark
         self._of: tuple[str, int] = ("", 0)  # bone and registration of the touches
         self._result: CheckResult | None = None
+        self._decided_ns = 0  # when
         self._wanted: tuple[str, FloatArray] | None = None
+        # Bones with the registrations that a check has found wrong, and none has found right since.
+        self._failed: set[tuple[str, int]] = set()
 
     @property
     def state(self) -> PatientCheck | None:
         """As the operator sees it."""
-        if not self._touches and self._waiting is None:
+        if not self._touches and self._waiting is None and not self._has_failed:
             return None
         answer = CheckAnswer.OPEN if self._result is None else self._result.answer
         wanted, wanted_mm = self._wanted or ("", None)
         n = len(self._touches)
-        return PatientCheck(
-            answer, self._of[0], n, self._result, wanted, wanted_mm, self._is_of_now()
+        is_old = (
+            answer is not CheckAnswer.OPEN
+            and self._session.time_ns - self._decided_ns > self._valid_ns
         )
+        is_in_force = self._is_of_now() and not is_old
+        return PatientCheck(
+            answer, self._of[0], n, self._result, wanted, wanted_mm, is_in_force, self._has_failed
+        )
+
+    @property
+    def _has_failed(self) -> bool:
+        return self._now in self._failed
+
+    @property
+    def _now(self) -> tuple[str, int]:
+        bone = self._session.bone
+        return bone, self._session.registration_of(bone)
 
     @property
     def why_unconfirmed(self) -> str:
         """Why nobody may say that the bone was checked: a check that failed; empty: they may."""
-        result = self._result
-        if result is None or result.answer is not CheckAnswer.FAILED or not self._is_of_now():
+        if not self._has_failed:
             return ""
         return "the check on the patient failed: register again, or check again"
 
@@ -95,15 +123,15 @@ class PatientChecking:
         """Take a point as soon as the tip rests."""
         if not self._is_of_now():
             self.forget()
-        bone = self._session.bone
-        self._of = bone, self._session.registration_of(bone)
-        self._waiting = _PATIENCE, landmark
+        self._of = self._now
+        self._waiting = _MOST_WAITED_FRAMES, landmark
         self._readings.clear()
 
     def add_picks(self, picks: Sequence[Pick], stage: StageSpec) -> CheckAnswer | None:
-        """Landmarks picked in the left picture; the answer, once it is decided.
+        """Landmarks picked in the left picture: what they say.
 
-        A pick says where its landmark is across the line of sight, and nothing along it.
+        A pick says where its landmark is across the line of sight and nothing along it: picks
+        alone can find an error, but never pass.
         """
         tracked = self._session.tracked
         pose = None if tracked is None else tracked.left_from_bone
@@ -111,11 +139,11 @@ class PatientChecking:
             return None
         if not self._is_of_now():
             self.forget()
-        self._of = stage.bone, self._session.registration_of(stage.bone)
+        self._of = self._now
         for pick in picks:
-            self._touches.append(self._see_pick(pick, pose))
+            self._keep(self._see_pick(pick, pose))
         self._session.add_event("check", f"{len(picks)} picked landmarks are compared")
-        return self._decide(stage, is_told=True)
+        return self._decide(stage)
 
     def _see_pick(self, pick: Pick, left_from_bone: RigidTransform) -> Touched:
         ray = self._rig.left.rays(np.array([pick.left_px]))[0]
@@ -127,19 +155,24 @@ class PatientChecking:
         sigma_mm = _PICK_SIGMA_PX * depth_mm / self._rig.left.focal_px
         directions = across @ left_from_bone.rotation
         known_mm = self._landmark_sigma_mm(pick.name)
-        return Touched(pick.model_mm, directions, off_mm, float(np.hypot(sigma_mm, known_mm)))
+        sigma_mm = float(np.hypot(sigma_mm, known_mm))
+        return Touched(pick.model_mm, directions, off_mm, sigma_mm, pick.name)
 
     def _landmark_sigma_mm(self, landmark: str) -> float:
         planned = self._plan.content.landmarks.get(landmark)
         known_mm = None if planned is None else planned.sd_mm
         return _LANDMARK_SIGMA_MM if known_mm is None else known_mm
 
-    def drop(self) -> None:
-        """Forget the last touch."""
-        if self._touches:
-            self._touches.pop()
-            self._decide(self._session.stage, is_told=False)
+    def drop(self) -> CheckAnswer | None:
+        """Forget the last touch; what the others say, when they decide."""
         self._waiting = None
+        if not self._is_of_now():
+            self.forget()
+        if not self._touches:
+            return None
+        self._touches.pop()
+        self._session.add_event("check", f"point {len(self._touches) + 1} dropped")
+        return self._decide(self._session.stage)
 
     def forget(self) -> None:
         """Begin anew."""
@@ -150,15 +183,22 @@ class PatientChecking:
         if self._waiting is None:
             return None
         left, landmark = self._waiting
+        if not self._is_of_now():
+            self.forget()
+            text = "no point was taken: another bone or registration is in force"
+            self._session.add_event("check", text, EventLevel.WARNING)
+            return None
         placed = None if reading is None else reading.placed
-        if placed is not None:
+        if placed is None:
+            self._readings.clear()
+        else:
             self._readings.append(placed.tip_mm)
         if placed is not None and self._is_resting():
             self._waiting = None
             return self._take(placed, landmark, stage)
         if left <= 1:
             self._waiting = None
-            why = "the pointer was not seen" if not self._readings else "the tip did not rest"
+            why = "the tip did not rest" if self._readings else "the pointer is not seen"
             self._session.add_event("check", f"no point was taken: {why}", EventLevel.WARNING)
             return None
         self._waiting = left - 1, landmark
@@ -169,8 +209,13 @@ class PatientChecking:
         return len(tips) == _N_RESTING and float(np.ptp(tips, axis=0).max()) <= _REST_MM
 
     def _is_of_now(self) -> bool:
-        bone = self._session.bone
-        return self._of == (bone, self._session.registration_of(bone))
+        return self._of == self._now
+
+    def _keep(self, touched: Touched) -> None:
+        """A landmark counts once: how well it is known does not grow with every touch."""
+        if touched.name:
+            self._touches = [one for one in self._touches if one.name != touched.name]
+        self._touches.append(touched)
 
     def _take(self, placed: ToolOnBone, landmark: str, stage: StageSpec) -> CheckAnswer | None:
         tip_mm = np.mean(self._readings, axis=0)
@@ -187,35 +232,57 @@ class PatientChecking:
             text = f"no point was taken: the tip is {off_mm:.0f} mm away"
             session.add_event("check", text, EventLevel.WARNING)
             return None
-        self._touches.append(touched)
+        self._keep(touched)
         where = landmark or "surface"
         session.add_event("check", f"point {len(self._touches)}, {where}: {off_mm:.2f} mm off")
-        return self._decide(stage, is_told=True)
+        return self._decide(stage)
 
     def _touch_landmark(self, placed: ToolOnBone, tip_mm: FloatArray, landmark: str) -> Touched:
         point_mm = self._plan.landmarks_of(placed.bone)[landmark]
         sigma_mm = float(np.sqrt(np.trace(placed.covariance_mm2) / 3.0))
         sigma_mm = float(np.hypot(sigma_mm, self._landmark_sigma_mm(landmark)))
-        return Touched(point_mm, np.eye(3), tip_mm - point_mm, _with_touch(sigma_mm))
+        return Touched(point_mm, np.eye(3), tip_mm - point_mm, _with_touch(sigma_mm), landmark)
 
-    def _decide(self, stage: StageSpec, *, is_told: bool) -> CheckAnswer | None:
+    def _decide(self, stage: StageSpec) -> CheckAnswer | None:
         """What the touches say now; told when it is decided."""
         self._result, self._wanted = None, None
         if not self._touches:
             return None
-        targets_mm = self._find_targets(stage)
-        limit_mm = min(stage.tolerance_mm, _MOST_MM)
-        self._result = result = judge_touches(self._touches, targets_mm, limit_mm)
+        self._result = result = self._judge(stage)
         if result.answer is CheckAnswer.OPEN:
-            self._wanted = self._choose_next(stage, targets_mm)
+            self._wanted = self._choose_next(stage)
             return None
-        if is_told:
-            level = EventLevel.INFO if result.answer is CheckAnswer.PASSED else EventLevel.ALARM
-            self._session.add_event("check", tell_result(result, stage.bone), level)
+        self._decided_ns = self._session.time_ns
+        if result.answer is CheckAnswer.FAILED:
+            self._failed.add(self._of)
+        elif result.answer is CheckAnswer.PASSED:
+            self._failed.discard(self._of)
+        level = EventLevel.ALARM if result.answer is CheckAnswer.FAILED else EventLevel.INFO
+        self._session.add_event("check", tell_result(result, stage.bone), level)
         return result.answer
 
+    def _judge(self, stage: StageSpec) -> CheckResult:
+        """By the targets and tolerances of all stages of the bone: the worst of their answers.
+
+        A check counts for every stage of its bone, so it must hold in each.
+        """
+        common_mm = self._tools.tip_sigma_mm("pointer")
+        results = [
+            judge_touches(
+                self._touches, self._find_targets(one), min(one.tolerance_mm, _MOST_MM), common_mm
+            )
+            for one in self._stages
+            if one.bone == stage.bone
+        ]
+        result = min(results, key=lambda one: (_WORST_FIRST.index(one.answer), -one.most_mm))
+        is_picked = all(len(one.directions) == 2 for one in self._touches)
+        if is_picked and result.answer in (CheckAnswer.OPEN, CheckAnswer.PASSED):
+            reason = "picks in one picture tell no depth: touch the bone with a pointer"
+            return replace(result, answer=CheckAnswer.CANNOT_TELL, reason=reason)
+        return result
+
     def _find_targets(self, stage: StageSpec) -> FloatArray:
-        """Of the stage; of a plan without any, the landmarks of its bone, or its middle."""
+        """Of a stage; of a plan without any, the landmarks of its bone, or its middle."""
         targets_mm: FloatArray = self._plan.targets_of(stage.targets)
         if len(targets_mm):
             return targets_mm
@@ -225,10 +292,11 @@ class PatientChecking:
         middle_mm: FloatArray = self._plan.bones[stage.bone].mesh.vertices_mm.mean(axis=0)
         return middle_mm[None]
 
-    def _choose_next(
-        self, stage: StageSpec, targets_mm: FloatArray
-    ) -> tuple[str, FloatArray] | None:
+    def _choose_next(self, stage: StageSpec) -> tuple[str, FloatArray] | None:
         """Where the next touch tells most, among what faces the cameras."""
+        targets_mm = np.concatenate(
+            [self._find_targets(one) for one in self._stages if one.bone == stage.bone]
+        )
         tracked = self._session.tracked
         pose = None if tracked is None else tracked.left_from_bone
         if pose is None:
@@ -262,6 +330,14 @@ class PatientChecking:
         return f"at the cross, {away_mm:.0f} mm from {name.split('/')[-1].replace('_', ' ')}"
 
 
+_WORST_FIRST = (
+    CheckAnswer.FAILED,
+    CheckAnswer.OPEN,
+    CheckAnswer.CANNOT_TELL,
+    CheckAnswer.PASSED,
+)
+
+
 def _names(picks: Sequence[Pick]) -> list[str]:
     return [pick.name for pick in picks]
 
@@ -274,6 +350,7 @@ def tell_result(result: CheckResult, bone: str) -> str:
     """One sentence for people."""
     figures = f"{result.measured_mm:.2f} mm off, {result.most_mm:.2f} at most"
     limit = f"{result.limit_mm:.1f} mm are allowed"
+    limit += f"; {result.size_note}" if result.size_note else ""
     match result.answer:
         case CheckAnswer.PASSED:
             return f"{bone} checked on the patient: {figures}; {limit}"

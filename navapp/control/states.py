@@ -166,7 +166,7 @@ class ToolReading:
     surface_mm: float | None = None  # of the tip from the bone's surface, positive outside
     # name and distance of the plan's nearest landmark, mm.
     nearest: tuple[str, float] | None = None
-    hole: HoleOffset | None = None  # of the stage's holes the one that the tip is nearest to
+    hole: HoleOffset | None = None  # of the stage's holes the one whose entry is nearest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,7 +189,8 @@ class PatientCheck:
     result: CheckResult | None  # None before the first touch
     wanted: str  # where the next touch is asked for, in words; empty once it is decided
     wanted_mm: FloatArray | None  # (3,) that place, bone coordinates
-    is_valid: bool  # it was made with the registration in force
+    is_valid: bool  # it was made with the registration in force, and is not too old
+    has_failed: bool = False  # a check found that registration wrong, and none found it right since
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from drivers.frames import StereoFrame
 from navapp.control.states import ToolLine, ToolReading
 from navapp.geometry.mesh import TriangleMesh
@@ -39,14 +41,25 @@ class ToolWatch:
     """
 
     def __init__(self, tools: Mapping[ToolKind, Tool], rig: StereoRig, plan: Plan) -> None:
-        self._plan = plan
-        self._followed = {kind: _Followed(ToolTracker(tool, rig)) for kind, tool in tools.items()}
+        self._plan, self._tools = plan, dict(tools)
+        # They are not looked for in the same frame.
+        self._followed = {
+            kind: _Followed(ToolTracker(tool, rig), wait=2 * number)
+            for number, (kind, tool) in enumerate(tools.items())
+        }
         self._surface: tuple[str, int, SurfaceDistance] | None = None
 
     @property
     def kinds(self) -> tuple[ToolKind, ...]:
         """Of the tools that are looked for."""
         return tuple(self._followed)
+
+    def tip_sigma_mm(self, kind: ToolKind) -> float:
+        """Largest standard deviation of a tool's calibrated tip; 0 without the tool."""
+        tool = self._tools.get(kind)
+        if tool is None:
+            return 0.0
+        return float(np.sqrt(np.linalg.eigvalsh(tool.tip_covariance_mm2)[-1]))
 
     def follow(
         self,
@@ -145,5 +158,5 @@ class ToolWatch:
             placed,
             distance_mm,
             placed.nearest(self._plan.landmarks_of(placed.bone)),
-            min(offsets, key=lambda one: one.off_mm, default=None),
+            min(offsets, key=lambda one: np.hypot(one.off_mm, one.depth_mm), default=None),
         )

@@ -20,6 +20,7 @@ _MANNER = (
     "of the working volume. The standard is cited for the manner; conformity is not claimed. "
     "Research software, not for clinical use."
 )
+_OF_POINTS = "Distances from their mean, mm; each place is the mean of 8 pairs of pictures at rest."
 _HEAD = ("", "n", "mean", "span", "RMS", "maximum")
 
 
@@ -48,16 +49,20 @@ def write_localisation_report(
         (f"{place}: the middle divot, three orientations", one.point)
         for place, one in figures.items()
     ]
-    parts += ["<h2>Single point</h2>", make_note("Distances from the mean, mm."), _table(rows)]
+    parts += ["<h2>Single point</h2>", make_note(_OF_POINTS), _table(rows)]
     rows = [
         (f"{place}: leaned {axis}", scatter)
         for place, one in figures.items()
         for axis, scatter in one.rotations.items()
     ]
-    parts += ["<h2>Rotations</h2>", make_note("Distances from the mean, mm."), _table(rows)]
+    parts += [
+        "<h2>Rotations</h2>",
+        make_note("Distances of single pairs from their mean, mm."),
+        _table(rows),
+    ]
     rows = [(place, one.distances) for place, one in figures.items()]
     rows.append(("all places", all_distances))
-    note = "Measured less true, mm; the maximum without its sign."
+    note = "Measured less true, mm, between places that are means of 8 pairs; maximum without sign."
     parts += ["<h2>Distances between divots</h2>", make_note(note), _table(rows)]
     parts.append(_plot(taken, list(figures), divots_mm))
     if truth_mm is not None:

@@ -53,8 +53,10 @@ class MarkerFinder:
             shift = np.array([x, y], dtype=np.float64)
         corners, ids, _ = self._detector.detectMarkers(picture)
         known = self._plate.ids
-        found = {} if ids is None else dict(zip(np.ravel(ids).tolist(), corners, strict=True))
-        kept = sorted(number for number in found if number in known)
+        numbers = [] if ids is None else np.ravel(ids).tolist()
+        found = dict(zip(numbers, corners, strict=True))
+        # Of a marker that is there twice nobody knows which is the tool's.
+        kept = sorted(one for one in found if one in known and numbers.count(one) == 1)
         pixels = [np.asarray(found[number], dtype=np.float64).reshape(4, 2) for number in kept]
         return SeenMarkers(
             np.array([number - known.start for number in kept], dtype=np.intp),

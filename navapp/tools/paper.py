@@ -1,4 +1,4 @@
-"""What a printer and a pair of hands did to a plate: its paper differs from its design.
+"""How the printed and folded paper of a plate differs from its design.
 
 Parameters, in this order: stretch along x, stretch along y, shear of the paper; of every marker its
 shift along x and y (mm); of every face but the first its turn and shift against the design

@@ -10,7 +10,7 @@ from navapp.tools.plate_fit import PlateFit
 def fit_paper(fits: list[PlateFit], before: Paper) -> Paper:
     """What all pictures together say.
 
-    Each view is one error, whatever its size (a sandwich over the views).
+    The covariance is a sandwich over the views: what a view leaves counts as one error.
 
     Args:
         fits: of the views, all with the same paper before.

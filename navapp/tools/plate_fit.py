@@ -47,8 +47,8 @@ class PlateFit:
     covariance: FloatArray  # (6, 6) twist about the plate's origin, left camera's axes; mm, rad
     spread_px: FloatArray  # (2,) of white in the left and the right picture
     paper: FloatArray  # (P,) that explains them best
-    # What these pictures alone say of the paper, whatever the pose: information (P, P), and that
-    # times the paper which they tell (P,).
+    # Of these pictures alone, with pose and spread solved for: the information on the paper (P, P)
+    # and the right side of its normal equations (P,).
     paper_information: FloatArray
     paper_pull: FloatArray
     pose_by_paper: FloatArray  # (6, P) how the twist of the pose follows another paper

@@ -25,6 +25,7 @@ _LEAST_FACING = 0.26
 # Edges nearer to each other than this cannot be told apart; places looked at across an edge.
 _BLUR_REACH_PX, _LEAST_END_PX, _LEAST_REACH_PX, _MOST_REACH_PX = 1.5, 1.2, 1.5, 4.0
 _LEAST_CONTRAST, _CONTRAST_SHARE, _LEFT_SHARE = 5.0, 0.4, 0.35
+_NEAREST_MM = 50.0
 _CORNER_ROUNDS, _EDGE_ROUNDS = 2, 2
 # A marker is seen when so much of its inside agrees, a plate when so much of its edges does.
 _SEEN_INSIDE, _SEEN_SHARE, _INSIDE_SHARE, _MOST_SIGMA_PX = 0.85, 0.2, 0.7, 0.35
@@ -98,7 +99,13 @@ class PlateMeter:
             one.corners_px[np.isin(one.markers, common)].reshape(-1, 2) for one in (left, right)
         ]
         points = self.plate.corners_mm[common].reshape(-1, 3)
-        pose = _align(points, _triangulate(self.rig, pixels[0], pixels[1]))
+        seen = _triangulate(self.rig, pixels[0], pixels[1])
+        # Markers that are mistaken for each other's lie at no depth, or have no plate's shape.
+        if not (np.isfinite(seen).all() and (seen[:, 2] > _NEAREST_MM).all()):
+            return None
+        pose = _align(points, seen)
+        if np.linalg.norm(pose.apply(points) - seen, axis=1).max() > self.plate.marker_mm:
+            return None
         for _ in range(_CORNER_ROUNDS):
             both = [self._corner_lines(eye, points, pixels[eye], pose) for eye in range(2)]
             pose = fit_plate(self.rig, (both[0], both[1]), pose, self._paper).left_from_plate

@@ -5,6 +5,8 @@ import numpy as np
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
 
+_USUAL_SIZES = 3.0
+
 
 class SurfaceDistance:
     """Finds the nearest place of a surface; the first call builds its tree.
@@ -19,15 +21,18 @@ class SurfaceDistance:
         self._corners = surface.vertices_mm[surface.faces]
         self._tree = cKDTree(self._corners.mean(axis=1))
         edges = self._corners[:, 1:] - self._corners[:, :1]
-        # Large triangles lie further from their middles: as many more are looked at.
-        self._reach_mm = float(np.linalg.norm(edges, axis=2).max())
+        # Large triangles reach far from their middles: the few largest are always looked at.
+        sizes_mm = np.linalg.norm(edges, axis=2).max(axis=1)
+        self._reach_mm = _USUAL_SIZES * float(np.median(sizes_mm))
+        self._large = np.flatnonzero(sizes_mm > self._reach_mm)
         normals = np.cross(edges[:, 0], edges[:, 1])
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
     def find(self, point_mm: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Of a point (3,): signed distance (positive outside), nearest place, unit normal there."""
         first, _ = self._tree.query(point_mm, k=1)
-        near = np.array(self._tree.query_ball_point(point_mm, first + self._reach_mm), dtype=int)
+        around = self._tree.query_ball_point(point_mm, first + self._reach_mm)
+        near = np.union1d(np.array(around, dtype=int), self._large)
         places = _nearest_on_triangles(point_mm, self._corners[near])
         distances = np.linalg.norm(places - point_mm, axis=1)
         best = int(distances.argmin())

@@ -49,7 +49,7 @@ class ToolTracker:
             self._tool, found.left_from_plate, found.covariance, found.seen_share, captured_ns
         )
         if seen.tip_bound_mm > _WORST_BOUND_MM:
-            return Unseen("too little of the plate is seen to know the tip")
+            return Unseen("the plate is seen, but the tip is not known within a millimetre")
         self._last = seen
         return seen
 

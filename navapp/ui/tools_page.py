@@ -24,6 +24,7 @@ _NO_TOOLS = (
     " no tool is known",
     " calibrate one: navapp calibrate pivot --out pointer.json",
     ' and name it:   [tools] pointer = "pointer.json"',
+    " without one, landmarks picked in the picture (p, then k) can find an error",
 )
 _ANSWERS = {
     CheckAnswer.OPEN: Level.ATTENTION,
@@ -39,9 +40,10 @@ class ToolTable(TextView):
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """As many lines as there are."""
         snapshot = view.snapshot
-        if not snapshot.tools:
-            return [Content.styled(line, "$text-muted") for line in _NO_TOOLS]
-        lines = [line for tool in snapshot.tools for line in _tell_tool(tool, view)]
+        if snapshot.tools:
+            lines = [line for tool in snapshot.tools for line in _tell_tool(tool, view)]
+        else:
+            lines = [Content.styled(line, "$text-muted") for line in _NO_TOOLS]
         lines += [Content(""), *_tell_check(snapshot, view), Content("")]
         return [*lines, *_tell_landmarks(snapshot)]
 
@@ -73,10 +75,11 @@ def _tell_reading(reading: ToolReading, view: View) -> list[Content]:
         lines.append(Content(f"   {_short(name)} {away_mm:.1f} mm away"))
     if reading.hole is not None:
         hole = reading.hole
-        lines.append(_row("entry", hole.off_mm, placed.bound_mm, "mm", stage, view))
+        lines.append(Content(f"   hole {hole.name}"))
+        lines.append(_row("off line", hole.off_mm, placed.bound_mm, "mm", stage, view))
         if hole.angle_deg is not None and hole.bound_deg is not None:
             lines.append(_row("angle", hole.angle_deg, hole.bound_deg, "deg", stage, view))
-        lines.append(Content(f"   depth   {hole.depth_mm:+7.2f} mm of {hole.name}"))
+        lines.append(Content(f"   depth    {hole.depth_mm:+6.2f} mm"))
     return lines
 
 
@@ -86,7 +89,7 @@ def _row(what: str, value: float, bound: float, unit: str, stage: StageSpec, vie
     style = "$success" if value + bound <= limit else "$warning"
     style = style if value - bound <= limit else "$error"
     return Content.assemble(
-        f"   {what:<7}{value:7.2f} {unit:<3} ",
+        f"   {what:<9}{value:6.2f} {unit:<3} ",
         (draw_bar(value, limit, _BAR_WIDTH, view.symbols), style),
         (f" {view.symbols.at_most}{bound:.2f}, {limit:.1f} allowed", "$text-muted"),
     )

@@ -1,6 +1,5 @@
 """The tools that a configuration names."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -36,10 +35,10 @@ def configured(tmp_path: Path, **tools: Tool) -> Configuration:
 
 def test_named_tools_are_read(tmp_path) -> None:
     configuration = configured(tmp_path, pointer=a_tool(), drill=a_tool(8, AXIS))
-    tools = read_tools(configuration, a_rig(), Diagnostics())
+    tools = read_tools(configuration.tools.files, a_rig(), Diagnostics())
     assert list(tools) == ["pointer", "drill"]
     np.testing.assert_allclose(tools["drill"].axis, AXIS)
-    assert read_tools(Configuration(), a_rig(), Diagnostics()) == {}
+    assert read_tools({}, a_rig(), Diagnostics()) == {}
 
 
 @pytest.mark.parametrize(
@@ -51,18 +50,18 @@ def test_named_tools_are_read(tmp_path) -> None:
 )
 def test_tools_that_cannot_be_used_are_refused(tmp_path, tools, words) -> None:
     with pytest.raises(ConfigurationError, match=words):
-        read_tools(configured(tmp_path, **tools), a_rig(), Diagnostics())
+        read_tools(configured(tmp_path, **tools).tools.files, a_rig(), Diagnostics())
 
 
 def test_a_missing_file_is_named() -> None:
     configuration = Configuration.model_validate({"tools": {"pointer": "nowhere.json"}})
     with pytest.raises(InputError, match=r"nowhere.json does not exist"):
-        read_tools(configuration, a_rig(), Diagnostics())
+        read_tools(configuration.tools.files, a_rig(), Diagnostics())
 
 
 @pytest.mark.parametrize("is_same", [True, False])
 def test_a_tool_of_another_rig_is_told(tmp_path, capsys, is_same) -> None:
     rig = a_rig()
     tool = a_tool(rig_id=rig.rig_id if is_same else "other")
-    read_tools(configured(tmp_path, pointer=dataclasses.replace(tool)), rig, Diagnostics())
+    read_tools(configured(tmp_path, pointer=tool).tools.files, rig, Diagnostics())
     assert ("calibrated with another rig" in capsys.readouterr().err) is not is_same

@@ -18,7 +18,7 @@ from navapp.control.commands import (
 from navapp.control.stages import CHECKED_ON_PATIENT
 from navapp.control.states import PatientCheck
 from navapp.tools.patient_check import FEWEST_TOUCHES, CheckAnswer
-from navapp.values import BoneModel, Pick, Plan
+from navapp.values import BoneModel, Pick, Plan, Reason
 from tests.control.fakes import Bench, a_plan, navigating
 from tests.control.held_pointer import POINTER, HeldPointer
 from tests.registration.shapes import ball_mesh
@@ -178,6 +178,9 @@ def test_picked_landmarks_are_compared_without_a_pointer(held: HeldPointer) -> N
     check = bench.snapshot.patient_check
     assert check.n_touches == 3
     assert check.result.measured_mm < 0.05
+    # Nothing of the depth: they can find an error, but never pass.
+    assert check.answer is CheckAnswer.CANNOT_TELL
+    assert "no depth" in check.result.reason
     assert command_from_json(command_to_json(CheckPicks(picks))).picks[0].name == picks[0].name
 
 
@@ -216,3 +219,68 @@ def test_the_displays_picture_says_it(bench: Bench, held: HeldPointer) -> None:
     assert banner(dataclasses.replace(shown, patient_check=None)).endswith(
         "not verified on the patient"
     )
+
+
+def test_a_failed_check_takes_the_guides_and_cannot_be_forgotten(
+    bench: Bench, held: HeldPointer
+) -> None:
+    for name in ("patient", "side", "plan"):
+        bench.do(ConfirmCondition(name))
+    assert bench.frames(1).is_navigable
+    numbers = iter(range(40))
+    while touch(bench, held, next(numbers), (1.2, 0.0, 1.2)).answer is CheckAnswer.OPEN:
+        pass
+    assert Reason.CHECK_FAILED in bench.frames(1).reasons
+    bench.do(ForgetPoints())
+    assert Reason.CHECK_FAILED in bench.frames(1).reasons
+    bench.do(ConfirmCondition(CHECKED_ON_PATIENT))
+    assert "the check on the patient failed" in bench.events[-1].text
+    bench.do(Register())
+    bench.frames(1)
+    bench.accept()
+    assert Reason.CHECK_FAILED not in bench.frames(1).reasons
+
+
+def test_a_touch_that_waits_is_not_taken_of_another_registration(
+    bench: Bench, held: HeldPointer
+) -> None:
+    assert touch(bench, held, 1).n_touches == 1
+    held.tip_mm = None
+    bench.do(TouchPoint())
+    bench.frames(2)
+    bench.do(Register())
+    bench.frames(1)
+    bench.accept()
+    held.tip_mm = np.array([0.0, 0.0, 270.0])
+    bench.frames(12)
+    assert bench.snapshot.patient_check is None
+    assert any("another bone or registration" in event.text for event in bench.events)
+
+
+def test_a_landmark_counts_once(bench: Bench, held: HeldPointer) -> None:
+    point = PLAN.landmarks_of("femur")["femur/notch"]
+    held.tip_mm = point + np.array([0.0, 0.0, 300.0])
+    for _ in range(3):
+        bench.do(TouchPoint("femur/notch"))
+        check = bench.frames(12).patient_check
+    assert check.n_touches == 1
+
+
+def test_a_dropped_point_is_told_and_decides_anew(bench: Bench, held: HeldPointer) -> None:
+    numbers = iter(range(40))
+    while (check := touch(bench, held, next(numbers))).answer is CheckAnswer.OPEN:
+        pass
+    assert check.answer is CheckAnswer.PASSED
+    while bench.snapshot.patient_check.n_touches >= FEWEST_TOUCHES:
+        bench.do(DropPoint())
+    assert bench.snapshot.patient_check.answer is CheckAnswer.OPEN
+    assert any("dropped" in event.text for event in bench.events)
+
+
+def test_a_check_grows_old(bench: Bench, held: HeldPointer) -> None:
+    numbers = iter(range(40))
+    while touch(bench, held, next(numbers)).answer is CheckAnswer.OPEN:
+        pass
+    assert bench.snapshot.patient_check.is_valid
+    bench.clock.advance_ns(31 * 60 * 10**9)
+    assert not bench.frames(1).patient_check.is_valid

@@ -171,7 +171,7 @@ def test_what_the_judge_may_say_is_all_in_the_table() -> None:
         "PROJECTOR_ALTERS", "PROJECTOR_LOST", "POSE_TOO_OLD", "STAGE_WITHOUT_BONE",
         "DISPLAY_DIFFERS", "DISPLAY_NOT_ACCEPTED", "DISPLAY_EXPIRED", "MOVES_TOO_FAST",
         "OTHER_EYE", "MIRROR_INEXACT", "MIRROR_UNCHECKED", "MIRROR_CHECK_FAILED",
-        "MIRROR_CHECK_OLD", "TIME_OUT_OPEN",
+        "MIRROR_CHECK_OLD", "CHECK_FAILED", "TIME_OUT_OPEN",
     }  # fmt: skip
 
 

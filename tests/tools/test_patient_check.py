@@ -208,18 +208,18 @@ def test_few_touches_say_that_the_size_is_not_known() -> None:
 
 def test_the_share_in_the_size_note_is_how_often_it_would_be_noticed() -> None:
     rng = np.random.default_rng(14)
-    touches = touch_all(rng, 18, sigma_mm=0.9)
+    touches = touch_all(rng, 18, sigma_mm=0.5)
     note = judge_touches(touches, TARGETS_MM, LIMIT_MM).size_note
     said = float(note.removesuffix(" of 100)").split(" in ")[-1]) / 100.0
-    # The size by a fit of its own; of the motion nobody knows more than 3 mm and 0.06 rad.
+    # The size by a fit of its own; nothing is known beforehand but 3 mm, 0.06 rad and a tenth.
     rows = [
         np.concatenate([n, np.cross(p, n), [n @ p]]) / touches[0].sigma_mm
         for n, p in ((one.directions[0], one.point_mm - CENTRE_MM) for one in touches)
     ]
-    known = np.eye(6, 7) / np.array([[3.0]] * 3 + [[0.06]] * 3)
+    known = np.eye(7) / np.array([[3.0]] * 3 + [[0.06]] * 3 + [[0.1]])
     rows_all = np.vstack([rows, known])
     sigma = float(np.sqrt(np.linalg.inv(rows_all.T @ rows_all)[6, 6]))
-    noticed = 0.02 + sigma * rng.normal(0.0, 1.0, 20000) > 1.645 * sigma
+    noticed = 0.02 + sigma * rng.normal(0.0, 1.0, 20000) > 3.6 * sigma
     assert said == pytest.approx(float(noticed.mean()), abs=0.02)
 
 
@@ -265,3 +265,20 @@ def test_places_asked_for_decide_sooner_than_places_at_random() -> None:
         touches = [Touched(places[k], normals[k][None], np.zeros(1), SIGMA_MM) for k in some]
         bounds.append(judge_touches(touches, TARGETS_MM, LIMIT_MM).most_mm)
     assert judge_touches(chosen, TARGETS_MM, LIMIT_MM).most_mm < np.min(bounds)
+
+
+def test_touches_of_one_place_say_nothing_of_the_size_and_end_nothing() -> None:
+    """All at the only target: no touch tells how large the bone is."""
+    target = np.array([[1.0, 2.0, 3.0]])
+    touches = [Touched(target[0], np.eye(3), np.full(3, 0.1), 0.2)] * FEWEST_TOUCHES
+    result = judge_touches(touches, target, LIMIT_MM)
+    assert result.answer is CheckAnswer.PASSED
+    assert result.size_note.startswith("size: cannot tell")
+
+
+def test_an_error_that_all_touches_have_in_common_does_not_shrink() -> None:
+    touches = touch_all(np.random.default_rng(21), MOST_TOUCHES)
+    alone = judge_touches(touches, TARGETS_MM, LIMIT_MM)
+    together = judge_touches(touches, TARGETS_MM, LIMIT_MM, common_sigma_mm=0.3)
+    assert together.measured_mm == alone.measured_mm
+    assert together.most_mm > alone.most_mm + 0.1

@@ -161,3 +161,20 @@ def test_a_marker_beside_its_place_is_not_the_plate(meter: PlateMeter, facing: P
     """Two pictures of different poses belong to no pose."""
     elsewhere = pictures_of(shape_of(FLAT), held((0.0, 25.0, 30.0), (14.0, 12.0, 460.0)))
     assert isinstance(meter.measure((facing[0], elsewhere[1])), str)
+
+
+def test_swapped_pictures_give_a_word(meter: PlateMeter, facing: Pictures) -> None:
+    """Everything would lie behind the cameras."""
+    assert isinstance(meter.measure((facing[1], facing[0])), str)
+
+
+def test_markers_that_are_there_twice_are_nobodys(meter: PlateMeter, facing: Pictures) -> None:
+    """A spare print lies on the table: no pair of left and right copies makes a pose."""
+    doubled = []
+    for picture in facing:
+        shown = picture.copy()
+        rows, columns = np.nonzero(picture > 120)
+        part = picture[rows.min() : rows.max(), columns.min() : columns.max()]
+        shown[: part.shape[0], -part.shape[1] :] = part
+        doubled.append(shown)
+    assert isinstance(meter.measure((doubled[0], doubled[1])), str)

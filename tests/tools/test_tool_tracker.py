@@ -116,7 +116,7 @@ def test_an_uncertain_tip_is_not_believed_and_not_followed(
     # By the angle alone: the tip lies 137 mm from the plate.
     meter.covariance = np.diag([1e-4] * 3 + [(0.4 / 137.0) ** 2] * 3)
     found = tracker.track(BLANK, 0)
-    assert found == Unseen("too little of the plate is seen to know the tip")
+    assert found == Unseen("the plate is seen, but the tip is not known within a millimetre")
     tracker.track(BLANK, 10 * MS)
     assert meter.boxes[1] == (None, None)
     meter.covariance = np.diag([1e-4] * 3 + [(0.3 / 137.0) ** 2] * 3)

@@ -71,7 +71,7 @@ def test_tool_and_check_are_told_at_all_sizes(size: tuple[int, int]) -> None:
     text = text_at(size, a_snapshot())
     for words in (
         "pointer", "83 % of its plate seen, 40 ms old", "-0.12 mm", "0.16",
-        "notch 3.7 mm away", "1.40 mm", "2.30 deg", "-6.50 mm of canal",
+        "notch 3.7 mm away", "hole canal", "off line", "1.40 mm", "2.30 deg", "-6.50 mm",
         "4 points: more points", "0.21 mm off", "0.00 to 1.32, 1.0 allowed",
         "size: cannot tell 2 %", "touch next at the cross, 7 mm from notch",
         "b  medial condyle",
@@ -82,7 +82,7 @@ def test_tool_and_check_are_told_at_all_sizes(size: tuple[int, int]) -> None:
 @pytest.mark.parametrize(
     ("changes", "words", "silent"),
     [
-        ({"tools": ()}, "no tool is known", "check on the patient"),
+        ({"tools": (), "patient_check": None}, "(p, then k) can find an error", "surface "),
         (
             {"tools": (ToolLine("pointer", None, "no marker is seen by both cameras"),)},
             "no marker is seen by both cameras",

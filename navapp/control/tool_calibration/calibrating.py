@@ -5,6 +5,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+import numpy as np
+
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
 from drivers.interfaces import StereoCamera
@@ -21,14 +23,14 @@ from navapp.control.tool_calibration.states import (
 from navapp.errors import DeviceError, DeviceTimeout, ResultError
 from navapp.geometry.rectification import luma
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import rotation_angle_deg
+from navapp.geometry.transform import rotation_angle_deg, vector_from_rotation
 from navapp.tools.plate import Plate
 from navapp.tools.plate_meter import PlateMeter, PlatePose
 
 # Two kept poses differ by this at least; the tip is solved for after so many new ones.
 _APART_DEG, _SOLVE_EVERY = 2.0, 10
 _FEWEST_POSES, _MOST_POSES, _LEAST_LEAN_DEG = 60, 400, 20.0
-_TURN_DEG = 80.0
+_TURN_DEG, _FEWEST_OF_TURN, _SETTLING_NS = 80.0, 12, 1_500_000_000
 _TIMEOUT_S = 0.2
 _INSTRUCTIONS = {
     ToolPhase.PIVOT: "stand the tip in a small hole and lean the tool slowly to all sides",
@@ -92,7 +94,7 @@ class ToolCalibrating:
         self.collected = CollectedPoses(self._plate)
         self._phase = ToolPhase.PIVOT
         self._tip: tuple[tuple[float, float, float], float, float] | None = None
-        self._n_solved = 0
+        self._n_solved, self._newest_ns, self._settled_ns = 0, 0, 0
         if self._hand is not None:
             self._hand.begin("pivot")
 
@@ -124,8 +126,11 @@ class ToolCalibrating:
 
     def _finish(self) -> None:
         """End with what there is; told why not when it cannot be solved."""
+        if self._settings.has_axis and len(self.collected.turns) < 2:
+            self._events.add("not yet: a drill is turned about itself twice")
+            return
         try:
-            self.collected.solve_tip()
+            self.collected.check()
         except ResultError as error:
             self._events.add(f"not yet: {error.problem}")
             return
@@ -139,7 +144,7 @@ class ToolCalibrating:
         except DeviceError as error:
             self._trouble = str(error)
             raise
-        self._frame = frame
+        self._frame, self._newest_ns = frame, frame.captured_ns
         self._found = self._meter.measure((luma(frame.left), luma(frame.right)))
         if isinstance(self._found, PlatePose):
             self._keep(self._found)
@@ -149,13 +154,15 @@ class ToolCalibrating:
         if self._phase is not ToolPhase.PIVOT:
             fits = self.collected.turns[-1]
         pose = found.left_from_plate
+        if self._newest_ns < self._settled_ns:
+            return
         if fits and rotation_angle_deg(fits[-1].left_from_plate, pose) < _APART_DEG:
             return
         fits.append(found.fit)
         if self._phase is ToolPhase.PIVOT:
             self._look_at_tip()
-        elif self._swept_deg() >= _TURN_DEG:
-            self._go_on()
+        elif self._swept_deg() >= _TURN_DEG and len(fits) >= _FEWEST_OF_TURN:
+            self._end_turn()
 
     def _look_at_tip(self) -> None:
         """Solve for the tip now and then; go on when it is known well enough."""
@@ -163,6 +170,11 @@ class ToolCalibrating:
         if n < self._n_solved + _SOLVE_EVERY:
             return
         self._n_solved = n
+        if n >= _MOST_POSES:
+            # Further ones say little more, and take ever longer.
+            self._events.add(f"{n} poses did not do: they are forgotten; hold the tip still")
+            self._begin()
+            return
         try:
             _, pivot = self.collected.solve_tip()
         except ResultError:
@@ -173,10 +185,16 @@ class ToolCalibrating:
         if is_good and pivot.half_angle_deg >= _LEAST_LEAN_DEG:
             self._events.add(f"the tip is known within {pivot.bound_mm:.3f} mm")
             self._go_on()
-        elif n >= _MOST_POSES:
-            # Further ones say little more, and take ever longer.
-            self._events.add(f"{n} poses did not do: they are forgotten; hold the tip still")
-            self._begin()
+
+    def _end_turn(self) -> None:
+        """To the next phase, unless the axis cannot be solved for: then the turn is made again."""
+        try:
+            self.collected.check()
+        except ResultError as error:
+            self._events.add(f"once more: {error.problem}")
+            self.collected.turns[-1].clear()
+            return
+        self._go_on()
 
     def _go_on(self) -> None:
         """To the next phase."""
@@ -186,15 +204,20 @@ class ToolCalibrating:
         is_first = self._phase is ToolPhase.PIVOT
         self._phase = ToolPhase.FIRST_TURN if is_first else ToolPhase.SECOND_TURN
         self.collected.turns.append([])
+        # Until then the tool is leaned to where it will be turned.
+        self._settled_ns = self._newest_ns + _SETTLING_NS
         if self._hand is not None:
             self._hand.begin("turn")
 
     def _swept_deg(self) -> float:
-        """The largest angle from any pose of this turn to its newest."""
-        if not self.collected.turns or not self.collected.turns[-1]:
+        """How far this turn has turned the tool, about the axis that it turns about most."""
+        turn = self.collected.turns[-1] if self.collected.turns else []
+        if len(turn) < 3:
             return 0.0
-        turn = [fit.left_from_plate for fit in self.collected.turns[-1]]
-        return max(rotation_angle_deg(turn[-1], one) for one in turn)
+        first = turn[0].left_from_plate.rotation
+        turned = [vector_from_rotation(first.T @ fit.left_from_plate.rotation) for fit in turn]
+        axis = np.linalg.svd(np.array(turned))[2][0]
+        return float(np.degrees(np.ptp(np.array(turned) @ axis)))
 
     def _make_snapshot(self) -> ToolSnapshot:
         frame, found = self._frame, self._found

@@ -47,6 +47,16 @@ class CollectedPoses:
         """
         return solve_axis([self._matrices(turn, paper) for turn in self.turns], tip_mm)
 
+    def check(self) -> None:
+        """Whether tip and axis can be solved for.
+
+        Raises:
+            ResultError: as of `solve_tip` and `solve_axis`.
+        """
+        paper, pivot = self.solve_tip()
+        if self.turns:
+            self.solve_axis(paper, pivot.robust.tip_mm)
+
     def solve(self, made_on: date, rig_id: str) -> tuple[Tool, Pivot, ToolAxis | None]:
         """The tool, with how its tip and its axis were found.
 
