@@ -23,7 +23,7 @@ from navapp.values import MeasuredFace, Reason, ResectionPlane, Status
 from tests.control.fakes import Bench, a_pose, answer, navigating
 
 # What is said of the frame and not of a bone.
-OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies", "bone_version", "measured"}
+OF_THE_FRAME = {"index", "state", "stage", "bone", "bodies", "bone_version", "measured", "tools"}
 TIBIA = answer(Status.DEGRADED, Reason.COVERAGE_LOW, pose=a_pose("tibia", x_mm=4.0))
 
 

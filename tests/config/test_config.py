@@ -26,6 +26,7 @@ CHANGED: dict[str, Any] = {
             "cartilage_mm": 1.25,
             "motion": "jump",
             "instrument": "sweep",
+            "tool": "drill",
             "misses": 0.25,
             "scale": 0.5,
             "stepped": True,
@@ -94,6 +95,7 @@ CHANGED: dict[str, Any] = {
     "stereo": {},
     "registration": {},
     "tracking": {"method": "paper", "follow_refused": True},
+    "tools": {"pointer": "tools/p.json", "drill": "tools/d.json"},
     "calibration": {
         "stop_capture_mm": 0.2,
         "accept_mm": 0.5,
