@@ -146,19 +146,10 @@ def _follow(testing: "AccuracyTesting", diagnostics: Diagnostics) -> None:
 
 def _on_screen(testing: "AccuracyTesting") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
-    from navapp.cli.run import log_folder
-    from navapp.control.guided_runner import GuidedRunner
+    from navapp.cli.guided_screen import run_on_screen
     from navapp.ui.accuracy_test.app import run_accuracy_app
 
-    runner = GuidedRunner(testing, "accuracy test")
-    runner.start()
-    try:
-        code = run_accuracy_app(runner, log_folder() / "navapp.log")
-    finally:
-        runner.stop()
-    if runner.error is not None:
-        raise runner.error
-    return code
+    return run_on_screen(testing, "accuracy test", run_accuracy_app)
 
 
 def _report(

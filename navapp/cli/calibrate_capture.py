@@ -183,19 +183,10 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
 
 def _on_screen(capture: "Capture") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
-    from navapp.cli.run import log_folder
-    from navapp.control.guided_runner import GuidedRunner
+    from navapp.cli.guided_screen import run_on_screen
     from navapp.ui.capture.app import run_capture_app
 
-    runner = GuidedRunner(capture, "capture")
-    runner.start()
-    try:
-        code = run_capture_app(runner, log_folder() / "navapp.log")
-    finally:
-        runner.stop()
-    if runner.error is not None:
-        raise runner.error
-    return code
+    return run_on_screen(capture, "capture", run_capture_app)
 
 
 def _finish(

@@ -169,19 +169,10 @@ def follow(calibrating: "ToolCalibrating", diagnostics: Diagnostics) -> None:
 
 def _on_screen(calibrating: "ToolCalibrating") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
-    from navapp.cli.run import log_folder
-    from navapp.control.guided_runner import GuidedRunner
+    from navapp.cli.guided_screen import run_on_screen
     from navapp.ui.tool_calibration.app import run_tool_app
 
-    runner = GuidedRunner(calibrating, "tool")
-    runner.start()
-    try:
-        code = run_tool_app(runner, log_folder() / "navapp.log")
-    finally:
-        runner.stop()
-    if runner.error is not None:
-        raise runner.error
-    return code
+    return run_on_screen(calibrating, "tool", run_tool_app)
 
 
 def _report(

@@ -7,14 +7,19 @@ import traceback
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from textual import events
 from textual.screen import Screen
 
+from navapp.ui.pictures.picture import Picture
 from navapp.ui.quiet_app import QuietApp, drive, say
 from navapp.ui.symbols import UNICODE, Symbols, choose_symbols
 from navapp.ui.terminal import own_terminal
+from navapp.ui.text_view import Lines
 from navapp.ui.theme import NAVAPP_THEME
 
+Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]] | None
 POLLS_PER_S = 8
 _INTERRUPTED = 130  # exit code, as of a program that ctrl+c ends
 _CHARACTERS = {"+": "plus", "-": "minus"}
@@ -66,6 +71,18 @@ class GuidedScreen(Screen[None], Generic[SnapshotT]):
     def show(self, snapshot: SnapshotT, symbols: Symbols) -> None:
         """Show a snapshot with these characters."""
         raise NotImplementedError
+
+    def name_pictures(self) -> None:
+        """Of both cameras."""
+        for side in ("left", "right"):
+            self.query_one(f"#{side}").border_title = side
+
+    def pass_on(self, pictures: Pictures, symbols: Symbols, view: object) -> None:
+        """Both cameras' pictures to their widgets, and a view to all lines."""
+        for side, picture in zip(("left", "right"), pictures or (None, None), strict=True):
+            self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
+        for lines in self.query(Lines):
+            lines.show(view)
 
 
 class GuidedApp(QuietApp, Generic[SnapshotT, CommandT]):

@@ -16,6 +16,7 @@ from navapp.ui.guided_app import (
     GuidedSession,
     run_guided_app,
 )
+from navapp.ui.guided_panels import TOO_SMALL, format_events, format_key, format_title
 from navapp.ui.pictures.picture import Picture
 from navapp.ui.symbols import UNICODE, Symbols
 from navapp.ui.text_view import Lines
@@ -42,14 +43,9 @@ class AccuracyTitle(Lines[AccuracyView]):
         """One line."""
         snapshot = view.snapshot
         right = Content.styled(f"{snapshot.n_kept} of {snapshot.n_tasks} ", "bold $foreground")
-        left = Content.assemble(
-            (" navapp accuracy-test ", "bold $primary"),
-            (" sim " if snapshot.camera.startswith("sim:") else "", "bold $background on $warning"),
-            " ", snapshot.camera.removeprefix("sim:"),
-        )  # fmt: skip
-        room = max(width - right.cell_length, 0)
-        left = left.truncate(room).pad_right(max(room - left.cell_length, 0))
-        return [Content.assemble(left, right)]
+        camera = snapshot.camera
+        name, is_sim = camera.removeprefix("sim:"), camera.startswith("sim:")
+        return [format_title("accuracy-test", name, right, width, is_sim=is_sim)]
 
 
 class TaskLines(Lines[AccuracyView]):
@@ -82,9 +78,7 @@ class AccuracyEvents(Lines[AccuracyView]):
 
     def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """As many lines as there is room for."""
-        newest = list(reversed(view.snapshot.events))[:height]
-        told = [cut(f" {one}", width, view.symbols) for one in newest]
-        return [Content.styled(one, "$text-muted") for one in told]
+        return format_events(view.snapshot.events, width, height, view.symbols)
 
 
 class AccuracyFooter(Lines[AccuracyView]):
@@ -92,9 +86,7 @@ class AccuracyFooter(Lines[AccuracyView]):
 
     def build(self, view: AccuracyView, width: int, height: int) -> list[Content]:
         """One line."""
-        parts: list[str | Content | tuple[str, str]] = []
-        for key, label in _KEYS:
-            parts += [(f" {key} ", "bold $primary"), (f"{label} ", "$foreground")]
+        parts = [part for key, label in _KEYS for part in format_key(key, label)]
         return [Content.assemble(*parts).truncate(width)]
 
 
@@ -106,7 +98,7 @@ class SmallAccuracy(Lines[AccuracyView]):
         task = view.snapshot.task
         return [
             Content("all tasks are done" if task is None else task.instruction),
-            Content.styled("make the terminal 80 x 24", "$text-muted"),
+            TOO_SMALL,
         ]
 
 
@@ -127,17 +119,11 @@ class AccuracyScreen(GuidedScreen[AccuracySnapshot]):
 
     def on_mount(self) -> None:
         """Name the pictures."""
-        for side in ("left", "right"):
-            self.query_one(f"#{side}").border_title = side
+        self.name_pictures()
 
     def show(self, snapshot: AccuracySnapshot, symbols: Symbols) -> None:
         """Pass a snapshot on."""
-        pictures = snapshot.pictures or (None, None)
-        for side, picture in zip(("left", "right"), pictures, strict=True):
-            self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
-        view = AccuracyView(snapshot, symbols)
-        for lines in self.query(Lines):
-            lines.show(view)
+        self.pass_on(snapshot.pictures, symbols, AccuracyView(snapshot, symbols))
 
 
 class AccuracyApp(GuidedApp[AccuracySnapshot, AccuracyCommand]):

@@ -27,7 +27,6 @@ from navapp.ui.guided_app import (
 )
 from navapp.ui.pictures.picture import Picture
 from navapp.ui.symbols import UNICODE, Symbols
-from navapp.ui.text_view import Lines
 
 _KEYS = {key.key: key for key in KEYS}
 CaptureSession = GuidedSession[CaptureSnapshot, CaptureCommand]
@@ -54,17 +53,11 @@ class CaptureScreen(GuidedScreen[CaptureSnapshot]):
 
     def on_mount(self) -> None:
         """Name the pictures."""
-        for side in ("left", "right"):
-            self.query_one(f"#{side}").border_title = side
+        self.name_pictures()
 
     def show(self, snapshot: CaptureSnapshot, symbols: Symbols) -> None:
         """Pass a snapshot on."""
-        pictures = snapshot.pictures or (None, None)
-        for side, picture in zip(("left", "right"), pictures, strict=True):
-            self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
-        view = CaptureView(snapshot, symbols)
-        for lines in self.query(Lines):
-            lines.show(view)
+        self.pass_on(snapshot.pictures, symbols, CaptureView(snapshot, symbols))
 
 
 class CaptureApp(GuidedApp[CaptureSnapshot, CaptureCommand]):

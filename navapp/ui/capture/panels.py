@@ -7,6 +7,7 @@ from textual.content import Content
 from navapp.control.capture.states import CapturePhase, CaptureSnapshot
 from navapp.ui.capture.keys import HAND_HINT, KEYS, is_possible
 from navapp.ui.gauges import Number, cut, draw_bar, draw_fraction_bar
+from navapp.ui.guided_panels import TOO_SMALL, Parts, format_events, format_key, format_title
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines, break_line
 from navapp.ui.view import Level
@@ -47,15 +48,9 @@ class CaptureTitle(Lines[CaptureView]):
             (f"{snapshot.n_kept} pairs", "bold $foreground"), "  ",
             (f"{level.mark(view.symbols)} {word}", level.value), " ",
         )  # fmt: skip
-        is_simulated = snapshot.camera.startswith("sim:")
-        left = Content.assemble(
-            (" navapp calibrate ", "bold $primary"),
-            (" sim " if is_simulated else "", "bold $background on $warning"),
-            " ", snapshot.camera.removeprefix("sim:"),
-        )  # fmt: skip
-        room = max(width - right.cell_length, 0)
-        left = left.truncate(room).pad_right(max(room - left.cell_length, 0))
-        return [Content.assemble(left, right)]
+        camera = snapshot.camera
+        name, is_sim = camera.removeprefix("sim:"), camera.startswith("sim:")
+        return [format_title("calibrate", name, right, width, is_sim=is_sim)]
 
 
 class InstructionLines(Lines[CaptureView]):
@@ -158,8 +153,7 @@ class CaptureEvents(Lines[CaptureView]):
 
     def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
         """As many lines as there is room for."""
-        newest = list(reversed(view.snapshot.events))[:height]
-        return [Content.styled(cut(text, width, view.symbols), "$text-muted") for text in newest]
+        return format_events(view.snapshot.events, width, height, view.symbols)
 
 
 class CaptureFooter(Lines[CaptureView]):
@@ -168,18 +162,14 @@ class CaptureFooter(Lines[CaptureView]):
     def build(self, view: CaptureView, width: int, height: int) -> list[Content]:
         """One line."""
         snapshot = view.snapshot
-        parts: list[str | Content | tuple[str, str]] = []
+        parts: Parts = []
         for key in KEYS:
             if not key.label or (key.is_for_hand and not snapshot.has_hand):
                 continue
             label = "let go" if key.key == "m" and snapshot.is_following else key.label
-            if is_possible(key, snapshot):
-                parts += [(f" {key.shown} ", "bold $primary"), (f"{label} ", "$foreground")]
-            else:
-                parts.append((f" {key.shown} {label} ", "$text-disabled"))
+            parts += format_key(key.shown, label, is_possible(key, snapshot))
         if snapshot.has_hand:
-            keys, label = HAND_HINT
-            parts += [(f" {keys} ", "bold $primary"), (f"{label} ", "$foreground")]
+            parts += format_key(*HAND_HINT)
         return [Content.assemble(*parts).truncate(width)]
 
 
@@ -193,5 +183,5 @@ class SmallCapture(Lines[CaptureView]):
             Content.styled(word, level.value),
             Content(view.snapshot.instruction),
             Content(f"{view.snapshot.n_kept} pairs"),
-            Content.styled("make the terminal 80 x 24", "$text-muted"),
+            TOO_SMALL,
         ]

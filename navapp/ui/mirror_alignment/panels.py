@@ -7,6 +7,7 @@ from textual.content import Content
 from navapp.control.mirror_alignment.aimed_corner import MOST_MOVED_MM
 from navapp.control.mirror_alignment.states import AlignmentPhase, AlignmentSnapshot
 from navapp.ui.gauges import Number, cut, draw_bar
+from navapp.ui.guided_panels import TOO_SMALL, Parts, format_events, format_key, format_title
 from navapp.ui.mirror_alignment.keys import CROSS_HINTS, HAND_HINT, KEYS, Key, is_possible
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines, break_line
@@ -54,14 +55,9 @@ class AlignmentTitle(Lines[AlignmentView]):
             (f", {n_strays} left out" if n_strays else "", Level.ATTENTION.value), "  ",
             (f"{level.mark(view.symbols)} {word}", level.value), " ",
         )  # fmt: skip
-        left = Content.assemble(
-            (" navapp calibrate mirror ", "bold $primary"),
-            (" sim " if snapshot.camera.startswith("sim:") else "", "bold $background on $warning"),
-            f" {snapshot.display.removeprefix('sim:')}, {snapshot.eye} eye",
-        )  # fmt: skip
-        room = max(width - right.cell_length, 0)
-        left = left.truncate(room).pad_right(max(room - left.cell_length, 0))
-        return [Content.assemble(left, right)]
+        device = f"{snapshot.display.removeprefix('sim:')}, {snapshot.eye} eye"
+        is_sim = snapshot.camera.startswith("sim:")
+        return [format_title("calibrate mirror", device, right, width, is_sim=is_sim)]
 
 
 class InstructionLines(Lines[AlignmentView]):
@@ -147,8 +143,7 @@ class AlignmentEvents(Lines[AlignmentView]):
 
     def build(self, view: AlignmentView, width: int, height: int) -> list[Content]:
         """As many lines as there is room for."""
-        newest = list(reversed(view.snapshot.events))[:height]
-        return [Content.styled(cut(text, width, view.symbols), "$text-muted") for text in newest]
+        return format_events(view.snapshot.events, width, height, view.symbols)
 
 
 class AlignmentFooter(Lines[AlignmentView]):
@@ -157,18 +152,18 @@ class AlignmentFooter(Lines[AlignmentView]):
     def build(self, view: AlignmentView, width: int, height: int) -> list[Content]:
         """The cross and what becomes of it, then the others."""
         snapshot = view.snapshot
-        rows: list[list[str | Content | tuple[str, str]]] = [[], []]
+        rows: list[Parts] = [[], []]
         can_move = snapshot.phase is AlignmentPhase.ALIGNING
         for shown, label in CROSS_HINTS:
-            rows[0] += _hint(shown, label, can_move)
+            rows[0] += format_key(shown, label, can_move)
         for key in KEYS:
             if not key.label or (key.is_for_hand and not snapshot.has_hand):
                 continue
-            rows[int(key.key not in ("enter", "u", "n", "s"))] += _hint(
+            rows[int(key.key not in ("enter", "u", "n", "s"))] += format_key(
                 key.shown, _label(key, snapshot), is_possible(key, snapshot)
             )
         if snapshot.has_hand:
-            rows[1] += _hint(*HAND_HINT, True)
+            rows[1] += format_key(*HAND_HINT)
         return [Content.assemble(*row).truncate(width) for row in rows]
 
 
@@ -176,12 +171,6 @@ def _label(key: Key, snapshot: AlignmentSnapshot) -> str:
     if key.key == "m" and snapshot.is_following:
         return "let go"
     return key.label
-
-
-def _hint(shown: str, label: str, is_possible: bool) -> list[str | Content | tuple[str, str]]:
-    if not is_possible:
-        return [(f" {shown} {label} ", "$text-disabled")]
-    return [(f" {shown} ", "bold $primary"), (f"{label} ", "$foreground")]
 
 
 class SmallAlignment(Lines[AlignmentView]):
@@ -194,5 +183,5 @@ class SmallAlignment(Lines[AlignmentView]):
             Content.styled(word, level.value),
             Content(view.snapshot.trouble or view.snapshot.instruction),
             Content(f"{view.snapshot.n_kept} of {view.snapshot.fewest} crosses"),
-            Content.styled("make the terminal 80 x 24", "$text-muted"),
+            TOO_SMALL,
         ]

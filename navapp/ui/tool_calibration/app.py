@@ -21,7 +21,6 @@ from navapp.ui.guided_app import (
 )
 from navapp.ui.pictures.picture import Picture
 from navapp.ui.symbols import UNICODE, Symbols
-from navapp.ui.text_view import Lines
 from navapp.ui.tool_calibration.panels import (
     PlateLine,
     SmallTool,
@@ -56,17 +55,11 @@ class ToolScreen(GuidedScreen[ToolSnapshot]):
 
     def on_mount(self) -> None:
         """Name the pictures."""
-        for side in ("left", "right"):
-            self.query_one(f"#{side}").border_title = side
+        self.name_pictures()
 
     def show(self, snapshot: ToolSnapshot, symbols: Symbols) -> None:
         """Pass a snapshot on."""
-        pictures = snapshot.pictures or (None, None)
-        for side, picture in zip(("left", "right"), pictures, strict=True):
-            self.query_one(f"#{side}", Picture).show_picture(picture, symbols.ramp)
-        view = ToolView(snapshot, symbols)
-        for lines in self.query(Lines):
-            lines.show(view)
+        self.pass_on(snapshot.pictures, symbols, ToolView(snapshot, symbols))
 
 
 class ToolApp(GuidedApp[ToolSnapshot, ToolCommand]):

@@ -6,6 +6,7 @@ from textual.content import Content
 
 from navapp.control.tool_calibration.states import ToolPhase, ToolSnapshot
 from navapp.ui.gauges import Number, cut, draw_bar, draw_fraction_bar
+from navapp.ui.guided_panels import TOO_SMALL, format_events, format_key, format_title
 from navapp.ui.symbols import Symbols
 from navapp.ui.text_view import Lines
 from navapp.ui.view import Level
@@ -43,14 +44,9 @@ class ToolTitle(Lines[ToolView]):
             (f"{snapshot.n_poses} poses", "bold $foreground"), "  ",
             (f"{level.mark(view.symbols)} {word}", level.value), " ",
         )  # fmt: skip
-        left = Content.assemble(
-            (" navapp calibrate pivot ", "bold $primary"),
-            (" sim " if snapshot.camera.startswith("sim:") else "", "bold $background on $warning"),
-            " ", snapshot.camera.removeprefix("sim:"),
-        )  # fmt: skip
-        room = max(width - right.cell_length, 0)
-        left = left.truncate(room).pad_right(max(room - left.cell_length, 0))
-        return [Content.assemble(left, right)]
+        camera = snapshot.camera
+        name, is_sim = camera.removeprefix("sim:"), camera.startswith("sim:")
+        return [format_title("calibrate pivot", name, right, width, is_sim=is_sim)]
 
 
 class ToDoLine(Lines[ToolView]):
@@ -116,10 +112,7 @@ class ToolEvents(Lines[ToolView]):
 
     def build(self, view: ToolView, width: int, height: int) -> list[Content]:
         """As many lines as there is room for."""
-        newest = list(reversed(view.snapshot.events))[:height]
-        return [
-            Content.styled(cut(f" {one}", width, view.symbols), "$text-muted") for one in newest
-        ]
+        return format_events(view.snapshot.events, width, height, view.symbols)
 
 
 class ToolFooter(Lines[ToolView]):
@@ -127,9 +120,7 @@ class ToolFooter(Lines[ToolView]):
 
     def build(self, view: ToolView, width: int, height: int) -> list[Content]:
         """One line."""
-        parts: list[str | Content | tuple[str, str]] = []
-        for key, label in KEYS:
-            parts += [(f" {key} ", "bold $primary"), (f"{label} ", "$foreground")]
+        parts = [part for key, label in KEYS for part in format_key(key, label)]
         return [Content.assemble(*parts).truncate(width)]
 
 
@@ -142,5 +133,5 @@ class SmallTool(Lines[ToolView]):
         return [
             Content.styled(word, level.value),
             Content(view.snapshot.instruction),
-            Content.styled("make the terminal 80 x 24", "$text-muted"),
+            TOO_SMALL,
         ]
