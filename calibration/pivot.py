@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from navapp.errors import ResultError
 from navapp.geometry.transform import FloatArray
+from navapp.tools.tool import bound_of
 
 _FEWEST_POSES = 10
 # Lengths of three-dimensional normal residuals in standard deviations of one component: the
@@ -17,7 +18,6 @@ _HUBER = 2.0
 _MOST_STEPS = 100
 # A pose's error may enter the tip so many times: the tool must lean by some 8 degrees.
 _WORST_GAIN = 10.0
-_CHI2_3_95 = 7.815
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +57,7 @@ class Pivot:
     @property
     def bound_mm(self) -> float:
         """95 % bound of the tip's error, along its least certain direction."""
-        return float(np.sqrt(_CHI2_3_95 * np.linalg.eigvalsh(self.covariance_mm2)[-1]))
+        return bound_of(self.covariance_mm2)
 
 
 def solve_pivot(tracker_from_tool: ArrayLike) -> Pivot:

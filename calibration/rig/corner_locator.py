@@ -6,13 +6,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.rig.lengths import triangulate_mm
 from calibration.targets.boards import Board
 from calibration.targets.detection import find_board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rectification import Image, luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
+from navapp.geometry.triangulation import triangulate_mm
 
 
 def find_pair(board: Board, left: Image, right: Image) -> SeenPair | None:

@@ -1,4 +1,4 @@
-"""Triangulation with a rig: points, epipolar distances and ratios of lengths on the board."""
+"""Epipolar distances, and ratios of lengths on the board."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -9,6 +9,7 @@ from calibration.targets.boards import Board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
+from navapp.geometry.triangulation import triangulate_mm
 
 
 def compute_epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:
@@ -24,19 +25,6 @@ def compute_epipolar_px(rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray
             (lines * rays).sum(axis=1) / np.hypot(lines[:, 0], lines[:, 1]) * rig.right.focal_px
         )
     return np.concatenate(distances)
-
-
-def triangulate_mm(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
-    """(n, 3) points in the left camera's frame, half-way between both rays."""
-    a = rig.left.rays(left_px)
-    b = rig.right_from_left.inverse().rotate(rig.right.rays(right_px))
-    centre = rig.right_from_left.inverse().translation_mm
-    aa, bb, ab = (a * a).sum(axis=1), (b * b).sum(axis=1), (a * b).sum(axis=1)
-    ac, bc = a @ centre, b @ centre
-    scale = aa * bb - ab**2
-    s, t = (bb * ac - ab * bc) / scale, (ab * ac - aa * bc) / scale
-    middle: FloatArray = 0.5 * (a * s[:, None] + b * t[:, None] + centre)
-    return middle
 
 
 def compute_length_ratios(board: Board, rig: StereoRig, pairs: Sequence[SeenPair]) -> FloatArray:

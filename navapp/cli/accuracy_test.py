@@ -19,8 +19,9 @@ from navapp.errors import ResultError, UsageError
 if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.accuracy_test.testing import AccuracyTesting
-    from navapp.devices.accuracy_test import OpenedAccuracyTest
+    from navapp.devices.accuracy_test import SimulatedHand
     from navapp.evaluation.localisation import Scatter
+    from navapp.geometry.rig import StereoRig
     from navapp.geometry.transform import FloatArray
     from navapp.tools.tool import Tool
 
@@ -78,10 +79,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     tool = _find_tool(configuration, diagnostics)
     has_screen = options.screen or not is_simulated
     with ExitStack() as undo:
-        opened = open_accuracy_test(configuration, divots_mm, is_headless=not has_screen)
+        opened, hand = open_accuracy_test(configuration, divots_mm, is_headless=not has_screen)
         undo.callback(opened.camera.close)
         tasks = make_tasks(divots_mm, PLACES[: options.places])
-        testing = AccuracyTesting(opened.camera, opened.clock, opened.rig, tool, tasks, opened.hand)
+        testing = AccuracyTesting(opened.camera, opened.clock, opened.rig, tool, tasks, hand)
         if has_screen:
             if (code := _on_screen(testing)) != 0:
                 return code
@@ -89,7 +90,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
             _follow(testing, diagnostics)
     if not testing.taken:
         raise ResultError("the test was left before anything was taken")
-    _report(testing, opened, tool, divots_mm, folder, options, diagnostics)
+    _report(testing, opened.rig, hand, tool, divots_mm, folder, options, diagnostics)
     return 0
 
 
@@ -120,11 +121,11 @@ def _find_tool(configuration: "Configuration", diagnostics: Diagnostics) -> "Too
         )
     plate = SIMULATED_PLATES["pointer"]
     with ExitStack() as undo:
-        opened = open_tool_calibration(configuration, "pointer", plate, is_headless=True)
+        opened, hand = open_tool_calibration(configuration, "pointer", plate, is_headless=True)
         undo.callback(opened.camera.close)
         settings = ToolSettings(has_axis=False)
         calibrating = ToolCalibrating(
-            opened.camera, opened.clock, opened.rig, plate, settings, opened.hand
+            opened.camera, opened.clock, opened.rig, plate, settings, hand
         )
         follow(calibrating, diagnostics)
     tool, _, _ = calibrating.collected.solve(date.today(), opened.rig.rig_id)
@@ -154,7 +155,8 @@ def _on_screen(testing: "AccuracyTesting") -> int:
 
 def _report(
     testing: "AccuracyTesting",
-    opened: "OpenedAccuracyTest",
+    rig: "StereoRig",
+    hand: "SimulatedHand | None",
     tool: "Tool",
     divots_mm: "FloatArray",
     folder: Path | None,
@@ -162,27 +164,27 @@ def _report(
     diagnostics: Diagnostics,
 ) -> None:
     """Tell, and write what was asked for."""
-    from navapp.evaluation.localisation import figures_to_json, measure_all
+    from navapp.evaluation.localisation import measure_all
     from navapp.evaluation.localisation_report import write_localisation_report
     from navapp.geometry.whole_files import write_whole
 
     figures, distances = measure_all(testing.taken, divots_mm)
-    truth = _compare_with_truth(testing, opened)
+    truth = _compare_with_truth(testing, hand)
     about = {
         "software": f"navapp {__version__}",
         "day": date.today().isoformat(),
-        "rig": f"{opened.rig.name} ({opened.rig.rig_id})",
-        "devices": "simulated" if opened.hand is not None else testing.snapshot.camera,
+        "rig": f"{rig.name} ({rig.rig_id})",
+        "devices": "simulated" if hand is not None else testing.snapshot.camera,
         "tip's bound from its calibration": _tip_text(tool),
         "tasks done": f"{testing.snapshot.n_kept} of {testing.snapshot.n_tasks}",
     }
     content: dict[str, Any] = {
-        "places": {place: figures_to_json(one) for place, one in figures.items()},
-        "distances": _scatter_json(distances),
-        "against_truth": _scatter_json(truth),
+        "places": {place: asdict(one) for place, one in figures.items()},
+        "distances": None if distances is None else asdict(distances),
+        "against_truth": None if truth is None else asdict(truth),
         "tasks_done": testing.snapshot.n_kept,
         "tasks": testing.snapshot.n_tasks,
-        "simulated": opened.hand is not None,
+        "simulated": hand is not None,
     }
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -204,22 +206,18 @@ def _tip_text(tool: "Tool") -> str:
 
 
 def _compare_with_truth(
-    testing: "AccuracyTesting", opened: "OpenedAccuracyTest"
+    testing: "AccuracyTesting", hand: "SimulatedHand | None"
 ) -> "Scatter | None":
     """Of a simulated test: distances of all tips from their divots."""
     from navapp.evaluation.localisation import Scatter
 
-    if opened.hand is None:
+    if hand is None:
         return None
     off = np.array(
-        [np.linalg.norm(one.tip_mm - opened.hand.true_divot_mm(one.task)) for one in testing.taken]
+        [np.linalg.norm(one.tip_mm - hand.true_divot_mm(one.task)) for one in testing.taken]
     )
     rms_mm = float(np.sqrt(np.mean(off**2)))
     return Scatter(len(off), float(off.mean()), float(np.ptp(off)), rms_mm, float(off.max()))
-
-
-def _scatter_json(scatter: "Scatter | None") -> dict[str, Any] | None:
-    return None if scatter is None else asdict(scatter)
 
 
 def _points_csv(testing: "AccuracyTesting") -> str:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from calibration.tool_axis import ToolAxis
     from navapp.config import Configuration
     from navapp.control.tool_calibration.calibrating import ToolCalibrating
-    from navapp.devices.tool_calibration import OpenedToolCalibration
     from navapp.tools.plate import Plate
 
 _EXAMPLE = """\
@@ -88,6 +87,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 def _run_live(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.config import find_file, load
+    from navapp.control.tool_calibration.calibrating import ToolCalibrating, ToolSettings
     from navapp.devices.tool_calibration import open_tool_calibration
     from navapp.tools.tool_files import write_tool
 
@@ -97,11 +97,14 @@ def _run_live(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     configuration = load(find_file(options.config))
     plate = _find_plate(options, configuration)
     with ExitStack() as undo:
-        opened = open_tool_calibration(
+        opened, hand = open_tool_calibration(
             configuration, options.tool, plate, is_headless=options.headless
         )
         undo.callback(opened.camera.close)
-        calibrating = _make_calibrating(opened, plate, options)
+        settings = ToolSettings(has_axis=options.tool == "drill")
+        calibrating = ToolCalibrating(
+            opened.camera, opened.clock, opened.rig, plate, settings, hand
+        )
         if options.headless:
             follow(calibrating, diagnostics)
         elif (code := _on_screen(calibrating)) != 0:
@@ -135,15 +138,6 @@ def _find_plate(options: argparse.Namespace, configuration: "Configuration") -> 
     if not is_simulated:
         raise UsageError("a live calibration needs --board PLATE.json, the tool's printed plate")
     return SIMULATED_PLATES[options.tool]
-
-
-def _make_calibrating(
-    opened: "OpenedToolCalibration", plate: "Plate", options: argparse.Namespace
-) -> "ToolCalibrating":
-    from navapp.control.tool_calibration.calibrating import ToolCalibrating, ToolSettings
-
-    settings = ToolSettings(has_axis=options.tool == "drill")
-    return ToolCalibrating(opened.camera, opened.clock, opened.rig, plate, settings, opened.hand)
 
 
 def follow(calibrating: "ToolCalibrating", diagnostics: Diagnostics) -> None:

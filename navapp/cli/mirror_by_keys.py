@@ -216,19 +216,10 @@ def _keep(
 
 def _on_screen(session: "MirrorAlignment") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
-    from navapp.cli.run import log_folder
-    from navapp.control.guided_runner import GuidedRunner
+    from navapp.cli.guided_screen import run_on_screen
     from navapp.ui.mirror_alignment.app import run_alignment_app
 
-    runner = GuidedRunner(session, "mirror alignment")
-    runner.start()
-    try:
-        code = run_alignment_app(runner, log_folder() / "navapp.log")
-    finally:
-        runner.stop()
-    if runner.error is not None:
-        raise runner.error
-    return code
+    return run_on_screen(session, "mirror alignment", run_alignment_app)
 
 
 def _headless(

@@ -1,44 +1,34 @@
 """The check on the patient: takes touched points, asks for more, and tells what they say."""
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from navapp.control.commands import CheckPicks, TouchPoint
+from navapp.control.next_touch import choose_next_touch, name_place
 from navapp.control.session import Session
 from navapp.control.stages import STAGES
 from navapp.control.states import EventLevel, PatientCheck, ToolReading
 from navapp.control.tool_watch import ToolWatch
+from navapp.control.touches import RestingTip, see_pick, touch_landmark, touch_surface
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.transform import FloatArray
 from navapp.tools.patient_check import (
     CheckAnswer,
     CheckResult,
     Touched,
-    find_next_place,
     judge_touches,
 )
 from navapp.tools.tool_on_bone import ToolOnBone
 from navapp.values import Pick, Plan, StageSpec
 
-# A tip rests when so many readings lie within so much of each other.
-_N_RESTING, _REST_MM = 5, 0.3
 # It is waited for so many frames that the tip rests.
 _MOST_WAITED_FRAMES = 45
 # A registration is good for no more than this, whatever the stage allows.
 _MOST_MM = 1.0
-# What pressing on tissue, and a model's own error, add to a touch.
-_TOUCH_SIGMA_MM = 0.15
-# Of a pick in the picture, with the magnifier.
-_PICK_SIGMA_PX = 2.0
-# Of a landmark of which the plan does not say how well it is known.
-_LANDMARK_SIGMA_MM = 0.5
 # A touch further off is on something else.
 _FARTHEST_MM = 10.0
-# Places that the next touch is chosen from; those that face the camera so much can be reached.
-_N_PLACES, _LEAST_FACING = 300, 0.35
 
 
 class PatientChecking:
@@ -64,7 +54,7 @@ class PatientChecking:
         self._valid_ns = round(valid_minutes * 60e9)
         self._stages = tuple(plan.stage(stage) for stage in STAGES)
         self._touches: list[Touched] = []
-        self._readings: deque[FloatArray] = deque(maxlen=_N_RESTING)
+        self._tip = RestingTip()
         self._waiting: tuple[int, str] | None = None  # frames left, landmark
         self._of: tuple[str, int] = ("", 0)  # bone and registration of the touches
         self._result: CheckResult | None = None
@@ -125,7 +115,7 @@ class PatientChecking:
             self.forget()
         self._of = self._now
         self._waiting = _MOST_WAITED_FRAMES, landmark
-        self._readings.clear()
+        self._tip = RestingTip()
 
     def add_picks(self, picks: Sequence[Pick], stage: StageSpec) -> CheckAnswer | None:
         """Landmarks picked in the left picture: what they say.
@@ -141,27 +131,9 @@ class PatientChecking:
             self.forget()
         self._of = self._now
         for pick in picks:
-            self._keep(self._see_pick(pick, pose))
+            self._keep(see_pick(pick, pose, self._rig.left, self._plan))
         self._session.add_event("check", f"{len(picks)} picked landmarks are compared")
         return self._decide(stage)
-
-    def _see_pick(self, pick: Pick, left_from_bone: RigidTransform) -> Touched:
-        ray = self._rig.left.rays(np.array([pick.left_px]))[0]
-        sight = ray / np.linalg.norm(ray)
-        place = left_from_bone.apply(pick.model_mm)
-        across = np.linalg.svd(sight[None])[2][1:]
-        depth_mm = float(place @ sight)
-        off_mm = across @ (depth_mm * sight - place)
-        sigma_mm = _PICK_SIGMA_PX * depth_mm / self._rig.left.focal_px
-        directions = across @ left_from_bone.rotation
-        known_mm = self._landmark_sigma_mm(pick.name)
-        sigma_mm = float(np.hypot(sigma_mm, known_mm))
-        return Touched(pick.model_mm, directions, off_mm, sigma_mm, pick.name)
-
-    def _landmark_sigma_mm(self, landmark: str) -> float:
-        planned = self._plan.content.landmarks.get(landmark)
-        known_mm = None if planned is None else planned.sd_mm
-        return _LANDMARK_SIGMA_MM if known_mm is None else known_mm
 
     def drop(self) -> CheckAnswer | None:
         """Forget the last touch; what the others say, when they decide."""
@@ -189,24 +161,17 @@ class PatientChecking:
             self._session.add_event("check", text, EventLevel.WARNING)
             return None
         placed = None if reading is None else reading.placed
-        if placed is None:
-            self._readings.clear()
-        else:
-            self._readings.append(placed.tip_mm)
-        if placed is not None and self._is_resting():
+        tip_mm = self._tip.add(None if placed is None else placed.tip_mm)
+        if placed is not None and tip_mm is not None:
             self._waiting = None
-            return self._take(placed, landmark, stage)
+            return self._take(placed, tip_mm, landmark, stage)
         if left <= 1:
             self._waiting = None
-            why = "the tip did not rest" if self._readings else "the pointer is not seen"
+            why = "the tip did not rest" if self._tip.is_seen else "the pointer is not seen"
             self._session.add_event("check", f"no point was taken: {why}", EventLevel.WARNING)
             return None
         self._waiting = left - 1, landmark
         return None
-
-    def _is_resting(self) -> bool:
-        tips = np.array(self._readings)
-        return len(tips) == _N_RESTING and float(np.ptp(tips, axis=0).max()) <= _REST_MM
 
     def _is_of_now(self) -> bool:
         return self._of == self._now
@@ -217,16 +182,16 @@ class PatientChecking:
             self._touches = [one for one in self._touches if one.name != touched.name]
         self._touches.append(touched)
 
-    def _take(self, placed: ToolOnBone, landmark: str, stage: StageSpec) -> CheckAnswer | None:
-        tip_mm = np.mean(self._readings, axis=0)
+    def _take(
+        self, placed: ToolOnBone, tip_mm: FloatArray, landmark: str, stage: StageSpec
+    ) -> CheckAnswer | None:
         session = self._session
-        surface = self._tools.find_surface(placed.bone, session.bone_version, session.bone_surface)
         if landmark:
-            touched = self._touch_landmark(placed, tip_mm, landmark)
+            touched = touch_landmark(placed, tip_mm, landmark, self._plan)
         else:
-            distance_mm, foot_mm, normal = surface.find(tip_mm)
-            sigma_mm = float(np.sqrt(normal @ placed.covariance_mm2 @ normal))
-            touched = Touched(foot_mm, normal[None], np.array([distance_mm]), _with_touch(sigma_mm))
+            version, left_of_it = session.bone_version, session.bone_surface
+            surface = self._tools.find_surface(placed.bone, version, left_of_it)
+            touched = touch_surface(placed, tip_mm, surface)
         off_mm = float(np.linalg.norm(touched.off_mm))
         if off_mm > _FARTHEST_MM:
             text = f"no point was taken: the tip is {off_mm:.0f} mm away"
@@ -236,12 +201,6 @@ class PatientChecking:
         where = landmark or "surface"
         session.add_event("check", f"point {len(self._touches)}, {where}: {off_mm:.2f} mm off")
         return self._decide(stage)
-
-    def _touch_landmark(self, placed: ToolOnBone, tip_mm: FloatArray, landmark: str) -> Touched:
-        point_mm = self._plan.landmarks_of(placed.bone)[landmark]
-        sigma_mm = float(np.sqrt(np.trace(placed.covariance_mm2) / 3.0))
-        sigma_mm = float(np.hypot(sigma_mm, self._landmark_sigma_mm(landmark)))
-        return Touched(point_mm, np.eye(3), tip_mm - point_mm, _with_touch(sigma_mm), landmark)
 
     def _decide(self, stage: StageSpec) -> CheckAnswer | None:
         """What the touches say now; told when it is decided."""
@@ -301,35 +260,14 @@ class PatientChecking:
         pose = None if tracked is None else tracked.left_from_bone
         if pose is None:
             return None
-        mesh = self._session.bone_surface or self._plan.bones[stage.bone].make_seen_surface()
-        used = np.unique(mesh.faces)
-        some = used[:: max(1, len(used) // (4 * _N_PLACES))]
-        places, normals = mesh.vertices_mm[some], mesh.normals[some]
-        in_left = pose.apply(places)
-        facing = -np.einsum("nj,nj->n", pose.rotate(normals), in_left)
-        is_seen = facing > _LEAST_FACING * np.linalg.norm(in_left, axis=1)
-        box = self._seen_box(targets_mm)
-        is_seen &= ((places >= box[0]) & (places <= box[1])).all(axis=1)
-        if not is_seen.any():
+        surface = self._session.bone_surface or self._plan.bones[stage.bone].make_seen_surface()
+        place_mm = choose_next_touch(self._touches, targets_mm, surface, pose)
+        if place_mm is None:
             return None
-        places, normals = places[is_seen], normals[is_seen]
-        best = find_next_place(self._touches, targets_mm, places, normals, _with_touch(0.1))
-        return self._name_place(places[best], stage), places[best]
-
-    def _seen_box(self, targets_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What is laid bare: around the targets and what was touched."""
-        points = np.concatenate([targets_mm, [one.point_mm for one in self._touches]])
-        return points.min(axis=0) - 15.0, points.max(axis=0) + 15.0
-
-    def _name_place(self, place_mm: FloatArray, stage: StageSpec) -> str:
-        landmarks = self._plan.landmarks_of(stage.bone)
-        if not landmarks:
-            return "at the cross in the picture"
-        name = min(landmarks, key=lambda one: float(np.linalg.norm(landmarks[one] - place_mm)))
-        away_mm = float(np.linalg.norm(landmarks[name] - place_mm))
-        return f"at the cross, {away_mm:.0f} mm from {name.split('/')[-1].replace('_', ' ')}"
+        return name_place(place_mm, self._plan.landmarks_of(stage.bone)), place_mm
 
 
+# Of the answers of several stages.
 _WORST_FIRST = (
     CheckAnswer.FAILED,
     CheckAnswer.OPEN,
@@ -340,10 +278,6 @@ _WORST_FIRST = (
 
 def _names(picks: Sequence[Pick]) -> list[str]:
     return [pick.name for pick in picks]
-
-
-def _with_touch(sigma_mm: float) -> float:
-    return float(np.hypot(sigma_mm, _TOUCH_SIGMA_MM))
 
 
 def tell_result(result: CheckResult, bone: str) -> str:

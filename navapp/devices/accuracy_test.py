@@ -1,21 +1,14 @@
 """Opens the camera of an accuracy test; a simulated one sees a pointer in a simulated hand."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from drivers.clock import Clock, SystemClock
-from drivers.interfaces import StereoCamera
 from navapp.config import Configuration
-from navapp.devices.cameras import make_real_camera
-from navapp.devices.rig_match import open_matching, read_configured_rig
-from navapp.devices.simulated_room import Pace, make_simulated_camera
+from navapp.devices.calibrated_camera import CalibratedCamera, open_calibrated
 from navapp.devices.simulated_tool import HELD, SIMULATED_PLATES, Table, make_shape
 from navapp.geometry import StereoRig
 from navapp.geometry.transform import FloatArray, rotation_from_vector
 from navapp.tools.accuracy_tasks import Task
 from sim_devices.held_tool import ToolInView
-from sim_devices.rigs import make_default_rig
 from sim_devices.tool_hand import ReachingHand
 
 # The simulated divot plate: five columns and four rows, not quite regular.
@@ -66,8 +59,9 @@ class SimulatedHand:
         held = rotation_from_vector((_LEAN_RAD * lean[0], _LEAN_RAD * lean[1], 0.0)) @ HELD
         self._hand.go(place, held, axis)
 
-    def is_there(self, time_ns: int) -> bool:
-        """It does it."""
+    @property
+    def is_there(self) -> bool:
+        """It does it, in the newest picture."""
         return self._hand.is_there
 
     def true_divot_mm(self, task: Task) -> FloatArray:
@@ -75,39 +69,30 @@ class SimulatedHand:
         return self._true_mm[task]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OpenedAccuracyTest:
-    """An opened, calibrated camera in front of a divot plate."""
-
-    camera: StereoCamera
-    clock: Clock  # of its frames
-    rig: StereoRig
-    hand: SimulatedHand | None = None
-
-
 def open_accuracy_test(
     configuration: Configuration, divots_mm: FloatArray, *, is_headless: bool
-) -> OpenedAccuracyTest:
+) -> tuple[CalibratedCamera, SimulatedHand | None]:
     """Open the configured camera; a simulated one sees a simulated pointer.
+
+    Args:
+        configuration: in force.
+        divots_mm: (N, 3) of the divot plate.
+        is_headless: as of `open_calibrated`.
+
+    Returns:
+        The camera, and the hand that holds the pointer in front of simulated ones.
 
     Raises:
         DeviceError, RigError, ConfigurationError.
     """
-    section = configuration.camera
-    if section.backend != "simulated":
-        clock: Clock = SystemClock()
-        rig = read_configured_rig(configuration)
-        camera: StereoCamera = make_real_camera(configuration, clock, rig.rig_id)
-        open_matching(camera, rig)
-        return OpenedAccuracyTest(camera, clock, rig)
-    settings, pace = section.simulated, Pace.of(section.simulated, is_headless=is_headless)
-    true_rig = make_default_rig()
-    shape = make_shape("pointer", SIMULATED_PLATES["pointer"], settings.seed)
-    hand = ReachingHand(shape, np.array(_PLACES_MM["centre"]), HELD, settings.seed)
-    scene = ToolInView(Table(true_rig), shape, hand.left_from_tool)
-    camera = make_simulated_camera(scene, settings, pace, section.rate_hz)
-    rig = true_rig if settings.scale == 1.0 else true_rig.scale(settings.scale)
-    if section.rig is not None:
-        rig = read_configured_rig(configuration)
-    open_matching(camera, rig)
-    return OpenedAccuracyTest(camera, pace.clock, rig, SimulatedHand(hand, divots_mm))
+    seed = configuration.camera.simulated.seed
+    hands: list[SimulatedHand] = []
+
+    def make_scene(rig: StereoRig) -> ToolInView:
+        shape = make_shape("pointer", SIMULATED_PLATES["pointer"], seed)
+        hand = ReachingHand(shape, np.array(_PLACES_MM["centre"]), HELD, seed)
+        hands.append(SimulatedHand(hand, divots_mm))
+        return ToolInView(Table(rig), shape, hand.left_from_tool)
+
+    opened = open_calibrated(configuration, make_scene, is_headless=is_headless)
+    return opened, hands[0] if hands else None

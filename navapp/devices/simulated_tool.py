@@ -32,8 +32,8 @@ _TILTS_DEG = (
 _PLACES_APART_MM, _N_TOUCHES, _LEAST_FACING = 12.0, 8, 0.55
 
 
-def make_shape(kind: ToolKind, plate: Plate, seed: int) -> ToolShape:
-    """A tool of the simulated room with a plate of this design, as printer and maker left it."""
+def make_shape(kind: ToolKind, plate: Plate, seed: int, errors: float = 1.0) -> ToolShape:
+    """A tool with a plate of this design; `errors` scales what printer and maker did wrong."""
     per_face = plate.columns * plate.rows
     layouts = tuple(
         PlateLayout(
@@ -45,7 +45,7 @@ def make_shape(kind: ToolKind, plate: Plate, seed: int) -> ToolShape:
         )
         for face in range(plate.faces)
     )
-    return make_tool(kind, layouts, plate.plate_from_faces, seed)
+    return make_tool(kind, layouts, plate.plate_from_faces, seed, errors)
 
 
 class Table:

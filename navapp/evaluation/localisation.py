@@ -4,8 +4,7 @@ The manner alone is taken from the standard; nothing here claims to conform to i
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,11 +90,6 @@ def measure_all(
     errors = [find_length_errors(tips, divots_mm) for tips in of_place.values()]
     joined = measure_lengths(np.concatenate([np.empty(0), *errors]))
     return {place: measure_place(tips, divots_mm) for place, tips in of_place.items()}, joined
-
-
-def figures_to_json(figures: PlaceFigures) -> dict[str, Any]:
-    """As they stand in `accuracy.json`."""
-    return asdict(figures)
 
 
 def _tips(taken: Sequence[TakenTip], kind: TaskKind, number: int) -> FloatArray:

@@ -216,6 +216,22 @@ def rotation_angle_deg(a: RigidTransform, b: RigidTransform) -> float:
     return float(np.degrees(angle_between_rad(a.rotation, b.rotation)))
 
 
+def twist_slopes(arms_mm: FloatArray) -> FloatArray:
+    """(N, 3, 6) J = [I | -[a]x]: how places move with a twist about a centre.
+
+    The places lie at arms a (N, 3) from it; the twist is a translation in mm, then a rotation
+    vector in rad.
+    """
+    slopes = np.zeros((len(arms_mm), 3, 6))
+    slopes[:, :, :3] = np.eye(3)
+    x, y, z = arms_mm.T
+    # -[a]x, row by row.
+    slopes[:, 0, 4], slopes[:, 0, 5] = z, -y
+    slopes[:, 1, 3], slopes[:, 1, 5] = -z, x
+    slopes[:, 2, 3], slopes[:, 2, 4] = y, -x
+    return slopes
+
+
 def skew(vector: ArrayLike) -> FloatArray:
     """Cross-product matrix (3, 3): `skew(a) @ b` is a x b."""
     x, y, z = np.asarray(vector, dtype=np.float64)

@@ -11,7 +11,7 @@ from enum import Enum
 
 import numpy as np
 
-from navapp.geometry.transform import FloatArray
+from navapp.geometry.transform import FloatArray, twist_slopes
 
 # What is thought possible before the first touch (standard deviations): it keeps few touches from
 # telling too much. A motion's shift and turn, a bone's growth.
@@ -108,7 +108,7 @@ def find_next_place(
     middle_mm = targets_mm.mean(axis=0)
     covariance = _explain(touches, middle_mm, 0.0).covariance
     mean_square = _mean_square(targets_mm, middle_mm)
-    rows = np.einsum("mk,mkj->mj", normals, _slopes(places_mm, middle_mm))
+    rows = np.einsum("mk,mkj->mj", normals, twist_slopes(places_mm - middle_mm))
     # By Sherman and Morrison: what one more row takes off the mean square error.
     seen = rows @ covariance
     gains = np.einsum("mi,ij,mj->m", seen, mean_square, seen)
@@ -136,7 +136,7 @@ def _explain(
     information, right = np.diag(np.append(_PRIOR, _PRIOR_SIZE**-2)), np.zeros(7)
     common, rows, offs = np.zeros((6, 3)), [np.empty((0, 6))], [np.empty(0)]
     for one in touches:
-        motion = one.directions @ _slopes(one.point_mm[None], middle_mm)[0]
+        motion = one.directions @ twist_slopes(one.point_mm[None] - middle_mm)[0]
         growth = one.directions @ (one.point_mm - middle_mm)
         slopes = np.column_stack([motion, growth])
         information = information + slopes.T @ slopes / one.sigma_mm**2
@@ -195,19 +195,8 @@ def _tell_power(size_sigma: float) -> str:
 
 def _mean_square(targets_mm: FloatArray, middle_mm: FloatArray) -> FloatArray:
     """(6, 6) M: m M m is the mean squared distance that a motion m moves the targets by."""
-    jacobian = _slopes(targets_mm, middle_mm)
+    jacobian = twist_slopes(targets_mm - middle_mm)
     return np.asarray(np.einsum("nki,nkj->ij", jacobian, jacobian) / len(jacobian))
-
-
-def _slopes(points_mm: FloatArray, middle_mm: FloatArray) -> FloatArray:
-    """(N, 3, 6) of places by a small motion: shift mm, then turn rad about the middle."""
-    x, y, z = (points_mm - middle_mm).T
-    slopes = np.zeros((len(points_mm), 3, 6))
-    slopes[:, :, :3] = np.eye(3)
-    slopes[:, 0, 4], slopes[:, 0, 5] = z, -y
-    slopes[:, 1, 3], slopes[:, 1, 5] = -z, x
-    slopes[:, 2, 3], slopes[:, 2, 4] = y, -x
-    return slopes
 
 
 def _find_bounds(measured_mm: float, errors: FloatArray) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,16 @@ class _Edge:
     clear: float  # to the nearest edge beside it
 
 
+class _Numbers(NamedTuple):
+    """Of an edge, as of the fields of `PlateEdges`."""
+
+    face: int
+    marker: int
+    edge: int
+    side: int
+    is_border: bool
+
+
 def find_plate_edges(plate: Plate) -> PlateEdges:
     """All edges of a plate, with places less than a millimetre apart."""
     cell_mm = plate.marker_mm / plate.n_cells
@@ -53,11 +64,10 @@ def find_plate_edges(plate: Plate) -> PlateEdges:
         face = marker // per_face
         corner_mm = plate.marker_corners_mm[face, marker % per_face, 0]
         for edge in _marker_edges(plate.black_cells(marker_id), plate.margin_mm / cell_mm):
-            pose = plate.plate_from_faces[face]
-            parts.append(_place_edge(edge, cell_mm, corner_mm, pose, (face, marker, len(parts))))
-            # Both signs of both directions.
-            parts[-1].side[:] = 4 * marker + 2 * edge.is_vertical + (edge.sign > 0)
-            parts[-1].is_border[:] = edge.at in (0, plate.n_cells)
+            # Both signs of both directions of a marker.
+            side = 4 * marker + 2 * edge.is_vertical + (edge.sign > 0)
+            numbers = _Numbers(face, marker, len(parts), side, edge.at in (0, plate.n_cells))
+            parts.append(_place_edge(edge, cell_mm, corner_mm, plate, numbers))
     names = PlateEdges.__dataclass_fields__
     joined = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
     return PlateEdges(**joined)
@@ -67,10 +77,11 @@ def _place_edge(
     edge: _Edge,
     cell_mm: float,
     corner_mm: FloatArray,
-    plate_from_face: FloatArray,
-    numbers: tuple[int, int, int],
+    plate: Plate,
+    numbers: _Numbers,
 ) -> PlateEdges:
-    """Places on one edge of a marker; `numbers` are its face, its marker, its own."""
+    """Places on one edge of a marker, whose upper left corner lies at `corner_mm` of its face."""
+    plate_from_face = plate.plate_from_faces[numbers.face]
     along = np.array([0.0, 1.0] if edge.is_vertical else [1.0, 0.0])
     across = along[::-1]
     length_mm = (edge.last - edge.first) * cell_mm
@@ -84,11 +95,11 @@ def _place_edge(
         np.tile(edge.sign * turn @ across, (n, 1)),
         np.full(n, edge.clear * cell_mm),
         np.minimum(steps_mm, length_mm - steps_mm),
-        np.full(n, numbers[0]),
-        np.full(n, numbers[1]),
-        np.full(n, numbers[2]),
-        np.zeros(n, dtype=np.intp),
-        np.zeros(n, dtype=bool),
+        np.full(n, numbers.face),
+        np.full(n, numbers.marker),
+        np.full(n, numbers.edge),
+        np.full(n, numbers.side),
+        np.full(n, numbers.is_border),
         flat_mm,
     )
 

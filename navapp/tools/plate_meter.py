@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
+from navapp.geometry.triangulation import triangulate_mm
 from navapp.tools.edge_kernels import locate_edges
 from navapp.tools.marker_finder import Box, MarkerFinder, SeenMarkers
 from navapp.tools.paper import Paper, as_designed
@@ -99,7 +100,7 @@ class PlateMeter:
             one.corners_px[np.isin(one.markers, common)].reshape(-1, 2) for one in (left, right)
         ]
         points = self.plate.corners_mm[common].reshape(-1, 3)
-        seen = _triangulate(self.rig, pixels[0], pixels[1])
+        seen = triangulate_mm(self.rig, pixels[0], pixels[1])
         # Markers that are mistaken for each other's lie at no depth, or have no plate's shape.
         if not (np.isfinite(seen).all() and (seen[:, 2] > _NEAREST_MM).all()):
             return None
@@ -212,19 +213,6 @@ class _Located:
     lines: Lines
     shown: NDArray[np.intp]  # places that can be seen at this pose
     kept: NDArray[np.intp]  # of these, where an edge was found
-
-
-def _triangulate(rig: StereoRig, left_px: FloatArray, right_px: FloatArray) -> FloatArray:
-    """(n, 3) mm in the left camera: the middle of the shortest way between two rays."""
-    right_in_left = rig.right_from_left.inverse()
-    a, b = rig.left.rays(left_px), right_in_left.rotate(rig.right.rays(right_px))
-    origin = right_in_left.translation_mm
-    aa, ab, bb = (a * a).sum(axis=1), (a * b).sum(axis=1), (b * b).sum(axis=1)
-    ao, bo = a @ origin, b @ origin
-    determinant = aa * bb - ab * ab
-    s, t = (bb * ao - ab * bo) / determinant, (ab * ao - aa * bo) / determinant
-    middle: FloatArray = 0.5 * (s[:, None] * a + t[:, None] * b + origin)
-    return middle
 
 
 def _align(source_mm: FloatArray, target_mm: FloatArray) -> RigidTransform:

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from navapp.geometry.transform import FloatArray, RigidTransform, skew
+from navapp.geometry.transform import FloatArray, RigidTransform, twist_slopes
 from navapp.tools.paper import Paper
 from navapp.tools.plate import Plate
 
@@ -57,7 +57,7 @@ class SeenTool:
     def tip_covariance_mm2(self) -> FloatArray:
         """(3, 3) in the left camera's axes: of the pose, and of the calibration."""
         turn = self.left_from_plate.rotation
-        by_pose = np.hstack([np.eye(3), -skew(turn @ self.tool.tip_mm)])
+        by_pose = twist_slopes((turn @ self.tool.tip_mm)[None])[0]
         seen = by_pose @ self.covariance @ by_pose.T
         return np.asarray(seen + turn @ self.tool.tip_covariance_mm2 @ turn.T)
 

@@ -6,7 +6,7 @@ from enum import Enum
 
 import numpy as np
 
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform, twist_slopes
 from navapp.values.measured import Foreground, RowCheck
 from navapp.values.timings import FrameTimings
 
@@ -191,15 +191,7 @@ class PoseEstimate:
 
     def _move_by_twist(self, centre_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
         """(N, 3, 6) J = [I | -[p - c]x]: how points of the bone move with the pose's twist."""
-        offsets = (points_mm - centre_mm) @ self.camera_from_bone.rotation.T
-        jacobian = np.zeros((len(offsets), 3, 6))
-        jacobian[:, :, :3] = np.eye(3)
-        x, y, z = offsets.T
-        # -[p - c]x, row by row.
-        jacobian[:, 0, 4], jacobian[:, 0, 5] = z, -y
-        jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
-        jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
-        return jacobian
+        return twist_slopes((points_mm - centre_mm) @ self.camera_from_bone.rotation.T)
 
 
 class Status(Enum):

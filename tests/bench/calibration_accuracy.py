@@ -23,7 +23,6 @@ import cv2
 import numpy as np
 
 from calibration.rig.held_out_views import look_at_rig
-from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import Calibration, solve_rig
 from calibration.targets.boards import Board, parse_board, read_board
 from calibration.targets.detection import SeenBoard, find_board
@@ -36,6 +35,7 @@ from navapp.geometry.rectification import luma
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.triangulation import triangulate_mm
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pairs, drawn_rig
 
 _CHESSBOARD = {"type": "chessboard", "squares_x": 10, "squares_y": 7, "square_mm": 1.0}

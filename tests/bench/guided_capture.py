@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import solve_rig
 from calibration.targets.seen_pairs import SeenPair
 from navapp.control.capture.next_view import plan_next_view
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
+from navapp.geometry.triangulation import triangulate_mm
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_rig, seen_pair
 
 SIZE, DEPTH_MM = (WIDTH, HEIGHT), (350.0, 550.0)

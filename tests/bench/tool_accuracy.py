@@ -87,9 +87,9 @@ def calibrate(seed: int) -> tuple[Tool, dict[str, NDArray[np.float64] | None]]:
     """Our tool, and the tips that the peers find in the same pictures."""
     section = {"camera": {"simulated": {"seed": seed}}}
     configuration = Configuration.model_validate(section)
-    opened = open_tool_calibration(configuration, "drill", PLATE, is_headless=True)
+    opened, hand = open_tool_calibration(configuration, "drill", PLATE, is_headless=True)
     calibrating = ToolCalibrating(
-        opened.camera, opened.clock, opened.rig, PLATE, ToolSettings(has_axis=True), opened.hand
+        opened.camera, opened.clock, opened.rig, PLATE, ToolSettings(has_axis=True), hand
     )
     poses: dict[str, list[NDArray[np.float64]]] = {name: [] for name in PEERS}
     while not (snapshot := calibrating.step()).is_over:

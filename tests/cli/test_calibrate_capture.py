@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from calibration.rig.lengths import triangulate_mm
 from calibration.rig.parameters import RigModel, pack
 from calibration.rig.uncertainty import make_working_points_mm
 from navapp.cli.main import run
 from navapp.geometry import read_rig
+from navapp.geometry.triangulation import triangulate_mm
 from sim_devices.rigs import make_default_rig
 
 BOARD = {

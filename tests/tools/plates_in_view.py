@@ -5,13 +5,13 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from navapp.devices.simulated_tool import make_shape
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tools.plate import Plate
 from sim_devices.held_tool import Cover, ToolInView
-from sim_devices.printed_plate import PlateLayout
 from sim_devices.rigs import NO_TURN, Turn, make_default_rig
 from sim_devices.sensor import SensorModel
-from sim_devices.tool_shapes import ToolShape, make_tool
+from sim_devices.tool_shapes import ToolShape
 
 Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
@@ -31,18 +31,7 @@ class PlainRoom:
 @lru_cache(maxsize=8)
 def shape_of(plate: Plate, seed: int = 1, errors: float = 0.0) -> ToolShape:
     """A tool with that plate, printed as it was designed unless told otherwise."""
-    n = plate.columns * plate.rows
-    layouts = tuple(
-        PlateLayout(
-            plate.dictionary,
-            tuple(plate.ids[face * n : (face + 1) * n]),
-            plate.columns,
-            plate.square_mm,
-            plate.marker_mm,
-        )
-        for face in range(plate.faces)
-    )
-    return make_tool("pointer", layouts, plate.plate_from_faces, seed, errors)
+    return make_shape("pointer", plate, seed, errors)
 
 
 def held(

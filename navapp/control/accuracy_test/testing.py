@@ -41,8 +41,9 @@ class DoesTasks(Protocol):
         """Go there and do it."""
         ...
 
-    def is_there(self, time_ns: int) -> bool:
-        """It does it."""
+    @property
+    def is_there(self) -> bool:
+        """It does it, in the newest picture."""
         ...
 
 
@@ -130,7 +131,7 @@ class AccuracyTesting:
             return
         self._frame = frame
         if self._hand is not None:
-            self._is_taking = self._hand.is_there(frame.captured_ns)
+            self._is_taking = self._hand.is_there
         found = self._tracker.track((luma(frame.left), luma(frame.right)), frame.captured_ns)
         if isinstance(found, SeenTool):
             self._missing, self._bound_mm = "", found.tip_bound_mm

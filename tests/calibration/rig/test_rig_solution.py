@@ -7,12 +7,12 @@ import pytest
 
 from calibration.rig.acceptance import find_occupied_cells
 from calibration.rig.dropped_pairs import Fault
-from calibration.rig.lengths import triangulate_mm
 from calibration.rig.rig_solution import solve_rig
 from calibration.rig.uncertainty import make_working_points_mm
 from calibration.targets.boards import parse_board
 from calibration.targets.seen_pairs import SeenPair
 from navapp.errors import ResultError
+from navapp.geometry.triangulation import triangulate_mm
 from tests.calibration.marks import (
     BOARD,
     HEIGHT,
