@@ -134,6 +134,29 @@ class PlateMeter:
 
     def _locate(self, eye: int, picture: NDArray[np.uint8], pose: RigidTransform) -> "_Located":
         """Edges of the faces that this eye sees."""
+        expected = self._expect(eye, pose)
+        told = np.empty((len(expected.shown), 3))
+        locate_edges(picture, expected.places_px, expected.steps_px, expected.reach_px, told)
+        offset_px, contrast, left_grey = told.T
+        found = np.isfinite(offset_px) & (contrast > _LEAST_CONTRAST)
+        if found.any():
+            usual = float(np.median(contrast[found]))
+            found[found] &= contrast[found] > _CONTRAST_SHARE * usual
+        found[found] &= left_grey[found] < _LEFT_SHARE * contrast[found]
+        kept = expected.shown[found]
+        lines = Lines(
+            self._edges.points_mm[kept],
+            self._by_paper[kept],
+            expected.across_px[found],
+            offset_px[found],
+            1.0,
+            self._edges.edge[kept],
+            self._edges.side[kept],
+        )
+        return _Located(lines, expected.shown, kept)
+
+    def _expect(self, eye: int, pose: RigidTransform) -> "_Expected":
+        """Where an eye sees edges at a pose: those far enough from other edges and from ends."""
         edges = self._edges
         camera, eye_from_left = view(self.rig, eye)
         eye_from_plate = eye_from_left @ pose
@@ -153,28 +176,14 @@ class PlateMeter:
         is_shown = (facing > _LEAST_FACING) & (reach >= _LEAST_REACH_PX)
         is_shown &= edges.end_mm * np.linalg.norm(tangents, axis=1) >= _LEAST_END_PX
         shown = np.flatnonzero(is_shown)
-        places = np.ascontiguousarray(camera.project(in_eye[shown]))
-        told = np.empty((len(shown), 3))
-        across, reach = across[shown], np.ascontiguousarray(reach[shown])
-        # Looked along the plate's own normal, which stays beside the edge however slanted it is.
-        steps = np.ascontiguousarray(normals[shown] / np.abs(along[shown])[:, None])
-        locate_edges(picture, places, steps, reach, told)
-        found = np.isfinite(told[:, 0]) & (told[:, 1] > _LEAST_CONTRAST)
-        if found.any():
-            usual = float(np.median(told[found, 1]))
-            found[found] &= told[found, 1] > _CONTRAST_SHARE * usual
-        found[found] &= told[found, 2] < _LEFT_SHARE * told[found, 1]
-        kept = shown[found]
-        lines = Lines(
-            edges.points_mm[kept],
-            self._by_paper[kept],
-            across[found],
-            told[found, 0],
-            1.0,
-            edges.edge[kept],
-            edges.side[kept],
+        return _Expected(
+            shown,
+            np.ascontiguousarray(camera.project(in_eye[shown])),
+            across[shown],
+            # Looked along the plate's own normal: it stays beside the edge however slanted it is.
+            np.ascontiguousarray(normals[shown] / np.abs(along[shown])[:, None]),
+            np.ascontiguousarray(reach[shown]),
         )
-        return _Located(lines, shown, kept)
 
     def _judge(self, fit: PlateFit, chosen: list["_Located"]) -> PlatePose | str:
         """Whether what agrees is enough, and the right plate."""
@@ -204,6 +213,17 @@ class PlateMeter:
         if is_good[inside].mean() < _INSIDE_SHARE * is_good[~inside].mean():
             return "another plate's markers"
         return share
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Expected:
+    """Edges as one eye should see them."""
+
+    shown: NDArray[np.intp]  # (n,) places that can be seen
+    places_px: FloatArray  # (n, 2)
+    across_px: FloatArray  # (n, 2) unit, at right angles to the edge, towards white
+    steps_px: FloatArray  # (n, 2) to 1 px beyond the edge
+    reach_px: FloatArray  # (n,) how far it is looked, at right angles to the edge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
