@@ -1,10 +1,7 @@
 """The snapshot of a session, with the interlocks' answer in it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
-from functools import lru_cache
-from types import MappingProxyType
 
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_handlers import DeviceReport
@@ -30,17 +27,11 @@ from navapp.control.states import (
 )
 from navapp.control.tool_watch import ToolWatch
 from navapp.geometry.box import Box
-from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.values import Plan, Reason, TrackedFrame
+from navapp.geometry.transform import RigidTransform
+from navapp.values import Reason, TrackedFrame
 
 # That tell where a bone lies in the picture.
 _N_POINTS_OF_BOX = 300
-
-
-@lru_cache(maxsize=3)
-def _landmarks_of(plan: Plan, bone: str) -> Mapping[str, FloatArray]:
-    # Once, not with every frame.
-    return MappingProxyType(plan.landmarks_of(bone))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,7 +81,7 @@ class SnapshotMaker:
             picture_size_px=(rig.width, rig.height),
             left_picture=None if picture is None else picture.left,
             can_draw_start=self.specification.method == "bimcc",
-            landmarks=_landmarks_of(plan, session.stage.bone),
+            landmarks=plan.landmarks_of(session.stage.bone),
             plain_picture=None if picture is None else picture.plain,
             shows_depth=session.shows_depth and not shows_eye,
             has_eye=self.eye.is_possible,

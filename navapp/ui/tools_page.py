@@ -98,11 +98,12 @@ def _row(what: str, value: float, bound: float, unit: str, stage: StageSpec, vie
 def _tell_check(snapshot: Snapshot, view: View) -> list[Content]:
     check = snapshot.patient_check
     title = Content.styled(" check on the patient", "bold $foreground")
-    if check is None or not check.is_valid:
-        return [
-            title,
-            Content("   touch the bone with the pointer's tip, keep it still, press ENTER"),
-        ]
+    if check is None or not check.is_valid or check.n_touches == 0:
+        todo = Content("   touch the bone with the pointer's tip, keep it still, press ENTER")
+        if check is None or not check.has_failed:
+            return [title, todo]
+        failed = f"   {Level.BAD.mark(view.symbols)} a check of this registration failed"
+        return [title, Content.styled(failed, Level.BAD.value), todo]
     level = _ANSWERS[check.answer]
     word = f"   {level.mark(view.symbols)} {check.n_touches} points: {check.answer.value}"
     lines = [title, Content.styled(word, level.value), *_tell_result(check, view)]

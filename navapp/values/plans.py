@@ -5,6 +5,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Protocol, TypeVar
 
@@ -166,20 +167,9 @@ class Plan:
             if one.bone == stage.bone and (name in named or not named)
         }
 
-    def landmarks_of(self, bone: str) -> dict[str, FloatArray]:
+    def landmarks_of(self, bone: str) -> Mapping[str, FloatArray]:
         """Points on a bone that have a name, (3,) mm: its landmarks, and targets of one point."""
-        if bone not in self.bones:
-            return {}
-        vertices_mm = self.bones[bone].mesh.vertices_mm
-        known = {name: np.reshape(points, (-1, 3)) for name, points in self.targets.items()}
-        named = {name: points_mm[0] for name, points_mm in known.items() if len(points_mm) == 1}
-        named |= {name: one.point_mm for name, one in self.content.landmarks.items()}
-        return {
-            name: point_mm
-            for name, point_mm in named.items()
-            # The hip's centre, too, is called the femur's.
-            if name.startswith(f"{bone}/") and _is_beside(vertices_mm, point_mm)
-        }
+        return _find_landmarks(self, bone)
 
     def stage(self, spec: StageSpec) -> StageSpec:
         """A stage as this plan has it: with its bone and, when it names any, its targets."""
@@ -187,6 +177,25 @@ class Plan:
         if planned is None:
             return spec
         return replace(spec, bone=planned.bone, targets=planned.targets or spec.targets)
+
+
+@lru_cache(maxsize=8)
+def _find_landmarks(plan: Plan, bone: str) -> Mapping[str, FloatArray]:
+    # Once: sessions ask with every frame.
+    if bone not in plan.bones:
+        return {}
+    vertices_mm = plan.bones[bone].mesh.vertices_mm
+    known = {name: np.reshape(points, (-1, 3)) for name, points in plan.targets.items()}
+    named = {name: points_mm[0] for name, points_mm in known.items() if len(points_mm) == 1}
+    named |= {name: one.point_mm for name, one in plan.content.landmarks.items()}
+    return MappingProxyType(
+        {
+            name: point_mm
+            for name, point_mm in named.items()
+            # The hip's centre, too, is called the femur's.
+            if name.startswith(f"{bone}/") and _is_beside(vertices_mm, point_mm)
+        }
+    )
 
 
 def find_crowded(picks: Sequence[Pick]) -> tuple[str, str] | None:

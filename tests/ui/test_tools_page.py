@@ -118,6 +118,13 @@ def test_a_failed_check_says_why() -> None:
     assert "1.8 mm beside" in text
 
 
+def test_a_failed_check_is_told_after_its_points_are_forgotten() -> None:
+    check = dataclasses.replace(CHECK, n_touches=0, result=None, wanted="", has_failed=True)
+    text = text_at((160, 48), a_snapshot(patient_check=check))
+    assert "a check of this registration failed" in text
+    assert "more points" not in text
+
+
 def test_points_are_taken_dropped_and_forgotten_by_keys() -> None:
     async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
         await pilot.press("u", "enter", "b", "m", "x", "n")
