@@ -1,7 +1,7 @@
 """Production BiMCC-ICP: bidirectional maximum correntropy against what one camera can see.
 
 A coarse loop pairs thinned points both ways while the kernel narrows; a fine loop pairs all points
-forward under a kernel as narrow as the noise (equations in docs/registration.md).
+forward under a kernel as narrow as the noise (equations in docs/how/registration.md).
 """
 
 from dataclasses import dataclass, replace

@@ -51,7 +51,7 @@ def solve_icp(
 def solve_bimcc_literal(
     scene: Scene, model: RegistrationModel, start: RigidTransform, n_points: int | None = None
 ) -> Solution:
-    """BiMCC-ICP as printed, with the print's slips mended (docs/registration.md).
+    """BiMCC-ICP as printed, with the print's slips mended (docs/how/registration.md).
 
     All scene points pair forward and the model's points backward, those that no camera can see too:
     on a one-sided view the far side pulls the model towards the camera. Of either about `n_points`

@@ -9,7 +9,7 @@ from navapp.geometry.transform import FloatArray
 from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial_kernels import rotate
 
-# The score's formula is in docs/registration.md, "A bone that is partly buried". All chosen.
+# The score's formula is in docs/how/registration.md, "A bone that is partly buried". All chosen.
 # Seen under a flatter angle, a point's depth hangs on fractions of a pixel.
 LEAST_COSINE = 0.2
 # Seen through: further away than so many widths of the kernel; fully so by this much more.

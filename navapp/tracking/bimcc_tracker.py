@@ -1,7 +1,7 @@
 """The production tracker: stereo on the model's own surface, BiMCC-ICP, and a judge.
 
 Source: the paper's proposed system, section 3.2 and figure 2: the steps of `BimccTracker.track` are
-its intra-operative stage. How they differ from it, and why, is told in docs/registration.md.
+its intra-operative stage. How they differ from it, and why, is told in docs/how/registration.md.
 """
 
 from collections.abc import Callable, Iterable
@@ -29,7 +29,7 @@ class BimccTracker(Tracker):
 
     `aspects`, edges of the bone, are for a first registration without a pose: without them it goes
     by the measured surface alone, which finds the bone in a box, but less often in the whole view
-    (docs/registration.md). The other parts have defaults; a test replaces them.
+    (docs/how/registration.md). The other parts have defaults; a test replaces them.
     """
 
     tells_foreground = True

@@ -16,7 +16,7 @@ _HALF = _SEARCH + _TAPS
 # The levels beside an edge are means over the samples from the first of these to the last.
 _LEVEL_FROM, _FLANK = 4, 8
 # Where behind the outline it is less dark than this, the edge is as often that of tissue on the
-# bone (python -m tests.bench.outline; docs/registration.md).
+# bone (python -m tests.bench.outline; docs/how/registration.md).
 _LEAST_MISSING = 0.7
 
 _TAPS_PX = _STEP_PX * np.arange(-_TAPS, _TAPS + 1)

@@ -33,7 +33,7 @@ _BESIDE_PX, _NEARER_PX = 9, 1.0
 # Standard deviation of an edge's place: sampling, and texture that reaches the rim.
 _EDGE_SIGMA_PX = 0.15
 # Standard deviation of an offset that all edges share: the tone curve of video cameras (ITU-R
-# BT.709, computed: docs/registration.md) moves edges towards the dark, a linear one does not.
+# BT.709, computed: docs/how/registration.md) moves edges towards the dark, a linear one does not.
 _COMMON_SD_PX = 0.3
 
 

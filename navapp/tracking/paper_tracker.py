@@ -1,8 +1,8 @@
 """The paper's proposal as a tracker: filled occlusions, and BiMCC-ICP as it is printed.
 
 Source: the paper, section 3.2, figure 2, algorithm 2 on top of algorithm 1. The slips of its print
-that are mended here are listed in docs/registration.md. What differs from section 3.1 is all that
-stands here; the refinement on the contour, equation (4) there, is no step of section 3.2.
+that are mended here are listed in docs/how/registration.md. What differs from section 3.1 is all
+that stands here; the refinement on the contour, equation (4) there, is no step of section 3.2.
 """
 
 from navapp.geometry.transform import RigidTransform

@@ -1,4 +1,4 @@
-"""First registration without a pose, printed as the table of docs/registration.md.
+"""First registration without a pose, printed as the table of docs/how/registration.md.
 
 usage: python -m tests.bench.first_registration [FOLDER] [--seeds N] [--first SEED]
                                                 [--only WORDS] [--filled] [--verbose]
@@ -9,7 +9,7 @@ whole view, with and without the aspects. The truth draws the box (that of the v
 side off by up to 15 % of its size, as an operator would draw it) and scores the answer. The last
 rows start from the true pose: what the judge then refuses, no search can make good. With `--filled`
 the gaps of free measurements are filled by weighted least squares, and filled points take part in
-the search (docs/stereo.md).
+the search (docs/how/stereo.md).
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""How far off a pose may be for the follower's samples, printed as the table of docs/stereo.md.
+"""How far off a pose may be for the follower's samples, printed as the table of docs/how/stereo.md.
 
 usage: python -m tests.bench.follower_reach [--seeds N]
 

@@ -1,4 +1,4 @@
-"""The settings of the search for a tibia from its femur, varied on simulated knees (docs/limb.md).
+"""The settings of the search for a tibia from its femur, varied on knees (docs/how/limb.md).
 
 usage: python -m tests.bench.knee_search [--seeds N] [--first SEED] [--only TEXT]
 

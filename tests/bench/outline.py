@@ -1,4 +1,4 @@
-"""What edges along the model's outline are worth, printed as the tables of docs/registration.md.
+"""What edges along the model's outline are worth: the tables of docs/how/registration.md.
 
 usage: python -m tests.bench.outline [--seeds N] [--first SEED]
 

@@ -22,7 +22,7 @@ from navapp.tracking import Goal
 from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
 from navapp.values.verdicts import CAUSES
 
-DOCS = Path(__file__).parents[2] / "docs" / "registration.md"
+DOCS = Path(__file__).parents[2] / "docs" / "how" / "registration.md"
 POSE = RigidTransform.identity("left_rect", "femur")
 ESTIMATE = PoseEstimate(POSE, np.eye(6), 2000, 0.95, 0.1, 0.1, 5, True)
 LOOSE = replace(ESTIMATE, covariance=np.diag([np.inf] * 6)).with_reason(Reason.DEGENERATE)
@@ -284,7 +284,7 @@ def limit_of(rule: Rule, limit: float | None) -> str:
 
 
 def rows_of_the_docs() -> list[str]:
-    """The table of docs/registration.md, as it follows from the rules."""
+    """The table of docs/how/registration.md, as it follows from the rules."""
     rows = ["| reason | looked at | DEGRADED | LOST | limit from |", "|---|---|---|---|---|"]
     for rule in RULES:
         degraded, lost = (limit_of(rule, limit) for limit in (rule.degraded, rule.lost))

@@ -26,7 +26,7 @@ _N_PROFILES = 1000
 # The model that is worked with: what a camera can tell needs no more.
 _WORKING_VERTICES, _WORKING_WITHIN_MM = 7000, 0.1
 # What the surface's errors do to a pose, in edges of the longest kind of a voxel: simulated CTs of
-# other protocols (docs/preop.md).
+# other protocols (docs/how/preop.md).
 _POSE_SD_VOXELS = 0.08
 # The flat end of a cut shaft: its rim is rounded by smoothing.
 _CUT_VOXELS = 0.75
