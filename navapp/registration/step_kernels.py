@@ -2,7 +2,8 @@
 
 Source: the correntropy criterion J = 1/N sum exp(-rho_i^2 / 2 sigma^2) (the paper, proposed
 equations 7 to 9 as corrected in docs/how/registration.md), maximised in half-quadratic form: the
-best weights for a pose are w_i = exp(-rho_i^2 / 2 sigma^2), the best pose for weights is least squares.
+best weights for a pose are w_i = exp(-rho_i^2 / 2 sigma^2), the best pose for weights is least
+squares.
 """
 
 from typing import NamedTuple
