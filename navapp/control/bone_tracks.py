@@ -27,7 +27,9 @@ class Candidate:
 
 
 class BoneTracks:
-    """The accepted track of each bone, and the candidates of the stage's bone, best first.
+    """The accepted track of each bone, and the candidates of the stage's bone.
+
+    The first of them is under review; the others follow from best to worst.
 
     Args:
         trackers: of the bones.
@@ -50,6 +52,11 @@ class BoneTracks:
     def candidate(self) -> Candidate | None:
         """The pose under review."""
         return self._candidates[0] if self._candidates else None
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that are left, by their numbers."""
+        return tuple(sorted(self._candidates, key=lambda one: one.number))
 
     @property
     def candidate_id(self) -> int | None:
@@ -146,6 +153,19 @@ class BoneTracks:
         self.track_number += 1
         self._n_reviewed += 1
         return self._candidates.pop(0)
+
+    def choose(self, step: int) -> Candidate:
+        """The next candidate by its number comes under review, or with -1 the one before.
+
+        The others keep their order and the poses that they were last seen at.
+        """
+        by_number = self.candidates
+        place = by_number.index(self._candidates[0]) + step
+        chosen = by_number[place % len(by_number)]
+        self._candidates = [chosen, *(one for one in by_number if one is not chosen)]
+        self.track_number += 1
+        self._n_reviewed += 1
+        return chosen
 
     def review(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:
         """Follow the candidate into a frame, or judge a proposed pose where it stands."""

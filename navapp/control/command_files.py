@@ -9,6 +9,7 @@ from navapp.control.commands import (
     Cancel,
     CheckMirror,
     CheckPicks,
+    ChooseCandidate,
     Command,
     ConfirmCondition,
     ConfirmCross,
@@ -93,6 +94,8 @@ def command_to_json(command: Command) -> dict[str, Any]:
         return {"command": "check_picks", "start": prior_to_json(Prior(picks=command.picks))}
     if isinstance(command, DistrustRig):
         return {"command": "distrust_rig", "why": command.why}
+    if isinstance(command, ChooseCandidate):
+        return {"command": "choose", "step": command.step}
     if isinstance(command, Accept | Reject):
         return {"command": _NAMES[type(command)], "candidate_id": command.candidate_id}
     return {"command": _NAMES[type(command)]}
@@ -126,6 +129,8 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return TouchPoint(str(value["landmark"]))
         if name == "check_picks":
             return CheckPicks(prior_from_json(value["start"]).picks)
+        if name == "choose":
+            return ChooseCandidate(int(value["step"]))
         if name == "distrust_rig":
             return DistrustRig(str(value["why"]))
         if name in _DECISIONS:

@@ -7,6 +7,7 @@ from navapp.control.commands import (
     Cancel,
     CheckMirror,
     CheckPicks,
+    ChooseCandidate,
     Command,
     ConfirmCondition,
     ConfirmCross,
@@ -52,6 +53,7 @@ _NAMES: dict[type[Command], str] = {
     Cancel: "cancel",
     Accept: "accept",
     Reject: "reject",
+    ChooseCandidate: "candidate",
     Show: "show",
     ToggleEye: "eye",
     ToggleLayer: "layer",
@@ -108,6 +110,8 @@ class CommandHandler:
                 session.accept()
             case Reject():
                 session.reject()
+            case ChooseCandidate():
+                session.choose_candidate(command.step)
             case Blank():
                 self._on_blank()
             case Show():

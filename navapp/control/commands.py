@@ -50,6 +50,13 @@ class Reject:
 
 
 @dataclass(frozen=True, slots=True)
+class ChooseCandidate:
+    """Put another of the candidates under review."""
+
+    step: int  # 1: the next by its number, -1: the one before
+
+
+@dataclass(frozen=True, slots=True)
 class Blank:
     """Make the display black until `Show`."""
 
@@ -189,6 +196,7 @@ Command = (
     | Propose
     | Accept
     | Reject
+    | ChooseCandidate
     | Blank
     | Show
     | ToggleDepth

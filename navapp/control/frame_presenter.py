@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 
 from drivers.frames import StereoFrame
+from navapp.control.candidate_pictures import CandidatePictures
 from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
 from navapp.control.mirror_checking import MirrorChecking
@@ -45,6 +46,7 @@ class FramePresenter:
         self._session, self._display, self._composer = session, display, composer
         self._mirror_checking, self._eye, self._depth_marks = mirror_checking, eye, depth_marks
         self._valid_ms = valid_ms
+        self._candidate_pictures = CandidatePictures(composer)
         self._is_late = False
 
     def show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
@@ -108,7 +110,8 @@ class FramePresenter:
         drawn = self._depth_marks.draw(video, foreground) if session.shows_depth else video
         plain = frame.left if has_guides else None
         residuals = self._draw_residuals(snapshot, foreground) if snapshot.is_candidate else None
-        session.keep_picture(OperatorPicture(drawn, plain, left=frame.left, residuals=residuals))
+        others = self._candidate_pictures.update(frame.left, snapshot, session.candidates)
+        session.keep_picture(OperatorPicture(drawn, plain, False, frame.left, residuals, others))
 
     def _draw_residuals(self, snapshot: Snapshot, foreground: Foreground | None) -> Image | None:
         """What a candidate is judged by beside its outline."""

@@ -1,6 +1,7 @@
 """The pictures for the screen and for the display, from what the session knows."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from navapp.control.mirror_error import MirrorError
 from navapp.control.states import SessionState, Snapshot
+from navapp.geometry.box import Box
 from navapp.geometry.display_model_view import EyeView
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import rectifier_of
@@ -20,6 +22,8 @@ from navapp.values import Foreground, OverlayMode, Plan, Reason, Status
 
 Image = NDArray[np.uint8]
 
+_AROUND_PX = 30  # that a candidate's picture shows around the bone
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OperatorPicture:
@@ -31,6 +35,8 @@ class OperatorPicture:
     left: Image | None = None  # the left picture that came with it, as it is
     # of a candidate: how far the measured surface lies from the model.
     residuals: Image | None = None
+    # of several candidates that wait for a decision: each by its number.
+    candidates: Mapping[int, Image] = field(default_factory=dict)
 
 
 class Composer:
@@ -82,6 +88,36 @@ class Composer:
         if point_mm is not None and is_ok:
             cross_px = self._left_view.camera.project(point_mm[None])[0]
         return compose_video(left, scene, banner(snapshot), mark, cross_px)
+
+    def draw_candidate(
+        self, left: Image, left_from_bone: RigidTransform, status: Status, snapshot: Snapshot
+    ) -> Image | None:
+        """The left picture around the stage's bone at a pose; None where that is out of sight.
+
+        Args:
+            left: picture of a frame.
+            left_from_bone: the pose.
+            status: the judge's word on it: of a lost one no outline is drawn.
+            snapshot: of that frame.
+        """
+        bone = snapshot.stage.bone
+        camera = self._left_view.camera
+        surface = snapshot.bone_surface or _seen_surface(self._plan, bone)
+        box = Box.around(camera.project(left_from_bone.apply(surface.vertices_mm)))
+        part = None if box is None else box.grow(_AROUND_PX).clip(camera.width, camera.height)
+        if part is None or part.is_empty:
+            return None
+        scene = Scene(
+            self._plan,
+            snapshot.stage,
+            left_from_bone,
+            self._left_view,
+            is_candidate=True,
+            layers=("bone",),
+            surface=snapshot.bone_surface,
+        )
+        is_lost = status is Status.LOST
+        return compose_video(left, None if is_lost else scene, "")[part.slices]
 
     def draw_residuals(
         self,

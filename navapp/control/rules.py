@@ -8,6 +8,7 @@ from navapp.control.commands import (
     Accept,
     Cancel,
     CheckMirror,
+    ChooseCandidate,
     Command,
     ConfirmCross,
     DistrustRig,
@@ -36,6 +37,8 @@ def why_refused(command: Command, snapshot: Snapshot) -> str:
             return "no registration is running"
         case Accept() | Reject():
             return _why_undecided(command, snapshot)
+        case ChooseCandidate() if len(snapshot.candidates) < 2:
+            return "there is no other candidate"
         case Show() if not snapshot.is_blanked:
             return "the display is not blanked"
         case ToggleEye() if not snapshot.has_eye:

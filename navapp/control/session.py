@@ -98,6 +98,11 @@ class Session:
         return self._tracks.candidate
 
     @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that wait for a decision, by their numbers."""
+        return self._tracks.candidates
+
+    @property
     def candidate_id(self) -> int | None:
         """Of the pose under review; None when there is none."""
         return self._tracks.candidate_id
@@ -386,6 +391,12 @@ class Session:
             self.fall_back(text)
         else:
             self.add_event("reject", text)
+
+    def choose_candidate(self, step: int) -> None:
+        """Put the next candidate by its number under review, or with -1 the one before."""
+        chosen = self._tracks.choose(step)
+        self._tracked = None
+        self.add_event("candidate", f"candidate {chosen.number} of {chosen.count} under review")
 
     def lose_camera(self, why: str, *, can_return: bool) -> None:
         """The camera is gone: a fault, and the end of the session unless it can return."""

@@ -20,6 +20,7 @@ from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
 from navapp.control.stages import STAGES
 from navapp.control.states import (
+    CandidateLine,
     DeviceLine,
     Progress,
     SessionState,
@@ -70,6 +71,7 @@ class SnapshotMaker:
             verdict=None if tracked is None else tracked.verdict,
             left_from_bone=None if tracked is None else tracked.left_from_bone,
             candidate_id=session.candidate_id,
+            candidates=self._list_candidates(),
             pose_age_ms=session.pose_age_ms(now_ns),
             others=session.other_bones(now_ns),
             limb=session.limb(now_ns),
@@ -118,6 +120,19 @@ class SnapshotMaker:
             is_over=session.is_over,
         )
         return judge(draft)
+
+    def _list_candidates(self) -> tuple[CandidateLine, ...]:
+        session = self.session
+        pictures = {} if session.picture is None else session.picture.candidates
+        return tuple(
+            CandidateLine(
+                one.number,
+                one.tracked.verdict,
+                one is session.candidate,
+                pictures.get(one.number),
+            )
+            for one in session.candidates
+        )
 
     def _device_reasons(self, reports: tuple[DeviceReport, ...]) -> tuple[Reason, ...]:
         """Of projector, mirror and a display that is seen in it."""

@@ -135,6 +135,17 @@ class OtherBone:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CandidateLine:
+    """One of several candidates that wait for the operator's decision."""
+
+    number: int  # 1 is the one that the search takes for the best
+    verdict: Verdict  # on the pose that it was last seen at
+    is_shown: bool  # it is under review: accept and reject are about this one
+    # uint8 (h, w, 3) BGR: around the bone, with its outline at that pose; None before there is one.
+    picture: NDArray[np.uint8] | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class LimbLine:
     """What femur and tibia said together last."""
 
@@ -219,6 +230,7 @@ class Snapshot:
     # of the candidate that waits for the operator's decision: another one for every candidate of a
     # session; None when none waits. It is on the screen when there is a verdict.
     candidate_id: int | None = None
+    candidates: tuple[CandidateLine, ...] = ()  # all that wait for a decision, by their numbers
     pose_age_ms: float | None = None  # of that pose, now
     valid_ms: float = 500.0  # a pose that is older is not where the bone is
     # in the mirror: where the bone will be when light from the display is seen; None when it moves

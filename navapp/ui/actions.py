@@ -11,6 +11,7 @@ from navapp.control.commands import (
     Blank,
     Cancel,
     CheckMirror,
+    ChooseCandidate,
     Command,
     ConfirmCross,
     EnterStage,
@@ -87,8 +88,15 @@ def _nudge_action(shift: str, arrow: str, step_px: int) -> Action:
         f"{shift}{arrow}",
         "move",
         f"check of the mirror: move the cross by {step_px} px",
-        lambda _: NudgeCross(right * step_px, down * step_px),
+        lambda snapshot: _choose_or_nudge(snapshot, right * step_px, down * step_px),
     )
+
+
+def _choose_or_nudge(snapshot: Snapshot, right_px: int, down_px: int) -> Command:
+    """The arrows to left and right go through the candidates that wait for a decision."""
+    if len(snapshot.candidates) > 1 and right_px != 0:
+        return ChooseCandidate(1 if right_px > 0 else -1)
+    return NudgeCross(right_px, down_px)
 
 
 def _stage_action(number: int) -> Action:

@@ -8,7 +8,7 @@ from navapp.ui.devices_panel import DevicesPanel
 from navapp.ui.event_list import EventList
 from navapp.ui.footer import KeyFooter
 from navapp.ui.line_panel import LinePanel
-from navapp.ui.pictures.picture_view import NOTICE, PictureView, ResidualView
+from navapp.ui.pictures.picture_view import NOTICE, CandidateView, PictureView, ResidualView
 from navapp.ui.pose_panel import PosePanel, format_navigable_line, format_reason_lines
 from navapp.ui.screens import ViewScreen
 from navapp.ui.stepper import StageStepper
@@ -16,6 +16,9 @@ from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 from navapp.ui.work_line import WorkLine
+
+# That can be compared side by side; a search gives no more.
+MOST_CANDIDATES = 3
 
 
 class SmallNotice(TextView):
@@ -44,6 +47,11 @@ def _stage_and_state(view: View) -> str:
 class MainScreen(ViewScreen[None]):
     """What the operator sees most of the time."""
 
+    def show(self, view: View, *, is_text_due: bool) -> None:
+        """Several candidates need room to be compared."""
+        self.set_class(len(view.snapshot.candidates) > 1, "-compared")
+        super().show(view, is_text_due=is_text_due)
+
     def compose(self) -> ComposeResult:
         """From top to bottom."""
         yield SmallNotice()
@@ -56,6 +64,8 @@ class MainScreen(ViewScreen[None]):
                     yield PosePanel()
                     yield LinePanel()
                     yield DevicesPanel()
+            with Horizontal(id="candidates"):
+                yield from (CandidateView(index) for index in range(MOST_CANDIDATES))
             yield StageStepper()
             yield WorkLine()
             yield EventList()

@@ -38,7 +38,7 @@ class PosePanel(TextView):
 
     def show(self, view: View) -> None:
         """Say in the frame whose figures these are."""
-        title = "candidate" if view.snapshot.is_candidate else "pose"
+        title = _title(view.snapshot)
         if self.border_title != title:
             self.border_title = title
         super().show(view)
@@ -131,6 +131,16 @@ def _age(age_ms: float | None) -> str:
     return f"{age_ms:.0f} ms" if age_ms < 999.5 else f"{min(age_ms / 1e3, 9999.0):.0f} s"
 
 
+def _title(snapshot: Snapshot) -> str:
+    """Whose figures these are."""
+    shown = [one.number for one in snapshot.candidates if one.is_shown]
+    if not snapshot.is_candidate:
+        return "pose"
+    if len(snapshot.candidates) < 2 or not shown:
+        return "candidate"
+    return f"candidate {shown[0]}, {len(snapshot.candidates)} wait"
+
+
 def _candidate(view: View, width: int) -> list[Content]:
     """The judge's word on the candidate and the figures to decide by."""
     snapshot, verdict = view.snapshot, view.snapshot.verdict
@@ -139,12 +149,14 @@ def _candidate(view: View, width: int) -> list[Content]:
     lines = [Content.styled(f"{level.mark(view.symbols)} judged {status.value}", level.value)]
     figures = [_figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"), *_fit(snapshot)]
     accept = ("a", "bold $foreground"), " accept   "
+    others = [Content("arrows: compare")] if len(snapshot.candidates) > 1 else []
     asks = [
+        *others,
         Content.assemble(
             *(accept if not why_refused(Accept(snapshot.candidate_id), snapshot) else ()),
             ("r", "bold"),
             " reject",
-        )
+        ),
     ]
     if verdict is not None and verdict.reasons:
         why = textwrap.wrap(verdict.reasons[0].value, width)[:2]

@@ -5,6 +5,7 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from navapp.control.states import DeviceHealth, EventLevel, SessionState, Snapshot
@@ -15,6 +16,8 @@ from navapp.ui.quiet_app import drive, say
 from navapp.ui.session import Session
 from navapp.ui.symbols import choose_symbols
 from navapp.ui.terminal import check_terminal, own_terminal
+from navapp.ui.tutorial.apps import TutorialApp
+from navapp.ui.tutorial.guide import Guide
 from navapp.values import Reason
 
 
@@ -25,6 +28,7 @@ def run_screen(
     *,
     pictures: Wish = "blocks",
     hints: Sequence[str] = (),
+    guide: Guide[Snapshot] | None = None,
 ) -> int:
     """Run the screen until it ends, then stop the session, whatever happened.
 
@@ -34,6 +38,7 @@ def run_screen(
         title: first word of the title line.
         pictures: how the terminal gets them.
         hints: told when it starts.
+        guide: of the tutorial, shown above the picture.
 
     Returns:
         Exit code; 128 and the number of the signal that ended it. After a failure one sentence is
@@ -48,7 +53,8 @@ def run_screen(
             if symbols.is_ascii and not graphics.has_pixels:
                 graphics = Graphics(words=graphics.words)
             told = (*hints, *(() if graphics.has_pixels else (f"pictures are {graphics.words}",)))
-            app = NavigationApp(session, title, symbols=symbols, graphics=graphics, hints=told)
+            make_app = NavigationApp if guide is None else partial(TutorialApp, guide)
+            app = make_app(session, title, symbols=symbols, graphics=graphics, hints=told)
             code = asyncio.run(drive(app))
             failure = app.failure
             if failure is not None:

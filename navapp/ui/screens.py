@@ -8,7 +8,7 @@ from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen, Screen
 
 from navapp.ui.page_keys import PageKeys
-from navapp.ui.pictures.picture_view import PictureView, ResidualView
+from navapp.ui.pictures.picture_view import CandidateView, PictureView, ResidualView
 from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
@@ -45,7 +45,8 @@ class ViewScreen(Screen[ResultT], Generic[ResultT]):
     def show(self, view: View, *, is_text_due: bool) -> None:
         """Pass a view on; text only when it is due, the picture always."""
         self.view = view
-        for picture in (*self.query(PictureView), *self.query(ResidualView)):
+        pictures = (*self.query(PictureView), *self.query(ResidualView), *self.query(CandidateView))
+        for picture in pictures:
             picture.show(view)
         if is_text_due:
             for widget in self.query(TextView):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from navapp.control.commands import Command
 from navapp.control.stages import STAGES
 from navapp.control.states import (
+    CandidateLine,
     ConditionLine,
     DeviceHealth,
     DeviceLine,
@@ -188,6 +189,21 @@ def registering(**changes: Any) -> Snapshot:
 def blanked(**changes: Any) -> Snapshot:
     """Dark by the operator's will."""
     return navigating(**{"is_blanked": True, "reasons": (Reason.BLANKED,), **changes})
+
+
+def compared(**changes: Any) -> Snapshot:
+    """Three candidates wait, the second one is under review."""
+    bounds_mm = (0.34, 0.41, 1.2)
+    candidates = tuple(
+        CandidateLine(
+            number,
+            dataclasses.replace(GOOD, predicted_tre_mm=bound_mm, coverage=0.8 - 0.1 * number),
+            number == 2,
+            picture(phase=float(number))[10:80, 30:130],
+        )
+        for number, bound_mm in enumerate(bounds_mm, start=1)
+    )
+    return review(**{"candidates": candidates, "residual_picture": picture(2.0), **changes})
 
 
 class ScriptedSession:

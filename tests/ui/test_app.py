@@ -12,6 +12,7 @@ from navapp.control.commands import (
     Blank,
     Cancel,
     CheckMirror,
+    ChooseCandidate,
     Command,
     ConfirmCross,
     EnterStage,
@@ -386,3 +387,13 @@ def test_a_small_terminal_still_says_why() -> None:
         assert "research, not for clinical use" in text
 
     play(snapshots.suspended(stage=STAGES[2]), script, size=(60, 20))
+
+
+def test_arrows_go_through_candidates_where_several_wait() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("right", "left")
+
+    app = play(snapshots.compared(), script)
+    assert app.session.commands == [ChooseCandidate(1), ChooseCandidate(-1)]
+    app = play(snapshots.navigating(cross_check=CHECKING), script)
+    assert app.session.commands == [NudgeCross(1, 0), NudgeCross(-1, 0)]

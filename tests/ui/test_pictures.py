@@ -20,6 +20,7 @@ STATES: dict[str, tuple[Callable[[], Snapshot], str, str]] = {
     "navigating": (snapshots.navigating, "NAVIGABLE  yes", "left view"),
     "suspended": (snapshots.suspended, "NAVIGABLE  NO", "left view · NO GUIDES"),
     "review": (snapshots.review, "judged OK", "left view · CANDIDATE, not accepted"),
+    "compared": (snapshots.compared, "arrows: compare", "left view · CANDIDATE, not accepted"),
     "starting": (snapshots.starting, "NAVIGABLE  NO", "left view · NO GUIDES"),
     "blanked": (snapshots.blanked, "NAVIGABLE  NO", "left view · BLANKED, the display is dark"),
 }

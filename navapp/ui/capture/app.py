@@ -1,5 +1,6 @@
 """The application of a guided capture."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from textual.app import ComposeResult
@@ -82,6 +83,10 @@ class CaptureApp(GuidedApp[CaptureSnapshot, CaptureCommand]):
         return command_of(found, snapshot)
 
 
-def run_capture_app(session: CaptureSession, log_path: Path) -> int:
+def run_capture_app(
+    session: CaptureSession,
+    log_path: Path,
+    make_app: Callable[..., CaptureApp] = CaptureApp,
+) -> int:
     """Run the screen until it ends; see `run_guided_app`."""
-    return run_guided_app(lambda symbols: CaptureApp(session, symbols=symbols), log_path)
+    return run_guided_app(lambda symbols: make_app(session, symbols=symbols), log_path)

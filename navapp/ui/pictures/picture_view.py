@@ -1,8 +1,10 @@
 """The picture with the overlay, in a frame that says what it is."""
 
+from navapp.control.states import CandidateLine
 from navapp.geometry.box import Box
 from navapp.ui.pictures.fitting import choose_part
 from navapp.ui.pictures.picture import Picture
+from navapp.ui.symbols import Symbols
 from navapp.ui.view import Level, View
 from navapp.values import DEPTH_COLOURS, Origin
 
@@ -73,6 +75,43 @@ class PictureView(Picture):
             return None
         self._bone_part = choose_part(bone, size_px, width / height, self._bone_part)
         return self._bone_part
+
+
+class CandidateView(Picture):
+    """One of several candidates: its outline, and the judge's word on it.
+
+    Args:
+        index: from 0, among all that wait for a decision.
+    """
+
+    def __init__(self, index: int) -> None:
+        super().__init__(f"candidate-{index}")
+        self._index = index
+
+    def show(self, view: View) -> None:
+        """That candidate, when several wait."""
+        candidates = view.snapshot.candidates
+        is_known = len(candidates) > 1 and self._index < len(candidates)
+        self.set_class(is_known, "-known")
+        if not is_known:
+            self.show_picture(None, view.symbols.ramp)
+            return
+        one = candidates[self._index]
+        self.set_class(one.is_shown, "-shown")
+        title = describe_candidate(one, view.symbols)
+        if self.border_title != title:
+            self.border_title = title
+        self.show_picture(one.picture, view.symbols.ramp)
+
+
+def describe_candidate(one: CandidateLine, symbols: Symbols) -> str:
+    """Number, the judge's word, coverage, bound; a mark on the one under review."""
+    verdict = one.verdict
+    bound_mm = verdict.predicted_tre_mm
+    bound = "" if bound_mm is None else f" {symbols.at_most} {bound_mm:.2f} mm"
+    mark = f"{symbols.ok} " if one.is_shown else ""
+    word = f"{mark}{one.number} {verdict.status.value}, {100.0 * verdict.coverage:.0f} % seen"
+    return word + bound
 
 
 class ResidualView(Picture):
