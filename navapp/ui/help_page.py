@@ -22,7 +22,7 @@ _WORD_WIDTH = max(len(word) for word, _ in WORDS)
 # The first of several actions -> their keys and what they do, in one line.
 _SHARED = {
     "stage-1": ("1 - 5", "go to that stage"),
-    "nudge-left": ("arrows", "compare candidates; in the mirror check move the cross"),
+    "nudge-left": ("arrows", "compare candidates; in the mirror: move the cross"),
 }
 
 
