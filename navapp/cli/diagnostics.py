@@ -31,6 +31,11 @@ class Diagnostics:
         if not self.is_quiet:
             sys.stderr.write(f"navapp: warning: {text}\n")
 
+    def note(self, text: str) -> None:
+        """What is going on, on stderr."""
+        if not self.is_quiet:
+            sys.stderr.write(f"navapp: {text}\n")
+
     def detail(self, text: str) -> None:
         """What only who asked for more wants to know, on stderr."""
         if self.is_verbose and not self.is_quiet:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from navapp.cli.compiling import run_compiled
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.register_inputs import (
     RegisterInputs,
@@ -108,17 +109,19 @@ def _register(
     """The answer, and how many ms it took."""
     from navapp.registration import register
 
-    diagnostics.detail("registering (compiles first, once on a machine)")
-    started = time.perf_counter()
-    answer = register(
-        work.scene,
-        work.model,
-        work.start,
-        options.method,
-        is_global=options.is_global,
-        on_progress=lambda share: diagnostics.progress("starts", share),
-    )
-    return answer, compute_since_ms(started)
+    def measure() -> tuple["Registration", float]:
+        started = time.perf_counter()
+        answer = register(
+            work.scene,
+            work.model,
+            work.start,
+            options.method,
+            is_global=options.is_global,
+            on_progress=lambda share: diagnostics.progress("starts", share),
+        )
+        return answer, compute_since_ms(started)
+
+    return run_compiled(measure, diagnostics)
 
 
 def _content(

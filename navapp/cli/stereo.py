@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from navapp.cli.compiling import run_compiled
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.stereo_pair import StereoPair, find_band, read_pair, render_expected_px
 from navapp.errors import ResultError, UsageError
@@ -60,11 +61,12 @@ def add_parser(subparsers: Any) -> None:
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Match the pair, write what was asked for; the exit code."""
     _check(options)
-    pair = read_pair(options)
-    shape = pair.rectified.left.shape
-    if options.json != "-":
-        diagnostics.say(f"matching {shape[1]}x{shape[0]} (compiles first, once on a machine)")
-    answer = _match(pair, options)
+
+    def match() -> tuple[StereoPair, "StereoAnswer"]:
+        pair = read_pair(options)
+        return pair, _match(pair, options)
+
+    pair, answer = run_compiled(match, diagnostics)
     answer = replace(answer, timings=replace(answer.timings, rectify_ms=pair.rectify_ms))
     _write(pair, answer, options)
     content = _content(pair, answer)
