@@ -48,20 +48,26 @@ def add_parser(subparsers: Any) -> None:
         default="bimcc",
         help="bimcc-literal is the paper's own, icp its baseline",
     )
-    parser.add_argument("--initial", metavar="T.json", help="rough scene_from_model (or .txt)")
+    parser.add_argument(
+        "--initial",
+        metavar="T.json",
+        help="rough scene_from_model, lengths in the files' unit (or .txt)",
+    )
     parser.add_argument("--global", dest="is_global", action="store_true", help="try many starts")
     parser.add_argument(
         "--camera",
         type=float,
         nargs=3,
         metavar=("X", "Y", "Z"),
-        help="where the scene was seen from, there; what faces away does not pair",
+        help="where the scene was seen from, in its coordinates and unit; what faces away does not "
+        "pair",
     )
     parser.add_argument(
         "--units",
         choices=("mm", "m", "none"),
         default="mm",
-        help="of both files (default mm); none: limits follow the spacing of the model's points",
+        help="of both files, of --initial, --camera and the result (default mm); none: the files' "
+        "own unit, limits follow the spacing of the model's points",
     )
     parser.add_argument("--aligned", metavar="OUT.ply", help="the model in the scene's coordinates")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
@@ -178,7 +184,8 @@ def _covariance(work: RegisterInputs, answer: "Registration") -> FloatArray:
 
 def _tell(content: dict[str, Any], units: str, diagnostics: Diagnostics) -> None:
     """The result for people."""
-    unit = "" if units == "none" else f" {units}"
+    has_unit = units != "none"
+    unit = f" {units}" if has_unit else ""
     parts = []
     if np.isfinite(content["rms"]):
         parts.append(f"rms {content['rms']:.3g}{unit}")
@@ -190,6 +197,8 @@ def _tell(content: dict[str, Any], units: str, diagnostics: Diagnostics) -> None
     starts = content["starts"]
     parts.append(f"{starts} start{'s' if starts > 1 else ''}")
     parts.append(f"{content['timing_ms']['register']:.0f} ms")
+    if not has_unit:
+        parts.append("lengths in the files' own unit")
     diagnostics.say(f"{content['status']}: {', '.join(parts)}")
     if content["scene_from_model"] is not None:
         diagnostics.say("scene_from_model")

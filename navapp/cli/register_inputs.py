@@ -98,7 +98,7 @@ def _warnings(scene: "SceneFile", model: "ModelFile", options: argparse.Namespac
         about = 10 ** round(float(np.log10(ratio)))
         warnings.append(
             f"the {larger} is about {about} times as large as the {smaller} (ratio {ratio:.0f}): "
-            "is one of them in m?"
+            + ("is one of them in m?" if options.units != "none" else "is their unit the same?")
         )
     if options.units != "none":
         across = float(np.ptp(model.mesh.vertices_mm, axis=0).max())

@@ -1,6 +1,7 @@
 """`navapp register`: poses, units, files of every kind, and what is refused."""
 
 import json
+import re
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -637,3 +638,27 @@ def test_two_surfaces_without_a_unit(data: Path, tmp_path: Path) -> None:
     for share in (0.3, 0.5, 0.6, 0.7):
         n = int(share * len(model))
         assert np.sqrt((ours[:n] ** 2).mean()) <= 1.01 * np.sqrt((theirs[:n] ** 2).mean())
+
+
+def test_people_are_told_no_unit_where_the_files_have_none(
+    bone: Bone, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bone.write(1e-4, "none")
+    start = bone.start(5.0, 4.0, 1e-4)
+    options = [str(bone.scene), str(bone.model), "--initial", start, "--units", "none"]
+    assert run(["register", *options]) == 0
+    told = capsys.readouterr()
+    assert "lengths in the files' own unit" in told.out
+    assert not re.search(r"\d (mm|m)\b", told.out + told.err)
+
+
+def test_files_without_a_unit_that_differ_in_size_are_told_so(
+    bone: Bone, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bone.write(1.0, "none")
+    write_ply(bone.scene, TriangleMesh(1e-3 * bone.points, NO_FACES), unit="none")
+    assert run(["register", str(bone.scene), str(bone.model), "--units", "none"]) == 4
+    told = capsys.readouterr().err
+    assert "1000 times as large" in told
+    assert "is their unit the same?" in told
+    assert "in m?" not in told
